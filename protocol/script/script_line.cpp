@@ -9,112 +9,25 @@
 
 #include "protocol/json_depth.hpp"
 #include "protocol/nearest_word.hpp"
+#include "protocol/script/script_values.hpp"
 
 namespace enfilade::protocol {
-
-void refuse(std::string_view field, const std::string& text) {
-  throw LineError{field.empty() ? text : std::string(field) + ": " + text};
-}
 
 namespace {
 
 using nlohmann::json;
 
-constexpr std::size_t kMaxNameLength = 64;
 constexpr double kMaxWait = 1e6;          // seconds; longer waits are typing errors
 constexpr double kMaxAvatarWait = 86400;  // seconds
 constexpr std::size_t kMaxBodyNameLength = 1000;
 constexpr double kRadiansPerDegree = 0.017453292519943295;  // as in the sidecar reader
-constexpr std::size_t kMaxQuoteLength = 40;
 // Limits of all worlds (scene/world/data/validation.cpp). A world's own limits may be lower.
-constexpr double kMaxCoordinate = 1e7;  // metres
-constexpr double kMaxSpeed = 1000;      // metres per second
+constexpr double kMaxSpeed = 1000;  // metres per second
 constexpr double kMaxDegrees = 1e6;
 constexpr double kMaxJointValue = 1000;  // radians or metres
 // Degrees per second. The world also limits the speed of the body's farthest point.
 constexpr double kMaxRotationSpeed = 1e6;
 constexpr double kMaxJointSpeed = 20;  // radians or metres per second
-
-/// Formats a JSON value for a message, shortened.
-std::string excerpt(const json& value) {
-  if (isDeeperThan(value, kMaxJsonDepth)) return "a too deeply nested value";
-  std::string text = value.dump();
-  if (text.size() > kMaxQuoteLength) {
-    std::size_t cut = kMaxQuoteLength;
-    while (cut > 0 && (static_cast<unsigned char>(text[cut]) & 0xC0u) == 0x80u) --cut;
-    text = text.substr(0, cut) + "...";
-  }
-  return text;
-}
-
-// ---- values ------------------------------------------------------------------------------------
-
-double parseNumber(const json& value, std::string_view field, const char* what) {
-  if (!value.is_number()) {
-    refuse(field, "must be " + std::string(what) + ", not " + excerpt(value));
-  }
-  return value.get<double>();
-}
-
-/// Parses a number from `low` to `high`; with `above`, `low` itself is refused.
-double parseNumberInRange(const json& value, std::string_view field, const char* what, double low,
-                          double high, bool above = false) {
-  const double read = parseNumber(value, field, what);
-  if (read <= high && (above ? read > low : read >= low)) return read;
-  refuse(field, excerpt(value) + " is out of range; use " + (above ? "more than " : "") +
-                    json(low).dump() + " to " + json(high).dump());
-}
-
-bool parseFlag(const json& value, std::string_view field) {
-  if (!value.is_boolean()) refuse(field, "must be true or false, not " + excerpt(value));
-  return value.get<bool>();
-}
-
-void readPoint(const json& value, const std::string& field, v1::Vec3* point) {
-  static constexpr std::array<const char*, 3> axes{"x", "y", "z"};
-  if (!value.is_array() || value.size() != axes.size()) {
-    refuse(field, "must be three numbers [x, y, z] in metres, not " + excerpt(value));
-  }
-  std::array<double, 3> xyz{};
-  for (std::size_t i = 0; i < axes.size(); ++i) {
-    xyz[i] = parseNumberInRange(value[i], field + "." + axes[i], "a number of metres",
-                                -kMaxCoordinate, kMaxCoordinate);
-  }
-  point->set_x(xyz[0]);
-  point->set_y(xyz[1]);
-  point->set_z(xyz[2]);
-}
-
-bool isNameLetter(char c) {
-  return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
-         c == '_' || c == '-';
-}
-
-std::string parseName(const json& value, std::string_view field, const char* what) {
-  if (!value.is_string()) {
-    refuse(field, "must be " + std::string(what) + " in quotes, not " + excerpt(value));
-  }
-  std::string text = value.get<std::string>();
-  if (text.empty()) refuse(field, "is empty; give " + std::string(what));
-  if (text.size() > kMaxNameLength) {
-    refuse(field, "has " + std::to_string(text.size()) + " characters; at most " +
-                      std::to_string(kMaxNameLength) + " are allowed");
-  }
-  if (!std::all_of(text.begin(), text.end(), isNameLetter) || text.front() == '.') {
-    refuse(field, excerpt(value) +
-                      " has a character that is not allowed; use A-Z, a-z, 0-9, '_', '-' and "
-                      "'.' (not first)");
-  }
-  return text;
-}
-
-const json& requireKey(const json& line, const char* key, const char* example) {
-  const auto found = line.find(key);
-  if (found == line.end()) refuse(key, std::string("is missing; add ") + example);
-  return *found;
-}
-
-// ---- the verbs ---------------------------------------------------------------------------------
 
 /// `"points":[[x,y,z],...]` or `"box":[[x,y,z],[x,y,z]]`.
 void readPart(const json& part, const std::string& field, v1::ConvexPart* into) {
@@ -243,6 +156,20 @@ void readWalk(const json& line, v1::Walk* walk) {
   }
 }
 
+void readGo(const json& line, v1::Go* go) {
+  const json& to = requireKey(line, "to", R"("to":[x,y,z] or "to":"room:NAME")");
+  if (to.is_string()) {
+    if (to.get<std::string>().empty()) refuse("to", "must name a room, a storey or an object");
+    go->mutable_to()->set_name(to.get<std::string>());
+  } else {
+    readPoint(to, "to", go->mutable_to()->mutable_point());
+  }
+  if (line.contains("speed")) {
+    go->set_speed(parseNumberInRange(line["speed"], "speed", "a number of metres per second", 0,
+                                     kMaxSpeed, true));
+  }
+}
+
 void readLook(const json& line, v1::Look* look) {
   readPoint(requireKey(line, "at", R"("at":[x,y,z], a point to look at)"), "at",
             look->mutable_at());
@@ -301,6 +228,7 @@ const std::vector<Verb>& verbs() {
   static const std::vector<Verb> all{
       {"spawn", {"at", "facing", "radius", "height", "flying", "parts", "links", "self_contact"}},
       {"walk", {"to", "along", "speed"}},
+      {"go", {"to", "speed"}},
       {"look", {"at"}},
       {"wait", {"for"}},
       {"capture", {"as"}},
@@ -365,6 +293,7 @@ void readOrder(const json& line, const std::string& verb, v1::Command& command) 
                                "the avatar's name"));
   if (verb == "spawn") readSpawn(line, command.mutable_spawn());
   if (verb == "walk") readWalk(line, command.mutable_walk());
+  if (verb == "go") readGo(line, command.mutable_go());
   if (verb == "look") readLook(line, command.mutable_look());
   if (waits) command.mutable_wait()->set_seconds(readWaitSeconds(line));
   if (verb == "capture") readCapture(line, command.mutable_capture());

@@ -10,33 +10,13 @@
 #include <string>
 #include <vector>
 
+#include "scene/navigation/clear_width.hpp"
 #include "scene/navigation/navigation_mesh.hpp"
+#include "scene/navigation/path_finder.hpp"
 #include "scene/navigation/walker.hpp"
 #include "scene/world/world.hpp"
 
 namespace enfilade::scene {
-
-/// What ends the only ways to a goal.
-struct Obstruction {
-  EntityId entity = 0;           ///< that the walker hit; 0: unknown
-  Vec3 position = Vec3::Zero();  ///< of the walker's feet there, scene frame, metres
-  double clearWidth = 0;         ///< metres between the obstacles there; 0: not measured
-};
-
-struct NavigationPath {
-  std::vector<Vec3> points;  ///< feet, scene frame, metres: way points of a Walk; empty: none found
-  double length = 0;         ///< metres, in space, along `points`
-  std::string reason;        ///< without a path: why
-  std::optional<Obstruction> obstruction;
-
-  bool found() const { return !points.empty(); }
-};
-
-/// The place of a path with the least space to its sides.
-struct NarrowPlace {
-  Vec3 position = Vec3::Zero();  ///< feet, scene frame, metres
-  double clearWidth = 0;         ///< metres, measured across the path above the step height
-};
 
 struct NavigationReport {
   std::size_t polygons = 0;  ///< of the mesh for ample clearance
@@ -46,7 +26,15 @@ struct NavigationReport {
   double seconds = 0;  ///< for the meshes
 };
 
-/// Places that the agent can stand at, by islands.
+/// The walkable cells of a map seen from above.
+struct NavigationMap {
+  Vec3 corner = Vec3::Zero();           ///< of cell 0, scene frame, metres: smallest x and z
+  double cell = 0;                      ///< metres
+  std::uint32_t width = 0, height = 0;  ///< cells along x and z
+  std::vector<std::uint8_t> cells;      ///< row by row along x; 1: walkable
+};
+
+/// Which places to draw.
 struct RandomPlace {
   std::optional<Vec3> near = {};  ///< within `maxDistance` metres in space
   double maxDistance = 0;
@@ -55,7 +43,8 @@ struct RandomPlace {
   std::optional<std::uint32_t> island = {};  ///< number as by islandOf()
 };
 
-/// Thread-safe; queries run one after another. The state of bodies is that of the construction.
+/// Thread-safe; queries run one after another. The state of bodies is that of the construction or
+/// of the last update().
 class Navigation {
  public:
   using Progress = std::function<void(double)>;  ///< share that is done, 0..1
@@ -67,8 +56,12 @@ class Navigation {
              const Progress& progress = {});
   ~Navigation();
 
+  /// Takes over the poses of bodies, and builds the tiles again in which they changed. Returns the
+  /// number of these tiles.
+  std::size_t update(const Snapshot& snapshot, int threads = 2);
+
   const NavigationAgent& agent() const { return agent_; }
-  const NavigationReport& report() const { return report_; }
+  NavigationReport report();
   std::string findEntityName(EntityId id) const { return world_.data().findEntityName(id); }
 
   /// A path from where an agent at `from` stands to where it stands at `to`. Both may be up to a
@@ -82,30 +75,29 @@ class Navigation {
   std::optional<Vec3> snap(const Vec3& point, double maxDistance);
   /// A place that is uniform in area; nullopt: none was found.
   std::optional<Vec3> findRandomPlace(std::mt19937_64& random, const RandomPlace& wanted);
+  /// Where a walk from one place towards another ends: at the first obstacle, or, if it slides,
+  /// where it gains nothing more. nullopt: there is no place to stand at `from`.
+  std::optional<Vec3> tryStep(const Vec3& from, const Vec3& to, bool slides);
+  /// nullopt: there is no place to stand at `point`.
+  std::optional<ObstacleDistance> findObstacle(const Vec3& point, double maxDistance);
+  /// The walkable cells at floors within 0.5 m of `height`. Throws std::invalid_argument for more
+  /// than 4 million cells.
+  NavigationMap drawMap(double cell, double height);
+  /// Areas of the islands, m^2, by number.
+  std::vector<double> islandAreas();
   /// Number of the island at a point, 0 for the largest; nullopt: no polygon is near.
   std::optional<std::uint32_t> islandOf(const Vec3& point);
 
  private:
-  struct Proof;
-  void buildMeshes(int threads, const Progress& progress);
+  void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
+  void assembleMeshes();
   NavigationMesh buildMesh(Clearance clearance) const;
-  std::optional<Vec3> standAt(const Vec3& point, double maxDrop);
-  std::optional<Vec3> standNear(const Vec3& point);
-  NavigationPath findPathOn(NavigationMesh& mesh, Clearance clearance, const Vec3& from,
-                            const Vec3& to, Proof& proof);
-  bool proveLegs(std::vector<Vec3> corners, Clearance clearance, NavigationPath& path,
-                 Proof& proof);
-  bool goAround(const WalkOutcome& stop, const Vec3& corner, NavigationPath& path, Proof& proof);
-  void explain(const Vec3& from, const Vec3& to, NavigationPath& path);
-  double measureClearWidth(const Vec3& position, const Vec3& direction);
-  NarrowPlace measureNarrowest(const std::vector<Vec3>& points, const Vec3& near,
-                               double maxDistance);
-
   const NavigationAgent agent_;
   World world_;  ///< never ticks
   TileGrid grid_;
   std::mutex mutex_;
-  Walker walker_;
+  std::optional<Walker> walker_;
+  std::vector<TileMesh> ampleTiles_, scarceTiles_;
   std::optional<NavigationMesh> ample_, scarce_, unobstructed_;
   std::vector<std::uint32_t> islands_;  ///< by polygon of `ample_`
   std::vector<double> areaUpTo_;        ///< by polygon of `ample_`, cumulative

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
 #include <numeric>
@@ -51,7 +52,7 @@ struct NavigationMesh::Detour {
   }
 };
 
-NavigationMesh::NavigationMesh(const TileGrid& grid, std::vector<std::vector<std::uint8_t>> tiles)
+NavigationMesh::NavigationMesh(const TileGrid& grid, std::vector<TileMesh> tiles)
     : detour_(std::make_unique<Detour>()) {
   dtNavMeshParams params{};
   const Float3 origin = toFloats(grid.origin);
@@ -64,7 +65,7 @@ NavigationMesh::NavigationMesh(const TileGrid& grid, std::vector<std::vector<std
   if (tileBits > 14 || dtStatusFailed(detour_->mesh.init(&params)))
     throw std::runtime_error("navigation: the scene has too many tiles (" +
                              std::to_string(tiles.size()) + ")");
-  for (const std::vector<std::uint8_t>& tile : tiles) {
+  for (const TileMesh& tile : tiles) {
     auto* data = static_cast<unsigned char*>(dtAlloc(tile.size(), DT_ALLOC_PERM));
     if (!data) throw std::bad_alloc();
     std::memcpy(data, tile.data(), tile.size());
@@ -266,6 +267,34 @@ Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) con
   dtRandomPointInConvexPoly(corners.data(), polygon->vertCount, areas.data(), static_cast<float>(s),
                             static_cast<float>(t), point.data());
   return toVec3(point.data());
+}
+
+void NavigationMesh::rasterize(double low, double high, double x, double z, double cell,
+                               std::uint32_t width, std::uint32_t height,
+                               std::vector<std::uint8_t>& cells) const {
+  for (std::uint32_t index = 0; index < polygonCount(); ++index) {
+    const dtPoly* polygon = nullptr;
+    const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
+    if (centres_[index].y() < low || centres_[index].y() > high) continue;
+    std::array<float, 3 * DT_VERTS_PER_POLYGON> corners{};
+    Aabb box;
+    for (int i = 0; i < polygon->vertCount; ++i) {
+      std::copy_n(&tile.verts[polygon->verts[i] * 3], 3, &corners[static_cast<std::size_t>(3 * i)]);
+      box.include(toVec3(&corners[static_cast<std::size_t>(3 * i)]));
+    }
+    const auto first = [&](double least, double origin) {
+      return static_cast<std::uint32_t>(std::max(0.0, std::floor((least - origin) / cell)));
+    };
+    for (std::uint32_t row = first(box.min.z(), z); row < height && z + row * cell <= box.max.z();
+         ++row) {
+      for (std::uint32_t column = first(box.min.x(), x);
+           column < width && x + column * cell <= box.max.x(); ++column) {
+        const Float3 middle = toFloats({x + (column + 0.5) * cell, 0, z + (row + 0.5) * cell});
+        if (dtPointInPolygon(middle.data(), corners.data(), polygon->vertCount))
+          cells[std::size_t{row} * width + column] = 1;
+      }
+    }
+  }
 }
 
 std::vector<std::uint32_t> NavigationMesh::findIslands() const {

@@ -26,7 +26,7 @@ struct Corridor {
 /// Copies share nothing. Const functions may be called from several threads.
 class NavigationMesh {
  public:
-  explicit NavigationMesh(const TileGrid& grid, std::vector<std::vector<std::uint8_t>> tiles);
+  NavigationMesh(const TileGrid& grid, std::vector<TileMesh> tiles);
   ~NavigationMesh();
   NavigationMesh(NavigationMesh&&) noexcept;
   NavigationMesh& operator=(NavigationMesh&&) noexcept;
@@ -53,6 +53,10 @@ class NavigationMesh {
   void closePortal(std::uint32_t from, std::uint32_t to);
   /// A point of a polygon for two numbers of 0..1, uniform in area.
   Vec3 pointInPolygon(std::uint32_t polygon, double s, double t) const;
+  /// Sets the cells to 1 whose middle lies over a polygon of a height within low..high. Cell 0 has
+  /// its corner at (x, z); rows run along x.
+  void rasterize(double low, double high, double x, double z, double cell, std::uint32_t width,
+                 std::uint32_t height, std::vector<std::uint8_t>& cells) const;
   /// For each polygon the number of its island: polygons joined by open portals. The largest island
   /// has number 0.
   std::vector<std::uint32_t> findIslands() const;

@@ -20,6 +20,7 @@ constexpr double kLongStep = 0.1, kMaxStep = 1;
 constexpr double kEvenHeight = 1e-3;      // metres: a step that rises or sinks more is not even
 constexpr int kMaxTicksWithoutGain = 30;  // half a second: no progress towards the way point
 constexpr double kMinGain = 1e-3;         // metres in that time
+constexpr double kMinSlideGain = 1e-4;    // metres in a tick
 constexpr int kMaxTicks = 1'000'000;      // more than an hour: the goal is unreasonably far
 
 }  // namespace
@@ -138,6 +139,23 @@ WalkOutcome Walker::walkTo(const Vec3& goal) {
     shortDistance -= computeGroundDistance(before, avatar_.footPosition);
   }
   return {WalkOutcome::Kind::blocked, avatar_.footPosition, 0};
+}
+
+WalkOutcome Walker::slideTo(const Vec3& goal) {
+  double least = computeGroundDistance(avatar_.footPosition, goal);
+  for (int ticks = 0, ticksWithoutGain = 0; ticks < kMaxTicks; ++ticks) {
+    const double distance = computeGroundDistance(avatar_.footPosition, goal);
+    if (distance <= kArrivalDistance && avatar_.grounded)
+      return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0};
+    ticksWithoutGain = distance < least - kMinSlideGain ? 0 : ticksWithoutGain + 1;
+    least = std::min(least, distance);
+    if (ticksWithoutGain > kMaxTicksWithoutGain) break;
+    step(computeWalkVelocity(avatar_.footPosition, goal, false, agent_.speed,
+                             world_.settings.tickDuration));
+    if (avatar_.footPosition.y() < world_.scene->bounds().min.y())
+      return {WalkOutcome::Kind::fell, avatar_.footPosition, 0};
+  }
+  return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy};
 }
 
 }  // namespace enfilade::scene

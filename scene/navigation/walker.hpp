@@ -42,6 +42,9 @@ class Walker {
   /// obstacle that is not a step, and where the floor ends.
   WalkOutcome walkTo(const Vec3& goal);
 
+  /// Walks tick by tick towards `goal`, slides along obstacles, and ends where it gains nothing.
+  WalkOutcome slideTo(const Vec3& goal);
+
   const Vec3& footPosition() const { return avatar_.footPosition; }
   const NavigationAgent& agent() const { return agent_; }
 

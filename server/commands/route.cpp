@@ -60,8 +60,8 @@ Json toJson(const Vec3& point) {
 }
 
 Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
-                const std::optional<scene::NarrowPlace>& narrowest,
-                const scene::Navigation& navigation) {
+                const std::optional<scene::NarrowPlace>& narrowest, scene::Navigation& navigation) {
+  const scene::NavigationReport mesh = navigation.report();
   Json report{{"found", path.found()}};
   if (path.found()) {
     report["length"] = path.length;
@@ -85,10 +85,10 @@ Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
   report["agent"] = {{"radius", command.agent.radius},
                      {"height", command.agent.height},
                      {"step_height", command.settings.stepHeight}};
-  report["mesh"] = {{"seconds", navigation.report().seconds},
-                    {"area", navigation.report().area},
-                    {"islands", navigation.report().islands},
-                    {"bytes", navigation.report().bytes}};
+  report["mesh"] = {{"seconds", mesh.seconds},
+                    {"area", mesh.area},
+                    {"islands", mesh.islands},
+                    {"bytes", mesh.bytes}};
   return report;
 }
 

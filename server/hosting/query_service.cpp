@@ -10,22 +10,26 @@
 #include "server/messages/proximity_messages.hpp"
 #include "server/messages/ray_messages.hpp"
 #include "server/messages/world_messages.hpp"
+#include "server/navigation/navigation_service.hpp"
 
 namespace enfilade::server {
 
 struct QueryService::State {
-  explicit State(std::shared_ptr<const scene::Scene> s) : scene(std::move(s)) {}
+  explicit State(std::shared_ptr<const scene::Scene> s) : scene(std::move(s)), navigation(scene) {}
 
   std::shared_ptr<const scene::Scene> scene;
   std::optional<scene::RayCaster> caster;                 ///< built at the first ray query
   std::shared_ptr<const scene::Snapshot> casterSnapshot;  ///< state of the caster's moving entities
   std::optional<scene::EntityIndex> index;                ///< built at the first proximity query
-  WorkThread thread;                                      // last member: it uses the others
+  NavigationService navigation;                           ///< used by its thread alone
+  WorkThread thread, navigationThread;                    // last members: they use the others
 
   const scene::RayCaster& casterAt(const std::shared_ptr<const scene::Snapshot>& snapshot);
   scene::SceneAt makeSceneAt(const SceneQuery& query);
   std::variant<v1::RayReply, v1::Error> answerRays(const SceneQuery& query,
                                                    std::vector<std::uint8_t>& attachment);
+  std::variant<v1::NavigationReply, v1::Error> answerNavigation(
+      const SceneQuery& query, std::vector<std::uint8_t>& attachment);
   EncodedMessage answerQuery(const SceneQuery& query);
   EncodedMessage answerSafely(const SceneQuery& query);
 };
@@ -59,6 +63,12 @@ std::variant<v1::RayReply, v1::Error> QueryService::State::answerRays(
                   *query.snapshot, attachment);
 }
 
+std::variant<v1::NavigationReply, v1::Error> QueryService::State::answerNavigation(
+    const SceneQuery& query, std::vector<std::uint8_t>& attachment) {
+  return navigation.answer(query.message.navigation(), {query.snapshot, query.settings},
+                           attachment);
+}
+
 namespace {
 
 /// Stores the answer in `field` of the message, or the error.
@@ -87,6 +97,8 @@ EncodedMessage QueryService::State::answerQuery(const SceneQuery& query) {
     setReply(reply,
              answerTouching(message.touching(), makeSceneAt(query), query.settings, query.limits),
              &v1::ServerMessage::mutable_touching);
+  else if (message.has_navigation())
+    setReply(reply, answerNavigation(query, attachment), &v1::ServerMessage::mutable_navigation);
   else
     setReply(reply, answerCannotTouch(message.cannot_touch(), makeSceneAt(query), query.settings),
              &v1::ServerMessage::mutable_cannot_touch);
@@ -111,15 +123,33 @@ QueryService::~QueryService() {
 
 void QueryService::submit(SceneQuery query, std::function<void(EncodedMessage)> done) {
   ENFILADE_ASSERT(query.message.has_rays() || query.message.has_distances() ||
-                  query.message.has_touching() || query.message.has_cannot_touch());
+                  query.message.has_touching() || query.message.has_cannot_touch() ||
+                  query.message.has_navigation());
   const auto shared = std::make_shared<const SceneQuery>(std::move(query));
-  state_->thread.post([state = state_.get(), shared, done = std::move(done)] {
+  WorkThread& thread = shared->message.has_navigation() ? state_->navigationThread : state_->thread;
+  thread.post([state = state_.get(), shared, done = std::move(done)] {
     done(state->answerSafely(*shared));
+  });
+}
+
+void QueryService::submitPath(
+    SceneQuery query, std::function<void(std::variant<v1::NavigationReply, v1::Error>)> done) {
+  ENFILADE_ASSERT(query.message.has_navigation());
+  const auto shared = std::make_shared<const SceneQuery>(std::move(query));
+  state_->navigationThread.post([state = state_.get(), shared, done = std::move(done)] {
+    std::vector<std::uint8_t> attachment;
+    try {
+      done(state->answerNavigation(*shared, attachment));
+    } catch (const std::exception& error) {
+      spdlog::error("a query failed: {}", error.what());
+      done(makeError(v1::ERROR_INTERNAL, error.what()));
+    }
   });
 }
 
 void QueryService::finish() {
   state_->thread.finish();
+  state_->navigationThread.finish();
 }
 
 }  // namespace enfilade::server

@@ -1,9 +1,10 @@
-// Answers queries about a snapshot (rays, distances, touching, time to contact) on a thread of its
-// own, so that ticks do not wait. Acceleration structures are built at first use.
+// Answers queries about a snapshot (rays, distances, touching, time to contact, navigation) on
+// threads of its own, so that ticks do not wait. Acceleration structures are built at first use.
 #pragma once
 
 #include <functional>
 #include <memory>
+#include <variant>
 
 #include "protocol/enfilade.pb.h"
 #include "scene/world/data/scene.hpp"
@@ -17,7 +18,7 @@ namespace enfilade::server {
 /// A query with its snapshot, settings and limits.
 struct SceneQuery {
   std::shared_ptr<const scene::Snapshot> snapshot;
-  v1::ClientMessage message;  ///< a RayQuery, DistanceQuery, TouchingQuery or CannotTouchQuery
+  v1::ClientMessage message;  ///< a query about the scene at a tick
   scene::WorldSettings settings;
   ServerLimits limits;
 };
@@ -29,8 +30,12 @@ class QueryService {
   QueryService(const QueryService&) = delete;
   QueryService& operator=(const QueryService&) = delete;
 
-  /// `done` receives the encoded reply or Error on the service's thread, in the order of the calls.
+  /// `done` receives the encoded reply or Error on a thread of the service. Navigation queries are
+  /// answered in their order, all others in theirs.
   void submit(SceneQuery query, std::function<void(EncodedMessage)> done);
+  /// The same for a path, with the reply as it is.
+  void submitPath(SceneQuery query,
+                  std::function<void(std::variant<v1::NavigationReply, v1::Error>)> done);
   /// Waits for all queries. Do not submit queries afterwards.
   void finish();
 

@@ -72,6 +72,8 @@ const char* getCommandName(const v1::Command& command) {
       return "crouch";
     case v1::Command::kDriveJoints:
       return "drive_joints";
+    case v1::Command::kGo:
+      return "go";
     default:
       return "unknown";
   }

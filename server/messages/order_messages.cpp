@@ -131,6 +131,8 @@ OrderOrError orderFromProto(const v1::Command& message) {
       return crouchFromProto(message.crouch());
     case v1::Command::kDriveJoints:
       return driveJointsFromProto(message.drive_joints());
+    case v1::Command::kGo:  // the server submits the Walk
+      return makeError(v1::ERROR_REFUSED_COMMAND, "go needs a server that finds the path", "go");
     case v1::Command::ORDER_NOT_SET:
       break;
   }

@@ -32,7 +32,8 @@ struct WalkTrace {
   std::vector<MapContact> contacts;      ///< contacts that began
   std::vector<MapContact> blockedWalks;  ///< ends of blocked walks
   std::vector<MapCapture> captures;
-  std::vector<double> floors = {};  ///< metres: heights with a plan, however little walking is there
+  /// metres: heights that get a plan, however little walking is there
+  std::vector<double> floors = {};
 };
 
 /// Finds the floor heights with much walking, ascending; empty without walks.

@@ -1,7 +1,9 @@
 #include "server/runs/in_process_driver.hpp"
 
+#include "scene/world/data/world_data.hpp"
 #include "server/messages/frame_messages.hpp"
 #include "server/messages/world_messages.hpp"
+#include "server/navigation/go_order.hpp"
 
 namespace enfilade::server {
 InProcessDriver::InProcessDriver(RecordableWorld& world, render::RendererSelector* renderer,
@@ -13,7 +15,19 @@ double InProcessDriver::tickSeconds() const {
 }
 
 std::optional<v1::Error> InProcessDriver::submit(const v1::Command& command) {
-  return world_.submit(command);
+  return command.has_go() ? go(command) : world_.submit(command);
+}
+
+std::optional<v1::Error> InProcessDriver::go(const v1::Command& command) {
+  auto query = makePathQuery(world_, command);
+  if (auto* error = std::get_if<v1::Error>(&query)) return std::move(*error);
+  if (!navigation_) navigation_.emplace(static_cast<const scene::World&>(world_).data().scene);
+  std::vector<std::uint8_t> attachment;
+  auto walk =
+      makeWalk(command, navigation_->answer(std::get<v1::NavigationQuery>(query),
+                                            {world_.snapshot(), world_.settings()}, attachment));
+  if (auto* error = std::get_if<v1::Error>(&walk)) return std::move(*error);
+  return world_.submit(std::get<v1::Command>(walk));
 }
 
 std::optional<v1::Error> InProcessDriver::submit(const v1::BodyCommand& command) {

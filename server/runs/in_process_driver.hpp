@@ -1,9 +1,12 @@
 // Runs a script on a world in this process, as fast as possible and without sockets.
 #pragma once
 
+#include <optional>
+
 #include "protocol/clients/cpp/socket_driver.hpp"
 #include "render/service/renderer_selector.hpp"
 #include "server/messages/tick_statistics.hpp"
+#include "server/navigation/navigation_service.hpp"
 #include "server/recording/recordable_world.hpp"
 
 namespace enfilade::server {
@@ -31,11 +34,14 @@ class InProcessDriver : public protocol::ScriptDriver {
   void record(const std::string& avatar, const protocol::ReceivedFrame& received);
   void recordImages();
 
+  std::optional<v1::Error> go(const v1::Command& command);
+
   RecordableWorld& world_;
   render::RendererSelector* renderer_;
   protocol::CaptureFormat format_;
   TickStatistics statistics_;
   std::uint64_t frames_ = 0;
+  std::optional<NavigationService> navigation_;  ///< from the first Go on
 };
 
 }  // namespace enfilade::server

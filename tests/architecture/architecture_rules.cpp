@@ -75,6 +75,7 @@ const std::vector<std::string> kRooms{
     "server/messages",
     "server/recording/foxglove",
     "server/recording",
+    "server/navigation",
     "server/hosting",
     "server/hosting/requests",
     "server/worlds",

@@ -94,7 +94,7 @@ TEST(Documents, EveryCommandOfScriptMdParses) {
     EXPECT_EQ(parseScript(command, "SCRIPT.md").lines.size(), 1u) << command;
     ++commands;
   }
-  EXPECT_EQ(commands, 15);
+  EXPECT_EQ(commands, 16);
 }
 
 TEST(Documents, TheClientsBytesOfProtocolMdAreAHello) {

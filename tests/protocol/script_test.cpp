@@ -114,7 +114,7 @@ TEST(Script, MissingKeysAreReportedWithARemedy) {
   expectError(R"({"look":"ann"})", "tour.jsonl:1: at: is missing");
   expectError(R"({"walk":"ann"})", "tour.jsonl:1: to: is missing");
   expectError(R"({"capture":"ann"})", "tour.jsonl:1: as: is missing");
-  expectError(R"({})", "tour.jsonl:1: no command; a line needs one of spawn, walk, look");
+  expectError(R"({})", "tour.jsonl:1: no command; a line needs one of spawn, walk, go, look");
   expectError(R"({"for":"ann"})", "tour.jsonl:1: no command");
 }
 

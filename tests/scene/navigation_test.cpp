@@ -164,6 +164,52 @@ TEST(Navigation, FindsRoomsStoreysAndObjectsByName) {
   EXPECT_FALSE(findNamedPlace(*scene, "nowhere", 1));
 }
 
+TEST(Navigation, AStepEndsAtAWallOrSlidesAlongIt) {
+  Navigation navigation(boxScene(twoRooms(1)), {}, {});
+  const auto stopped = navigation.tryStep({2, 0.1, 1.5}, {5, 0.1, 2.5}, false);
+  const auto slid = navigation.tryStep({2, 0.1, 1.5}, {5, 0.1, 2.5}, true);
+  ASSERT_TRUE(stopped && slid);
+  EXPECT_NEAR(stopped->x(), 3.6, 0.03);
+  EXPECT_LT(stopped->z(), 2.2);
+  EXPECT_NEAR(slid->x(), 3.6, 0.03);
+  EXPECT_NEAR(slid->z(), 2.5, 0.1);
+  const auto free = navigation.tryStep({2, 0.1, 1.5}, {3, 0.1, 1}, true);
+  ASSERT_TRUE(free);
+  EXPECT_NEAR(free->x(), 3, 2e-3);
+  EXPECT_FALSE(navigation.tryStep({4, 0.1, 2}, {5, 0.1, 2}, true));
+}
+
+TEST(Navigation, TheClosestObstacleIsNamedAndTheFloorIsNone) {
+  Navigation navigation(boxScene(twoRooms(1)), {}, {});
+  const auto near = navigation.findObstacle({3, 0.1, 2}, 2);
+  ASSERT_TRUE(near);
+  EXPECT_NEAR(near->distance, 0.9, 2e-3);
+  EXPECT_EQ(navigation.findEntityName(near->entity), "wall/right");
+  const auto none = navigation.findObstacle({1, 0.1, 0}, 2);
+  ASSERT_TRUE(none);
+  EXPECT_EQ(none->entity, 0u);
+  EXPECT_EQ(none->distance, 2);
+}
+
+TEST(Navigation, AMapShowsTheRoomsAndTheWallBetween) {
+  Navigation navigation(boxScene(twoRooms(0.5)), {}, {});
+  const NavigationMap map = navigation.drawMap(0.1, 0);
+  ASSERT_EQ(map.cells.size(), std::size_t{map.width} * map.height);
+  const auto at = [&](double x, double z) {
+    const auto column = static_cast<std::size_t>((x - map.corner.x()) / map.cell);
+    const auto row = static_cast<std::size_t>((z - map.corner.z()) / map.cell);
+    return map.cells[row * map.width + column];
+  };
+  EXPECT_EQ(at(2.05, 0.05), 1);
+  EXPECT_EQ(at(6.05, 0.05), 1);
+  EXPECT_EQ(at(4.05, 0.05), 0);
+  double area = 0;
+  for (const double island : navigation.islandAreas()) area += island;
+  const auto walkable = std::count(map.cells.begin(), map.cells.end(), 1);
+  EXPECT_NEAR(0.01 * static_cast<double>(walkable), area, 1.5);
+  EXPECT_THROW(navigation.drawMap(0.001, 0), std::invalid_argument);
+}
+
 TEST(Navigation, AClosedDoorIsNamedAndAnOpenOneIsPassed) {
   auto boxes = twoRooms(1);
   boxes.push_back({"leaf", {3.98, 0.01, -0.49}, {4.02, 2, 0.49}});
@@ -182,6 +228,9 @@ TEST(Navigation, AClosedDoorIsNamedAndAnOpenOneIsPassed) {
   const auto snapshot = makeSnapshotWithOpenDoors(scene, {});
   Navigation open(scene, {}, {}, snapshot.get());
   EXPECT_TRUE(open.findPath({1, 0.1, 2}, {7, 0.1, -2}).found());
+  EXPECT_GT(closed.update(*snapshot), 0u);
+  EXPECT_TRUE(closed.findPath({1, 0.1, 2}, {7, 0.1, -2}).found());
+  EXPECT_EQ(closed.update(*snapshot), 0u);
 }
 
 /// Places of a grid of 2 cm on a level floor that the agent reaches from a place, by brute force.

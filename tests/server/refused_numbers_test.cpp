@@ -88,6 +88,9 @@ std::vector<v1::Command> everyOrder() {
   orders.push_back(commandOf("ann"));
   orders[7].mutable_drive_joints()->add_to()->set_value(0.25);
   orders[7].mutable_drive_joints()->set_speed(2);
+  orders.push_back(commandOf("ann"));
+  *orders[8].mutable_go()->mutable_to()->mutable_point() = point();
+  orders[8].mutable_go()->set_speed(2);
   return orders;
 }
 
@@ -106,6 +109,33 @@ std::vector<v1::RayQuery> everyRayQuery() {
   scan.set_columns(2);
   scan.set_rows(2);
   scan.set_reach(3);
+  return queries;
+}
+
+std::vector<v1::NavigationQuery> everyNavigationQuery() {
+  std::vector<v1::NavigationQuery> queries(6);
+  for (v1::NavigationQuery& query : queries) {
+    query.set_radius(0.3);
+    query.set_height(1.5);
+    query.set_speed(1.5);
+  }
+  *queries[0].mutable_path()->mutable_from()->mutable_point() = point();
+  *queries[0].mutable_path()->add_to()->mutable_point() = point();
+  v1::NavigationQuery::Random& random = *queries[1].mutable_random();
+  random.set_count(1);
+  *random.mutable_near() = point();
+  random.set_max_distance(2);
+  *random.mutable_away_from() = point();
+  random.set_min_distance(0.5);
+  *queries[2].mutable_snap()->add_points() = point();
+  queries[2].mutable_snap()->set_max_distance(1);
+  auto& step = *queries[3].mutable_steps()->add_steps();
+  *step.mutable_from() = point();
+  *step.mutable_to() = point();
+  *queries[4].mutable_clearance()->add_points() = point();
+  queries[4].mutable_clearance()->set_max_distance(1);
+  queries[5].mutable_map()->set_cell(0.5);
+  queries[5].mutable_map()->set_height(0.1);
   return queries;
 }
 
@@ -143,6 +173,8 @@ std::vector<v1::ClientMessage> everyRequest(bool frames) {
   body.set_to(0.5);
   body.set_speed(1);
   for (const v1::RayQuery& query : everyRayQuery()) *all.emplace_back().mutable_rays() = query;
+  for (const v1::NavigationQuery& query : everyNavigationQuery())
+    *all.emplace_back().mutable_navigation() = query;
   all.emplace_back().mutable_subscribe()->set_state_rate(10);
   all.emplace_back().mutable_set_clock()->mutable_free_run()->set_speed(1);
   if (!frames) return all;

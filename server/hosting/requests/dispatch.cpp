@@ -35,6 +35,7 @@ Role requiredRole(v1::ClientMessage::BodyCase body) {
     case v1::ClientMessage::kDistances:
     case v1::ClientMessage::kTouching:
     case v1::ClientMessage::kCannotTouch:
+    case v1::ClientMessage::kNavigation:
     case v1::ClientMessage::kDescribe:
     case v1::ClientMessage::kMetrics:
     case v1::ClientMessage::kListWorlds:
@@ -108,6 +109,8 @@ void dispatchRequest(const RequestContext& context) {
       return handleTouching(context, message.touching());
     case v1::ClientMessage::kCannotTouch:
       return handleCannotTouch(context, message.cannot_touch());
+    case v1::ClientMessage::kNavigation:
+      return handleNavigation(context, message.navigation());
     case v1::ClientMessage::kDescribe:
       return handleDescribe(context, message.describe());
     case v1::ClientMessage::kMetrics:

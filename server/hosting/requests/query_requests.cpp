@@ -69,6 +69,9 @@ class BoundedNames {
 void handleRays(const RequestContext& context, const v1::RayQuery& query) {
   forwardQuery(context, query, "rays.tick");
 }
+void handleNavigation(const RequestContext& context, const v1::NavigationQuery& query) {
+  forwardQuery(context, query, "navigation.tick");
+}
 void handleDistances(const RequestContext& context, const v1::DistanceQuery& query) {
   forwardQuery(context, query, "distances.tick");
 }

@@ -8,6 +8,7 @@ namespace enfilade::server {
 // The query service replies to these.
 
 void handleRays(const RequestContext& context, const v1::RayQuery& query);
+void handleNavigation(const RequestContext& context, const v1::NavigationQuery& query);
 void handleDistances(const RequestContext& context, const v1::DistanceQuery& query);
 void handleTouching(const RequestContext& context, const v1::TouchingQuery& query);
 void handleCannotTouch(const RequestContext& context, const v1::CannotTouchQuery& query);

@@ -1,5 +1,5 @@
 // The plan of the storey: the scene from above, cut above the floor of the avatar or camera. Walls that are cut are
-// dark, because the inner sides of their triangles are visible there. A click orders a walk.
+// dark, because the inner sides of their triangles are visible there. A click walks there.
 import { DoubleSide, OrthographicCamera, ShaderMaterial, Vector3 } from "three";
 import type { App } from "./app";
 import { colorOf } from "./avatars";

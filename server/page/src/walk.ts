@@ -156,7 +156,7 @@ export class Walk {
     }
   }
 
-  /** Walks straight to a place, until a key is pressed. */
+  /** Walks to a place along a path that the server finds, until a key is pressed. */
   async walkTo(place: Vector3): Promise<void> {
     if (!this.isWalking) return;
     const facing = place.clone().sub(this.#rig.position).setY(0);
@@ -165,7 +165,8 @@ export class Walk {
     if (this.#isDriving) await this.#app.connection.command(this.name, { case: "drive", value: { velocity: {} } });
     this.#isDriving = false;
     this.#driven.set(0, 0, 0);
-    const notice = await this.#order({ case: "walk", value: { along: [plain(place)] } }, 600);
+    const to = { by: { case: "point" as const, value: plain(place) } };
+    const notice = await this.#order({ case: "go", value: { to } }, 600);
     if (notice?.kind === Notice_Kind.BLOCKED) this.#app.say(`Stopped by ${notice.obstacleName || "an obstacle"}.`);
     if (notice?.kind === Notice_Kind.REFUSED) this.#app.say(notice.text);
   }

@@ -19,6 +19,7 @@ from .avatar import Avatar
 from .client import Client, connect
 from .environment import WalkEnv
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
+from .navigation import Map, Navigation, Obstacle, Path, Spot
 from .process import Server, serve
 from .results import (Apart, AvatarState, Contact, Frame, Hits, Horizon, Notice, Pair, Replay, Scan,
                       State, Step, Touching, World)
@@ -26,6 +27,6 @@ from .vector_environment import VectorWalkEnv
 
 __all__ = [
     "Apart", "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Frame",
-    "Hits", "Horizon", "Notice", "OrderFailed", "Pair", "Replay", "Scan", "Server", "ServerError", "StartFailed",
-    "State", "Step", "Touching", "VectorWalkEnv", "WalkEnv", "World", "connect", "messages", "serve",
+    "Hits", "Horizon", "Map", "Navigation", "Notice", "Obstacle", "OrderFailed", "Pair", "Path", "Replay", "Scan",
+    "Server", "ServerError", "Spot", "StartFailed", "State", "Step", "Touching", "VectorWalkEnv", "WalkEnv", "World", "connect", "messages", "serve",
 ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional, Sequence
+from typing import TYPE_CHECKING, Any, Optional, Sequence, Union
 
 from . import messages
 from .errors import OrderFailed
@@ -46,6 +46,13 @@ class Avatar:
         if speed is not None:
             order.speed = speed
         return self._client.command(self.name, walk=order)
+
+    def go(self, to: Union[Point, str], *, speed: Optional[float] = None) -> int:
+        """Walks along a path to a point, or to a room, a storey or an object by name. Raises ServerError
+        with the reason if there is no path."""
+        place = messages.NavigationPlace(name=to) if isinstance(to, str) else \
+            messages.NavigationPlace(point=vec(to))
+        return self._client.command(self.name, go=messages.Go(to=place, speed=speed))
 
     def look(self, at: Point) -> int:
         return self._client.command(self.name, look=messages.Look(at=vec(at)))

@@ -16,6 +16,7 @@ from . import messages, results
 from .avatar import Avatar
 from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
+from .navigation import Navigation
 from .questions import Point, cannot_touch_query, entity, frame_request, points, vec
 from .results import (Apart, Contact, Frame, Hits, Horizon, Notice, Pair, Replay, Scan, State,
                       Step, Touching, World)
@@ -580,6 +581,12 @@ class Client:
         (seconds) before the next check."""
         reply, _ = self.request(cannot_touch=cannot_touch_query(a, b, assume, least, tick))
         return results.apart(reply.cannot_touch)
+
+    def navigation(self, radius: Optional[float] = None, height: Optional[float] = None, *,
+                   speed: Optional[float] = None, doors: str = "as_they_are") -> Navigation:
+        """Returns paths and places for an upright avatar of a size in metres (default: as an avatar's).
+        `doors`: "as_they_are" at the tick of each query, or "open". The first query builds meshes."""
+        return Navigation(self, radius, height, speed, doors)
 
     def names(self, ids: Union[np.ndarray, Iterable[int]]) -> Dict[int, str]:
         """Returns the path of an object or the name of an avatar, by entity id; "" for an unknown

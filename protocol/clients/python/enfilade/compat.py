@@ -1,0 +1,129 @@
+"""Names and meanings of habitat-sim's path finder on top of Client.navigation().
+
+    from enfilade.compat import PathFinder, ShortestPath
+
+    pathfinder = PathFinder(client.navigation(radius=0.1, height=1.5))
+    path = ShortestPath()
+    path.requested_start = pathfinder.get_random_navigable_point()
+    path.requested_end = pathfinder.get_random_navigable_point()
+    pathfinder.find_path(path)
+
+Paths are walked by the server before they are returned. docs/coming_from_habitat.md lists what differs.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import List, Optional, Sequence
+
+import numpy as np
+
+from .navigation import Navigation, Spot
+
+_NOWHERE = np.full(3, np.nan)
+
+
+class ShortestPath:
+    """A request and its answer, as habitat_sim.ShortestPath."""
+
+    def __init__(self) -> None:
+        self.requested_start: Sequence[float] = ()
+        self.requested_end: Sequence[float] = ()
+        self.points: List[np.ndarray] = []
+        self.geodesic_distance = math.inf
+
+
+class MultiGoalShortestPath:
+    """The same with many ends, of which the nearest one counts."""
+
+    def __init__(self) -> None:
+        self.requested_start: Sequence[float] = ()
+        self.requested_ends: Sequence[Sequence[float]] = ()
+        self.points: List[np.ndarray] = []
+        self.geodesic_distance = math.inf
+        self.closest_end_point_index = -1
+
+
+class PathFinder:
+    """As habitat_sim.PathFinder, for the agent of a Navigation."""
+
+    is_loaded = True
+
+    def __init__(self, navigation: Navigation, seed: int = 0) -> None:
+        self.navigation = navigation
+        self._random = np.random.default_rng(seed)
+
+    def seed(self, seed: int) -> None:
+        self._random = np.random.default_rng(seed)
+
+    def _draw(self) -> int:
+        return int(self._random.integers(0, 2 ** 63))
+
+    def find_path(self, path: "ShortestPath | MultiGoalShortestPath") -> bool:
+        """Fills in `points` and `geodesic_distance`. Returns whether there is a path."""
+        many = isinstance(path, MultiGoalShortestPath)
+        ends = list(path.requested_ends) if many else [path.requested_end]  # type: ignore[union-attr]
+        found = self.navigation.paths(path.requested_start, ends)
+        best = min(range(len(found)), key=lambda i: found[i].length, default=-1)
+        path.geodesic_distance = found[best].length if best >= 0 else math.inf
+        path.points = list(found[best].points) if best >= 0 else []
+        if many:
+            path.closest_end_point_index = best if math.isfinite(path.geodesic_distance) else -1  # type: ignore[union-attr]
+        return math.isfinite(path.geodesic_distance)
+
+    def get_random_navigable_point(self, max_tries: int = 10, island_index: int = -1) -> np.ndarray:
+        """`max_tries` has no effect: the server tries often enough."""
+        return _point(self.navigation.random_place(self._draw(), island=_island(island_index)))
+
+    def get_random_navigable_point_near(self, circle_center: Sequence[float], radius: float,
+                                        max_tries: int = 100, island_index: int = -1) -> np.ndarray:
+        return _point(self.navigation.random_place(self._draw(), near=circle_center, max_distance=radius,
+                                                   island=_island(island_index)))
+
+    def snap_point(self, point: Sequence[float], island_index: int = -1) -> np.ndarray:
+        """The closest place within 2 m; NaN: none, or it lies on another island."""
+        spot = self.navigation.snap(point)
+        if spot is not None and island_index >= 0 and spot.island != island_index:
+            return _NOWHERE.copy()
+        return _point(spot)
+
+    def is_navigable(self, pt: Sequence[float], max_y_delta: float = 0.5) -> bool:
+        return self.navigation.is_navigable(pt, max_y_delta)
+
+    def try_step(self, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
+        return _point(self.navigation.try_step(start, end))
+
+    def try_step_no_sliding(self, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
+        return _point(self.navigation.try_step(start, end, slide=False))
+
+    def get_island(self, point: Sequence[float]) -> int:
+        spot = self.navigation.snap(point)
+        return spot.island if spot is not None and spot.island is not None else -1
+
+    def island_area(self, island_index: int = -1) -> float:
+        areas = self.navigation.island_areas
+        return self.navigable_area if island_index < 0 else areas[island_index]
+
+    @property
+    def num_islands(self) -> int:
+        return len(self.navigation.island_areas)
+
+    @property
+    def navigable_area(self) -> float:
+        return self.navigation.navigable_area
+
+    def distance_to_closest_obstacle(self, pt: Sequence[float], max_search_radius: float = 2.0) -> float:
+        """From the agent's surface, as in habitat-sim; NaN: no agent can stand there."""
+        obstacle = self.navigation.clearance(pt, max_search_radius)
+        return math.nan if obstacle is None else max(0.0, obstacle.distance - self.navigation.radius)
+
+    def get_topdown_view(self, meters_per_pixel: float, height: float) -> np.ndarray:
+        return self.navigation.top_down(height, meters_per_pixel).cells
+
+
+def _island(index: int) -> Optional[int]:
+    return index if index >= 0 else None
+
+
+def _point(spot: Optional[Spot]) -> np.ndarray:
+    return _NOWHERE.copy() if spot is None else spot.at

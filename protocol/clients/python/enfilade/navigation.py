@@ -1,0 +1,195 @@
+"""Paths and places for an upright avatar of one size. The server walks each path before it returns it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from . import messages
+from .questions import Point, points, vec
+
+if TYPE_CHECKING:
+    from .client import Client
+
+Place = Union[Point, str]  # a point of the feet, or the name of a room, a storey or an object
+
+_DOORS = {"as_they_are": 1, "open": 2}
+_PAGE = {"spots": 10_000, "steps": 1000, "clearance": 1000}
+_GOALS = 100  # of one query
+
+
+@dataclass(frozen=True)
+class Path:
+    """A path, or the reason why not. `points` are the feet, N x 3: way points of a walk after
+    the first."""
+    found: bool
+    points: np.ndarray
+    length: float  # metres; infinite without a path
+    reason: str = ""
+    obstacle: int = 0  # the entity in the way
+    obstacle_name: str = ""
+    obstacle_at: Optional[Tuple[float, float, float]] = None
+    clear_width: Optional[float] = None  # metres: at the obstacle, or at the narrowest place of the path
+    narrowest_at: Optional[Tuple[float, float, float]] = None
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A place to stand: the feet, and the number of the island, 0 for the largest."""
+    at: np.ndarray
+    island: Optional[int]
+
+
+@dataclass(frozen=True)
+class Obstacle:
+    """The closest obstacle above the step height. `entity` 0: none within the searched distance."""
+    distance: float  # metres from the avatar's axis
+    entity: int = 0
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Map:
+    """Walkable cells seen from above: `cells[row, column]`, rows along z, columns along x."""
+    cells: np.ndarray
+    corner: Tuple[float, float, float]  # smallest x and z
+    cell: float = field(default=0.0)  # metres
+
+
+def _xyz(point: Any) -> Tuple[float, float, float]:
+    return (point.x, point.y, point.z)
+
+
+def _place(place: Place) -> Any:
+    if isinstance(place, str):
+        return messages.NavigationPlace(name=place)
+    return messages.NavigationPlace(point=vec(place))
+
+
+def _path(one: Any) -> Path:
+    return Path(
+        found=one.found, points=np.array([_xyz(p) for p in one.points], np.float64).reshape(-1, 3),
+        length=one.length if one.found else math.inf, reason=one.reason, obstacle=one.obstacle,
+        obstacle_name=one.obstacle_name,
+        obstacle_at=_xyz(one.obstacle_at) if one.HasField("obstacle_at") else None,
+        clear_width=one.clear_width or None,
+        narrowest_at=_xyz(one.narrowest_at) if one.HasField("narrowest_at") else None)
+
+
+def _spot(one: Any) -> Optional[Spot]:
+    if not one.found:
+        return None
+    return Spot(np.array(_xyz(one.at)), one.island if one.HasField("island") else None)
+
+
+class Navigation:
+    """Made by Client.navigation(). The step height is that of the world's policies."""
+
+    def __init__(self, client: "Client", radius: Optional[float], height: Optional[float],
+                 speed: Optional[float], doors: str) -> None:
+        if doors not in _DOORS:
+            raise ValueError(f"doors: unknown value {doors!r}; give as_they_are or open")
+        self._client = client
+        self.radius = 0.3 if radius is None else radius  # metres
+        self._options = {"radius": radius, "height": height, "speed": speed, "doors": _DOORS[doors]}
+        self._report: Any = None  # the last reply
+
+    def _ask(self, **query: Any) -> Tuple[Any, memoryview]:
+        reply, attachment = self._client.request(
+            navigation=messages.NavigationQuery(**self._options, **query))
+        self._report = reply.navigation
+        return reply.navigation, attachment
+
+    def path(self, start: Place, goal: Place, *, narrowest: bool = False) -> Path:
+        """Returns the path from one place to another. `narrowest`: also measures its clear width."""
+        return self.paths(start, [goal], narrowest=narrowest)[0]
+
+    def paths(self, start: Place, goals: Sequence[Place], *, narrowest: bool = False) -> List[Path]:
+        """Returns the paths from one place to many, in their order."""
+        found: List[Path] = []
+        for first in range(0, len(goals), _GOALS):
+            reply, _ = self._ask(path=messages.NavigationQuery.Path(
+                **{"from": _place(start)}, to=[_place(goal) for goal in goals[first:first + _GOALS]],
+                narrowest=narrowest))
+            found += [_path(one) for one in reply.paths]
+        return found
+
+    def geodesic_distance(self, start: Place, goal: Place) -> float:
+        """Returns the length of the path, metres; infinite without one."""
+        return self.path(start, goal).length
+
+    def random_place(self, seed: int, **options: Any) -> Optional[Spot]:
+        """As random_places() for one place."""
+        return self.random_places(1, seed, **options)[0]
+
+    def random_places(self, count: int, seed: int, *, near: Optional[Point] = None,
+                      max_distance: float = 0.0, away_from: Optional[Point] = None,
+                      min_distance: float = 0.0, island: Optional[int] = None) -> List[Optional[Spot]]:
+        """Draws places that are uniform in area; None where none was found. The same seed gives the same
+        places. `near` with `max_distance`, and `away_from` with `min_distance`, are metres in space."""
+        query = messages.NavigationQuery.Random(count=count, seed=seed, max_distance=max_distance,
+                                                min_distance=min_distance, island=island)
+        if near is not None:
+            query.near.CopyFrom(vec(near))
+        if away_from is not None:
+            query.away_from.CopyFrom(vec(away_from))
+        return [_spot(one) for one in self._ask(random=query)[0].spots]
+
+    def snap(self, point: Point, max_distance: float = 2.0) -> Optional[Spot]:
+        """Returns where an avatar at the point stands, or the closest place; None: none is so close."""
+        return self.snap_all([point], max_distance)[0]
+
+    def snap_all(self, where: Any, max_distance: float = 2.0) -> List[Optional[Spot]]:
+        """snap() of N x 3 points."""
+        array = points(where, "snap")
+        found: List[Optional[Spot]] = []
+        for first in range(0, len(array), _PAGE["spots"]):
+            page = array[first:first + _PAGE["spots"]]
+            query = messages.NavigationQuery.Snap(points=[vec(p) for p in page], max_distance=max_distance)
+            found += [_spot(one) for one in self._ask(snap=query)[0].spots]
+        return found
+
+    def is_navigable(self, point: Point, max_y_delta: float = 0.5) -> bool:
+        """Whether an avatar can stand at the point, at a height that differs by at most this."""
+        spot = self.snap(point, max_distance=max_y_delta)
+        return spot is not None and math.hypot(spot.at[0] - point[0], spot.at[2] - point[2]) < 1e-3
+
+    def try_step(self, start: Point, goal: Point, *, slide: bool = True) -> Optional[Spot]:
+        """Returns where a straight walk ends; None: an avatar cannot stand at the start."""
+        step = messages.NavigationQuery.Steps.Step(**{"from": vec(start)}, to=vec(goal))
+        return _spot(self._ask(steps=messages.NavigationQuery.Steps(steps=[step], stop=not slide))[0].spots[0])
+
+    def clearance(self, point: Point, max_distance: float = 2.0) -> Optional[Obstacle]:
+        """Returns the closest obstacle; None: an avatar cannot stand there."""
+        query = messages.NavigationQuery.Clearance(points=[vec(point)], max_distance=max_distance)
+        one = self._ask(clearance=query)[0].obstacles[0]
+        return Obstacle(one.distance, one.entity, one.name) if one.found else None
+
+    def top_down(self, height: float, cell: float = 0.05) -> Map:
+        """Returns a map of the floors within 0.5 m of a height."""
+        reply, attachment = self._ask(map=messages.NavigationQuery.Map(cell=cell, height=height))
+        cells = np.frombuffer(attachment, np.uint8).reshape(reply.map_height, reply.map_width)
+        return Map(cells.astype(bool), _xyz(reply.map_corner), cell)
+
+    def _meshes(self) -> Any:
+        if self._report is None:
+            self.snap((0.0, 0.0, 0.0))
+        return self._report
+
+    @property
+    def island_areas(self) -> List[float]:
+        """Square metres of the islands, by number: those of the largest 1000."""
+        return list(self._meshes().island_areas)
+
+    @property
+    def navigable_area(self) -> float:
+        """Square metres."""
+        return self._meshes().navigable_area
+
+    @property
+    def build_seconds(self) -> float:
+        """How long the server built the meshes of this size."""
+        return self._meshes().build_seconds

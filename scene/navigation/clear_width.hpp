@@ -1,0 +1,34 @@
+// How much space there is around places: measured with a thin prism above the step height.
+#pragma once
+
+#include <vector>
+
+#include "scene/navigation/agent.hpp"
+#include "scene/world/data/world_data.hpp"
+
+namespace enfilade::scene {
+
+inline constexpr double kMaxSideWidth = 3;  ///< metres to each side: larger is not measured
+
+/// The place of a path with the least space to its sides.
+struct NarrowPlace {
+  Vec3 position = Vec3::Zero();  ///< feet, scene frame, metres
+  double clearWidth = 0;         ///< metres, measured across the path above the step height
+};
+
+/// How far a standing agent is from what it could walk into.
+struct ObstacleDistance {
+  double distance = 0;  ///< metres from the agent's axis, above the step height
+  EntityId entity = 0;  ///< 0: none within the searched distance
+};
+
+/// The narrowest place of a line of places, of those within `maxDistance` metres of `near`.
+/// Infinite width: none was measured.
+NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agent,
+                             const std::vector<Vec3>& points, const Vec3& near, double maxDistance);
+
+/// The closest obstacle of an agent that stands at `footPosition`, up to `maxDistance` metres.
+ObstacleDistance measureObstacle(const WorldData& world, const NavigationAgent& agent,
+                                 const Vec3& footPosition, double maxDistance);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,235 @@
+#include "scene/navigation/path_finder.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <limits>
+#include <utility>
+
+#include "scene/navigation/clear_width.hpp"
+#include "scene/navigation/grid_search.hpp"
+#include "scene/navigation/stand.hpp"
+#include "scene/world/avatars/walk_velocity.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr int kMaxProposals = 12;                             // corridors to try on a mesh
+constexpr std::size_t kMaxRepairWalks = 100'000;              // of a path: some tenths of a second
+constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  // metres
+constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way around it begins
+constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
+constexpr int kMaxRepairs = 12;                          // of a leg
+constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
+constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
+
+double computeLength(const std::vector<Vec3>& points) {
+  double length = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
+  return length;
+}
+
+/// What a search has spent and met.
+struct Proof {
+  GridSearch coarse{kCoarseSpacing, 1.5, kMaxRepairWalks};
+  GridSearch fine{kFineSpacing, 0.7, kMaxRepairWalks};
+  Vec3 failedAt = Vec3::Zero();  ///< where the last proof failed
+  std::vector<Obstruction> met;
+};
+
+/// Goes around what stopped the walker on the way from the last place of `path` to `corner`, and
+/// appends places up to where it joins that way again, or up to the corner.
+bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corner,
+              NavigationPath& path, Proof& proof) {
+  const Vec3 legStart = path.points.back();
+  const Vec3 way = projectToGround(corner - legStart);
+  const double length = way.norm();
+  if (!(length > 0)) return false;
+  const Vec3 direction = way / length;
+  const double stopped = computeGroundDistance(legStart, stop.footPosition);
+  if (stopped > 2 * kStandOff) {  // begin shortly before the obstacle
+    finder.walker.returnTo(legStart);
+    const Vec3 before = legStart + (stopped - kStandOff) * direction;
+    if (finder.walker.walkTo(before).kind == WalkOutcome::Kind::arrived)
+      path.points.push_back(finder.walker.footPosition());
+  }
+  const Vec3 from = path.points.back();
+  std::vector<Vec3> targets;
+  for (const double beyond : kRejoinDistances) {
+    const double along = (stopped + beyond) / length;
+    if (along >= 1) break;
+    if (const auto place = standNear(finder.walker, legStart + along * (corner - legStart)))
+      targets.push_back(*place);
+  }
+  targets.push_back(corner);
+  for (GridSearch* search : {&proof.coarse, &proof.fine}) {
+    for (const Vec3& target : targets) {
+      auto places = findGridPath(finder.walker, from, target, *search);
+      if (!places) continue;
+      path.points.insert(path.points.end(), places->begin() + 1, places->end());
+      return true;
+    }
+  }
+  return false;
+}
+
+/// Walks from corner to corner, with repairs. Appends the places to `path`, which has the first
+/// one.
+bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance clearance,
+               NavigationPath& path, Proof& proof) {
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const bool isLast = i + 1 == corners.size();
+    for (int repairs = 0;; ++repairs) {
+      const Vec3 from = path.points.back();
+      if (!isLast && computeGroundDistance(from, corners[i]) < kArrivalDistance) break;
+      finder.walker.returnTo(from);
+      const WalkOutcome outcome = finder.walker.walkTo(corners[i]);
+      const bool isHigh = std::abs(outcome.footPosition.y() - corners[i].y()) > 1;
+      if (outcome.kind == WalkOutcome::Kind::arrived && !isHigh) {
+        path.points.push_back(outcome.footPosition);
+        break;
+      }
+      proof.failedAt = outcome.footPosition;
+      if (repairs == 0 && !isLast && clearance == Clearance::scarce) {
+        const auto place = standNear(finder.walker, corners[i]);
+        if (!place) break;  // the next corner may be reached without this one
+        corners[i] = *place;
+      }
+      if (repairs < kMaxRepairs && goAround(finder, outcome, corners[i], path, proof)) continue;
+      proof.met.push_back({outcome.obstacle, outcome.footPosition, 0});
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Closes the portal of a corridor that is closest to a failure; false: the corridor has none.
+bool closeNearestPortal(NavigationMesh& mesh, const Corridor& corridor, const Vec3& failure) {
+  const auto& polygons = corridor.polygons;
+  if (polygons.size() < 2) return false;
+  std::size_t at = 0;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < polygons.size(); ++i) {
+    const double distance =
+        (mesh.portalMiddle(polygons[i], polygons[i + 1]) - failure).squaredNorm();
+    if (distance < least) least = distance, at = i;
+  }
+  mesh.closePortal(polygons[at], polygons[at + 1]);
+  return true;
+}
+
+NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Clearance clearance,
+                          const Vec3& from, const Vec3& to, Proof& proof) {
+  const Vec3 extent(3 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
+                    3 * finder.agent.radius);
+  const auto start = mesh.findNearest(from, extent), goal = mesh.findNearest(to, extent);
+  NavigationPath path;
+  if (!start || !goal) return path;
+  for (int proposal = 0; proposal < kMaxProposals; ++proposal) {
+    const auto corridor = mesh.findCorridor(*start, *goal);
+    if (!corridor) return path;
+    std::vector<Vec3> corners = mesh.straighten(*corridor, start->point, goal->point);
+    if (corners.size() > 1) corners.erase(corners.begin(), corners.begin() + 1);
+    if (!corners.empty()) corners.pop_back();
+    corners.push_back(to);
+    path.points = {from};
+    if (proveLegs(finder, corners, clearance, path, proof)) {
+      path.points = shortenPath(finder.walker, path.points);
+      path.length = computeLength(path.points);
+      return path;
+    }
+    path.points.clear();
+    if (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0) return path;  // proves nothing
+    if (!closeNearestPortal(mesh, *corridor, proof.failedAt)) return path;
+  }
+  return path;
+}
+
+/// Finds what is in the way on the mesh for anything thinner and without bodies.
+void explain(const PathFinder& finder, const Vec3& from, const Vec3& to, NavigationPath& path) {
+  const NavigationMesh& mesh = finder.unobstructed();
+  const Vec3 extent(2 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
+                    2 * finder.agent.radius);
+  const auto first = mesh.findNearest(from, extent);
+  const auto last = mesh.findNearest(to, extent);
+  const auto corridor = first && last ? mesh.findCorridor(*first, *last) : std::nullopt;
+  if (!corridor) {
+    path.reason = "no floor, step or stair leads there";
+    return;
+  }
+  std::vector<Vec3> corners = mesh.straighten(*corridor, first->point, last->point);
+  corners.push_back(to);
+  Vec3 at = from;
+  for (const Vec3& corner : corners) {
+    const auto place = standNear(finder.walker, corner);
+    if (!place) continue;
+    GridSearch search{kCoarseSpacing, 1, 20'000};
+    finder.walker.returnTo(at);
+    const WalkOutcome outcome = finder.walker.walkTo(*place);
+    if (outcome.kind == WalkOutcome::Kind::arrived ||
+        findGridPath(finder.walker, at, *place, search)) {
+      at = *place;
+      continue;
+    }
+    path.obstruction = Obstruction{outcome.obstacle, outcome.footPosition, 0};
+    std::vector<Vec3> middles{first->point};
+    for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
+      middles.push_back(mesh.portalMiddle(corridor->polygons[i - 1], corridor->polygons[i]));
+    middles.push_back(last->point);
+    const double width = measureNarrowest(finder.world, finder.agent, middles, outcome.footPosition,
+                                          kMaxWidthDistance)
+                             .clearWidth;
+    if (width < 2 * finder.agent.radius + 0.05) path.obstruction->clearWidth = width;
+    break;
+  }
+  if (!path.obstruction) {
+    path.reason = "no way was found within the limits of the search";
+    return;
+  }
+  const std::string name = finder.world.findEntityName(path.obstruction->entity);
+  path.reason = (name.empty() ? std::string("the floor ends") : name + " is in the way");
+  if (path.obstruction->clearWidth > 0) {
+    std::array<char, 96> text{};
+    std::snprintf(text.data(), text.size(), ": clear width %.3f m, needs %.3f",
+                  path.obstruction->clearWidth, 2 * finder.agent.radius);
+    path.reason += text.data();
+  }
+}
+
+}  // namespace
+
+NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& to) {
+  NavigationPath none;
+  if (const auto error = finder.walker.place(from, kMaxStandDrop)) {
+    none.reason = "at the start " + *error;
+    return none;
+  }
+  const Vec3 start = finder.walker.footPosition();
+  if (const auto error = finder.walker.place(to, kMaxStandDrop)) {
+    none.reason = "at the goal " + *error;
+    return none;
+  }
+  const Vec3 goal = finder.walker.footPosition();
+  Proof proof;
+  NavigationPath best = findPathOn(finder, finder.ample, Clearance::ample, start, goal, proof);
+  const Vec3 extent(finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
+                    finder.agent.radius);
+  const auto first = finder.scarce.findNearest(start, extent),
+             last = finder.scarce.findNearest(goal, extent);
+  const auto shortcut = first && last ? finder.scarce.findCorridor(*first, *last) : std::nullopt;
+  if (shortcut && (!best.found() ||
+                   computeLength(finder.scarce.straighten(*shortcut, first->point, last->point)) *
+                           kWorthTrying <
+                       best.length)) {
+    NavigationPath other = findPathOn(finder, finder.scarce, Clearance::scarce, start, goal, proof);
+    if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
+  }
+  if (!best.found()) {
+    if (!proof.met.empty()) best.obstruction = proof.met.front();
+    explain(finder, start, goal, best);
+  }
+  return best;
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,44 @@
+// Finds paths on the meshes of an agent, and proves them by walking.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "scene/navigation/navigation_mesh.hpp"
+#include "scene/navigation/walker.hpp"
+
+namespace enfilade::scene {
+
+/// What ends the only ways to a goal.
+struct Obstruction {
+  EntityId entity = 0;           ///< that the walker hit; 0: the floor ends
+  Vec3 position = Vec3::Zero();  ///< of the walker's feet there, scene frame, metres
+  double clearWidth = 0;         ///< metres between the obstacles there; 0: not measured
+};
+
+struct NavigationPath {
+  std::vector<Vec3> points;  ///< feet, scene frame, metres: way points of a Walk; empty: none found
+  double length = 0;         ///< metres, in space, along `points`
+  std::string reason;        ///< without a path: why
+  std::optional<Obstruction> obstruction;
+
+  bool found() const { return !points.empty(); }
+};
+
+/// What a search uses. A search may close portals of the meshes.
+struct PathFinder {
+  const WorldData& world;
+  const NavigationAgent& agent;
+  Walker& walker;
+  NavigationMesh& ample;
+  NavigationMesh& scarce;
+  /// The mesh of Clearance::none; built at the first call.
+  std::function<const NavigationMesh&()> unobstructed;
+};
+
+/// A path from where an agent at `from` stands to where it stands at `to`.
+NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& to);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,33 @@
+#include "scene/navigation/stand.hpp"
+
+#include <array>
+#include <cmath>
+#include <numbers>
+
+namespace enfilade::scene {
+
+std::optional<Vec3> standAt(Walker& walker, const Vec3& point, double maxDrop) {
+  if (walker.place(point, maxDrop)) return std::nullopt;
+  return walker.footPosition();
+}
+
+std::optional<Vec3> standNear(Walker& walker, const Vec3& point) {
+  constexpr std::array<double, 5> kRings{0.05, 0.1, 0.2, 0.3, 0.4};  // metres
+  constexpr int kDirections = 8;
+  const auto place = [&](const Vec3& aside) {
+    const Vec3 above = point + aside + Vec3(0, kHeightError, 0);
+    auto found = standAt(walker, above, 2 * kHeightError);
+    if (found && std::abs(found->y() - point.y()) > kHeightError) found.reset();
+    return found;
+  };
+  if (const auto found = place(Vec3::Zero())) return found;
+  for (const double ring : kRings) {
+    for (int i = 0; i < kDirections; ++i) {
+      const double angle = 2 * std::numbers::pi / kDirections * i;
+      if (const auto found = place(ring * Vec3(std::cos(angle), 0, std::sin(angle)))) return found;
+    }
+  }
+  return std::nullopt;
+}
+
+}  // namespace enfilade::scene

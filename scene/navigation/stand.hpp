@@ -1,0 +1,23 @@
+// Places where an agent stands.
+#pragma once
+
+#include <optional>
+
+#include "scene/navigation/walker.hpp"
+
+namespace enfilade::scene {
+
+/// metres. Users give the floor's own height, or a little more.
+inline constexpr double kMaxStandDrop = 0.6;
+/// metres. Heights of polygons are those of voxels.
+inline constexpr double kHeightError = 0.3;
+
+/// Where the walker stands if it is put down at `point`; nullopt: no room, or no floor within
+/// `maxDrop` metres below.
+std::optional<Vec3> standAt(Walker& walker, const Vec3& point, double maxDrop = kMaxStandDrop);
+
+/// A place within 0.4 m of a point of a mesh, at about its height: polygons for scarce clearance
+/// are too close to walls.
+std::optional<Vec3> standNear(Walker& walker, const Vec3& point);
+
+}  // namespace enfilade::scene

@@ -1,0 +1,289 @@
+#include "server/navigation/navigation_service.hpp"
+
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <random>
+#include <string>
+
+#include "scene/navigation/open_doors.hpp"
+#include "scene/navigation/place_names.hpp"
+#include "server/messages/world_messages.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using scene::Vec3;
+
+constexpr std::size_t kMaxEntries = 8;         // sizes whose meshes are kept
+constexpr std::size_t kMaxIslandAreas = 1000;  // in a reply
+constexpr double kNextToObject = 1;            // metres
+constexpr double kMaxCoordinate = 1e7;         // metres
+
+v1::Error makeFieldError(const std::string& field, const std::string& remedy,
+                         v1::ErrorCode code = v1::ERROR_BAD_MESSAGE) {
+  return makeError(code, "navigation." + field + ": " + remedy, "navigation." + field);
+}
+
+std::optional<v1::Error> validateNumber(const std::string& field, double value, double low,
+                                        double high) {
+  if (value >= low && value <= high) return std::nullopt;
+  char text[96];
+  std::snprintf(text, sizeof text, "give %g to %g, not %g", low, high, value);
+  return makeFieldError(field, text);
+}
+
+std::optional<v1::Error> validateCount(const std::string& field, std::int64_t count,
+                                       std::int64_t limit) {
+  if (count >= 1 && count <= limit) return std::nullopt;
+  return makeFieldError(field, "give 1 to " + std::to_string(limit),
+                        count < 1 ? v1::ERROR_BAD_MESSAGE : v1::ERROR_TOO_LARGE);
+}
+
+std::optional<v1::Error> validatePoint(const std::string& field, const v1::Vec3& point) {
+  const Vec3 place = vectorFromProto(point);
+  if (place.allFinite() && place.cwiseAbs().maxCoeff() <= kMaxCoordinate) return std::nullopt;
+  return makeFieldError(field, "give finite coordinates of at most 1e7 m");
+}
+
+bool equalSettings(const scene::WorldSettings& a, const scene::WorldSettings& b) {
+  return a.contactOffset == b.contactOffset && a.stepHeight == b.stepHeight &&
+         a.walkableNormalY == b.walkableNormalY && a.gravity == b.gravity &&
+         a.maxSpeed == b.maxSpeed && a.tickDuration == b.tickDuration && a.sliding == b.sliding;
+}
+
+/// Writes the answers to one query into its reply.
+struct Answer {
+  const scene::Scene& scene;
+  scene::Navigation& navigation;
+  v1::NavigationReply& reply;
+
+  std::variant<Vec3, v1::Error> resolve(const v1::NavigationPlace& place,
+                                        const std::string& field) const {
+    if (place.has_point()) {
+      if (auto error = validatePoint(field + ".point", place.point())) return std::move(*error);
+      return vectorFromProto(place.point());
+    }
+    if (place.name().empty()) return makeFieldError(field, "give a point or a name");
+    const auto box =
+        scene::findNamedPlace(scene, place.name(), navigation.agent().radius + kNextToObject);
+    if (!box)
+      return makeFieldError(
+          field + ".name",
+          "no room, storey or object is named '" + place.name() + "', or its extent is not known",
+          v1::ERROR_UNKNOWN_ENTITY);
+    const auto found = navigation.findPlaceIn(*box);
+    if (!found)
+      return makeFieldError(field + ".name", "there is no free place at '" + place.name() + "'",
+                            v1::ERROR_REFUSED_COMMAND);
+    return *found;
+  }
+
+  void addSpot(const std::optional<Vec3>& place) const {
+    v1::NavigationSpot& spot = *reply.add_spots();
+    spot.set_found(place.has_value());
+    if (!place) return;
+    *spot.mutable_at() = toProto(*place);
+    if (const auto island = navigation.islandOf(*place)) spot.set_island(*island);
+  }
+
+  void addPath(const scene::NavigationPath& path, bool measuresWidth) const {
+    v1::NavigationPath& message = *reply.add_paths();
+    message.set_found(path.found());
+    for (const Vec3& point : path.points) *message.add_points() = toProto(point);
+    message.set_length(path.length);
+    message.set_reason(path.reason);
+    if (path.obstruction) {
+      message.set_obstacle(path.obstruction->entity);
+      message.set_obstacle_name(navigation.findEntityName(path.obstruction->entity));
+      *message.mutable_obstacle_at() = toProto(path.obstruction->position);
+      message.set_clear_width(path.obstruction->clearWidth);
+    }
+    if (!path.found() || !measuresWidth) return;
+    const auto narrowest = navigation.findNarrowest(path.points);
+    if (!narrowest) return;
+    message.set_clear_width(narrowest->clearWidth);
+    *message.mutable_narrowest_at() = toProto(narrowest->position);
+  }
+
+  std::optional<v1::Error> operator()(const v1::NavigationQuery::Path& query) const {
+    if (auto error = validateCount("path.to", query.to_size(), 100)) return error;
+    const auto from = resolve(query.from(), "path.from");
+    if (const auto* error = std::get_if<v1::Error>(&from)) return *error;
+    for (int i = 0; i < query.to_size(); ++i) {
+      const auto to = resolve(query.to(i), "path.to[" + std::to_string(i) + "]");
+      if (const auto* error = std::get_if<v1::Error>(&to)) return *error;
+      addPath(navigation.findPath(std::get<Vec3>(from), std::get<Vec3>(to)), query.narrowest());
+    }
+    return std::nullopt;
+  }
+
+  std::optional<v1::Error> operator()(const v1::NavigationQuery::Random& query) const {
+    if (auto error = validateCount("random.count", query.count(), 10'000)) return error;
+    scene::RandomPlace wanted;
+    if (query.has_near()) {
+      if (auto error = validatePoint("random.near", query.near())) return error;
+      if (auto error = validateNumber("random.max_distance", query.max_distance(), 1e-3, 1e5))
+        return error;
+      wanted.near = vectorFromProto(query.near());
+      wanted.maxDistance = query.max_distance();
+    }
+    if (query.has_away_from()) {
+      if (auto error = validatePoint("random.away_from", query.away_from())) return error;
+      if (auto error = validateNumber("random.min_distance", query.min_distance(), 0, 1e5))
+        return error;
+      wanted.awayFrom = vectorFromProto(query.away_from());
+      wanted.minDistance = query.min_distance();
+    }
+    if (query.has_island()) wanted.island = query.island();
+    std::mt19937_64 random(query.seed());
+    for (std::uint32_t i = 0; i < query.count(); ++i)
+      addSpot(navigation.findRandomPlace(random, wanted));
+    return std::nullopt;
+  }
+
+  std::optional<v1::Error> operator()(const v1::NavigationQuery::Snap& query) const {
+    if (auto error = validateCount("snap.points", query.points_size(), 10'000)) return error;
+    if (auto error = validateNumber("snap.max_distance", query.max_distance(), 0, 100))
+      return error;
+    for (int i = 0; i < query.points_size(); ++i) {
+      const std::string field = "snap.points[" + std::to_string(i) + "]";
+      if (auto error = validatePoint(field, query.points(i))) return error;
+      addSpot(navigation.snap(vectorFromProto(query.points(i)), query.max_distance()));
+    }
+    return std::nullopt;
+  }
+
+  std::optional<v1::Error> operator()(const v1::NavigationQuery::Steps& query) const {
+    if (auto error = validateCount("steps.steps", query.steps_size(), 1000)) return error;
+    for (int i = 0; i < query.steps_size(); ++i) {
+      const std::string field = "steps.steps[" + std::to_string(i) + "].";
+      const auto& step = query.steps(i);
+      if (auto error = validatePoint(field + "from", step.from())) return error;
+      if (auto error = validatePoint(field + "to", step.to())) return error;
+      addSpot(navigation.tryStep(vectorFromProto(step.from()), vectorFromProto(step.to()),
+                                 !query.stop()));
+    }
+    return std::nullopt;
+  }
+
+  std::optional<v1::Error> operator()(const v1::NavigationQuery::Clearance& query) const {
+    if (auto error = validateCount("clearance.points", query.points_size(), 1000)) return error;
+    if (auto error = validateNumber("clearance.max_distance", query.max_distance(), 0.1, 20))
+      return error;
+    for (int i = 0; i < query.points_size(); ++i) {
+      const std::string field = "clearance.points[" + std::to_string(i) + "]";
+      if (auto error = validatePoint(field, query.points(i))) return error;
+      const auto found =
+          navigation.findObstacle(vectorFromProto(query.points(i)), query.max_distance());
+      v1::NavigationReply::Obstacle& obstacle = *reply.add_obstacles();
+      obstacle.set_found(found.has_value());
+      if (!found) continue;
+      obstacle.set_distance(found->distance);
+      obstacle.set_entity(found->entity);
+      obstacle.set_name(navigation.findEntityName(found->entity));
+    }
+    return std::nullopt;
+  }
+
+  std::optional<v1::Error> writeMap(const v1::NavigationQuery::Map& query,
+                                    std::vector<std::uint8_t>& attachment) const {
+    if (auto error = validateNumber("map.cell", query.cell(), 0.01, 10)) return error;
+    if (auto error = validateNumber("map.height", query.height(), -1e7, 1e7)) return error;
+    try {
+      scene::NavigationMap map = navigation.drawMap(query.cell(), query.height());
+      *reply.mutable_map_corner() = toProto(map.corner);
+      reply.set_map_width(map.width);
+      reply.set_map_height(map.height);
+      attachment = std::move(map.cells);
+    } catch (const std::invalid_argument& error) {
+      return makeFieldError("map.cell", error.what(), v1::ERROR_TOO_LARGE);
+    }
+    return std::nullopt;
+  }
+};
+
+void addReport(scene::Navigation& navigation, v1::NavigationReply& reply) {
+  const scene::NavigationReport report = navigation.report();
+  reply.set_navigable_area(report.area);
+  reply.set_build_seconds(report.seconds);
+  const std::vector<double> areas = navigation.islandAreas();
+  for (std::size_t i = 0; i < std::min(areas.size(), kMaxIslandAreas); ++i)
+    reply.add_island_areas(areas[i]);
+}
+
+}  // namespace
+
+scene::Navigation& NavigationService::prepare(const scene::NavigationAgent& agent, bool doorsOpen,
+                                              const NavigationState& state) {
+  const auto known = std::ranges::find_if(entries_, [&](const Entry& entry) {
+    return entry.agent.radius == agent.radius && entry.agent.height == agent.height &&
+           entry.agent.speed == agent.speed && entry.doorsOpen == doorsOpen &&
+           equalSettings(entry.settings, state.settings);
+  });
+  if (known != entries_.end()) {
+    entries_.splice(entries_.begin(), entries_, known);
+    if (!doorsOpen) known->navigation->update(*state.snapshot);
+    return *known->navigation;
+  }
+  const auto snapshot =
+      doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
+  auto navigation =
+      std::make_unique<scene::Navigation>(scene_, state.settings, agent, snapshot.get());
+  const scene::NavigationReport report = navigation->report();
+  spdlog::info("navigation: radius {} m, height {} m: {:.1f} m2 in {} islands, built in {:.2f} s",
+               agent.radius, agent.height, report.area, report.islands, report.seconds);
+  entries_.push_front({agent, state.settings, doorsOpen, std::move(navigation)});
+  if (entries_.size() > kMaxEntries) entries_.pop_back();
+  return *entries_.front().navigation;
+}
+
+std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
+    const v1::NavigationQuery& query, const NavigationState& state,
+    std::vector<std::uint8_t>& attachment) {
+  scene::NavigationAgent agent;
+  if (query.has_radius()) agent.radius = query.radius();
+  if (query.has_height()) agent.height = query.height();
+  if (query.has_speed()) agent.speed = query.speed();
+  if (auto error = validateNumber("radius", agent.radius, 0.05, 5)) return std::move(*error);
+  if (auto error = validateNumber("height", agent.height, 0.2, 10)) return std::move(*error);
+  if (auto error = validateNumber("speed", agent.speed, 0.01, 20)) return std::move(*error);
+  if (query.query_case() == v1::NavigationQuery::QUERY_NOT_SET)
+    return makeFieldError("query", "give path, random, snap, steps, clearance or map");
+  const bool doorsOpen = query.doors() == v1::NavigationQuery::DOORS_OPEN;
+  scene::Navigation& navigation = prepare(agent, doorsOpen, state);
+  v1::NavigationReply reply;
+  reply.set_tick(state.snapshot->tick);
+  reply.set_time(state.snapshot->time);
+  const Answer answer{*scene_, navigation, reply};
+  std::optional<v1::Error> error;
+  switch (query.query_case()) {
+    case v1::NavigationQuery::kPath:
+      error = answer(query.path());
+      break;
+    case v1::NavigationQuery::kRandom:
+      error = answer(query.random());
+      break;
+    case v1::NavigationQuery::kSnap:
+      error = answer(query.snap());
+      break;
+    case v1::NavigationQuery::kSteps:
+      error = answer(query.steps());
+      break;
+    case v1::NavigationQuery::kClearance:
+      error = answer(query.clearance());
+      break;
+    case v1::NavigationQuery::kMap:
+      error = answer.writeMap(query.map(), attachment);
+      break;
+    case v1::NavigationQuery::QUERY_NOT_SET:
+      break;
+  }
+  if (error) return std::move(*error);
+  addReport(navigation, reply);
+  return reply;
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,48 @@
+// Answers navigation queries of clients. Keeps the navigation meshes of the sizes that were asked
+// for last. Not thread-safe.
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <variant>
+#include <vector>
+
+#include "protocol/enfilade.pb.h"
+#include "scene/navigation/navigation.hpp"
+
+namespace enfilade::server {
+
+/// The state of a world, for a query.
+struct NavigationState {
+  std::shared_ptr<const scene::Snapshot> snapshot;
+  scene::WorldSettings settings;
+};
+
+class NavigationService {
+ public:
+  explicit NavigationService(std::shared_ptr<const scene::Scene> scene)
+      : scene_(std::move(scene)) {}
+
+  /// Returns the reply, or an error that names the field of the query. A map is written to
+  /// `attachment`.
+  std::variant<v1::NavigationReply, v1::Error> answer(const v1::NavigationQuery& query,
+                                                      const NavigationState& state,
+                                                      std::vector<std::uint8_t>& attachment);
+
+ private:
+  struct Entry {
+    scene::NavigationAgent agent;
+    scene::WorldSettings settings;
+    bool doorsOpen = false;
+    std::unique_ptr<scene::Navigation> navigation;
+  };
+  /// The navigation of a size, brought to the state of the query.
+  scene::Navigation& prepare(const scene::NavigationAgent& agent, bool doorsOpen,
+                             const NavigationState& state);
+
+  std::shared_ptr<const scene::Scene> scene_;
+  std::list<Entry> entries_;  ///< most recently used first
+};
+
+}  // namespace enfilade::server

@@ -1,0 +1,139 @@
+"""Navigation by the Python client: paths, places, maps, and habitat-sim's names."""
+
+import math
+import unittest
+
+import numpy as np
+
+import enfilade
+from enfilade.compat import MultiGoalShortestPath, PathFinder, ShortestPath
+from room import RoomCase
+
+
+class NavigationTest(RoomCase):
+    def setUp(self):
+        super().setUp()
+        self.navigation = self.client.navigation()
+
+    def test_a_path_goes_around_the_wall_and_is_walked(self):
+        path = self.navigation.path((2, 0, 0), (8, 0, 0), narrowest=True)
+        self.assertTrue(path.found, path.reason)
+        self.assertAlmostEqual(
+            path.length, float(np.linalg.norm(np.diff(path.points, axis=0), axis=1).sum()))
+        self.assertGreater(path.length, 2 * math.hypot(3, 4))
+        self.assertLess(path.length, 2 * math.hypot(3, 4.3) + 1)
+        ann = self.client.spawn("ann", at=path.points[0])
+        ann.walk(*path.points[1:])
+        self.client.run_until_idle()
+        self.assertEqual([one.kind for one in self.client.notices()][-1], "arrived")
+
+    def test_go_walks_to_a_point_and_to_an_object(self):
+        ann = self.client.spawn("ann", at=(2, 0, 0))
+        ann.go((8, 0, 0), speed=3)
+        ann.go("column")
+        self.client.run_until_idle()
+        self.assertEqual([one.kind for one in self.client.notices()], ["spawned", "arrived", "arrived"])
+        feet = self.client.step(1, avatars=True).avatars["ann"].feet
+        self.assertLess(math.hypot(feet[0], feet[2] - 6), 2)
+
+    def test_go_is_refused_with_the_reason(self):
+        ann = self.client.spawn("ann", at=(2, 0, 0))
+        with self.assertRaises(enfilade.ServerError) as raised:
+            ann.go((2, 5, 0))
+        self.assertIn("at the goal", str(raised.exception))
+        with self.assertRaises(enfilade.ServerError) as raised:
+            ann.go("nowhere")
+        self.assertIn("'nowhere'", str(raised.exception))
+
+    def test_an_unreachable_goal_has_a_reason(self):
+        path = self.navigation.path((2, 0, 0), (5.1, 3.1, 0))
+        self.assertFalse(path.found)
+        self.assertEqual(path.length, math.inf)
+        self.assertEqual(len(path.points), 0)
+        self.assertTrue(path.reason)
+        self.assertEqual(self.navigation.geodesic_distance((2, 0, 0), (5.1, 3.1, 0)), math.inf)
+
+    def test_random_places_repeat_with_the_seed(self):
+        places = self.navigation.random_places(50, 3)
+        self.assertTrue(all(place is not None for place in places))
+        again = self.navigation.random_places(50, 3)
+        np.testing.assert_array_equal([p.at for p in places], [p.at for p in again])
+        near = self.navigation.random_places(20, 4, near=(0, 0, 0), max_distance=2)
+        self.assertTrue(all(np.linalg.norm(p.at) <= 2 for p in near))
+        self.assertTrue(all(self.navigation.is_navigable(p.at) for p in near))
+
+    def test_snap_step_and_clearance(self):
+        self.assertIsNone(self.navigation.snap((5.1, 1, 0), 0.2))
+        spot = self.navigation.snap((4.9, 0, 0), 1)
+        self.assertAlmostEqual(spot.at[0], 4.7, delta=0.15)
+        self.assertEqual(spot.island, 0)
+        self.assertFalse(self.navigation.is_navigable((4.9, 0, 0)))
+        self.assertAlmostEqual(self.navigation.try_step((3, 0, 0), (6, 0, 0), slide=False).at[0], 4.7, delta=0.02)
+        self.assertIsNone(self.navigation.try_step((5.1, 0, 0), (6, 0, 0)))
+        obstacle = self.navigation.clearance((4, 0, 0))
+        self.assertEqual(obstacle.name, "wall")
+        self.assertAlmostEqual(obstacle.distance, 1, delta=0.01)
+
+    def test_a_map_shows_the_wall(self):
+        top = self.navigation.top_down(0.0, 0.1)
+        column = lambda x: int((x - top.corner[0]) / top.cell)
+        row = lambda z: int((z - top.corner[2]) / top.cell)
+        self.assertTrue(top.cells[row(0), column(2)])
+        self.assertFalse(top.cells[row(0), column(5.1)])
+        self.assertAlmostEqual(top.cells.sum() * 0.01, self.navigation.navigable_area, delta=8)
+
+    def test_wrong_fields_are_named(self):
+        with self.assertRaises(enfilade.ServerError) as raised:
+            self.client.navigation(radius=50).path((0, 0, 0), (1, 0, 0))
+        self.assertEqual(raised.exception.field, "navigation.radius")
+        with self.assertRaises(enfilade.ServerError) as raised:
+            self.navigation.top_down(0.0, 0.001)
+        self.assertEqual(raised.exception.field, "navigation.map.cell")
+        with self.assertRaises(enfilade.ServerError) as raised:
+            self.navigation.path((0, 0, 0), "attic")
+        self.assertEqual(raised.exception.field, "navigation.path.to[0].name")
+        with self.assertRaises(ValueError):
+            self.client.navigation(doors="ajar")
+
+
+class CompatTest(RoomCase):
+    def setUp(self):
+        super().setUp()
+        self.finder = PathFinder(self.client.navigation(radius=0.1, height=1.5), seed=1)
+
+    def test_shortest_paths(self):
+        path = ShortestPath()
+        path.requested_start, path.requested_end = (2, 0, 0), (8, 0, 0)
+        self.assertTrue(self.finder.find_path(path))
+        self.assertGreaterEqual(len(path.points), 3)
+        self.assertGreater(path.geodesic_distance, 10)
+        many = MultiGoalShortestPath()
+        many.requested_start, many.requested_ends = (2, 0, 0), [(8, 0, 0), (3, 0, 0), (5.1, 9, 0)]
+        self.assertTrue(self.finder.find_path(many))
+        self.assertEqual(many.closest_end_point_index, 1)
+        self.assertAlmostEqual(many.geodesic_distance, 1, delta=1e-3)
+        path.requested_end = (5.1, 9, 0)
+        self.assertFalse(self.finder.find_path(path))
+        self.assertEqual(path.geodesic_distance, math.inf)
+
+    def test_points_and_islands(self):
+        point = self.finder.get_random_navigable_point()
+        self.assertTrue(self.finder.is_navigable(point))
+        self.finder.seed(5)
+        first = self.finder.get_random_navigable_point_near((0, 0, 0), 3)
+        self.finder.seed(5)
+        np.testing.assert_array_equal(first, self.finder.get_random_navigable_point_near((0, 0, 0), 3))
+        self.assertTrue(np.isnan(self.finder.snap_point((50, 0, 0))).all())
+        self.assertEqual(self.finder.get_island((2, 0, 0)), 0)
+        self.assertGreaterEqual(self.finder.num_islands, 1)
+        self.assertGreater(self.finder.island_area(0), 300)
+        self.assertLessEqual(self.finder.island_area(0), self.finder.navigable_area + 1e-9)
+        self.assertAlmostEqual(self.finder.distance_to_closest_obstacle((4, 0, 0)), 0.9, delta=0.01)
+        end = self.finder.try_step((3, 0, 1), (6, 0, 2))
+        stop = self.finder.try_step_no_sliding((3, 0, 1), (6, 0, 2))
+        self.assertGreater(end[2], stop[2])
+        self.assertEqual(self.finder.get_topdown_view(0.1, 0).dtype, bool)
+
+
+if __name__ == "__main__":
+    unittest.main()

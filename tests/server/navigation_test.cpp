@@ -1,0 +1,110 @@
+// Tests of navigation through a connection, in scripts and by `enfilade route`.
+#include <nlohmann/json.hpp>
+
+#include "tests/server/program_fixture.hpp"
+#include "tests/server/served_room.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+v1::Command go(const std::string& avatar, const v1::Vec3& to) {
+  v1::Command command;
+  command.set_avatar(avatar);
+  *command.mutable_go()->mutable_to()->mutable_point() = to;
+  return command;
+}
+
+class NavigationRequests : public ServedRoom {};
+
+TEST_F(NavigationRequests, AnObserverMayAskAndTheReplyHasTheTick) {
+  serve();
+  auto ann = client("ann");
+  v1::ClientMessage step;
+  step.mutable_step()->set_ticks(3);
+  ann.request(std::move(step));
+  v1::ClientMessage request;
+  v1::NavigationQuery& query = *request.mutable_navigation();
+  query.set_tick(3);
+  *query.mutable_path()->mutable_from()->mutable_point() = vec(2, 0, 0);
+  *query.mutable_path()->add_to()->mutable_point() = vec(8, 0, 0);
+  query.mutable_path()->add_to()->set_name("room_column");
+  const v1::NavigationReply reply = ann.request(request).navigation();
+  EXPECT_EQ(reply.tick(), 3u);
+  ASSERT_EQ(reply.paths_size(), 2);
+  EXPECT_TRUE(reply.paths(0).found()) << reply.paths(0).reason();
+  EXPECT_TRUE(reply.paths(1).found()) << reply.paths(1).reason();
+  EXPECT_GE(reply.paths(0).points_size(), 3);
+  EXPECT_EQ(reply.island_areas_size(), 1);
+  query.set_tick(2);
+  EXPECT_THROW(ann.request(request), protocol::ProtocolError);
+}
+
+TEST_F(NavigationRequests, GoIsAWalkAfterTheQueuedOrders) {
+  serve();
+  auto ann = client("ann");
+  v1::Subscribe subscription;
+  subscription.set_notices(true);
+  ann.subscribe(subscription);
+  EXPECT_FALSE(ann.command(spawn("ann", 2, 0, 0)));
+  EXPECT_FALSE(ann.command(go("ann", vec(8, 0, 0))));
+  EXPECT_FALSE(ann.command(go("ann", vec(2, 0, 0))));
+  const auto refused = ann.command(go("ann", vec(5.1, 1, 0)));
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->field(), "go.to");
+  EXPECT_TRUE(ann.command(go("bob", vec(2, 0, 0))));
+  int arrived = 0;
+  for (int i = 0; i < 60 && arrived < 2; ++i) {
+    ann.step(60);
+    for (const v1::ServerMessage& message : ann.takeEvents()) {
+      for (const v1::Notice& notice : message.events().notices()) {
+        EXPECT_NE(notice.kind(), v1::Notice::KIND_BLOCKED) << notice.text();
+        arrived += notice.kind() == v1::Notice::KIND_ARRIVED ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_EQ(arrived, 2);
+}
+
+class Route : public ProgramFixture {};
+
+TEST_F(Route, PrintsAPathItsLengthAndItsNarrowestPlace) {
+  const Ended ended = run({"route", path("room.obj"), "2,0,0", "8,0,0", "--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const auto report = nlohmann::json::parse(ended.out);
+  EXPECT_TRUE(report.at("found").get<bool>());
+  EXPECT_GT(report.at("length").get<double>(), 10);
+  EXPECT_GE(report.at("points").size(), 3u);
+  const Ended text = run({"route", path("room.obj"), "2,0,0", "object:room_column"});
+  ASSERT_EQ(text.code, 0) << text.err;
+  EXPECT_NE(text.out.find(" m from 2,0,0 to object:room_column"), std::string::npos) << text.out;
+}
+
+TEST_F(Route, WithoutAPathItExitsWithThreeAndTheReason) {
+  const Ended ended = run({"route", path("room.obj"), "2,0,0", "5.1,3.05,0", "--json"});
+  EXPECT_EQ(ended.code, 3) << ended.err;
+  const auto report = nlohmann::json::parse(ended.out);
+  EXPECT_FALSE(report.at("found").get<bool>());
+  EXPECT_FALSE(report.at("reason").get<std::string>().empty());
+  const Ended unknown = run({"route", path("room.obj"), "2,0,0", "attic"});
+  EXPECT_EQ(unknown.code, 1);
+  EXPECT_NE(unknown.err.find("TO: 'attic'"), std::string::npos) << unknown.err;
+  EXPECT_NE(unknown.err.find("inspect --objects"), std::string::npos) << unknown.err;
+}
+
+TEST_F(Route, AScriptGoesAroundTheWall) {
+  write(path("walk.jsonl"),
+        "{\"spawn\":\"ann\",\"at\":[2,0,0]}\n{\"go\":\"ann\",\"to\":[8,0,0]}\n"
+        "{\"go\":\"ann\",\"to\":\"room_column\"}\n");
+  const Ended ended =
+      run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--strict"});
+  EXPECT_EQ(ended.code, 0) << ended.err << ended.out;
+  write(path("bad.jsonl"),
+        "{\"spawn\":\"ann\",\"at\":[2,0,0]}\n{\"go\":\"ann\",\"to\":\"attic\"}\n");
+  const Ended refused =
+      run({"replay", path("room.obj"), path("bad.jsonl"), "--out", path("out"), "--strict"});
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_NE((refused.err + refused.out).find("'attic'"), std::string::npos) << refused.err;
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
