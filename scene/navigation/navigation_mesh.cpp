@@ -122,7 +122,7 @@ void NavigationMesh::collectPortals() {
         a = start + low * (b - start);
         b = start + high * (b - start);
       }
-      portals_.push_back({indexOf(to.ref), 0.5 * (a + b), false});
+      portals_.push_back({indexOf(to.ref), 0.5 * (a + b)});
     }
   }
   firstPortal_.push_back(static_cast<std::uint32_t>(portals_.size()));
@@ -250,10 +250,22 @@ Vec3 NavigationMesh::portalMiddle(std::uint32_t from, std::uint32_t to) const {
   return centres_[from];
 }
 
-void NavigationMesh::closePortal(std::uint32_t from, std::uint32_t to) {
+int NavigationMesh::closePortal(std::uint32_t from, std::uint32_t to) {
+  int failures = 0;
+  for (const auto& [a, b] : {std::pair(from, to), std::pair(to, from)}) {
+    for (std::uint32_t p = firstPortal_[a]; p < firstPortal_[a + 1]; ++p) {
+      if (portals_[p].to != b) continue;
+      portals_[p].closed = true;
+      failures = std::max<int>(failures, ++portals_[p].failures);
+    }
+  }
+  return failures;
+}
+
+void NavigationMesh::openPortal(std::uint32_t from, std::uint32_t to) {
   for (const auto& [a, b] : {std::pair(from, to), std::pair(to, from)})
     for (std::uint32_t p = firstPortal_[a]; p < firstPortal_[a + 1]; ++p)
-      if (portals_[p].to == b) portals_[p].closed = true;
+      if (portals_[p].to == b) portals_[p].closed = false;
 }
 
 Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) const {

@@ -49,8 +49,10 @@ class NavigationMesh {
   std::vector<Vec3> straighten(const Corridor& corridor, const Vec3& from, const Vec3& to) const;
   /// The middle of the portal between two neighbours, scene frame, metres.
   Vec3 portalMiddle(std::uint32_t from, std::uint32_t to) const;
-  /// Closes the portals between two polygons, in both directions.
-  void closePortal(std::uint32_t from, std::uint32_t to);
+  /// Closes the portals between two polygons, in both directions, and counts a failure. Returns
+  /// their failures.
+  int closePortal(std::uint32_t from, std::uint32_t to);
+  void openPortal(std::uint32_t from, std::uint32_t to);
   /// A point of a polygon for two numbers of 0..1, uniform in area.
   Vec3 pointInPolygon(std::uint32_t polygon, double s, double t) const;
   /// Sets the cells to 1 whose middle lies over a polygon of a height within low..high. Cell 0 has
@@ -67,6 +69,7 @@ class NavigationMesh {
     std::uint32_t to = 0;
     Vec3 middle = Vec3::Zero();
     bool closed = false;
+    std::uint8_t failures = 0;
   };
   void collectPortals();
   std::uint32_t indexOf(std::uint32_t reference) const;

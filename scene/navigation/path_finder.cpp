@@ -20,7 +20,8 @@ constexpr std::size_t kMaxRepairWalks = 100'000;              // of a path: some
 constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  // metres
 constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way around it begins
 constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
-constexpr int kMaxRepairs = 12;                          // of a leg
+constexpr int kRefutations = 4;            // failures at a portal after which it is not tried again
+constexpr int kMaxRepairs = 12;            // of a leg
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
 
@@ -104,20 +105,36 @@ bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance cl
   return true;
 }
 
-/// Closes the portal of a corridor that is closest to a failure; false: the corridor has none.
-bool closeNearestPortal(NavigationMesh& mesh, const Corridor& corridor, const Vec3& failure) {
-  const auto& polygons = corridor.polygons;
-  if (polygons.size() < 2) return false;
-  std::size_t at = 0;
-  double least = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i + 1 < polygons.size(); ++i) {
-    const double distance =
-        (mesh.portalMiddle(polygons[i], polygons[i + 1]) - failure).squaredNorm();
-    if (distance < least) least = distance, at = i;
+/// Closes portals of a mesh during a search. Those that failed often stay closed: they are refuted.
+class PortalClosures {
+ public:
+  explicit PortalClosures(NavigationMesh& mesh) : mesh_(mesh) {}
+  ~PortalClosures() {
+    for (const auto& [from, to] : closed_) mesh_.openPortal(from, to);
   }
-  mesh.closePortal(polygons[at], polygons[at + 1]);
-  return true;
-}
+  PortalClosures(const PortalClosures&) = delete;
+  PortalClosures& operator=(const PortalClosures&) = delete;
+
+  /// Closes the portal of a corridor that is closest to a failure; false: the corridor has none.
+  bool closeNearest(const Corridor& corridor, const Vec3& failure) {
+    const auto& polygons = corridor.polygons;
+    if (polygons.size() < 2) return false;
+    std::size_t at = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i + 1 < polygons.size(); ++i) {
+      const double distance =
+          (mesh_.portalMiddle(polygons[i], polygons[i + 1]) - failure).squaredNorm();
+      if (distance < least) least = distance, at = i;
+    }
+    if (mesh_.closePortal(polygons[at], polygons[at + 1]) < kRefutations)
+      closed_.emplace_back(polygons[at], polygons[at + 1]);
+    return true;
+  }
+
+ private:
+  NavigationMesh& mesh_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_;
+};
 
 NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Clearance clearance,
                           const Vec3& from, const Vec3& to, Proof& proof) {
@@ -126,6 +143,7 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
   const auto start = mesh.findNearest(from, extent), goal = mesh.findNearest(to, extent);
   NavigationPath path;
   if (!start || !goal) return path;
+  PortalClosures closures(mesh);
   for (int proposal = 0; proposal < kMaxProposals; ++proposal) {
     const auto corridor = mesh.findCorridor(*start, *goal);
     if (!corridor) return path;
@@ -141,7 +159,7 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
     }
     path.points.clear();
     if (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0) return path;  // proves nothing
-    if (!closeNearestPortal(mesh, *corridor, proof.failedAt)) return path;
+    if (!closures.closeNearest(*corridor, proof.failedAt)) return path;
   }
   return path;
 }

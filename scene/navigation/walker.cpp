@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "scene/world/avatars/avatar_motion.hpp"
 #include "scene/world/avatars/spawn.hpp"
@@ -17,7 +18,12 @@ constexpr std::size_t kMaxNeighbourhoods = 512;  // remembered; above, all are f
 /// Lengths of a step on even floor, metres. A longer step than a tick's sweeps over the same space;
 /// where it meets anything it is walked again at the speed of the walk.
 constexpr double kLongStep = 0.1, kMaxStep = 1;
-constexpr double kEvenHeight = 1e-3;      // metres: a step that rises or sinks more is not even
+/// metres: more than the arrival distance, by which the walk of an avatar may differ
+constexpr double kMargin = 3e-3;
+constexpr double kMaxSlope =
+    1.2;  // rise per length of the steepest ground: a greater rise is a step
+constexpr double kTickedLength = 0.5;  // metres, through a place that is too narrow for the margin
+constexpr double kEvenHeight = 1e-3;   // metres: a step that rises or sinks more is not even
 constexpr int kMaxTicksWithoutGain = 30;  // half a second: no progress towards the way point
 constexpr double kMinGain = 1e-3;         // metres in that time
 constexpr double kMinSlideGain = 1e-4;    // metres in a tick
@@ -31,6 +37,8 @@ Walker::Walker(const WorldData& world, const NavigationAgent& agent)
   spawn.radius = agent.radius;
   spawn.height = agent.height;
   applySpawnShape(spawn, world.settings, avatar_);
+  shape_ = avatar_.shape;
+  wideShape_ = makePrismShape(agent.radius + kMargin, agent.height, agent.height, world.settings);
 }
 
 void Walker::collectNearObstacles() {
@@ -47,8 +55,8 @@ void Walker::collectNearObstacles() {
     cell.max[axis] = cell.min[axis] + kCellSize;
   }
   const double reach = kMaxStep + world_.settings.stepHeight + kCellMargin;
-  cell.min += avatar_.shape->box.min - Vec3::Constant(reach);
-  cell.max += avatar_.shape->box.max + Vec3::Constant(reach);
+  cell.min += wideShape_->box.min - Vec3::Constant(reach);
+  cell.max += wideShape_->box.max + Vec3::Constant(reach);
   Neighbourhood& found = neighbourhoods_[cell_];
   if (!contains(found.box, avatar_.motionBounds)) {
     cell.include(avatar_.motionBounds);  // a fast fall
@@ -99,20 +107,43 @@ void Walker::returnTo(const Vec3& footPosition) {
 }
 
 WalkOutcome Walker::walkTo(const Vec3& goal) {
-  const double tick = world_.settings.tickDuration;
-  double least = computeGroundDistance(avatar_.footPosition, goal);
-  double shortDistance = 0, stepLimit = kMaxStep, lastFloor = avatar_.footPosition.y();
-  for (int ticks = 0, ticksWithoutGain = 0; ticks < kMaxTicks; ++ticks) {
+  const Vec3 start = avatar_.footPosition;
+  hasSteppedUp_ = false;
+  for (double least = std::numeric_limits<double>::infinity();;) {
+    avatar_.shape = wideShape_;
+    WalkOutcome outcome = walkWithMargin(goal);
+    avatar_.shape = shape_;
+    if (outcome.kind == WalkOutcome::Kind::arrived) {
+      if (!hasSteppedUp_) return outcome;
+      // Whether a step succeeds may depend on where the ticks begin.
+      returnTo(start);
+      return walkByTicks(goal, std::numeric_limits<double>::infinity());
+    }
+    outcome = walkByTicks(goal, kTickedLength);
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
-    if (distance <= kArrivalDistance && avatar_.grounded)
-      return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0};
-    ticksWithoutGain = distance < least - kMinGain ? 0 : ticksWithoutGain + 1;
-    least = std::min(least, distance);
-    if (ticksWithoutGain > kMaxTicksWithoutGain)
-      return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity};
+    if (outcome.kind != WalkOutcome::Kind::arrived) return outcome;
+    if (distance <= kArrivalDistance || !(distance < least)) return outcome;
+    least = distance;
+  }
+}
 
+/// Walks with a wider shape, in long steps where the floor is even. Ends before the first place
+/// that is too narrow for it.
+WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
+  const double tick = world_.settings.tickDuration;
+  double shortDistance = 0, stepLimit = kMaxStep, lastFloor = avatar_.footPosition.y();
+  Vec3 stood = avatar_.footPosition;
+  const auto end = [&](WalkOutcome::Kind kind) {
+    const WalkOutcome outcome{kind, avatar_.footPosition, avatar_.blockedBy};
+    if (kind != WalkOutcome::Kind::arrived) returnTo(stood);
+    return outcome;
+  };
+  for (int ticks = 0; ticks < kMaxTicks; ++ticks) {
+    const double distance = computeGroundDistance(avatar_.footPosition, goal);
+    if (distance <= kArrivalDistance && avatar_.grounded) return end(WalkOutcome::Kind::arrived);
     const bool isLong = shortDistance <= 0;
     const Vec3 before = avatar_.footPosition;
+    if (avatar_.grounded) stood = before;
     const double length = isLong ? std::min(stepLimit, chooseStep(goal, distance)) : 0;
     const double speed = std::max(agent_.speed, length / tick);
     step(computeWalkVelocity(before, goal, false, speed, tick));
@@ -130,15 +161,46 @@ WalkOutcome Walker::walkTo(const Vec3& goal) {
     if (!avatar_.grounded) {  // falls from tread to tread of a steep stair
       shortDistance = 2 * kLongStep;
       if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight)
+        return end(WalkOutcome::Kind::fell);
+      if ((avatar_.footPosition - before).squaredNorm() < kMinGain * kMinGain)
+        return end(WalkOutcome::Kind::blocked);
+      continue;
+    }
+    lastFloor = avatar_.footPosition.y();
+    const double rise = lastFloor - before.y();
+    const double across = computeGroundDistance(before, avatar_.footPosition);
+    if (rise > kMaxSlope * across + kEvenHeight) hasSteppedUp_ = true;
+    if (avatar_.blockedBy != 0) return end(WalkOutcome::Kind::blocked);
+    shortDistance -= across;
+  }
+  return end(WalkOutcome::Kind::blocked);
+}
+
+/// Walks as an avatar in a world does, over at most `length` metres. Arrived: nothing blocked it.
+WalkOutcome Walker::walkByTicks(const Vec3& goal, double length) {
+  const Vec3 start = avatar_.footPosition;
+  double lastFloor = start.y(), least = computeGroundDistance(start, goal);
+  int ticksWithoutGain = 0;
+  for (;;) {
+    const double distance = computeGroundDistance(avatar_.footPosition, goal);
+    if (avatar_.grounded && (distance <= kArrivalDistance ||
+                             computeGroundDistance(start, avatar_.footPosition) >= length))
+      return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0};
+    ticksWithoutGain = distance < least - kMinGain ? 0 : ticksWithoutGain + 1;
+    least = std::min(least, distance);
+    if (ticksWithoutGain > kMaxTicksWithoutGain)
+      return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity};
+    step(computeWalkVelocity(avatar_.footPosition, goal, false, agent_.speed,
+                             world_.settings.tickDuration));
+    if (!avatar_.grounded) {
+      if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight)
         return {WalkOutcome::Kind::fell, avatar_.footPosition, 0};
       continue;
     }
     lastFloor = avatar_.footPosition.y();
     if (avatar_.blockedBy != 0)
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy};
-    shortDistance -= computeGroundDistance(before, avatar_.footPosition);
   }
-  return {WalkOutcome::Kind::blocked, avatar_.footPosition, 0};
 }
 
 WalkOutcome Walker::slideTo(const Vec3& goal) {

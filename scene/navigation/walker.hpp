@@ -39,7 +39,8 @@ class Walker {
   /// Stands where it has stood before.
   void returnTo(const Vec3& footPosition);
   /// Walks straight to the way point `goal`; its height decides nothing. Stops at the first
-  /// obstacle that is not a step, and where the floor ends.
+  /// obstacle that is not a step, and where the floor ends. Keeps some millimetres from obstacles,
+  /// or else walks tick by tick: a later walk along the same line differs by less than that.
   WalkOutcome walkTo(const Vec3& goal);
 
   /// Walks tick by tick towards `goal`, slides along obstacles, and ends where it gains nothing.
@@ -49,6 +50,8 @@ class Walker {
   const NavigationAgent& agent() const { return agent_; }
 
  private:
+  WalkOutcome walkWithMargin(const Vec3& goal);
+  WalkOutcome walkByTicks(const Vec3& goal, double length);
   void step(const Vec3& velocity);
   void collectNearObstacles();
   double chooseStep(const Vec3& goal, double distance);
@@ -56,6 +59,8 @@ class Walker {
   const WorldData& world_;
   const NavigationAgent agent_;
   Avatar avatar_;
+  std::shared_ptr<const AvatarShape> shape_, wideShape_;
+  bool hasSteppedUp_ = false;  ///< in the present walk
   QueryCount count_;
   /// Obstacles around a cell, with their caches. The avatar has those of `cell_`.
   struct Neighbourhood {

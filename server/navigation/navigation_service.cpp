@@ -59,6 +59,7 @@ struct Answer {
   const scene::Scene& scene;
   scene::Navigation& navigation;
   v1::NavigationReply& reply;
+  const scene::Snapshot& snapshot;
 
   std::variant<Vec3, v1::Error> resolve(const v1::NavigationPlace& place,
                                         const std::string& field) const {
@@ -66,7 +67,12 @@ struct Answer {
       if (auto error = validatePoint(field + ".point", place.point())) return std::move(*error);
       return vectorFromProto(place.point());
     }
-    if (place.name().empty()) return makeFieldError(field, "give a point or a name");
+    if (place.has_avatar()) {
+      const scene::AvatarSnapshot* avatar = findAvatar(snapshot, place.avatar());
+      if (!avatar) return makeUnknownAvatarError(place.avatar(), "navigation." + field + ".avatar");
+      return avatar->footPosition;
+    }
+    if (place.name().empty()) return makeFieldError(field, "give a point, a name or an avatar");
     const auto box =
         scene::findNamedPlace(scene, place.name(), navigation.agent().radius + kNextToObject);
     if (!box)
@@ -257,7 +263,7 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   v1::NavigationReply reply;
   reply.set_tick(state.snapshot->tick);
   reply.set_time(state.snapshot->time);
-  const Answer answer{*scene_, navigation, reply};
+  const Answer answer{*scene_, navigation, reply, *state.snapshot};
   std::optional<v1::Error> error;
   switch (query.query_case()) {
     case v1::NavigationQuery::kPath:

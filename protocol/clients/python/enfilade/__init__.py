@@ -18,6 +18,7 @@ from . import messages
 from .avatar import Avatar
 from .client import Client, connect
 from .environment import WalkEnv
+from .episodes import Episode, draw_episode, read_episodes, write_episodes
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
 from .navigation import Map, Navigation, Obstacle, Path, Spot
 from .process import Server, serve
@@ -26,7 +27,8 @@ from .results import (Apart, AvatarState, Contact, Frame, Hits, Horizon, Notice,
 from .vector_environment import VectorWalkEnv
 
 __all__ = [
-    "Apart", "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Frame",
+    "Apart", "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Episode", "Frame",
     "Hits", "Horizon", "Map", "Navigation", "Notice", "Obstacle", "OrderFailed", "Pair", "Path", "Replay", "Scan",
-    "Server", "ServerError", "Spot", "StartFailed", "State", "Step", "Touching", "VectorWalkEnv", "WalkEnv", "World", "connect", "messages", "serve",
+    "Server", "ServerError", "Spot", "StartFailed", "State", "Step", "Touching", "VectorWalkEnv", "WalkEnv", "World", "connect", "draw_episode", "messages", "read_episodes",
+    "serve", "write_episodes",
 ]

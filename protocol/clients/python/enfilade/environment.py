@@ -17,6 +17,7 @@ import numpy as np
 from . import messages, results, spaces
 from .client import Client, Reply, connect
 from .connection import raise_refusal
+from .episodes import Episode, draw_episode
 from .errors import OrderFailed
 from .process import Server, serve
 from .questions import frame_request
@@ -38,6 +39,15 @@ def _numbers(given: Any, name: str, counts: Sequence[int]) -> Tuple[float, ...]:
     return numbers
 
 
+def _places(given: Any, name: str, counts: Sequence[int]) -> List[Tuple[float, ...]]:
+    """Returns the places; none for "anywhere"."""
+    if isinstance(given, str):
+        if given != "anywhere":
+            raise ValueError(f"{name}: give places or \"anywhere\", not {given!r}")
+        return []
+    return [_numbers(one, f"{name}[{i}]", counts) for i, one in enumerate(given)]
+
+
 class WalkEnv(spaces.EnvBase):
     """One avatar in a world of its own.
 
@@ -45,17 +55,23 @@ class WalkEnv(spaces.EnvBase):
         server (this client must then drive its world `world`). Or client: a connected one, which
         close() leaves open.
     starts: start positions, (x, y, z) of the feet or (x, y, z, facing in degrees); each reset chooses
-        one at random, and a facing if none is given.
+        one at random, and a facing if none is given. Or "anywhere": random places.
     goal: the walk succeeds within `goal_radius` metres of it, on the ground.
+    goals: goals instead, of which each reset chooses one that can be reached, or "anywhere". Distances
+        are then geodesic, at least `min_distance` at the start. Or `episodes`, which take turns.
+    radius, height: size of the avatar in metres. pitch: of the camera in radians, upwards positive.
     size: (width, height) of the pictures in pixels; `channels` of "rgb", "depth", "ids", or none.
     ticks_per_step: 1/60 s each. speed: metres per second. turn_speed: radians per second.
     discrete: actions are 0 stand, 1 walk ahead, 2 turn left, 3 turn right; else two numbers in -1..1,
         ahead and turn (left is positive).
 
     Observations: the channels (depth in metres, inf for the background), "position" of the feet,
-    "heading" as its cosine and sine, and "to_goal" in metres if there is a goal. The reward is the
-    progress towards the goal, or without a goal the distance walked, in metres; override reward() and
-    is_over().
+    "heading" as its cosine and sine, and with a goal "to_goal" in metres and "goal_polar": the distance
+    on the ground, and the angle from the heading, left positive. The reward is the progress towards the
+    goal, or without a goal the distance walked, in metres; override reward() and is_over(), and
+    new_episode() for other starts and goals. With goals or episodes `info` has "geodesic_distance",
+    "success", "spl" and "collided" (a step ended at something other than the floor). A fall out of
+    the scene ends the episode, with "fell" in `info` and the observation before it.
 
     Raises ValueError with the name of the argument before anything is sent. An exception during a
     step (KeyboardInterrupt) leaves it usable, but the world may have advanced by that step.
@@ -64,18 +80,31 @@ class WalkEnv(spaces.EnvBase):
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
 
     def __init__(self, scene: Union[str, Path, None] = None, *, address: str = "",
-                 starts: Sequence[Sequence[float]], goal: Optional[Sequence[float]] = None,
+                 starts: Union[str, Sequence[Sequence[float]]] = (),
+                 goal: Optional[Sequence[float]] = None,
+                 goals: Union[None, str, Sequence[Sequence[float]]] = None,
+                 episodes: Optional[Sequence[Episode]] = None, min_distance: float = 1.0,
+                 radius: Optional[float] = None, height: Optional[float] = None, pitch: float = 0.0,
                  goal_radius: float = 0.5, size: Tuple[int, int] = (128, 128),
                  channels: Sequence[str] = ("rgb", "depth"), ticks_per_step: int = 6,
                  speed: float = 1.4, turn_speed: float = math.pi / 2, max_steps: int = 1000,
                  fov_y: float = 1.2, discrete: bool = False,
                  render_mode: Optional[str] = "rgb_array", server_arguments: Sequence[str] = (),
                  client: Optional[Client] = None, world: str = "main", token: str = "") -> None:
-        if not len(starts):
-            raise ValueError("starts: give at least one start position")
-        self.starts = [_numbers(start, f"starts[{i}]", (3, 4)) for i, start in enumerate(starts)]
+        if not len(starts) and not episodes:
+            raise ValueError("starts: give at least one start position, or \"anywhere\"")
+        if sum(one is not None for one in (goal, goals, episodes)) > 1:
+            raise ValueError("give one of goal, goals and episodes")
+        self.starts = _places(starts, "starts", (3, 4))
+        self.goals = None if goals is None else _places(goals, "goals", (3,))
+        self.episodes = None if episodes is None else list(episodes)
         self.goal = None if goal is None else np.array(_numbers(goal, "goal", (3,)))
         self._first_goal = self.goal
+        if not abs(pitch) < math.pi / 2:
+            raise ValueError(f"pitch: give radians between -pi/2 and pi/2, not {pitch}")
+        self.min_distance, self.pitch = min_distance, pitch
+        self._size = {"radius": radius, "height": height}
+        self.is_geodesic = goals is not None or episodes is not None
         if isinstance(channels, str) or set(channels) - set(_CHANNELS):
             raise ValueError(f"channels: give some of {_CHANNELS}, not {channels!r}")
         if render_mode not in (None, *self.metadata["render_modes"]):
@@ -110,9 +139,14 @@ class WalkEnv(spaces.EnvBase):
         self._heading = 0.0
         self._steps = 0
         self._start: Sequence[float] = ()  # of the episode
+        self.episode: Optional[Episode] = None  # the present one, with goals or episodes
+        self._episode_number = 0
+        self._walked = 0.0  # metres in this episode
+        self._left = math.inf  # geodesic distance to the goal, metres
         self._tag = 0  # of the last reset()'s spawn
         self._state: Optional[results.AvatarState] = None
         self._rgb: Optional[np.ndarray] = None
+        self._seen: Observation = {}  # of the last step
         self.server: Optional[Server] = None
         self._own_client = client is None
         try:
@@ -124,6 +158,7 @@ class WalkEnv(spaces.EnvBase):
             raise
 
     def _begin(self) -> None:
+        self.navigation = self.client.navigation(**self._size, speed=self.speed)
         self.client.lockstep()
         self.client.subscribe(contacts=True, notices=True)
         limit = self.client.welcome.policies.speed_limit
@@ -154,20 +189,37 @@ class WalkEnv(spaces.EnvBase):
             parts["ids"] = box(0, 2**32 - 1, (height, width), np.uint32)
         parts["position"] = box(-np.inf, np.inf, (3,), np.float64)
         parts["heading"] = box(-1.0, 1.0, (2,), np.float64)
-        if self.goal is not None:
+        if self.goal is not None or self.is_geodesic:
             parts["to_goal"] = box(-np.inf, np.inf, (3,), np.float64)
+            parts["goal_polar"] = box(-np.inf, np.inf, (2,), np.float64)
         return spaces.Dict(parts)
 
     # ---- a task may override these -----------------------------------------------------------
 
+    def new_episode(self) -> Episode:
+        """Returns the next of `episodes`, or draws one; only with goals or episodes."""
+        if self.episodes is not None:
+            episode = self.episodes[self._episode_number % len(self.episodes)]
+            self._episode_number += 1
+            return episode
+        return draw_episode(self.navigation, self.np_random, min_distance=self.min_distance,
+                            start=self._one_of(self.starts), goal=self._one_of(self.goals))
+
+    def _one_of(self, places: Any) -> Optional[Sequence[float]]:
+        return places[int(self.np_random.integers(len(places)))] if places else None
+
     def reward(self, before: np.ndarray, after: np.ndarray, info: Dict[str, Any]) -> float:
         """Returns the reward of a step between two positions of the feet, in metres."""
+        if self.is_geodesic:
+            return float(info["progress"])
         if self.goal is None:
             return float(math.hypot(after[0] - before[0], after[2] - before[2]))
         return self._to_goal(before) - self._to_goal(after)
 
     def is_over(self, position: np.ndarray, info: Dict[str, Any]) -> bool:
         """Returns whether the task has ended, with or without success (`terminated`)."""
+        if self.is_geodesic:
+            return bool(info["success"])
         return self.goal is not None and self._to_goal(position) <= self.goal_radius
 
     def _to_goal(self, position: np.ndarray) -> float:
@@ -191,7 +243,7 @@ class WalkEnv(spaces.EnvBase):
             return None
         if self._rgb is not None:
             return self._rgb.copy()
-        return self.client.frame(self._name, forward=self._forward(), width=self.size[0],
+        return self.client.frame(self._name, forward=self._gaze(), width=self.size[0],
                                  height=self.size[1], fov_y=self.fov_y).rgb
 
     def close(self) -> None:
@@ -217,7 +269,8 @@ class WalkEnv(spaces.EnvBase):
         self._steps = 0
         self._tag += 1
         self._start = start
-        spawn = messages.Spawn(at=messages.Vec3(x=start[0], y=start[1], z=start[2]), facing=facing)
+        spawn = messages.Spawn(at=messages.Vec3(x=start[0], y=start[1], z=start[2]), facing=facing,
+                               **self._size)
         return self.client.post([
             {"restart": messages.Restart()},
             {"command": messages.Command(avatar=self._name, tag=self._tag, spawn=spawn)},
@@ -229,9 +282,10 @@ class WalkEnv(spaces.EnvBase):
         if unknown:
             raise ValueError(f"options: unknown {sorted(unknown)}; give start or goal")
         goal = options.get("goal")
-        if goal is not None and self._first_goal is None:
+        if goal is not None and self._first_goal is None and not self.is_geodesic:
             raise ValueError("options: goal needs an environment with a goal")
         goal = self._first_goal if goal is None else np.array(_numbers(goal, "goal", (3,)))
+        self._walked = 0.0
         start = options.get("start")
         if start is not None:
             start = _numbers(start, "start", (3, 4))
@@ -241,9 +295,21 @@ class WalkEnv(spaces.EnvBase):
             self.np_random = np.random.default_rng(seed)
         if seed is not None:
             self.action_space.seed(seed)
-        chosen = self.starts[int(self.np_random.integers(len(self.starts)))] \
-            if start is None else start
-        return chosen, goal
+        if not self.is_geodesic:
+            return start or self._one_of(self.starts) or self._anywhere(), goal
+        if start is None and goal is None:
+            self.episode = self.new_episode()
+        else:
+            self.episode = draw_episode(self.navigation, self.np_random, min_distance=0.0, start=start,
+                                        goal=goal)
+        self._left = self.episode.geodesic_distance
+        return (*self.episode.start, self.episode.facing), np.array(self.episode.goal)
+
+    def _anywhere(self) -> Sequence[float]:
+        spot = self.navigation.random_place(int(self.np_random.integers(0, 2 ** 63)), island=0)
+        if spot is None:
+            raise OrderFailed("starts: no place to stand was found in this scene")
+        return tuple(map(float, spot.at))
 
     def _take_reset(self, posted: List[int]) -> Tuple[Observation, Dict[str, Any]]:
         replies = self.client.replies(posted)
@@ -258,7 +324,10 @@ class WalkEnv(spaces.EnvBase):
         for reply, _ in replies[3:]:
             raise_refusal(reply)
         self._state = entered.avatars[self._name]
-        return self._observation(replies[3:]), self._info(entered, contacts)
+        info = self._info(entered, contacts)
+        if self.is_geodesic:
+            info["geodesic_distance"] = self._left
+        return self._observation(replies[3:]), info
 
     def _refusals(self) -> List[str]:
         """Returns the refusals of the spawn, and discards all other notices."""
@@ -283,26 +352,62 @@ class WalkEnv(spaces.EnvBase):
         drive = messages.Command(avatar=self._name, drive=messages.Drive(velocity=velocity))
         return self.client.post([
             {"command": drive},
-            {"step": messages.Step(ticks=self.ticks_per_step, avatars=True)}, *self._picture()])
+            {"step": messages.Step(ticks=self.ticks_per_step, avatars=True)}, *self._picture(),
+            *self._distance_query()])
+
+    def _distance_query(self) -> List[Dict[str, Any]]:
+        if not self.is_geodesic:
+            return []
+        assert self.goal is not None
+        return [{"navigation": self.navigation.query([self.goal], avatar=self._name)}]
 
     def _take_step(self, posted: List[int]) -> Tuple[Observation, float, bool, bool,
                                                      Dict[str, Any]]:
         replies = self.client.replies(posted)
         old, contacts = self._state, self.client._kept_contacts()
-        self.client._notices.clear()  # unused here
+        left = any(one.kind == "left" and one.avatar == self._name for one in self.client._notices)
+        self.client._notices.clear()
         self._state = None  # in case this fails
-        for reply, _ in replies:
+        for reply, _ in replies[:2]:
             raise_refusal(reply)
         assert old is not None
         made = results.step(replies[1][0].step)
-        if self._name not in made.avatars:
-            raise OrderFailed("the avatar is no longer in the world: another client commands it")
-        self._state = made.avatars[self._name]
         self._steps += 1
+        if self._name not in made.avatars:
+            if not left:
+                raise OrderFailed("the avatar is no longer in the world: another client commands it")
+            self._state = old
+            return self._seen, 0.0, True, False, self._fallen(made, contacts)
+        for reply, _ in replies[2:]:
+            raise_refusal(reply)
+        self._state = made.avatars[self._name]
         info = self._info(made, contacts)
         before, after = np.array(old.feet), np.array(self._state.feet)
+        if self.is_geodesic:
+            self._add_measures(info, before, after, replies.pop()[0].navigation.paths[0])
         return (self._observation(replies[2:]), self.reward(before, after, info),
                 self.is_over(after, info), self._steps >= self.max_steps, info)
+
+    def _fallen(self, made: results.Step, contacts: List[results.Contact]) -> Dict[str, Any]:
+        """The info of the step in which the avatar fell out of the scene."""
+        info = {**self._info(made, contacts), "fell": True}
+        if self.is_geodesic:
+            info.update(progress=0.0, geodesic_distance=self._left, success=False, spl=0.0, collided=False)
+        return info
+
+    def _add_measures(self, info: Dict[str, Any], before: np.ndarray, after: np.ndarray,
+                      path: Any) -> None:
+        assert self.episode is not None
+        self._walked += float(np.linalg.norm(after - before))
+        left = path.length if path.found else self._left
+        shortest = self.episode.geodesic_distance
+        if math.isnan(shortest):  # a file without it
+            shortest = self._walked + left
+        success = left <= self.goal_radius
+        info.update(progress=self._left - left, geodesic_distance=left, success=success,
+                    spl=shortest / max(self._walked + left, shortest) if success else 0.0,
+                    collided=bool(info["stopped_by"]))
+        self._left = left
 
     def _meaning(self, action: Any) -> Tuple[float, float]:
         """Returns ahead and turn of an action. Raises ValueError."""
@@ -322,10 +427,15 @@ class WalkEnv(spaces.EnvBase):
     def _forward(self) -> Tuple[float, float, float]:
         return (math.cos(self._heading), 0.0, -math.sin(self._heading))
 
+    def _gaze(self) -> Tuple[float, float, float]:
+        x, _, z = self._forward()
+        across = math.cos(self.pitch)
+        return (across * x, math.sin(self.pitch), across * z)
+
     def _picture(self) -> List[Dict[str, Any]]:
         if not self.channels:
             return []
-        return [{"frame": frame_request(self._name, forward=self._forward(), width=self.size[0],
+        return [{"frame": frame_request(self._name, forward=self._gaze(), width=self.size[0],
                                         height=self.size[1], fov_y=self.fov_y,
                                         channels=self.channels)}]
 
@@ -348,6 +458,10 @@ class WalkEnv(spaces.EnvBase):
         seen["heading"] = np.array([x, -z])
         if self.goal is not None:
             seen["to_goal"] = self.goal - seen["position"]
+            angle = math.atan2(-seen["to_goal"][2], seen["to_goal"][0]) - self._heading
+            seen["goal_polar"] = np.array([math.hypot(seen["to_goal"][0], seen["to_goal"][2]),
+                                           math.remainder(angle, math.tau)])
+        self._seen = seen
         return seen
 
     def _info(self, made: results.Step, contacts: List[results.Contact]) -> Dict[str, Any]:

@@ -12,9 +12,11 @@ from . import messages
 from .questions import Point, points, vec
 
 if TYPE_CHECKING:
+    from .avatar import Avatar
     from .client import Client
 
-Place = Union[Point, str]  # a point of the feet, or the name of a room, a storey or an object
+# A point of the feet, an Avatar, or the name of a room, a storey or an object.
+Place = Union[Point, str, "Avatar"]
 
 _DOORS = {"as_they_are": 1, "open": 2}
 _PAGE = {"spots": 10_000, "steps": 1000, "clearance": 1000}
@@ -66,6 +68,8 @@ def _xyz(point: Any) -> Tuple[float, float, float]:
 def _place(place: Place) -> Any:
     if isinstance(place, str):
         return messages.NavigationPlace(name=place)
+    if isinstance(getattr(place, "name", None), str):
+        return messages.NavigationPlace(avatar=place.name)  # type: ignore[union-attr]
     return messages.NavigationPlace(point=vec(place))
 
 
@@ -102,6 +106,11 @@ class Navigation:
             navigation=messages.NavigationQuery(**self._options, **query))
         self._report = reply.navigation
         return reply.navigation, attachment
+
+    def query(self, goals: Sequence[Place], *, avatar: str) -> Any:
+        """Returns the NavigationQuery of the paths from an avatar to goals, for Client.pipeline()."""
+        return messages.NavigationQuery(**self._options, path=messages.NavigationQuery.Path(
+            **{"from": messages.NavigationPlace(avatar=avatar)}, to=[_place(goal) for goal in goals]))
 
     def path(self, start: Place, goal: Place, *, narrowest: bool = False) -> Path:
         """Returns the path from one place to another. `narrowest`: also measures its clear width."""

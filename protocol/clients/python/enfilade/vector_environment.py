@@ -158,7 +158,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             try:
                 return env._take_reset(ids)
             except OrderFailed:
-                if not is_drawn or len(env.starts) == 1:
+                if not is_drawn or (len(env.starts) == 1 and not env.is_geodesic):
                     raise
                 ids = env._post_reset(None, {})
         return env._take_reset(ids)

@@ -1,0 +1,68 @@
+"""Point navigation with a scripted follower and a random walker: success and SPL over random episodes.
+
+    python3 point_navigation.py SCENE.. [--episodes 200] [--seed 1]
+
+The follower walks along the shortest path; the random walker shows what chance gives. ENFILADE names the
+program if it is not on the PATH; PYTHONPATH needs protocol/clients/python.
+"""
+import argparse
+import math
+
+import numpy as np
+
+import enfilade
+
+
+def follower(env):
+    """Returns a policy: turn to the next point of the shortest path, then walk to it."""
+    path = env.navigation.path(env.episode.start, env.episode.goal).points
+    seconds = env.ticks_per_step * env.client.tick_seconds
+    at = 1
+
+    def act(seen):
+        nonlocal at
+        feet = seen["position"]
+        while at + 1 < len(path) and math.hypot(*(path[at] - feet)[[0, 2]]) < 0.02:
+            at += 1
+        x, _, z = path[at] - feet
+        heading = math.atan2(seen["heading"][1], seen["heading"][0])
+        turn = math.remainder(math.atan2(-z, x) - heading, math.tau) / (env.turn_speed * seconds)
+        ahead = math.hypot(x, z) / (env.speed * seconds) if abs(turn) <= 1 else 0.0
+        return ahead, turn
+
+    return act
+
+
+def chance(env):
+    return lambda _: env.action_space.sample()
+
+
+def measure(env, make_policy, episodes, seed):
+    measures = []
+    for number in range(episodes):
+        seen, _ = env.reset(seed=seed + number)
+        policy, over = make_policy(env), False
+        while not over:
+            seen, _, terminated, truncated, info = env.step(policy(seen))
+            over = terminated or truncated
+        measures.append((info["success"], info["spl"]))
+    return np.mean(np.array(measures, float), axis=0)
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("scenes", nargs="+")
+    parser.add_argument("--episodes", type=int, default=200)
+    parser.add_argument("--seed", type=int, default=1)
+    asked = parser.parse_args()
+    for scene in asked.scenes:
+        with enfilade.WalkEnv(scene, starts="anywhere", goals="anywhere", channels=(), radius=0.2, height=1.5,
+                              goal_radius=0.2, max_steps=2000) as env:
+            for name, policy in (("follower", follower), ("random", chance)):
+                episodes = asked.episodes if policy is follower else max(1, asked.episodes // 10)
+                success, spl = measure(env, policy, episodes, asked.seed)
+                print(f"{scene}: {name}: success {success:.3f}, SPL {spl:.3f} over {episodes} episodes")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""Point navigation: episodes anywhere, geodesic measures, and habitat-lab's episode files."""
+
+import json
+import math
+import tempfile
+import unittest
+from pathlib import Path
+
+import numpy as np
+
+import enfilade
+from room import RoomCase
+
+
+def follow(env, path):
+    """Walks along a path by turning to each point in turn; returns the last result of step()."""
+    seconds = env.ticks_per_step * env.client.tick_seconds
+    at, result = 1, None
+    while result is None or not (result[2] or result[3]):
+        feet = np.array(env._state.feet)
+        while at + 1 < len(path) and math.hypot(*(path[at] - feet)[[0, 2]]) < 0.02:
+            at += 1
+        x, _, z = path[at] - feet
+        angle = math.remainder(math.atan2(-z, x) - env._heading, math.tau)
+        turn = angle / (env.turn_speed * seconds)
+        ahead = math.hypot(x, z) / (env.speed * seconds) if abs(turn) <= 1 else 0.0
+        result = env.step((ahead, turn))
+    return result
+
+
+class PointNavigation(RoomCase):
+    def environment(self, **options):
+        options = {"starts": "anywhere", "goals": "anywhere", "channels": (), "max_steps": 2000, **options}
+        env = enfilade.WalkEnv(self.scene, **options)
+        self.addCleanup(env.close)
+        return env
+
+    def test_a_follower_reaches_every_goal_on_the_shortest_path(self):
+        env = self.environment(radius=0.2, height=1.5, goal_radius=0.2)
+        for seed in range(5):
+            seen, info = env.reset(seed=seed)
+            episode = env.episode
+            self.assertAlmostEqual(info["geodesic_distance"], episode.geodesic_distance)
+            self.assertGreaterEqual(episode.geodesic_distance, 1)
+            self.assertAlmostEqual(seen["goal_polar"][0], math.hypot(*seen["to_goal"][[0, 2]]))
+            path = env.navigation.path(episode.start, episode.goal)
+            _, _, terminated, _, info = follow(env, path.points)
+            self.assertTrue(terminated)
+            self.assertTrue(info["success"])
+            self.assertGreater(info["spl"], 0.97)
+            self.assertLessEqual(info["spl"], 1)
+            self.assertLessEqual(info["geodesic_distance"], 0.2)
+
+    def test_rewards_add_up_to_the_geodesic_progress(self):
+        env = self.environment(starts=[(2, 0, 0, 0)], goals=[(8, 0, 0)])
+        _, info = env.reset(seed=1)
+        first = info["geodesic_distance"]
+        self.assertGreater(first, 10)  # around the wall
+        rewards, collided = 0.0, False
+        for _ in range(30):
+            _, reward, _, _, info = env.step((1, 0))
+            rewards += reward
+            collided = collided or info["collided"]
+        self.assertAlmostEqual(rewards, first - info["geodesic_distance"], places=9)
+        self.assertTrue(collided)  # straight into the wall
+        self.assertFalse(info["success"])
+        self.assertEqual(info["spl"], 0)
+
+    def test_the_angle_to_the_goal_is_positive_to_the_left(self):
+        env = self.environment(starts=[(0, 0, 0, 0)], goals=[(0, 0, -3)], min_distance=0.5)
+        seen, _ = env.reset(seed=0)
+        np.testing.assert_allclose(seen["goal_polar"], [3, math.pi / 2], atol=1e-2)
+        seen, *_ = env.step((0, 1))
+        self.assertLess(seen["goal_polar"][1], math.pi / 2)
+        self.assertTrue(env.observation_space.contains(seen))
+
+    def test_the_same_seed_gives_the_same_episode_and_options_replace_its_ends(self):
+        env = self.environment()
+        env.reset(seed=3)
+        first = env.episode
+        env.reset(seed=4)
+        self.assertNotEqual(env.episode, first)
+        env.reset(seed=3)
+        self.assertEqual(env.episode, first)
+        env.reset(options={"start": (2, 0, 0, 90), "goal": (8, 0, 0)})
+        self.assertEqual((env.episode.start, env.episode.facing), ((2, 0, 0), 90))
+
+    def test_a_new_episode_is_a_hook(self):
+        class Fixed(enfilade.WalkEnv):
+            def new_episode(self):
+                return enfilade.Episode((2.0, 0.0, 0.0), 0.0, (4.0, 0.0, 0.0), 2.0)
+        env = Fixed(self.scene, starts="anywhere", goals="anywhere", channels=())
+        self.addCleanup(env.close)
+        _, info = env.reset(seed=1)
+        self.assertEqual(info["geodesic_distance"], 2)
+
+    def test_episode_files_are_those_of_habitat_lab(self):
+        env = self.environment()
+        env.reset(seed=1)
+        with tempfile.TemporaryDirectory() as folder:
+            for name in ("episodes.json", "episodes.json.gz"):
+                file = Path(folder) / name
+                enfilade.write_episodes(file, [env.episode], "room.obj")
+                (read,) = enfilade.read_episodes(file)
+                np.testing.assert_allclose(read.start, env.episode.start)
+                np.testing.assert_allclose(read.goal, env.episode.goal)
+                self.assertAlmostEqual(math.remainder(read.facing - env.episode.facing, 360), 0, places=9)
+                self.assertEqual(read.geodesic_distance, env.episode.geodesic_distance)
+            one = json.loads((Path(folder) / "episodes.json").read_text())["episodes"][0]
+            one["start_rotation"] = [0, 0, 0, 1]  # habitat's agent looks along -Z
+            (Path(folder) / "north.json").write_text(json.dumps({"episodes": [one]}))
+            self.assertAlmostEqual(enfilade.read_episodes(Path(folder) / "north.json")[0].facing, 90)
+            (Path(folder) / "bad.json").write_text('{"episodes":[{}]}')
+            with self.assertRaises(ValueError):
+                enfilade.read_episodes(Path(folder) / "bad.json")
+        played = self.environment(goals=None, starts=(), episodes=[read])
+        played.reset(seed=1)
+        self.assertEqual(played.episode, read)
+
+    def test_who_falls_out_of_the_scene_ends_the_episode(self):
+        env = self.environment(starts=[(9, 0, 9, 0)], goals=[(0, 0, 0)], speed=5.0)
+        before, _ = env.reset(seed=0)
+        for _ in range(200):
+            seen, reward, terminated, _, info = env.step((1, 0))
+            if terminated:
+                break
+        self.assertTrue(terminated)
+        self.assertTrue(info["fell"])
+        self.assertFalse(info["success"])
+        self.assertEqual(seen.keys(), before.keys())
+        env.reset(seed=0)
+        env.step((0, 0))
+
+    def test_several_environments_run_episodes(self):
+        envs = enfilade.VectorWalkEnv(self.scene, 3, starts="anywhere", goals="anywhere", channels=())
+        self.addCleanup(envs.close)
+        envs.reset(seed=1)
+        _, rewards, _, _, infos = envs.step(np.zeros((3, 2)))
+        np.testing.assert_allclose(rewards, 0, atol=1e-6)
+        self.assertTrue(all(distance >= 0.9 for distance in infos["geodesic_distance"]))
+
+    def test_wrong_arguments_are_named(self):
+        for options in ({"starts": "everywhere"}, {"starts": ()}, {"goal": (1, 0, 0)}, {"pitch": 2}):
+            with self.assertRaises(ValueError):
+                self.environment(**options)
+
+
+if __name__ == "__main__":
+    unittest.main()
