@@ -29,6 +29,11 @@ constexpr double kMinGain = 1e-3;         // metres in that time
 constexpr double kMinSlideGain = 1e-4;    // metres in a tick
 constexpr int kMaxTicks = 1'000'000;      // more than an hour: the goal is unreasonably far
 
+/// True if the feet rose more than on the steepest ground.
+bool isStep(const Vec3& before, const Vec3& after) {
+  return after.y() - before.y() > kMaxSlope * computeGroundDistance(before, after) + kEvenHeight;
+}
+
 }  // namespace
 
 Walker::Walker(const WorldData& world, const NavigationAgent& agent)
@@ -167,9 +172,8 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
       continue;
     }
     lastFloor = avatar_.footPosition.y();
-    const double rise = lastFloor - before.y();
     const double across = computeGroundDistance(before, avatar_.footPosition);
-    if (rise > kMaxSlope * across + kEvenHeight) hasSteppedUp_ = true;
+    if (isStep(before, avatar_.footPosition)) hasSteppedUp_ = true;
     if (avatar_.blockedBy != 0) return end(WalkOutcome::Kind::blocked);
     shortDistance -= across;
   }
@@ -190,8 +194,9 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length) {
     least = std::min(least, distance);
     if (ticksWithoutGain > kMaxTicksWithoutGain)
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity};
-    step(computeWalkVelocity(avatar_.footPosition, goal, false, agent_.speed,
-                             world_.settings.tickDuration));
+    const Vec3 before = avatar_.footPosition;
+    step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));
+    if (isStep(before, avatar_.footPosition)) hasSteppedUp_ = true;
     if (!avatar_.grounded) {
       if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight)
         return {WalkOutcome::Kind::fell, avatar_.footPosition, 0};

@@ -18,9 +18,10 @@ using render::Image;
 using render::TextStyle;
 using scene::Aabb;
 
-constexpr double kMinFloorNormalY = 0.94;  // minimum y of a floor's normal: within 20 degrees
-constexpr double kMinFloorArea = 0.5;      // square metres: minimum floor area of an object
-constexpr double kMinStoreyShare = 0.04;   // minimum share of all floor area for a storey
+constexpr double kMinElevationRange = 0.5;  // metres between the lowest and the highest storey
+constexpr double kMinFloorNormalY = 0.94;   // minimum y of a floor's normal: within 20 degrees
+constexpr double kMinFloorArea = 0.5;       // square metres: minimum floor area of an object
+constexpr double kMinStoreyShare = 0.04;    // minimum share of all floor area for a storey
 constexpr std::size_t kMaxStoreys = 12;
 constexpr double kWallBottom = 0.3, kWallTop = 1.5;  // metres above a floor that a wall spans
 constexpr double kMaxFloorDistance = 0.6;  // metres between a stated elevation and its floor
@@ -108,6 +109,10 @@ std::vector<StoreyFloor> findStatedStoreys(const scene::Scene& scene,
   std::set<std::uint32_t> used;
   for (const scene::Object& object : model.objects)
     if (object.storey) used.insert(*object.storey);
+  // Storeys that all have one elevation, as some programs write, say nothing about heights.
+  const auto elevation = [&](std::uint32_t index) { return model.storeys[index].elevation; };
+  if (used.size() > 1 && elevation(*used.rbegin()) - elevation(*used.begin()) < kMinElevationRange)
+    return {};
   std::vector<StoreyFloor> storeys;
   for (const std::uint32_t index : used) {
     const double height = findFloorNear(heights, model.storeys[index].elevation);

@@ -36,6 +36,15 @@ class NavigationTest(RoomCase):
         feet = self.client.step(1, avatars=True).avatars["ann"].feet
         self.assertLess(math.hypot(feet[0], feet[2] - 6), 2)
 
+    def test_a_walk_is_awaited_with_its_result(self):
+        ann = self.client.spawn("ann", at=(2, 0, 0))
+        self.assertEqual(ann.go_and_wait((8, 0, 0)), "arrived")
+        self.assertEqual(ann.walk_and_wait((2, 0, 0)), "blocked by wall")
+        self.assertEqual(ann.walk_and_wait((8, 0, 0)), "arrived")
+        with self.assertRaises(enfilade.OrderFailed):
+            self.client.command("ann", leave=enfilade.messages.Leave())
+            ann.walk_and_wait((2, 0, 0))
+
     def test_go_is_refused_with_the_reason(self):
         ann = self.client.spawn("ann", at=(2, 0, 0))
         with self.assertRaises(enfilade.ServerError) as raised:

@@ -45,13 +45,17 @@ StoreyTable::StoreyTable(const IfcMetadata& metadata) : metadata_(metadata) {
 }
 
 std::optional<std::uint32_t> StoreyTable::find(const IfcProduct& product) const {
-  const IfcProduct* container = &product;
-  for (int depth = 0; container != nullptr && depth < kMaxContainers; ++depth) {
-    const auto found = indexById_.find(container->id);
-    if (found != indexById_.end()) return found->second;
-    container = metadata_.find(container->parent != 0 ? container->parent : container->host);
-  }
-  return std::nullopt;
+  const auto findAbove = [this](const IfcProduct* container) -> std::optional<std::uint32_t> {
+    for (int depth = 0; container != nullptr && depth < kMaxContainers; ++depth) {
+      const auto found = indexById_.find(container->id);
+      if (found != indexById_.end()) return found->second;
+      container = metadata_.find(container->parent != 0 ? container->parent : container->host);
+    }
+    return std::nullopt;
+  };
+  if (const auto storey = findAbove(&product)) return storey;
+  // A door that the file puts into the building is in the storey of its wall.
+  return product.host != 0 ? findAbove(metadata_.find(product.host)) : std::nullopt;
 }
 
 void addSpatialStructure(const IfcMetadata& metadata, const StoreyTable& storeys,

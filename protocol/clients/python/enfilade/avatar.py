@@ -12,6 +12,7 @@ from .results import AvatarState, Frame
 if TYPE_CHECKING:
     from .client import Client
 
+WAIT_TICKS = 15  # between two looks at the notices
 ENTRY_TICKS = 3  # maximum of enter(): an earlier avatar of the name leaves in the first
 
 
@@ -53,6 +54,28 @@ class Avatar:
         place = messages.NavigationPlace(name=to) if isinstance(to, str) else \
             messages.NavigationPlace(point=vec(to))
         return self._client.command(self.name, go=messages.Go(to=place, speed=speed))
+
+    def walk_and_wait(self, *along: Point, speed: Optional[float] = None) -> str:
+        """walk(), then ticks in lockstep until it ends. Returns "arrived", or "blocked by NAME"."""
+        return self._wait_for(self.walk(*along, speed=speed))
+
+    def go_and_wait(self, to: Union[Point, str], *, speed: Optional[float] = None) -> str:
+        """go(), then ticks in lockstep until it ends; as walk_and_wait()."""
+        return self._wait_for(self.go(to, speed=speed))
+
+    def _wait_for(self, tag: int) -> str:
+        with self._client._with_notices():
+            while True:
+                self._client.step(WAIT_TICKS)
+                for one in self._client._notices:
+                    if one.avatar != self.name or one.tag != tag:
+                        continue
+                    if one.kind == "arrived":
+                        return "arrived"
+                    if one.kind == "blocked":
+                        return f"blocked by {one.obstacle_name}" if one.obstacle_name else one.text
+                    if one.kind in ("refused", "dropped"):
+                        raise OrderFailed(f"avatar {self.name!r}: {one.text}")
 
     def look(self, at: Point) -> int:
         return self._client.command(self.name, look=messages.Look(at=vec(at)))
