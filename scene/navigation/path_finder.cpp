@@ -136,6 +136,19 @@ class PortalClosures {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_;
 };
 
+/// Walks the whole path without a stop: after a step a place may be reached at another height.
+bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
+  walker.returnTo(points.front());
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const WalkOutcome outcome = walker.walkOn(points[i]);
+    if (outcome.kind == WalkOutcome::Kind::arrived) continue;
+    proof.failedAt = outcome.footPosition;
+    proof.met.push_back({outcome.obstacle, outcome.footPosition, 0});
+    return false;
+  }
+  return true;
+}
+
 NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Clearance clearance,
                           const Vec3& from, const Vec3& to, Proof& proof) {
   const Vec3 extent(3 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
@@ -152,10 +165,11 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
     if (!corners.empty()) corners.pop_back();
     corners.push_back(to);
     path.points = {from};
+    finder.walker.takeMetSteps();
     if (proveLegs(finder, corners, clearance, path, proof)) {
       path.points = shortenPath(finder.walker, path.points);
       path.length = computeLength(path.points);
-      return path;
+      if (!finder.walker.takeMetSteps() || walksOn(finder.walker, path.points, proof)) return path;
     }
     path.points.clear();
     if (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0) return path;  // proves nothing

@@ -20,8 +20,7 @@ constexpr std::size_t kMaxNeighbourhoods = 512;  // remembered; above, all are f
 constexpr double kLongStep = 0.1, kMaxStep = 1;
 /// metres: more than the arrival distance, by which the walk of an avatar may differ
 constexpr double kMargin = 3e-3;
-constexpr double kMaxSlope =
-    1.2;  // rise per length of the steepest ground: a greater rise is a step
+constexpr double kMinStepRise = 0.01;  // metres in a tick
 constexpr double kTickedLength = 0.5;  // metres, through a place that is too narrow for the margin
 constexpr double kEvenHeight = 1e-3;   // metres: a step that rises or sinks more is not even
 constexpr int kMaxTicksWithoutGain = 30;  // half a second: no progress towards the way point
@@ -29,9 +28,9 @@ constexpr double kMinGain = 1e-3;         // metres in that time
 constexpr double kMinSlideGain = 1e-4;    // metres in a tick
 constexpr int kMaxTicks = 1'000'000;      // more than an hour: the goal is unreasonably far
 
-/// True if the feet rose more than on the steepest ground.
+/// True if the feet rose or sank in a tick as on a step, or on a round or steep thing.
 bool isStep(const Vec3& before, const Vec3& after) {
-  return after.y() - before.y() > kMaxSlope * computeGroundDistance(before, after) + kEvenHeight;
+  return std::abs(after.y() - before.y()) > kMinStepRise;
 }
 
 }  // namespace
@@ -74,18 +73,42 @@ void Walker::collectNearObstacles() {
   neighbourhoods_.erase(cell_);
 }
 
-/// Length of the next step on the way to `goal`, metres: as far as the floor is even.
-double Walker::chooseStep(const Vec3& goal, double distance) {
+/// How far the floor is even on the way to `goal`, metres.
+double Walker::measureEvenFloor(const Vec3& goal, double distance) {
   const Vec3 direction = projectToGround(goal - avatar_.footPosition) / distance;
-  return std::max(kLongStep, computeEvenDistance(floor_, avatar_.footPosition, direction,
-                                                 std::min(distance, kMaxStep)));
+  return computeEvenDistance(floor_, avatar_.footPosition, direction, std::min(distance, kMaxStep));
 }
 
-void Walker::step(const Vec3& velocity) {
+void Walker::prepareStep(const Vec3& velocity) {
   avatar_.desiredVelocity = velocity;
   avatar_.motionBounds = computeMotionBounds(world_.settings, avatar_);
   collectNearObstacles();
   avatar_.blockedBy = 0;
+}
+
+/// Steps if the way is free and level; false, at the same place: it is not. A move of this length
+/// alone would climb and pass what a walk in short steps cannot.
+bool Walker::stepEvenly(const Vec3& displacement, bool isFloorEven) {
+  const Vec3 before = avatar_.footPosition;
+  prepareStep(displacement / world_.settings.tickDuration);
+  const ShapeCastHit hit = castAvatarShape(*avatar_.shape, before, displacement, avatar_.obstacles,
+                                           makeContactOffset(world_.settings), count_);
+  if (hit.entity != 0) return false;
+  if (isFloorEven) {
+    avatar_.footPosition += displacement;
+    return true;
+  }
+  isUneven_ = true;
+  moveAvatar(world_, avatar_, count_);
+  if (avatar_.blockedBy == 0 && avatar_.grounded &&
+      std::abs(avatar_.footPosition.y() - before.y()) <= kEvenHeight)
+    return true;
+  returnTo(before);
+  return false;
+}
+
+void Walker::step(const Vec3& velocity) {
+  prepareStep(velocity);
   moveAvatar(world_, avatar_, count_);
 }
 
@@ -113,18 +136,18 @@ void Walker::returnTo(const Vec3& footPosition) {
 
 WalkOutcome Walker::walkTo(const Vec3& goal) {
   const Vec3 start = avatar_.footPosition;
-  hasSteppedUp_ = false;
+  hasStepped_ = isUneven_ = false;
   for (double least = std::numeric_limits<double>::infinity();;) {
     avatar_.shape = wideShape_;
     WalkOutcome outcome = walkWithMargin(goal);
     avatar_.shape = shape_;
     if (outcome.kind == WalkOutcome::Kind::arrived) {
-      if (!hasSteppedUp_) return outcome;
-      // Whether a step succeeds may depend on where the ticks begin.
+      if (!hasStepped_) return outcome;
+      // Whether a step succeeds, and where it ends, may depend on where the ticks begin.
       returnTo(start);
-      return walkByTicks(goal, std::numeric_limits<double>::infinity());
+      return walkByTicks(goal, std::numeric_limits<double>::infinity(), false);
     }
-    outcome = walkByTicks(goal, kTickedLength);
+    outcome = walkByTicks(goal, kTickedLength, false);
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (outcome.kind != WalkOutcome::Kind::arrived) return outcome;
     if (distance <= kArrivalDistance || !(distance < least)) return outcome;
@@ -146,15 +169,17 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
   for (int ticks = 0; ticks < kMaxTicks; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (distance <= kArrivalDistance && avatar_.grounded) return end(WalkOutcome::Kind::arrived);
-    const bool isLong = shortDistance <= 0;
     const Vec3 before = avatar_.footPosition;
     if (avatar_.grounded) stood = before;
-    const double length = isLong ? std::min(stepLimit, chooseStep(goal, distance)) : 0;
-    const double speed = std::max(agent_.speed, length / tick);
-    step(computeWalkVelocity(before, goal, false, speed, tick));
-    if (isLong && (avatar_.blockedBy != 0 || !avatar_.grounded ||
-                   std::abs(avatar_.footPosition.y() - before.y()) > kEvenHeight)) {
-      returnTo(before);
+    if (shortDistance <= 0) {
+      const double even = measureEvenFloor(goal, distance);
+      const double length = std::min({distance, stepLimit, std::max(kLongStep, even)});
+      const Vec3 displacement = projectToGround(goal - before) * (length / distance);
+      if (stepEvenly(displacement, length <= even)) {
+        lastFloor = avatar_.footPosition.y();
+        stepLimit = std::min(kMaxStep, 2 * stepLimit);
+        continue;
+      }
       // What was met on a very long step may lie far ahead.
       if (length > kLongStep)
         stepLimit = std::max(kLongStep, 0.25 * length);
@@ -162,7 +187,8 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
         shortDistance = 2 * kLongStep;
       continue;
     }
-    if (isLong) stepLimit = std::min(kMaxStep, 2 * stepLimit);
+    isUneven_ = true;
+    step(computeWalkVelocity(before, goal, false, agent_.speed, tick));
     if (!avatar_.grounded) {  // falls from tread to tread of a steep stair
       shortDistance = 2 * kLongStep;
       if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight)
@@ -173,15 +199,16 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
     }
     lastFloor = avatar_.footPosition.y();
     const double across = computeGroundDistance(before, avatar_.footPosition);
-    if (isStep(before, avatar_.footPosition)) hasSteppedUp_ = true;
+    if (isStep(before, avatar_.footPosition)) hasStepped_ = metSteps_ = true;
     if (avatar_.blockedBy != 0) return end(WalkOutcome::Kind::blocked);
     shortDistance -= across;
   }
   return end(WalkOutcome::Kind::blocked);
 }
 
-/// Walks as an avatar in a world does, over at most `length` metres. Arrived: nothing blocked it.
-WalkOutcome Walker::walkByTicks(const Vec3& goal, double length) {
+/// Walks as an avatar in a world does, over at most `length` metres. Arrived: nothing stopped it,
+/// or, if it may slide, nothing for long.
+WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide) {
   const Vec3 start = avatar_.footPosition;
   double lastFloor = start.y(), least = computeGroundDistance(start, goal);
   int ticksWithoutGain = 0;
@@ -196,16 +223,25 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length) {
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity};
     const Vec3 before = avatar_.footPosition;
     step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));
-    if (isStep(before, avatar_.footPosition)) hasSteppedUp_ = true;
+    if (isStep(before, avatar_.footPosition)) hasStepped_ = metSteps_ = true;
     if (!avatar_.grounded) {
       if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight)
         return {WalkOutcome::Kind::fell, avatar_.footPosition, 0};
       continue;
     }
     lastFloor = avatar_.footPosition.y();
-    if (avatar_.blockedBy != 0)
+    if (avatar_.blockedBy != 0 && !maySlide)
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy};
   }
+}
+
+WalkOutcome Walker::walkOn(const Vec3& goal) {
+  const Vec3 start = avatar_.footPosition;
+  hasStepped_ = isUneven_ = false;
+  const WalkOutcome outcome = walkWithMargin(goal);  // of the agent's own width
+  if (outcome.kind == WalkOutcome::Kind::arrived && !isUneven_) return outcome;
+  returnTo(start);
+  return walkByTicks(goal, std::numeric_limits<double>::infinity(), true);
 }
 
 WalkOutcome Walker::slideTo(const Vec3& goal) {

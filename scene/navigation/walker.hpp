@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "scene/navigation/agent.hpp"
@@ -43,24 +44,35 @@ class Walker {
   /// or else walks tick by tick: a later walk along the same line differs by less than that.
   WalkOutcome walkTo(const Vec3& goal);
 
+  /// As an avatar in a world walks on from where the walker stands; may slide along obstacles. Tick
+  /// by tick off even floor.
+  WalkOutcome walkOn(const Vec3& goal);
   /// Walks tick by tick towards `goal`, slides along obstacles, and ends where it gains nothing.
   WalkOutcome slideTo(const Vec3& goal);
+
+  /// Whether a walk stepped up or down since the last call. Where it then stands may depend on the
+  /// way that it came.
+  bool takeMetSteps() { return std::exchange(metSteps_, false); }
 
   const Vec3& footPosition() const { return avatar_.footPosition; }
   const NavigationAgent& agent() const { return agent_; }
 
  private:
   WalkOutcome walkWithMargin(const Vec3& goal);
-  WalkOutcome walkByTicks(const Vec3& goal, double length);
+  WalkOutcome walkByTicks(const Vec3& goal, double length, bool maySlide);
+  void prepareStep(const Vec3& velocity);
   void step(const Vec3& velocity);
   void collectNearObstacles();
-  double chooseStep(const Vec3& goal, double distance);
+  double measureEvenFloor(const Vec3& goal, double distance);
+  bool stepEvenly(const Vec3& displacement, bool isFloorEven);
 
   const WorldData& world_;
   const NavigationAgent agent_;
   Avatar avatar_;
   std::shared_ptr<const AvatarShape> shape_, wideShape_;
-  bool hasSteppedUp_ = false;  ///< in the present walk
+  bool hasStepped_ = false;  ///< in the present walk
+  bool metSteps_ = false;
+  bool isUneven_ = false;  ///< the present walk left even floor
   QueryCount count_;
   /// Obstacles around a cell, with their caches. The avatar has those of `cell_`.
   struct Neighbourhood {
