@@ -14,6 +14,7 @@ const CROUCHED = 1.2; // metres
 const MAX_SPAWNS = 20;
 const SPAWN_SECONDS = 5; // without a notice by then, no tick runs
 const ORDER_SECONDS = 2; // a queued order without a notice by then no longer holds back the keys
+const SNAP_DISTANCE = 1; // metres from a place on the plan to where there is room
 const DRIVE_INTERVAL = 0.05; // seconds between changes of a driven direction
 
 export class Walk {
@@ -165,10 +166,23 @@ export class Walk {
     if (this.#isDriving) await this.#app.connection.command(this.name, { case: "drive", value: { velocity: {} } });
     this.#isDriving = false;
     this.#driven.set(0, 0, 0);
-    const to = { by: { case: "point" as const, value: plain(place) } };
-    const notice = await this.#order({ case: "go", value: { to } }, 600);
+    const notice = await this.#goTo(place);
     if (notice?.kind === Notice_Kind.BLOCKED) this.#app.say(`Stopped by ${notice.obstacleName || "an obstacle"}.`);
     if (notice?.kind === Notice_Kind.REFUSED) this.#app.say(notice.text);
+  }
+
+  /** Orders a path to the closest place where the avatar has room; without one, says so and orders a straight walk. */
+  async #goTo(place: Vector3): Promise<Notice | null> {
+    const point = plain(place);
+    try {
+      const query = { case: "snap" as const, value: { points: [point], maxDistance: SNAP_DISTANCE } };
+      const [spot] = (await this.#app.connection.request("navigation", { query })).spots;
+      const to = { by: { case: "point" as const, value: spot?.found && spot.at ? spot.at : point } };
+      return await this.#order({ case: "go", value: { to } }, 600);
+    } catch (error) {
+      this.#app.say(`${error instanceof Error ? error.message : error} Walking straight ahead.`);
+      return this.#order({ case: "walk", value: { along: [point] } }, 600);
+    }
   }
 
   /** The velocity that the held keys ask for. */
