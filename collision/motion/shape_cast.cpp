@@ -97,10 +97,6 @@ struct TranslationCast {
 
 // ---- rotation about a fixed line ---------------------------------------------------------------
 
-Vec3 placeVertex(const PlacedConvex& body, const Vec3& vertex) {
-  return (body.rotation ? Vec3(*body.rotation * vertex) : vertex) + body.translation;
-}
-
 /// Path of a vertex that rotates about a line; the parameter is the angle.
 struct RotationPath {
   const PlacedConvex& body;

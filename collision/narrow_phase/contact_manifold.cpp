@@ -71,8 +71,7 @@ struct Outline {
 // ---- step 1 ------------------------------------------------------------------------------------
 
 Vec3 computeWorldVertex(const PlacedConvex& convex, std::uint32_t i) {
-  const Vec3& v = convex.vertices[i];
-  return (convex.rotation ? Vec3(*convex.rotation * v) : v) + convex.translation;
+  return placeVertex(convex, convex.vertices[i]);
 }
 
 /// A placed convex, projected along the contact normal.

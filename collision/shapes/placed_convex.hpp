@@ -26,4 +26,9 @@ struct PlacedConvex {
   const Hull* hull = nullptr;      ///< of exactly these vertices; null: queries scan all vertices
 };
 
+/// A point of the body's frame where the pose puts it.
+inline Vec3 placeVertex(const PlacedConvex& body, const Vec3& vertex) {
+  return (body.rotation ? Vec3(*body.rotation * vertex) : vertex) + body.translation;
+}
+
 }  // namespace enfilade::collision

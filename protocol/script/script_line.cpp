@@ -133,6 +133,11 @@ void readSpawn(const json& line, v1::Spawn* spawn) {
   }
 }
 
+double readSpeed(const json& line) {
+  return parseNumberInRange(line["speed"], "speed", "a number of metres per second", 0, kMaxSpeed,
+                            true);
+}
+
 void readWalk(const json& line, v1::Walk* walk) {
   const bool to = line.contains("to");
   if (to == line.contains("along")) {
@@ -150,10 +155,7 @@ void readWalk(const json& line, v1::Walk* walk) {
       readPoint(along[i], "along[" + std::to_string(i) + "]", walk->add_along());
     }
   }
-  if (line.contains("speed")) {
-    walk->set_speed(parseNumberInRange(line["speed"], "speed", "a number of metres per second", 0,
-                                       kMaxSpeed, true));
-  }
+  if (line.contains("speed")) walk->set_speed(readSpeed(line));
 }
 
 void readGo(const json& line, v1::Go* go) {
@@ -164,10 +166,7 @@ void readGo(const json& line, v1::Go* go) {
   } else {
     readPoint(to, "to", go->mutable_to()->mutable_point());
   }
-  if (line.contains("speed")) {
-    go->set_speed(parseNumberInRange(line["speed"], "speed", "a number of metres per second", 0,
-                                     kMaxSpeed, true));
-  }
+  if (line.contains("speed")) go->set_speed(readSpeed(line));
 }
 
 void readLook(const json& line, v1::Look* look) {

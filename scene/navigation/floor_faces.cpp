@@ -39,8 +39,7 @@ void addFace(std::vector<Vec3> corners, bool hasOutside, const Aabb& box,
 void addConvex(const collision::PlacedConvex& convex, const Aabb& box,
                std::vector<FloorFace>& faces) {
   const auto place = [&](std::size_t i) {
-    const Vec3& vertex = convex.vertices[i];
-    return Vec3((convex.rotation ? Vec3(*convex.rotation * vertex) : vertex) + convex.translation);
+    return collision::placeVertex(convex, convex.vertices[i]);
   };
   if (!convex.hull) {
     if (convex.vertices.size() == 3) addFace({place(0), place(1), place(2)}, false, box, faces);

@@ -1,13 +1,12 @@
 #include "scene/navigation/navigation.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
 #include <exception>
 #include <limits>
-#include <numbers>
+#include <numeric>
 #include <stdexcept>
 #include <thread>
 #include <utility>
@@ -21,12 +20,10 @@ namespace {
 constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile beyond the radius
 constexpr int kMaxRandomTries = 200;
 
-void setBodyPoses(WorldData& world, const Snapshot& snapshot) {
-  for (const BodySnapshot& body : *snapshot.bodies) {
-    Body& own = world.bodies[body.index];
-    setBodyPose(own, body.pose.translation, body.pose.rotation);
-    own.motionBounds = own.boxes.whole;
-  }
+/// Puts a body where it rests in a snapshot.
+void placeBody(const BodySnapshot& body, Body& own) {
+  setBodyPose(own, body.pose.translation, body.pose.rotation);
+  own.motionBounds = own.boxes.whole;
 }
 
 }  // namespace
@@ -38,7 +35,9 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
       world_(std::move(scene), settings),
       grid_(makeTileGrid(world_.scene().bounds(), agent)) {
   const auto start = std::chrono::steady_clock::now();
-  if (snapshot) setBodyPoses(world_.data(), *snapshot);
+  if (snapshot)
+    for (const BodySnapshot& body : *snapshot->bodies)
+      placeBody(body, world_.data().bodies[body.index]);
   std::vector<int> tiles(static_cast<std::size_t>(grid_.tilesX) *
                          static_cast<std::size_t>(grid_.tilesZ));
   std::iota(tiles.begin(), tiles.end(), 0);
@@ -90,13 +89,15 @@ void Navigation::assembleMeshes() {
   scarce_.emplace(grid_, scarceTiles_);
   islands_ = ample_->findIslands();
   areaUpTo_.clear();
+  report_.islandAreas.clear();
   double area = 0;
-  for (std::uint32_t i = 0; i < ample_->polygonCount(); ++i)
+  for (std::uint32_t i = 0; i < ample_->polygonCount(); ++i) {
     areaUpTo_.push_back(area += ample_->polygonArea(i));
+    if (islands_[i] >= report_.islandAreas.size()) report_.islandAreas.resize(islands_[i] + 1);
+    report_.islandAreas[islands_[i]] += ample_->polygonArea(i);
+  }
   report_.polygons = ample_->polygonCount();
   report_.area = area;
-  report_.islands =
-      islands_.empty() ? 0 : *std::max_element(islands_.begin(), islands_.end()) + std::size_t{1};
   report_.bytes = 2 * (ample_->memoryBytes() + scarce_->memoryBytes());
 }
 
@@ -122,8 +123,7 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
                                       own.orientation.coeffs() == body.pose.rotation.coeffs()))
       continue;
     markTiles(own.boxes.whole);
-    setBodyPose(own, body.pose.translation, body.pose.rotation);
-    own.motionBounds = own.boxes.whole;
+    placeBody(body, own);
     markTiles(own.boxes.whole);
   }
   std::vector<int> tiles;
@@ -229,13 +229,6 @@ NavigationMap Navigation::drawMap(double cell, double height) {
   return map;
 }
 
-std::vector<double> Navigation::islandAreas() {
-  const std::lock_guard lock(mutex_);
-  std::vector<double> areas(report_.islands, 0.0);
-  for (std::uint32_t i = 0; i < islands_.size(); ++i) areas[islands_[i]] += ample_->polygonArea(i);
-  return areas;
-}
-
 std::optional<std::uint32_t> Navigation::islandOf(const Vec3& point) {
   const std::lock_guard lock(mutex_);
   const auto nearest = ample_->findNearest(
@@ -251,10 +244,14 @@ std::optional<Vec3> Navigation::findRandomPlace(std::mt19937_64& random,
   std::vector<double> areas;
   if (wanted.near || wanted.island) {
     double area = 0;
-    std::vector<std::uint32_t> all(ample_->polygonCount());
-    for (std::uint32_t i = 0; i < all.size(); ++i) all[i] = i;
-    if (wanted.near) all = ample_->findPolygons(*wanted.near, Vec3::Constant(wanted.maxDistance));
-    for (const std::uint32_t polygon : all) {
+    std::vector<std::uint32_t> candidates;
+    if (wanted.near) {
+      candidates = ample_->findPolygons(*wanted.near, Vec3::Constant(wanted.maxDistance));
+    } else {
+      candidates.resize(ample_->polygonCount());
+      std::iota(candidates.begin(), candidates.end(), 0u);
+    }
+    for (const std::uint32_t polygon : candidates) {
       if (wanted.island && islands_[polygon] != *wanted.island) continue;
       polygons.push_back(polygon);
       areas.push_back(area += ample_->polygonArea(polygon));

@@ -19,9 +19,9 @@
 namespace enfilade::scene {
 
 struct NavigationReport {
-  std::size_t polygons = 0;  ///< of the mesh for ample clearance
-  double area = 0;           ///< square metres
-  std::size_t islands = 0;
+  std::size_t polygons = 0;         ///< of the mesh for ample clearance
+  double area = 0;                  ///< square metres
+  std::vector<double> islandAreas;  ///< square metres, by number: descending
   std::size_t bytes = 0;
   double seconds = 0;  ///< for the meshes
 };
@@ -83,8 +83,6 @@ class Navigation {
   /// The walkable cells at floors within 0.5 m of `height`. Throws std::invalid_argument for more
   /// than 4 million cells.
   NavigationMap drawMap(double cell, double height);
-  /// Areas of the islands, m^2, by number.
-  std::vector<double> islandAreas();
   /// Number of the island at a point, 0 for the largest; nullopt: no polygon is near.
   std::optional<std::uint32_t> islandOf(const Vec3& point);
 

@@ -18,8 +18,8 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr int kReferenceBits = 22;  // of a tile and a polygon, in a 32-bit dtPolyRef
-constexpr int kMaxNearPolygons = 256;
+constexpr int kReferenceBits = 22;         // of a tile and a polygon, in a 32-bit dtPolyRef
+constexpr std::size_t kFewPolygons = 256;  // a query with more is repeated
 constexpr int kMaxCorners = 4096;
 
 using Float3 = std::array<float, 3>;
@@ -142,10 +142,14 @@ double NavigationMesh::area() const {
 std::vector<std::uint32_t> NavigationMesh::findPolygons(const Vec3& point,
                                                         const Vec3& extent) const {
   const Float3 centre = toFloats(point), half = toFloats(extent);
-  std::array<dtPolyRef, kMaxNearPolygons> found{};
+  thread_local std::vector<dtPolyRef> found(kFewPolygons);
   int count = 0;
-  detour_->query.queryPolygons(centre.data(), half.data(), &detour_->filter, found.data(), &count,
-                               kMaxNearPolygons);
+  for (;;) {
+    detour_->query.queryPolygons(centre.data(), half.data(), &detour_->filter, found.data(), &count,
+                                 static_cast<int>(found.size()));
+    if (static_cast<std::size_t>(count) < found.size() || found.size() > polygonCount()) break;
+    found.resize(2 * found.size());
+  }
   std::vector<std::uint32_t> polygons;
   for (int i = 0; i < count; ++i) polygons.push_back(indexOf(found[static_cast<std::size_t>(i)]));
   return polygons;

@@ -41,7 +41,7 @@ class NavigationMesh {
 
   /// The closest point of the mesh to `point` within `extent` metres on each axis.
   std::optional<MeshPoint> findNearest(const Vec3& point, const Vec3& extent) const;
-  /// The polygons near a point: at most `limit`, in no order.
+  /// The polygons within `extent` metres of a point on each axis, in no order.
   std::vector<std::uint32_t> findPolygons(const Vec3& point, const Vec3& extent) const;
   /// The cheapest corridor through open portals; nullopt: not connected.
   std::optional<Corridor> findCorridor(const MeshPoint& from, const MeshPoint& to) const;

@@ -158,8 +158,7 @@ void append(const Vec3& point, std::vector<float>& out) {
 /// The faces of a hull, or the triangle itself.
 void appendConvex(const collision::PlacedConvex& convex, std::vector<float>& out) {
   const auto place = [&](std::size_t i) {
-    const Vec3& vertex = convex.vertices[i];
-    return Vec3((convex.rotation ? Vec3(*convex.rotation * vertex) : vertex) + convex.translation);
+    return collision::placeVertex(convex, convex.vertices[i]);
   };
   const auto* hull = convex.hull;
   if (!hull && convex.vertices.size() == 3)

@@ -87,7 +87,7 @@ Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
                      {"step_height", command.settings.stepHeight}};
   report["mesh"] = {{"seconds", mesh.seconds},
                     {"area", mesh.area},
-                    {"islands", mesh.islands},
+                    {"islands", mesh.islandAreas.size()},
                     {"bytes", mesh.bytes}};
   return report;
 }
@@ -121,18 +121,15 @@ WalkedPath makeWalkedPath(const scene::NavigationPath& path) {
   return walked;
 }
 
-void writePlan(const std::shared_ptr<const scene::Scene>& scene, const scene::Snapshot& snapshot,
+void writePlan(const std::shared_ptr<const scene::Scene>& scene,
+               const std::shared_ptr<const scene::Snapshot>& snapshot,
                const scene::NavigationPath& path, const RouteCommand& command) {
   render::RendererSelector renderer(scene);
-  const PlanRenderer renderPlan = [&](const render::Camera& camera) {
-    const render::Frame frame = renderer.render(snapshot, camera);
-    return std::optional(PlanPicture{render::toImage(frame), frame.ids});
-  };
   WalkTrace trace;
   trace.title = fmt::format("{} to {}: {:.2f} m", command.from, command.to, path.length);
   trace.paths.push_back(makeWalkedPath(path));
   trace.floors = {path.points.front().y(), path.points.back().y()};
-  if (const auto image = drawMap(trace, {renderPlan, scene.get()})) {
+  if (const auto image = drawMap(trace, {makePlanRenderer(renderer, snapshot), scene.get()})) {
     render::writePng(command.plan, *image);
     spdlog::info("plan: {}", command.plan.string());
   }
@@ -161,7 +158,7 @@ ExitCode route(const RouteCommand& command) {
           ? makeReport(command, path, narrowest, navigation).dump(-1, ' ', false, kReplace) + "\n"
           : formatText(command, path, narrowest),
       "the path was found");
-  if (path.found() && !command.plan.empty()) writePlan(scene, *snapshot, path, command);
+  if (path.found() && !command.plan.empty()) writePlan(scene, snapshot, path, command);
   return path.found() ? ExitCode::success : ExitCode::violations;
 }
 

@@ -323,12 +323,9 @@ void drawChangeMap(const WalkDifference& difference, const ComparedModels& model
   for (const OrderChange& change : difference.orders)
     if (change.worse && change.after && change.run == 0)
       trace.blockedWalks.push_back({change.after->position, Vec3::UnitX()});
-  const scene::Snapshot snapshot = *scene::World(models.after).snapshot();
-  const auto picture = [&](const render::Camera& camera) -> std::optional<PlanPicture> {
-    const render::Frame frame = models.afterRenderer->render(snapshot, camera);
-    return PlanPicture{render::toImage(frame), frame.ids};
-  };
-  const auto map = drawMap(trace, {picture, models.after.get()});
+  const PlanRenderer renderPlan =
+      makePlanRenderer(*models.afterRenderer, scene::World(models.after).snapshot());
+  const auto map = drawMap(trace, {renderPlan, models.after.get()});
   if (map) render::writePng(folder / "changes" / "map.png", *map);
 }
 

@@ -176,14 +176,6 @@ std::shared_ptr<const scene::Scene> loadRecordedScene(const v1::RecordingStart& 
   }
 }
 
-PlanRenderer makePlanRenderer(render::RendererSelector* renderer, const scene::World& world) {
-  return [renderer, &world](const render::Camera& camera) -> std::optional<PlanPicture> {
-    if (!renderer) return std::nullopt;
-    const render::Frame frame = renderer->render(*world.snapshot(), camera);
-    return PlanPicture{render::toImage(frame), frame.ids};
-  };
-}
-
 /// Runs the walk and writes its report and recording.
 std::vector<RefusedCommand> resimulateWalk(const ResimulateCommand& command,
                                            protocol::RecordingReader& recording,
@@ -213,7 +205,9 @@ std::vector<RefusedCommand> resimulateWalk(const ResimulateCommand& command,
                      walk.maxPairs,
                      0};
   summary.maxPairs = std::max(summary.maxPairs, summary.metrics.pairs());
-  report.writePictures(summary, {makePlanRenderer(renderer, world), scene.get()});
+  PlanRenderer renderPlan = [](const render::Camera&) { return std::nullopt; };
+  if (renderer) renderPlan = makePlanRenderer(*renderer, world.snapshot());
+  report.writePictures(summary, {std::move(renderPlan), scene.get()});
   report.writeContacts(driver.endContacts());
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - startTime;
   summary.wallSeconds = elapsed.count();

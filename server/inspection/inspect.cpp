@@ -17,16 +17,9 @@
 namespace enfilade::server {
 namespace {
 
-PlanRenderer makePlanRenderer(render::RendererSelector& renderer) {
-  return [&renderer](const render::Camera& camera) {
-    const render::Frame frame = renderer.render(scene::Snapshot(), camera);
-    return std::optional(PlanPicture{render::toImage(frame), frame.ids});
-  };
-}
-
 void writePlans(const std::shared_ptr<const scene::Scene>& scene, const InspectCommand& command) {
   render::RendererSelector renderer(scene);
-  const PlanRenderer picture = makePlanRenderer(renderer);
+  const PlanRenderer picture = makePlanRenderer(renderer, std::make_shared<scene::Snapshot>());
   int number = 0;
   for (const StoreyFloor& storey : findStoreys(*scene)) {
     const auto file =
@@ -43,7 +36,7 @@ void writePlans(const std::shared_ptr<const scene::Scene>& scene, const InspectC
 void writePage(const Inspection& inspection, const InspectCommand& command) {
   const std::shared_ptr<const scene::Scene>& scene = inspection.loaded.scene;
   render::RendererSelector renderer(scene);
-  const PlanRenderer picture = makePlanRenderer(renderer);
+  const PlanRenderer picture = makePlanRenderer(renderer, std::make_shared<scene::Snapshot>());
   std::vector<StoreyPlan> plans;
   for (const StoreyFloor& storey : findStoreys(*scene))
     plans.push_back(

@@ -48,12 +48,6 @@ std::optional<v1::Error> validatePoint(const std::string& field, const v1::Vec3&
   return makeFieldError(field, "give finite coordinates of at most 1e7 m");
 }
 
-bool equalSettings(const scene::WorldSettings& a, const scene::WorldSettings& b) {
-  return a.contactOffset == b.contactOffset && a.stepHeight == b.stepHeight &&
-         a.walkableNormalY == b.walkableNormalY && a.gravity == b.gravity &&
-         a.maxSpeed == b.maxSpeed && a.tickDuration == b.tickDuration && a.sliding == b.sliding;
-}
-
 /// Writes the answers to one query into its reply.
 struct Answer {
   const scene::Scene& scene;
@@ -215,9 +209,9 @@ void addReport(scene::Navigation& navigation, v1::NavigationReply& reply) {
   const scene::NavigationReport report = navigation.report();
   reply.set_navigable_area(report.area);
   reply.set_build_seconds(report.seconds);
-  const std::vector<double> areas = navigation.islandAreas();
-  for (std::size_t i = 0; i < std::min(areas.size(), kMaxIslandAreas); ++i)
-    reply.add_island_areas(areas[i]);
+  const std::size_t count = std::min(report.islandAreas.size(), kMaxIslandAreas);
+  reply.mutable_island_areas()->Add(
+      report.islandAreas.begin(), report.islandAreas.begin() + static_cast<std::ptrdiff_t>(count));
 }
 
 }  // namespace
@@ -225,9 +219,7 @@ void addReport(scene::Navigation& navigation, v1::NavigationReply& reply) {
 scene::Navigation& NavigationService::prepare(const scene::NavigationAgent& agent, bool doorsOpen,
                                               const NavigationState& state) {
   const auto known = std::ranges::find_if(entries_, [&](const Entry& entry) {
-    return entry.agent.radius == agent.radius && entry.agent.height == agent.height &&
-           entry.agent.speed == agent.speed && entry.doorsOpen == doorsOpen &&
-           equalSettings(entry.settings, state.settings);
+    return entry.agent == agent && entry.doorsOpen == doorsOpen && entry.settings == state.settings;
   });
   if (known != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, known);
@@ -240,7 +232,7 @@ scene::Navigation& NavigationService::prepare(const scene::NavigationAgent& agen
       std::make_unique<scene::Navigation>(scene_, state.settings, agent, snapshot.get());
   const scene::NavigationReport report = navigation->report();
   spdlog::info("navigation: radius {} m, height {} m: {:.1f} m2 in {} islands, built in {:.2f} s",
-               agent.radius, agent.height, report.area, report.islands, report.seconds);
+               agent.radius, agent.height, report.area, report.islandAreas.size(), report.seconds);
   entries_.push_front({agent, state.settings, doorsOpen, std::move(navigation)});
   if (entries_.size() > kMaxEntries) entries_.pop_back();
   return *entries_.front().navigation;

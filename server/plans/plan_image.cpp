@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "collision/assert.hpp"
 #include "render/avatar_mesh.hpp"
+#include "render/service/renderer_selector.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -35,6 +37,14 @@ double computeMedian(Peak& peak) {
 }
 
 }  // namespace
+
+PlanRenderer makePlanRenderer(render::RendererSelector& renderer,
+                              std::shared_ptr<const scene::Snapshot> snapshot) {
+  return [&renderer, snapshot = std::move(snapshot)](const render::Camera& camera) {
+    const render::Frame frame = renderer.render(*snapshot, camera);
+    return std::optional(PlanPicture{render::toImage(frame), frame.ids});
+  };
+}
 
 render::Colour computeAvatarColour(scene::EntityId id) {
   const Eigen::Vector3f linear = render::avatarColour(id);

@@ -3,12 +3,18 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
 #include "render/camera.hpp"
 #include "render/image/canvas.hpp"
+#include "scene/world/data/snapshot.hpp"
+
+namespace enfilade::render {
+class RendererSelector;
+}
 
 namespace enfilade::server {
 
@@ -22,6 +28,10 @@ struct PlanPicture {
 
 /// Renders a plan from a camera; nullopt if not available.
 using PlanRenderer = std::function<std::optional<PlanPicture>(const render::Camera&)>;
+
+/// Renders plans of a scene in a state. `renderer` must outlive the result.
+PlanRenderer makePlanRenderer(render::RendererSelector& renderer,
+                              std::shared_ptr<const scene::Snapshot> snapshot);
 
 inline constexpr double kPlanCutHeight = 1.2;  ///< metres above the floor: storeys are cut through
                                                ///< the windows, as usual for floor plans

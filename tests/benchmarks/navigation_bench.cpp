@@ -100,12 +100,12 @@ void measure(const std::string& file, int pairs, nlohmann::json& row) {
       std::printf("  wrong: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %s\n", from->x(),
                   from->y(), from->z(), to->x(), to->y(), to->z(), walked.text.c_str());
   }
-  const auto& report = navigation.report();
+  const auto report = navigation.report();
   row = {{"scene", std::filesystem::path(file).filename().string()},
          {"build_seconds", report.seconds},
          {"polygons", report.polygons},
          {"area", report.area},
-         {"islands", report.islands},
+         {"islands", report.islandAreas.size()},
          {"megabytes", static_cast<double>(report.bytes) * 1e-6},
          {"pairs", seconds.size()},
          {"found", found},

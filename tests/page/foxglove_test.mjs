@@ -12,6 +12,7 @@ import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
 import foxglove from "@foxglove/ws-protocol"; // a CommonJS module
 import { WebSocket } from "ws";
 import { connect } from "../../protocol/clients/javascript/enfilade.js";
+import { awaitReady, runTests } from "./harness.mjs";
 
 globalThis.WebSocket ??= WebSocket; // for the client of the protocol
 
@@ -32,14 +33,7 @@ const cleanups = [() => rmSync(scratch, { recursive: true })];
 async function startServer(what, args = []) {
   const child = spawn(options.server, ["serve", what, "--listen", "127.0.0.1:0", ...args], { stdio: ["ignore", "pipe", "ignore"] });
   cleanups.unshift(() => child.kill("SIGKILL"));
-  const ready = await new Promise((resolve, reject) => {
-    let text = "";
-    child.stdout.on("data", (data) => {
-      text += data;
-      if (text.includes("\n")) resolve(JSON.parse(text.split("\n")[0]));
-    });
-    child.once("exit", (code) => reject(new Error(`the server ended with ${code}`)));
-  });
+  const ready = await awaitReady(child);
   return ready.port;
 }
 
@@ -261,15 +255,6 @@ const tests = {
   },
 };
 
-let failures = 0;
-for (const [name, test] of Object.entries(tests)) {
-  try {
-    await test();
-    console.log(`ok      ${name}`);
-  } catch (error) {
-    failures += 1;
-    console.log(`FAILED  ${name}\n${error.stack}`);
-  }
-}
+const failures = await runTests(tests);
 for (const cleanup of cleanups) cleanup();
 process.exit(failures > 0 ? 1 : 0);

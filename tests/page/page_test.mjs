@@ -9,6 +9,7 @@ import { join } from "node:path";
 import { parseArgs } from "node:util";
 import { chromium } from "playwright-core";
 import { startProxy } from "./page_proxy.mjs";
+import { awaitReady } from "./harness.mjs";
 
 const { values: options } = parseArgs({
   options: {
@@ -34,14 +35,7 @@ const cleanups = [() => browser.close(), () => rmSync(scratch, { recursive: true
 async function startServer(what, { port = 0, args = [] } = {}) {
   const child = spawn(options.server, ["serve", what, "--listen", `127.0.0.1:${port}`, ...args], { stdio: ["ignore", "pipe", "pipe"] });
   child.stderr.resume();
-  const ready = await new Promise((resolve, reject) => {
-    let text = "";
-    child.stdout.on("data", (data) => {
-      text += data;
-      if (text.includes("\n")) resolve(JSON.parse(text.split("\n")[0]));
-    });
-    child.once("exit", (code) => reject(new Error(`the server ended with ${code}`)));
-  });
+  const ready = await awaitReady(child);
   const server = {
     port: ready.port,
     async stop() {

@@ -8,6 +8,7 @@ import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { parseArgs } from "node:util";
 import { chromium } from "playwright-core";
+import { runTests } from "./harness.mjs";
 
 const { values: options } = parseArgs({
   options: {
@@ -118,17 +119,7 @@ const tests = {
   },
 };
 
-let failures = 0;
-for (const [name, test] of Object.entries(tests)) {
-  try {
-    await test();
-    console.log(`ok      ${name}`);
-  } catch (error) {
-    failures += 1;
-    console.log(`FAILED  ${name}\n${error.stack}`);
-    await shoot(`replay-failed-${failures}`).catch(() => {});
-  }
-}
+const failures = await runTests(tests, (number) => shoot(`replay-failed-${number}`).catch(() => {}));
 await browser.close();
 rmSync(scratch, { recursive: true });
 process.exit(failures > 0 ? 1 : 0);

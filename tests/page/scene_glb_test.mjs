@@ -10,6 +10,7 @@ import { parseArgs } from "node:util";
 import { NodeIO } from "@gltf-transform/core";
 import { EXTMeshGPUInstancing } from "@gltf-transform/extensions";
 import validator from "gltf-validator";
+import { runTests } from "./harness.mjs";
 
 const { values: options } = parseArgs({
   options: { server: { type: "string" }, scenes: { type: "string", default: "../shared/scenes" } },
@@ -63,17 +64,9 @@ async function test(scene) {
   assert.equal(written.triangles, triangles);
   const wanted = inspected.object_list.filter(({ path }) => !triggers.has(path)).map(({ id }) => id);
   assert.deepEqual([...ids].sort((a, b) => a - b), wanted, "entities");
-  console.log(`ok       ${basename(scene)}: ${ids.size} objects, ${triangles} triangles, ${issues.numWarnings} warnings`);
+  console.log(`        ${basename(scene)}: ${ids.size} objects, ${triangles} triangles, ${issues.numWarnings} warnings`);
 }
 
-let failures = 0;
-for (const scene of scenes) {
-  try {
-    await test(scene);
-  } catch (error) {
-    failures += 1;
-    console.log(`FAILED   ${scene}\n${error.stack}`);
-  }
-}
+const failures = await runTests(Object.fromEntries(scenes.map((scene) => [scene, () => test(scene)])));
 rmSync(scratch, { recursive: true });
 process.exit(failures === 0 ? 0 : 1);

@@ -4,7 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <queue>
 
 #include "assets/building.hpp"
@@ -76,7 +75,7 @@ TEST(Navigation, ADoorThatIsTooNarrowIsNamedWithItsWidth) {
       << path.reason;
   EXPECT_NEAR(path.obstruction->clearWidth, 0.58, 0.02) << path.reason;
   EXPECT_NE(path.reason.find("needs 0.600"), std::string::npos) << path.reason;
-  EXPECT_EQ(navigation.report().islands, 2u);
+  EXPECT_EQ(navigation.report().islandAreas.size(), 2u);
 }
 
 TEST(Navigation, AThinnerAgentFitsThroughTheSameDoor) {
@@ -204,7 +203,7 @@ TEST(Navigation, AMapShowsTheRoomsAndTheWallBetween) {
   EXPECT_EQ(at(6.05, 0.05), 1);
   EXPECT_EQ(at(4.05, 0.05), 0);
   double area = 0;
-  for (const double island : navigation.islandAreas()) area += island;
+  for (const double island : navigation.report().islandAreas) area += island;
   const auto walkable = std::count(map.cells.begin(), map.cells.end(), 1);
   EXPECT_NEAR(0.01 * static_cast<double>(walkable), area, 1.5);
   EXPECT_THROW(navigation.drawMap(0.001, 0), std::invalid_argument);
@@ -240,12 +239,12 @@ class FloodFill {
     const auto shape = makePrismShape(radius, 1.75, 1.75, world.settings);
     ObstacleSet obstacles = collectObstaclesInBox(world, world.scene->bounds(), 0);
     QueryCount count;
-    std::array<std::vector<signed char>, 1> free{std::vector<signed char>(kSide * kSide, -1)};
+    std::vector<signed char> free(kSide * kSide, -1);  // -1: not known
     reached_.assign(kSide * kSide, false);
     std::queue<int> open;
     const auto visit = [&](int cell) {
       if (reached_[static_cast<std::size_t>(cell)]) return;
-      signed char& known = free[0][static_cast<std::size_t>(cell)];
+      signed char& known = free[static_cast<std::size_t>(cell)];
       EntityId nearest = 0;
       const Vec3 feet(kStep * (cell % kSide), 1e-3, kStep * (cell / kSide));
       if (known < 0) known = isClear(*shape, feet, 1e-5, obstacles, count, nearest) ? 1 : 0;
@@ -354,6 +353,44 @@ TEST(Navigation, PathsOfTheBuildingAreWalked) {
     EXPECT_LT((end.position - *to).norm(), 0.01);
   }
   EXPECT_GE(found, 15);
+}
+
+TEST(Walker, ALongStepOfTheProofPassesNothingThatStopsAWalk) {
+  // A pyramid that is in the way of the feet, and not of who stands a step higher.
+  Model model = boxModel({{"floor", {0, -0.2, -3}, {8, 0, 3}}});
+  Mesh pyramid;
+  for (const Vec3& corner : {Vec3(3.6, 0, -0.4), Vec3(4.4, 0, -0.4), Vec3(4.4, 0, 0.4),
+                             Vec3(3.6, 0, 0.4), Vec3(4, 1, 0)})
+    pyramid.positions.push_back(corner.cast<float>());
+  pyramid.indices = {0, 1, 2, 0, 2, 3, 0, 4, 1, 1, 4, 2, 2, 4, 3, 3, 4, 0};
+  model.meshes.push_back(pyramid);
+  model.objects.push_back({"pyramid", "", {1}, Eigen::Affine3d::Identity()});
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  World world(scene);
+  Walker walker(world.data(), {});
+  int passed = 0, stopped = 0;
+  for (double z = 0.3; z < 0.8; z += 0.01) {
+    ASSERT_FALSE(walker.place({2, 0.1, z}, 0.5));
+    if (walker.walkTo({6, 0, z}).kind != WalkOutcome::Kind::arrived) {
+      ++stopped;
+      continue;
+    }
+    ++passed;
+    // An avatar walks there on a straight line.
+    World walked(scene);
+    submitAvatarCommand(walked, {"walker", Spawn{{2, 0.01, z}}, 0});
+    submitAvatarCommand(walked, {"walker", Walk{{Vec3(6, 0, z)}}, 0});
+    double aside = 0;
+    for (int tick = 0; tick < 240; ++tick) {
+      tickWorld(walked);
+      const AvatarSnapshot& avatar = walked.snapshot()->avatars.at(0);
+      aside = std::max(aside, std::abs(avatar.footPosition.z() - z));
+    }
+    EXPECT_LT(aside, 1e-6) << z;
+    EXPECT_NEAR(walked.snapshot()->avatars.at(0).footPosition.x(), 6, 2e-3) << z;
+  }
+  EXPECT_GE(passed, 5);
+  EXPECT_GE(stopped, 5);
 }
 
 TEST(FloorFaces, ALineAcrossTilesStaysEvenUpToAHole) {

@@ -38,6 +38,8 @@ struct WorldSettings {
   /// radians or metres per second. Maximum joint speed that a command may request.
   double maxJointSpeed = 20;
   Sliding sliding = Sliding::slide;
+
+  bool operator==(const WorldSettings&) const = default;
 };
 
 /// Distance below which a pair is in contact, metres.

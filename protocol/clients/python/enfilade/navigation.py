@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 Place = Union[Point, str, "Avatar"]
 
 _DOORS = {"as_they_are": 1, "open": 2}
-_PAGE = {"spots": 10_000, "steps": 1000, "clearance": 1000}
-_GOALS = 100  # of one query
+_MOST_POINTS = 10_000  # of one query
+_MOST_GOALS = 100
 
 
 @dataclass(frozen=True)
@@ -119,9 +119,9 @@ class Navigation:
     def paths(self, start: Place, goals: Sequence[Place], *, narrowest: bool = False) -> List[Path]:
         """Returns the paths from one place to many, in their order."""
         found: List[Path] = []
-        for first in range(0, len(goals), _GOALS):
+        for first in range(0, len(goals), _MOST_GOALS):
             reply, _ = self._ask(path=messages.NavigationQuery.Path(
-                **{"from": _place(start)}, to=[_place(goal) for goal in goals[first:first + _GOALS]],
+                **{"from": _place(start)}, to=[_place(goal) for goal in goals[first:first + _MOST_GOALS]],
                 narrowest=narrowest))
             found += [_path(one) for one in reply.paths]
         return found
@@ -155,8 +155,8 @@ class Navigation:
         """snap() of N x 3 points."""
         array = points(where, "snap")
         found: List[Optional[Spot]] = []
-        for first in range(0, len(array), _PAGE["spots"]):
-            page = array[first:first + _PAGE["spots"]]
+        for first in range(0, len(array), _MOST_POINTS):
+            page = array[first:first + _MOST_POINTS]
             query = messages.NavigationQuery.Snap(points=[vec(p) for p in page], max_distance=max_distance)
             found += [_spot(one) for one in self._ask(snap=query)[0].spots]
         return found
