@@ -150,6 +150,11 @@ bool parseHeader(std::span<const std::uint8_t> header, google::protobuf::Message
          into.ParseFromArray(header.data(), static_cast<int>(header.size()));
 }
 
+std::uint32_t readHeaderLength(std::span<const std::uint8_t> encoded) {
+  static_assert(kPrefixBytes == 2 * kLengthBytes);
+  return littleEndian(encoded.data() + kLengthBytes);
+}
+
 std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
                                  std::span<const std::uint8_t> attachment) {
   std::vector<std::uint8_t> bytes = encodeHead(header, attachment.size());

@@ -104,6 +104,11 @@ std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header
 std::vector<std::uint8_t> encodeSplicedHead(std::uint32_t field, std::string_view first,
                                             std::size_t secondLength);
 
+/// Bytes of an encoded message before its header.
+inline constexpr std::size_t kPrefixBytes = 8;
+/// The length of the header, from the prefix of an encoded message.
+std::uint32_t readHeaderLength(std::span<const std::uint8_t> encoded);
+
 /// Parses a message header; false if invalid. Unlike ParseFromArray() it does not write to stderr,
 /// which a hostile peer could flood.
 bool parseHeader(std::span<const std::uint8_t> header, google::protobuf::MessageLite& into);

@@ -7,6 +7,7 @@
 #include <sstream>
 
 #include "render/camera_basis.hpp"
+#include "render/lens.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -75,7 +76,26 @@ std::optional<std::string> validatePinhole(const Pinhole& pinhole) {
   return std::nullopt;
 }
 
+std::optional<std::string> validateLens(const Camera& camera) {
+  const Camera::Lens& lens = *camera.lens;
+  if (camera.projection != Camera::Projection::perspective)
+    return describeInvalidField("lens", "given", "absent in an orthographic camera");
+  if (lens.kind == Camera::Lens::Kind::equirectangular)
+    return camera.pinhole ? std::optional(describeInvalidField(
+                                "pinhole", "given", "absent in an equirectangular camera"))
+                          : std::nullopt;
+  for (const double k : lens.k)
+    if (!(std::abs(k) <= 1e3)) return describeInvalidField("lens.k", k, "within 1000");
+  if (camera.pinhole) return validatePinhole(*camera.pinhole);
+  if (!(lens.width > 0 && lens.width <= 2 * std::numbers::pi))
+    return describeInvalidField("lens.width", lens.width, "above 0, up to 2 pi radians");
+  if (validatePinhole(computeFisheyeIntrinsics(camera)))
+    return describeInvalidField("lens.k", lens.k[0], "such that the model increases up to width");
+  return std::nullopt;
+}
+
 std::optional<std::string> validateFieldOfView(const Camera& camera) {
+  if (camera.lens) return validateLens(camera);
   if (camera.projection == Camera::Projection::perspective) {
     if (camera.pinhole) return validatePinhole(*camera.pinhole);
     const bool opens = camera.fovY > 0 && camera.fovY < std::numbers::pi;

@@ -1,6 +1,7 @@
 // The camera: pose, projection and image size.
 #pragma once
 
+#include <array>
 #include <optional>
 #include <string>
 
@@ -22,12 +23,25 @@ struct Pinhole {
 struct Camera {
   enum class Projection : std::uint8_t { perspective, orthographic };
 
+  /// A lens that bends straight lines (lens.hpp). Rays are clipped by their length, not their
+  /// depth.
+  struct Lens {
+    enum class Kind : std::uint8_t {
+      fisheye,         ///< OpenCV's fisheye model
+      equirectangular  ///< all directions: yaw along the rows, pitch along the columns
+    };
+    Kind kind = Kind::fisheye;
+    std::array<double, 4> k{};              ///< distortion of a fisheye
+    double width = 3.14159265358979323846;  ///< of a fisheye without pinhole: radians, 0..2 pi
+  };
+
   Projection projection = Projection::perspective;
   Vec3 eye = Vec3::Zero();
   Vec3 forward = Vec3::UnitX();
   Vec3 up = Vec3::UnitY();
   double fovY = 1.2;  ///< perspective: vertical field of view, 0 < fovY < pi
   std::optional<Pinhole> pinhole = std::nullopt;  ///< perspective: replaces fovY
+  std::optional<Lens> lens = std::nullopt;        ///< perspective; only for RayRenderer
   double heightY = 10;  ///< orthographic: metres from the bottom to the top of the image
   double near = 0.05;   ///< metres along forward; nearer geometry is clipped (used by plans)
   double far = 1000;    ///< metres along forward; > near

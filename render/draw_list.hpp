@@ -44,6 +44,10 @@ struct DrawItem {
 struct BodyPlacement {
   bool displaced = false;  ///< false: drawn as in the model
   Eigen::Affine3d sceneFromAuthored = Eigen::Affine3d::Identity();
+  bool operator==(const BodyPlacement& other) const {
+    return displaced == other.displaced &&
+           sceneFromAuthored.matrix() == other.sceneFromAuthored.matrix();
+  }
 };
 
 /// Per-instance vertex attributes (see Attribute).

@@ -5,6 +5,7 @@
 namespace enfilade::render {
 
 std::vector<float> computeRange(const Frame& frame) {
+  if (frame.camera.lens) return frame.range;
   std::vector<float> range = frame.depth;
   if (frame.camera.projection == Camera::Projection::orthographic) return range;
   const Pinhole pinhole = computeIntrinsics(frame.camera);

@@ -14,9 +14,10 @@ enum class RendererKind : std::uint8_t { automatic, gl, rays };
 const char* toString(RendererKind kind);
 std::optional<RendererKind> parseRendererKind(const std::string& name);
 
-/// The rule for `automatic`. It depends only on device, size and channels and not on time, so that
-/// a frame's bytes do not vary between runs, nor its style during a capture. Colour is always drawn
-/// with GL.
-RendererKind chooseRendererKind(bool softwareGl, const Camera& camera, const Channels& channels);
+/// The rule for `automatic`. It depends only on device, size, channels and the scene's triangles
+/// and not on time, so that a frame's bytes do not vary between runs, nor its style during a
+/// capture.
+RendererKind chooseRendererKind(bool softwareGl, const Camera& camera, const Channels& channels,
+                                std::size_t triangles);
 
 }  // namespace enfilade::render

@@ -28,6 +28,7 @@ constexpr double kMaxJointValue = 1000;  // radians or metres
 // Degrees per second. The world also limits the speed of the body's farthest point.
 constexpr double kMaxRotationSpeed = 1e6;
 constexpr double kMaxJointSpeed = 20;  // radians or metres per second
+constexpr double kMaxTurnRate = 1145;  // degrees per second: as the joints
 
 /// `"points":[[x,y,z],...]` or `"box":[[x,y,z],[x,y,z]]`.
 void readPart(const json& part, const std::string& field, v1::ConvexPart* into) {
@@ -218,6 +219,27 @@ void readJoints(const json& line, v1::DriveJoints* joints) {
   }
 }
 
+double readDegrees(const json& value, const char* key) {
+  return parseNumberInRange(value, key, "a number of degrees", -kMaxDegrees, kMaxDegrees);
+}
+
+void readTurn(const json& line, v1::Turn* turn) {
+  if (line.contains("by") == line.contains("facing"))
+    refuse("by", line.contains("by") ? "cannot be combined with \"facing\"; keep one of them"
+                                     : R"(is missing; add "by":degrees or "facing":degrees)");
+  if (line.contains("by")) turn->set_by(readDegrees(line["by"], "by"));
+  if (line.contains("facing")) turn->set_facing(readDegrees(line["facing"], "facing"));
+  if (line.contains("rate"))
+    turn->set_rate(parseNumberInRange(line["rate"], "rate", "a number of degrees per second", 0,
+                                      kMaxTurnRate, true));
+}
+
+void readTeleport(const json& line, v1::Teleport* teleport) {
+  readPoint(requireKey(line, "at", R"("at":[x,y,z], the new position)"), "at",
+            teleport->mutable_at());
+  if (line.contains("facing")) teleport->set_facing(readDegrees(line["facing"], "facing"));
+}
+
 struct Verb {
   const char* name;
   std::vector<const char*> keys;  ///< other keys than the verb
@@ -237,6 +259,8 @@ const std::vector<Verb>& verbs() {
       {"crouch", {"height"}},
       {"stand", {}},
       {"joints", {"to", "speed"}},
+      {"turn", {"by", "facing", "rate"}},
+      {"teleport", {"at", "facing"}},
       {"body", {"do", "to", "turn", "level", "speed", "turn_speed"}}};
   return all;
 }
@@ -259,10 +283,19 @@ std::string listVerbNames() {
   refuse("", "no command; a line needs one of " + listVerbNames());
 }
 
+/// Whether the line has a verb to which this one is a key, as "turn" to "body".
+bool isKeyOfOther(const json& line, const Verb& verb) {
+  return std::ranges::any_of(verbs(), [&](const Verb& other) {
+    return line.contains(other.name) &&
+           std::ranges::any_of(other.keys,
+                               [&](const std::string& key) { return key == verb.name; });
+  });
+}
+
 const Verb& findVerb(const json& line) {
   const Verb* found = nullptr;
   for (const Verb& verb : verbs()) {
-    if (!line.contains(verb.name)) continue;
+    if (!line.contains(verb.name) || isKeyOfOther(line, verb)) continue;
     if (found) {
       refuse("", std::string("\"") + found->name + "\" and \"" + verb.name +
                      "\" are in one line; write two lines");
@@ -303,6 +336,8 @@ void readOrder(const json& line, const std::string& verb, v1::Command& command) 
   if (verb == "crouch") readCrouch(line, command.mutable_crouch());
   if (verb == "stand") command.mutable_crouch();
   if (verb == "joints") readJoints(line, command.mutable_drive_joints());
+  if (verb == "turn") readTurn(line, command.mutable_turn());
+  if (verb == "teleport") readTeleport(line, command.mutable_teleport());
 }
 
 /// Body names may contain all characters, because they come from the file's nodes.

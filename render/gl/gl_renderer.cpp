@@ -414,6 +414,7 @@ GlRenderer::~GlRenderer() = default;
 Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                          const FrameOptions& options) {
   if (const auto error = validateCamera(camera)) throw RenderError(*error);
+  if (camera.lens) throw RenderError("camera: lens is given; it must be absent with OpenGL");
   State& s = *state_;
   s.context.makeCurrent();
   s.prepareScene();

@@ -12,6 +12,7 @@
 #include <span>
 
 #include "render/ambient_occlusion.hpp"
+#include "render/raytrace/lens_frame.hpp"
 #include "render/raytrace/ray_scene.hpp"
 #include "render/raytrace/trace.hpp"
 #include "scene/physics/thread_pool.hpp"
@@ -61,9 +62,9 @@ void fillDepth(const PlaneDepth& plane, int x, int y, std::span<float> out) {
 
 /// Trees whose first hit determines depth and ids; they include transparent surfaces that are drawn
 /// as opaque.
-std::vector<const RayTree*> collectFirstHitTrees(RayScene& scene, TransparencyMode transparency) {
-  std::vector<const RayTree*> trees = scene.opaqueTrees();
-  if (transparency == TransparencyMode::blend) return trees;
+std::vector<const RayTree*> collectFirstHitTrees(RayScene& scene, const FrameOptions& options) {
+  std::vector<const RayTree*> trees = scene.opaqueTrees(options.hiddenEntity);
+  if (options.transparency == TransparencyMode::blend) return trees;
   const std::vector<const RayTree*> transparentTrees = scene.transparentTrees();
   trees.insert(trees.end(), transparentTrees.begin(), transparentTrees.end());
   return trees;
@@ -84,7 +85,7 @@ class FrameTracer {
       : options_(options),
         rays_(computePrimaryRays(camera)),
         shading_(rays_, textures),
-        opaqueTrees_(collectFirstHitTrees(scene, options.transparency)),
+        opaqueTrees_(collectFirstHitTrees(scene, options)),
         origin_(scene.origin()) {
     if (options.channels.rgb && options.transparency == TransparencyMode::blend)
       transparentTrees_ = scene.transparentTrees();
@@ -294,6 +295,21 @@ struct RayRenderer::State {
         workers(options.threads) {}
 };
 
+namespace {
+
+template <class State>
+Frame drawFrame(State& state, const Camera& camera, const FrameOptions& options) {
+  if (camera.lens)
+    return traceLensFrame(camera, options, collectFirstHitTrees(state.scene, options),
+                          state.scene.transparentTrees(), state.scene.origin(), state.textures,
+                          state.workers);
+  FrameTracer tracer(camera, options, state.scene, state.textures);
+  tracer.draw(state.workers);
+  return std::move(tracer.frame);
+}
+
+}  // namespace
+
 RayRenderer::RayRenderer(std::shared_ptr<const scene::Scene> scene, const RayOptions& options)
     : state_(std::make_unique<State>(std::move(scene), options)) {}
 
@@ -303,12 +319,11 @@ Frame RayRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                           const FrameOptions& options) {
   if (const auto error = validateCamera(camera)) throw RenderError(*error);
   state_->scene.update(snapshot);
-  FrameTracer tracer(camera, options, state_->scene, state_->textures);
-  tracer.draw(state_->workers);
-  tracer.frame.tick = snapshot.tick;
-  tracer.frame.renderer = state_->name;
-  tracer.frame.software = true;
-  return std::move(tracer.frame);
+  Frame frame = drawFrame(*state_, camera, options);
+  frame.tick = snapshot.tick;
+  frame.renderer = state_->name;
+  frame.software = true;
+  return frame;
 }
 
 std::vector<std::uint8_t> RayRenderer::computeShadowMask(const scene::Snapshot& snapshot,
@@ -318,7 +333,7 @@ std::vector<std::uint8_t> RayRenderer::computeShadowMask(const scene::Snapshot& 
   if (const auto error = validateCamera(camera)) throw RenderError(*error);
   State& s = *state_;
   s.scene.update(snapshot);
-  const std::vector<const RayTree*> trees = collectFirstHitTrees(s.scene, options.transparency);
+  const std::vector<const RayTree*> trees = collectFirstHitTrees(s.scene, options);
   const PrimaryRays rays = computePrimaryRays(camera);
   const Shading shading(rays, s.textures);
   const TraceContext trace{trees, rays, shading, s.scene.origin(), options.hiddenEntity};

@@ -94,9 +94,11 @@ void RayScene::update(const scene::Snapshot& snapshot) {
 
 void RayScene::updateBodies(const scene::Snapshot& snapshot) {
   if (worldFromItem_.empty()) return;
-  const bool changed = !currentBodies_ || currentBodies_ != snapshot.bodies;
-  if (!changed) return;
-  const std::vector<BodyPlacement> bodies = computeBodyPlacements(*scene_, snapshot);
+  if (currentBodies_ && currentBodies_ == snapshot.bodies) return;
+  currentBodies_ = snapshot.bodies;
+  // Worlds of one scene take turns; in most of them the bodies are at the same place.
+  std::vector<BodyPlacement> bodies = computeBodyPlacements(*scene_, snapshot);
+  if (bodies == currentPlacements_) return;
   for (std::size_t i = 0; i < items_.size(); ++i) {
     const DrawItem& item = items_[i];
     if (item.body == kNoBody) continue;
@@ -105,7 +107,7 @@ void RayScene::updateBodies(const scene::Snapshot& snapshot) {
     worldFromItem_[i] = bodies[item.body].sceneFromAuthored * worldFromItem_[i];
   }
   for (LazyTree& trees : bodyTrees_) trees = {};
-  currentBodies_ = snapshot.bodies;
+  currentPlacements_ = std::move(bodies);
 }
 
 void RayScene::updateAvatars(const scene::Snapshot& snapshot) {
@@ -113,11 +115,16 @@ void RayScene::updateAvatars(const scene::Snapshot& snapshot) {
                  currentAvatars_.end(), hasSameAppearance)) {
     return;
   }
-  avatarTree_.reset();
-  currentAvatars_.clear();  // until the update is complete
+  avatarTree_ = {};
+  currentAvatars_ = snapshot.avatars;
+}
+
+void RayScene::buildAvatarTree() {
   avatarMeshes_.clear();
   worldFromAvatars_.clear();
   avatarMaterials_.clear();
+  scene::Snapshot snapshot;
+  snapshot.avatars = currentAvatars_;
   const AvatarMeshes all = buildAvatarMeshes(snapshot, 0);
   for (const AvatarMeshes::Item& avatarItem : all.items) {
     avatarMeshes_.push_back(extractMesh(all, avatarItem.range));
@@ -129,18 +136,21 @@ void RayScene::updateAvatars(const scene::Snapshot& snapshot) {
     batches.push_back(
         {&avatarMeshes_[i], &worldFromAvatars_[i], &avatarMaterials_[i], all.items[i].id});
   }
-  avatarTree_ = buildTree(std::move(batches));
-  currentAvatars_ = snapshot.avatars;
+  avatarTree_ = {true, buildTree(std::move(batches))};
 }
 
-std::vector<const RayTree*> RayScene::opaqueTrees() {
+std::vector<const RayTree*> RayScene::opaqueTrees(scene::EntityId hiddenEntity) {
   std::vector<const RayTree*> trees;
   for (const bool isDynamic : {false, true}) {
     LazyTree& lazyTree = (isDynamic ? bodyTrees_ : staticTrees_)[0];
     if (!lazyTree.built) lazyTree = {true, buildTree(collectBatches(isDynamic, false))};
     if (lazyTree.tree) trees.push_back(&*lazyTree.tree);
   }
-  if (avatarTree_) trees.push_back(&*avatarTree_);
+  const bool anyVisible = std::ranges::any_of(
+      currentAvatars_, [&](const scene::AvatarSnapshot& one) { return one.id != hiddenEntity; });
+  if (!anyVisible) return trees;
+  if (!avatarTree_.built) buildAvatarTree();
+  if (avatarTree_.tree) trees.push_back(&*avatarTree_.tree);
   return trees;
 }
 

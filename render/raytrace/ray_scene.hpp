@@ -19,8 +19,9 @@ class RayScene {
   /// Moves bodies and avatars to their poses in `snapshot`.
   void update(const scene::Snapshot& snapshot);
 
-  /// Non-empty trees, built on the first call. Pointers are valid until the next update().
-  std::vector<const RayTree*> opaqueTrees();
+  /// Non-empty trees, built on the first call. Pointers are valid until the next update(). An
+  /// avatar that is hidden may still be in them.
+  std::vector<const RayTree*> opaqueTrees(scene::EntityId hiddenEntity = 0);
   std::vector<const RayTree*> transparentTrees();
 
   /// Origin of the trees, world, metres. Rays must be relative to it, to reduce float rounding.
@@ -35,6 +36,7 @@ class RayScene {
   std::optional<RayTree> buildTree(std::vector<TriangleBatch> batches);  ///< nullopt: no batches
   void updateBodies(const scene::Snapshot& snapshot);
   void updateAvatars(const scene::Snapshot& snapshot);
+  void buildAvatarTree();
   void chooseInstancing();
 
   std::shared_ptr<const scene::Scene> scene_;
@@ -49,6 +51,7 @@ class RayScene {
   /// Valid for items of bodies; empty if the model has no bodies.
   std::vector<Eigen::Affine3d> worldFromItem_;
   std::shared_ptr<const std::vector<scene::BodySnapshot>> currentBodies_;
+  std::vector<BodyPlacement> currentPlacements_;
   std::vector<scene::AvatarSnapshot> currentAvatars_;
   std::vector<scene::Mesh> avatarMeshes_;
   std::vector<Eigen::Affine3d> worldFromAvatars_;
@@ -59,7 +62,7 @@ class RayScene {
     std::optional<RayTree> tree;  ///< nullopt: no such items
   };
   LazyTree staticTrees_[2], bodyTrees_[2];  ///< opaque, transparent
-  std::optional<RayTree> avatarTree_;
+  LazyTree avatarTree_;
 };
 
 }  // namespace enfilade::render

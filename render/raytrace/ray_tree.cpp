@@ -60,8 +60,11 @@ RayTree::RayTree(scene::MeshTrees& meshes, std::vector<TriangleBatch> batches, c
     : batches_(std::move(batches)),
       firstTriangle_(batches_.size(), 0),
       scene_(scene::makeEmbreeScene(meshes.device(), meshes.options())) {
-  for (TriangleBatch& batch : batches_)
+  for (TriangleBatch& batch : batches_) {
     batch.instanced = batch.instanced && scene::canBeInstanced(*batch.worldFromMesh);
+    firstId_ = std::min(firstId_, batch.id);
+    lastId_ = std::max(lastId_, batch.id);
+  }
   copyBatches(meshes.device(), false, origin, nullptr);
   copyBatches(meshes.device(), true, origin, maskFilter);
   addInstances(meshes, origin, maskFilter);

@@ -53,6 +53,8 @@ class RayTree {
 
   RTCSceneTy* embreeScene() const { return scene_.get(); }
   bool empty() const { return batches_.empty(); }
+  /// False: no batch has this id.
+  bool mayContain(scene::EntityId id) const { return id >= firstId_ && id <= lastId_; }
   const std::vector<TriangleBatch>& batches() const { return batches_; }
 
   /// The triangle of a hit, from Embree's three ids.
@@ -63,7 +65,8 @@ class RayTree {
   void addInstances(scene::MeshTrees& meshes, const Vec3& origin, scene::EmbreeFilter filter);
 
   std::vector<TriangleBatch> batches_;
-  std::vector<std::uint32_t> firstTriangle_;       ///< of each copied batch
+  scene::EntityId firstId_ = ~scene::EntityId{0}, lastId_ = 0;  ///< least and greatest
+  std::vector<std::uint32_t> firstTriangle_;                    ///< of each copied batch
   std::vector<std::uint32_t> batchOfTriangle_[2];  ///< for geometry 0 (not masked) and 1 (masked)
   scene::EmbreeScene scene_;
 };

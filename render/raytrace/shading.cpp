@@ -28,7 +28,7 @@ struct Barycentrics {
   std::array<double, 3> weights, perPixelX, perPixelY;
 };
 
-Barycentrics computeBarycentrics(const BarycentricWeights& weights, int x, int y) {
+Barycentrics computeBarycentrics(const BarycentricWeights& weights, double x, double y) {
   const std::array<double, 3> w = weights.at(x, y);
   const auto& c = weights.corner;
   const double sum = w[0] + w[1] + w[2];
@@ -79,7 +79,7 @@ ShadedTriangle::ShadedTriangle(const BatchTriangle& source, const PrimaryRays& r
   }
 }
 
-Texel Shading::computeAlbedo(const ShadedTriangle& triangle, int x, int y) const {
+Texel Shading::computeAlbedo(const ShadedTriangle& triangle, double x, double y) const {
   const float* base = triangle.batch->material->baseColour;
   Texel albedo{base[0], base[1], base[2], base[3]};
   if (triangle.batch->texture < 0) return albedo;
@@ -124,12 +124,12 @@ Vec3 Shading::orientNormal(const ShadedTriangle& triangle, const std::array<doub
   return length > 0 ? Vec3(flat / length) : toEye;
 }
 
-Vec3 Shading::computeNormal(const ShadedTriangle& triangle, int x, int y) const {
+Vec3 Shading::computeNormal(const ShadedTriangle& triangle, double x, double y) const {
   const Vec3 toEye = -rays_.directionAt(x, y).normalized();
   return orientNormal(triangle, computeBarycentrics(triangle.weights, x, y).weights, toEye);
 }
 
-SurfaceColour Shading::shadeSurface(const ShadedTriangle& triangle, int x, int y, double z,
+SurfaceColour Shading::shadeSurface(const ShadedTriangle& triangle, double x, double y, double z,
                                     float sunlit) const {
   const bool plan = rays_.parallel;
   const Vec3 direction = rays_.directionAt(x, y);
@@ -153,7 +153,7 @@ SurfaceColour Shading::shadeSurface(const ShadedTriangle& triangle, int x, int y
   return {glsl::exposed(radiance), glsl::glassAlpha(albedo[3], toGlsl(n), toGlsl(toEye))};
 }
 
-glsl::vec3 Shading::shadeSky(int x, int y) const {
+glsl::vec3 Shading::shadeSky(double x, double y) const {
   if (rays_.parallel) return glsl::planPaper();
   return glsl::exposed(glsl::skyFor(toGlsl(rays_.directionAt(x, y).normalized())));
 }

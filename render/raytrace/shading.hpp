@@ -37,15 +37,15 @@ class Shading {
       : rays_(rays), textures_(textures) {}
 
   /// Base colour times texture, linear.
-  Texel computeAlbedo(const ShadedTriangle& triangle, int x, int y) const;
+  Texel computeAlbedo(const ShadedTriangle& triangle, double x, double y) const;
   /// Unfiltered alpha at the barycentric coordinates (u, v) of corners 1 and 2.
   float sampleAlpha(const BatchTriangle& triangle, float u, float v) const;
   /// Unit length, facing the eye, world.
-  Vec3 computeNormal(const ShadedTriangle& triangle, int x, int y) const;
+  Vec3 computeNormal(const ShadedTriangle& triangle, double x, double y) const;
   /// `sunlit`: 1, or 0 in shadow.
-  SurfaceColour shadeSurface(const ShadedTriangle& triangle, int x, int y, double z,
+  SurfaceColour shadeSurface(const ShadedTriangle& triangle, double x, double y, double z,
                              float sunlit) const;
-  glsl::vec3 shadeSky(int x, int y) const;
+  glsl::vec3 shadeSky(double x, double y) const;
 
  private:
   Vec3 orientNormal(const ShadedTriangle& triangle, const std::array<double, 3>& weights,

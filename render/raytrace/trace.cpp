@@ -29,7 +29,7 @@ struct FilterContext {
   const TraceContext* trace;
   std::size_t tree;             ///< index into trace->trees
   std::vector<PixelHit>* hits;  ///< collects all hits; null: only first hits are needed
-  bool isShadowRay = false;     ///< shadow rays, which start at visible surfaces
+  bool byBarycentrics = false;  ///< alpha at the hit itself: the ray has no pixel
 };
 
 FilterContext makeFilterContext(const TraceContext& trace, std::size_t tree) {
@@ -62,7 +62,7 @@ void rejectTransparentTexels(const RTCFilterFunctionNArguments* arguments) {
   forEachLane(arguments, [&](unsigned lane, unsigned instance, unsigned geometry,
                              unsigned primitive) {
     const BatchTriangle batchTriangle = tree.findTriangle(instance, geometry, primitive);
-    if (context.isShadowRay) {
+    if (context.byBarycentrics) {
       const unsigned n = arguments->N;
       const float alpha = trace.shading.sampleAlpha(
           batchTriangle, RTCHitN_u(arguments->hit, n, lane), RTCHitN_v(arguments->hit, n, lane));
@@ -87,6 +87,13 @@ void rejectIgnoredEntity(const RTCFilterFunctionNArguments* arguments) {
       });
 }
 
+/// Lets rays pass through the ignored entity. A filter costs at each hit, so only trees that may
+/// contain the entity get one.
+void setIgnoredEntity(FilterContext& context, const TraceContext& trace) {
+  if (trace.trees[context.tree]->mayContain(trace.ignoredEntity))
+    context.embree.filter = rejectIgnoredEntity;
+}
+
 void recordAllHits(const RTCFilterFunctionNArguments* arguments) {
   const FilterContext& context = getFilterContext(arguments);
   forEachLane(arguments,
@@ -98,7 +105,7 @@ void recordAllHits(const RTCFilterFunctionNArguments* arguments) {
 }
 
 /// One pixel's ray between two depths.
-RTCRayHit makePixelRay(const TraceContext& trace, int x, int y, double from, double to) {
+RTCRayHit makePixelRay(const TraceContext& trace, double x, double y, double from, double to) {
   const PrimaryRays& rays = trace.rays;
   const Eigen::Vector3f start = (rays.eye - trace.origin + rays.startAt(x, y)).cast<float>();
   const Eigen::Vector3f direction = rays.directionAt(x, y).cast<float>();
@@ -108,7 +115,7 @@ RTCRayHit makePixelRay(const TraceContext& trace, int x, int y, double from, dou
   query.ray.tnear = static_cast<float>(std::max(0.0, from - rays.start));
   query.ray.tfar = static_cast<float>(to - rays.start);
   query.ray.mask = 0xFFFF'FFFFu;
-  query.ray.id = static_cast<unsigned>(y * rays.width + x);
+  query.ray.id = static_cast<unsigned>(static_cast<int>(y) * rays.width + static_cast<int>(x));
   query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
   return query;
 }
@@ -178,7 +185,7 @@ void traceRows(const TraceContext& trace, int y, std::vector<HitKey>& keys) {
     setUpPrimaryRays(packet, trace, x, y);
     for (std::size_t t = 0; t < trace.trees.size(); ++t) {
       FilterContext context = makeFilterContext(trace, t);
-      if (trace.ignoredEntity != 0) context.embree.filter = rejectIgnoredEntity;
+      setIgnoredEntity(context, trace);
       intersectPacket(packet, trace, context);
       RTCHit16& hit = packet.query.hit;
       for (std::size_t lane = 0; lane < kPacketSize; ++lane) {
@@ -233,7 +240,7 @@ struct ShadowPacket {
 /// Sets up a lane's shadow ray from the visible surface towards the sun; NaN `z`: inactive. The ray
 /// starts slightly towards the eye, where space is free, so that float rounding cannot place it
 /// behind the surface. Its first millimetre is skipped to avoid grazing self-intersections.
-void setUpShadowRay(ShadowPacket& packet, int lane, const TraceContext& trace, int x, int y,
+void setUpShadowRay(ShadowPacket& packet, int lane, const TraceContext& trace, double x, double y,
                     double z, const Vec3& sun) {
   const PrimaryRays& rays = trace.rays;
   const bool active = !std::isnan(z);
@@ -251,7 +258,7 @@ void setUpShadowRay(ShadowPacket& packet, int lane, const TraceContext& trace, i
   // Inactive lanes get an empty interval, as in setUpPrimaryRays().
   ray.tfar[lane] = active ? static_cast<float>(computeMaxSunDistance(rays, before, sun)) : -1.0f;
   ray.mask[lane] = 0xFFFF'FFFFu;
-  ray.id[lane] = static_cast<unsigned>(y * rays.width + x);
+  ray.id[lane] = static_cast<unsigned>(static_cast<int>(y) * rays.width + static_cast<int>(x));
   packet.valid[lane] = active ? -1 : 0;
 }
 
@@ -276,11 +283,11 @@ void traceShadowRows(const TraceContext& trace, int y, const std::vector<float>&
     }
     for (std::size_t t = 0; t < trace.trees.size(); ++t) {
       FilterContext context = makeFilterContext(trace, t);
-      context.isShadowRay = true;
+      context.byBarycentrics = true;
       // At edges, the origins are far apart. Also, with the coherent flag, rtcOccluded16 of Embree
       // 3.13 never returns for some packets that hit instances.
       context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
-      if (trace.ignoredEntity != 0) context.embree.filter = rejectIgnoredEntity;
+      setIgnoredEntity(context, trace);
       rtcOccluded16(packet.valid, trace.trees[t]->embreeScene(), &context.embree, &packet.ray);
       for (int lane = 0; lane < kPacketSize; ++lane) {
         if (packet.valid[lane] == 0 || !(packet.ray.tfar[lane] < 0)) continue;
@@ -291,7 +298,7 @@ void traceShadowRows(const TraceContext& trace, int y, const std::vector<float>&
   }
 }
 
-void traceBetween(const TraceContext& trace, int x, int y, double from, double to,
+void traceBetween(const TraceContext& trace, double x, double y, double from, double to,
                   std::vector<HitKey>& keys) {
   std::vector<PixelHit> hits;
   for (std::size_t t = 0; t < trace.trees.size(); ++t) {
@@ -308,13 +315,47 @@ void traceBetween(const TraceContext& trace, int x, int y, double from, double t
   }
 }
 
+HitKey traceFirst(const TraceContext& trace, double x, double y, double from, double to) {
+  RTCRayHit query = makePixelRay(trace, x, y, from, to);
+  HitKey key = kNoHit;
+  for (std::size_t t = 0; t < trace.trees.size(); ++t) {
+    FilterContext context = makeFilterContext(trace, t);
+    context.byBarycentrics = true;
+    setIgnoredEntity(context, trace);
+    rtcIntersect1(trace.trees[t]->embreeScene(), &context.embree, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) continue;
+    key = makeHitKey(t, query.hit.instID[0], query.hit.geomID, query.hit.primID);
+    query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;  // the next must be nearer
+  }
+  return key;
+}
+
+bool isInShadow(const TraceContext& trace, double x, double y, double z) {
+  ShadowPacket packet;
+  setUpShadowRay(packet, 0, trace, x, y, z, sunDirection());
+  RTCRay ray{};
+  ray.org_x = packet.ray.org_x[0], ray.org_y = packet.ray.org_y[0], ray.org_z = packet.ray.org_z[0];
+  ray.dir_x = packet.ray.dir_x[0], ray.dir_y = packet.ray.dir_y[0], ray.dir_z = packet.ray.dir_z[0];
+  ray.tnear = packet.ray.tnear[0];
+  ray.mask = 0xFFFF'FFFFu;
+  for (std::size_t t = 0; t < trace.trees.size(); ++t) {
+    FilterContext context = makeFilterContext(trace, t);
+    context.byBarycentrics = true;
+    setIgnoredEntity(context, trace);
+    ray.tfar = packet.ray.tfar[0];
+    rtcOccluded1(trace.trees[t]->embreeScene(), &context.embree, &ray);
+    if (ray.tfar < 0) return true;
+  }
+  return false;
+}
+
 double traceFirstBehind(const TraceContext& trace, int x, int y, double from) {
   RTCRayHit query = makePixelRay(trace, x, y, from, trace.rays.far);
   if (!(query.ray.tnear <= query.ray.tfar)) return std::numeric_limits<double>::quiet_NaN();
   bool met = false;
   for (std::size_t t = 0; t < trace.trees.size(); ++t) {
     FilterContext context = makeFilterContext(trace, t);
-    if (trace.ignoredEntity != 0) context.embree.filter = rejectIgnoredEntity;
+    setIgnoredEntity(context, trace);
     rtcIntersect1(trace.trees[t]->embreeScene(), &context.embree, &query);
     met = met || query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
   }

@@ -41,8 +41,12 @@ void traceAllHits(const TraceContext& trace, int y, const std::vector<float>& de
                   std::vector<PixelHit>& hits);
 
 /// Appends the keys of all hits of one pixel's ray between two depths, in the order of the trees.
-void traceBetween(const TraceContext& trace, int x, int y, double from, double to,
+void traceBetween(const TraceContext& trace, double x, double y, double from, double to,
                   std::vector<HitKey>& keys);
+/// The first hit of the ray through a point of the image, also between pixels, between two depths.
+HitKey traceFirst(const TraceContext& trace, double x, double y, double from, double to);
+/// Whether the surface at depth `z` on that ray is in the shadow of the sun.
+bool isInShadow(const TraceContext& trace, double x, double y, double z);
 /// Depth, in float precision, of the first hit of one pixel's ray behind `from`; NaN: no hit.
 double traceFirstBehind(const TraceContext& trace, int x, int y, double from);
 

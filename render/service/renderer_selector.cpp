@@ -10,6 +10,7 @@ namespace enfilade::render {
 
 struct RendererSelector::State {
   std::shared_ptr<const scene::Scene> scene;
+  std::size_t triangles = 0;  ///< of all objects
   RendererKind kind;
   DeviceChoice device;
   std::unique_ptr<GlRenderer> gl;
@@ -47,11 +48,16 @@ struct RendererSelector::State {
 
   RendererKind chooseKind(const Camera& camera, const FrameOptions& options,
                           RendererKind requested) const {
+    if (camera.lens) {
+      if (requested == RendererKind::gl || device.requireGpu)
+        throw RenderError("camera: lens is given; it must be absent with OpenGL: request rays");
+      return RendererKind::rays;
+    }
     const RendererKind wanted = requested == RendererKind::automatic ? kind : requested;
     if (wanted != RendererKind::automatic) return wanted;
     if (!gl) return RendererKind::rays;
     if (device.requireGpu) return RendererKind::gl;
-    return chooseRendererKind(gl->software(), camera, options.channels);
+    return chooseRendererKind(gl->software(), camera, options.channels, triangles);
   }
 
   /// Creates the renderer of `one` kind, which is not automatic, on first use.
@@ -83,6 +89,9 @@ RendererSelector::RendererSelector(std::shared_ptr<const scene::Scene> scene, Re
                                    const DeviceChoice& device)
     : state_(std::make_unique<State>()) {
   if (!scene) throw RenderError("Renderer: no scene");
+  for (const scene::Object& object : scene->model().objects)
+    for (const std::uint32_t mesh : object.meshes)
+      state_->triangles += scene->model().meshes[mesh].triangleCount();
   state_->scene = std::move(scene);
   state_->kind = kind;
   state_->device = device;

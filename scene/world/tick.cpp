@@ -74,7 +74,8 @@ void moveAvatars(WorldData& world, QueryCount& count) {
     avatar.requestedDisplacement = Vec3::Zero();
     avatar.idle = avatar.grounded && avatar.lastDisplacement.isZero(0) &&
                   avatar.desiredVelocity.isZero(0) && !avatar.dirty && avatar.chain.speed == 0 &&
-                  !avatar.pairsChanged && areNeighboursStationary(world, avatar);
+                  avatar.turn.left == 0 && !avatar.pairsChanged &&
+                  areNeighboursStationary(world, avatar);
     if (avatar.idle) continue;
     collectObstacles(world, avatar);
     const AvatarWorkCounter counter(avatar, count);

@@ -115,6 +115,10 @@ std::optional<CaptureChannels> parseChannels(const std::string& text) {
       channels.normals = true;
     } else if (word == "range") {
       channels.range = true;
+    } else if (word == "class") {
+      channels.classes = true;
+    } else if (word == "thing") {
+      channels.things = true;
     } else {
       return std::nullopt;
     }
@@ -123,7 +127,7 @@ std::optional<CaptureChannels> parseChannels(const std::string& text) {
 }
 std::string validateChannels(const std::string& text) {
   if (parseChannels(text)) return "";
-  return text + ": give a comma-separated list of rgb, depth, ids, normals, range";
+  return text + ": give a comma-separated list of rgb, depth, ids, normals, range, class, thing";
 }
 
 /// Parses overlay names; nullopt for an unknown name.

@@ -8,7 +8,7 @@
 namespace enfilade::server {
 
 struct ServerLimits {
-  std::uint32_t worlds = 64;                    ///< per server, "main" included
+  std::uint32_t worlds = 256;                   ///< per server, "main" included
   std::uint32_t avatars = 1000;                 ///< per world
   std::uint32_t imageSide = 4096;               ///< pixels; also the limit of the renderer
   std::uint32_t ticksPerStep = 36'000;          ///< ten minutes at the default tick

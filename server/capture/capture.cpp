@@ -75,7 +75,7 @@ render::FrameOptions makeFrameOptions(const CaptureFrame& captureFrame,
   render::FrameOptions frame;
   frame.hiddenEntity = captureFrame.hiddenAvatar;
   const bool marked = options.overlay.any();
-  frame.channels = {wanted.rgb || marked, wanted.ids || marked,
+  frame.channels = {wanted.rgb || marked, wanted.ids || wanted.classes || wanted.things || marked,
                     wanted.depth || wanted.range || marked, wanted.normals};
   frame.transparency = options.glass;
   frame.shadows = options.shadows;
@@ -131,7 +131,8 @@ void renderFrames(const CaptureCommand& command, const scene::Scene& scene, cons
                            plan.frames[index]);
       };
       counts.clampedPixels +=
-          writeFrame(command.out, command.pictures, index, *frame, overlay).clamped;
+          writeFrame(command.out, command.pictures, index, *frame, scene.objectClasses(), overlay)
+              .clamped;
       ++counts.written;
     });
     progress.update(counts.written);

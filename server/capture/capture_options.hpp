@@ -26,6 +26,7 @@ enum class ProgressFormat : std::uint8_t { bar, json };
 
 struct CaptureChannels {
   bool rgb = true, depth = true, ids = true, normals = false, range = false;
+  bool classes = false, things = false;
 };
 
 /// Marks that are drawn on a copy of the colour.

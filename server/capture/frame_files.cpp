@@ -34,6 +34,9 @@ std::vector<ChannelFile> listChannels(const PictureOptions& options) {
   if (wanted.ids) files.push_back({"ids", options.ids == IdsFile::png ? ".png" : ".npy"});
   if (wanted.normals) files.push_back({"normals", ".npy"});
   if (wanted.range) files.push_back({"range", getDepthExtension(options.depth)});
+  const char* idExtension = options.ids == IdsFile::png ? ".png" : ".npy";
+  if (wanted.classes) files.push_back({"class", idExtension});
+  if (wanted.things) files.push_back({"thing", idExtension});
   if (options.overlay.any()) files.push_back({"overlay", ".png"});
   return files;
 }
@@ -69,11 +72,13 @@ Bytes encodeDepth(const render::Frame& frame, const std::vector<float>& metres,
   return options.depth == DepthFile::png ? render::encodePng(steps) : render::packDepth(steps);
 }
 
-Bytes encodeIds(const render::Frame& frame, const PictureOptions& options) {
-  if (options.ids == IdsFile::npy) return render::encodeNpy(makeRaster(frame, 1, frame.ids));
+/// Encodes ids, or class and thing ids, which have the same format.
+Bytes encodeIds(const render::Frame& frame, const std::vector<std::uint32_t>& ids,
+                const PictureOptions& options) {
+  if (options.ids == IdsFile::npy) return render::encodeNpy(makeRaster(frame, 1, ids));
   std::vector<std::uint16_t> narrow;
-  narrow.reserve(frame.ids.size());
-  for (const std::uint32_t id : frame.ids) {
+  narrow.reserve(ids.size());
+  for (const std::uint32_t id : ids) {
     if (id > kMaxId16)
       throw std::runtime_error("id " + std::to_string(id) +
                                " does not fit into 16 bits; give --ids npy");
@@ -83,12 +88,14 @@ Bytes encodeIds(const render::Frame& frame, const PictureOptions& options) {
 }
 
 Bytes encodeChannel(const std::string& channel, const render::Frame& frame,
-                    const PictureOptions& options, const DrawOverlay& overlay,
-                    FrameFaults& faults) {
+                    const PictureOptions& options, const scene::ObjectClasses& classes,
+                    const DrawOverlay& overlay, FrameFaults& faults) {
   if (channel == "overlay") return render::encodePng(overlay(frame));
   if (channel == "rgb") return encodeRgb(frame, options);
   if (channel == "depth") return encodeDepth(frame, frame.depth, options, faults);
-  if (channel == "ids") return encodeIds(frame, options);
+  if (channel == "ids") return encodeIds(frame, frame.ids, options);
+  if (channel == "class") return encodeIds(frame, classes.classesOf(frame.ids), options);
+  if (channel == "thing") return encodeIds(frame, classes.thingsOf(frame.ids), options);
   if (channel == "normals") return render::encodeNpy(makeRaster(frame, 3, frame.normals));
   return encodeDepth(frame, render::computeRange(frame), options, faults);
 }
@@ -123,13 +130,14 @@ bool isFrameComplete(const fs::path& folder, const PictureOptions& options, std:
 }
 
 FrameFaults writeFrame(const fs::path& folder, const PictureOptions& options, std::size_t index,
-                       const render::Frame& frame, const DrawOverlay& overlay) {
+                       const render::Frame& frame, const scene::ObjectClasses& classes,
+                       const DrawOverlay& overlay) {
   FrameFaults faults;
   for (const ChannelFile& channel : listChannels(options)) {
     const fs::path file = folder / makeFilePath(channel, index);
     Bytes bytes;
     try {
-      bytes = encodeChannel(channel.folder, frame, options, overlay, faults);
+      bytes = encodeChannel(channel.folder, frame, options, classes, overlay, faults);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(file.string() + ": " + error.what());
     }

@@ -6,12 +6,13 @@
 #include <vector>
 
 #include "render/image/image.hpp"
+#include "scene/model/object_classes.hpp"
 #include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {
 
 /// Files of one frame, relative to the capture folder, for example rgb/000012.png. Order: rgb,
-/// depth, ids, normals, range, overlay.
+/// depth, ids, normals, range, class, thing, overlay.
 std::vector<std::filesystem::path> listFrameFiles(const PictureOptions& options, std::size_t index);
 
 /// Folders of the files, relative to the capture folder.
@@ -31,8 +32,9 @@ struct FrameFaults {
 using DrawOverlay = std::function<render::Image(const render::Frame& frame)>;
 
 /// Encodes the frame and writes its files atomically. Throws std::runtime_error with the file name,
-/// also if depth or ids do not fit into 16 bits.
+/// also if depth, ids, classes or things do not fit into 16 bits.
 FrameFaults writeFrame(const std::filesystem::path& folder, const PictureOptions& options,
-                       std::size_t index, const render::Frame& frame, const DrawOverlay& overlay);
+                       std::size_t index, const render::Frame& frame,
+                       const scene::ObjectClasses& classes, const DrawOverlay& overlay);
 
 }  // namespace enfilade::server

@@ -27,6 +27,8 @@ Json channelNames(const CaptureChannels& channels) {
   if (channels.ids) names.push_back("ids");
   if (channels.normals) names.push_back("normals");
   if (channels.range) names.push_back("range");
+  if (channels.classes) names.push_back("class");
+  if (channels.things) names.push_back("thing");
   return names;
 }
 
@@ -74,6 +76,8 @@ Json makeConventions(const PictureOptions& options, const scene::Model& model) {
   if (options.channels.depth) json["depth"] = describeDepth(options);
   if (options.channels.range) json["range"] = "as depth, but the distance from the eye";
   if (options.channels.ids) json["ids"] = "as in instances.json; 0: nothing is seen";
+  if (options.channels.classes) json["class"] = "class_id of instances.json; 0: none";
+  if (options.channels.things) json["thing"] = "thing of instances.json; 0: nothing is seen";
   if (options.channels.normals)
     json["normals"] = "float32 x, y, z, unit, world frame, towards the eye; 0, 0, 0: nothing";
   json["near"] = options.near;
@@ -112,6 +116,7 @@ Json lensOptions(const PictureOptions& options) {
 }  // namespace
 
 std::string makeInstancesJson(const scene::Model& model, const std::vector<AvatarName>& avatars) {
+  const scene::ObjectClasses classes = scene::computeObjectClasses(model);
   Json all = Json::object();
   std::vector<std::string> bodies(model.objects.size());
   for (const scene::BodySpec& body : model.bodies)
@@ -120,14 +125,22 @@ std::string makeInstancesJson(const scene::Model& model, const std::vector<Avata
     const scene::Object& object = model.objects[i];
     Json one{{"path", object.path}};
     if (!object.globalId.empty()) one["global_id"] = object.globalId;
-    if (!object.ifcClass.empty()) one["class"] = object.ifcClass;
+    const auto id = static_cast<std::uint32_t>(i + 1);
+    if (classes.classOf(id) != 0) {
+      one["class"] = classes.names[classes.classOf(id)];
+      one["class_id"] = classes.classOf(id);
+    }
+    one["thing"] = classes.thingOf(id);
     if (object.storey) one["storey"] = model.storeys[*object.storey].name;
     if (!object.operationType.empty()) one["operation"] = object.operationType;
     if (!bodies[i].empty()) one["body"] = bodies[i];
     all[std::to_string(i + 1)] = std::move(one);
   }
   for (const AvatarName& avatar : avatars)
-    all[std::to_string(avatar.id)] = Json{{"path", avatar.name}, {"class", "avatar"}};
+    all[std::to_string(avatar.id)] = Json{{"path", avatar.name},
+                                          {"class", "avatar"},
+                                          {"class_id", classes.classOf(avatar.id)},
+                                          {"thing", avatar.id}};
   return all.dump(1) + "\n";
 }
 

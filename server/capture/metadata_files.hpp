@@ -8,7 +8,8 @@
 
 namespace enfilade::server {
 
-/// Maps ids to path, global_id, class, operation and body; avatars have their names.
+/// Maps ids to path, global_id, class, class_id, thing, operation and body; avatars have their
+/// names.
 std::string makeInstancesJson(const scene::Model& model, const std::vector<AvatarName>& avatars);
 
 /// nerfstudio's format. The key "enfilade" describes axes, depth and other conventions.

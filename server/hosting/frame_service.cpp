@@ -24,13 +24,13 @@ struct PendingFrame {
   std::function<void(EncodedMessage)> done;
 };
 
-EncodedMessage encodeFrameReply(PendingFrame& pending) {
+EncodedMessage encodeFrameReply(PendingFrame& pending, const scene::Scene& scene) {
   const render::Frame frame = pending.frame.get();
   std::vector<std::uint8_t> attachment;
   v1::ServerMessage reply;
   reply.set_reply_to(pending.job.requestId);
   *reply.mutable_frame() =
-      toProto(frame, pending.job.snapshot->time, pending.job.request, attachment);
+      toProto(frame, pending.job.snapshot->time, pending.job.request, scene, attachment);
   reply.mutable_frame()->set_watch(pending.job.subscription);
   reply.mutable_frame()->set_dropped(pending.job.dropped);
   if (pending.job.onRendered) pending.job.onRendered(reply.frame(), attachment);
@@ -79,6 +79,7 @@ class FrameTurns {
 }  // namespace
 
 struct FrameService::State {
+  std::shared_ptr<const scene::Scene> scene;
   std::mutex mutex;  ///< guards the next three
   FrameTurns waiting;
   bool rendering = false;
@@ -93,9 +94,9 @@ struct FrameService::State {
 
 namespace {
 
-EncodedMessage makeReply(PendingFrame& pending) {
+EncodedMessage makeReply(PendingFrame& pending, const scene::Scene& scene) {
   try {
-    EncodedMessage encoded = encodeFrameReply(pending);
+    EncodedMessage encoded = encodeFrameReply(pending, scene);
     if (pending.job.renderedCount) ++*pending.job.renderedCount;
     return encoded;
   } catch (const render::RendererUnavailable& error) {
@@ -121,6 +122,7 @@ bool isCheapReply(const FrameJob& job) {
 
 FrameService::FrameService(std::shared_ptr<const scene::Scene> scene, const DrawingOptions& drawing)
     : state_(std::make_unique<State>()) {
+  state_->scene = scene;
   state_->renderer =
       std::make_unique<render::RenderThread>(std::move(scene), drawing.device, drawing.renderer);
   if (drawing.isRequested() && !unavailableReason().empty())
@@ -161,10 +163,11 @@ const std::string& FrameService::unavailableReason() const {
 /// A cheap reply is built on the render thread, which delays the next frame by one copy. Other
 /// frames are encoded on `thread`. No reply overtakes the frames queued there.
 void FrameService::State::deliver(const std::shared_ptr<PendingFrame>& pending) {
-  if (isCheapReply(pending->job) && pendingEncodes == 0) return pending->done(makeReply(*pending));
+  if (isCheapReply(pending->job) && pendingEncodes == 0)
+    return pending->done(makeReply(*pending, *scene));
   ++pendingEncodes;
   thread.post([this, pending] {
-    pending->done(makeReply(*pending));
+    pending->done(makeReply(*pending, *scene));
     --pendingEncodes;
   });
 }

@@ -28,6 +28,7 @@
 namespace enfilade::server {
 
 using ClientId = std::uint64_t;
+class WorldGroup;
 
 /// A Step in progress; the client's later requests wait for it.
 struct PendingStep {
@@ -78,6 +79,7 @@ struct Client {
   std::optional<PendingStep> pendingStep;
   std::map<std::uint32_t, FrameSubscription> frameSubscriptions;
   std::optional<PendingReply> pendingReply;
+  std::shared_ptr<WorldGroup> group;  ///< the worlds of its StepMany requests; null: none yet
 };
 
 /// The clock of a world, and the client that drives it.

@@ -14,13 +14,6 @@ using protocol::mcap::RecordingError;
 /// Thrown to abort a seek because the server stops.
 struct ServerStopping {};
 
-std::optional<v1::Error> validateHasReplay(const HostedWorld& hosted) {
-  if (hosted.replay) return std::nullopt;
-  return makeError(v1::ERROR_NOT_ALLOWED,
-                   "this world does not replay a recording: start the server with "
-                   "`enfilade serve RECORDING`");
-}
-
 /// Returns "branch.mcap", or "branch-2.mcap" and so on if the file exists.
 std::filesystem::path findFreeFile(const std::filesystem::path& first) {
   std::filesystem::path file = first;
@@ -51,10 +44,17 @@ void seekTo(HostedWorld& hosted, std::uint64_t tick) {
     if (hosted.isEnding()) throw ServerStopping{};
   });
   const v1::TickEvents activeContacts = hosted.replay->activeContactsAt(world);
-  replaceWorld(hosted, std::move(world), activeContacts);
+  replaceWorld(hosted, std::move(world), activeContacts, "the recording was sought");
 }
 
 }  // namespace
+
+std::optional<v1::Error> validateHasReplay(const HostedWorld& hosted) {
+  if (hosted.replay) return std::nullopt;
+  return makeError(v1::ERROR_NOT_ALLOWED,
+                   "this world does not replay a recording: start the server with "
+                   "`enfilade serve RECORDING`");
+}
 
 v1::Replay makeReplayStatus(const HostedWorld& hosted) {
   ENFILADE_ASSERT(hosted.replay);

@@ -15,6 +15,9 @@ std::optional<v1::Error> validateReplayRunning(const HostedWorld& hosted);
 /// An error if the world is an unbranched replay, which refuses commands; nullopt: accepts them.
 std::optional<v1::Error> validateAcceptsCommands(const HostedWorld& hosted);
 
+/// An error if the world replays no recording.
+std::optional<v1::Error> validateHasReplay(const HostedWorld& hosted);
+
 // These check a request and change nothing; nullopt: valid.
 
 std::optional<v1::Error> validateSeek(const HostedWorld& hosted, const v1::Seek& request);

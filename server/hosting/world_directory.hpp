@@ -2,12 +2,15 @@
 #pragma once
 
 #include <functional>
+#include <memory>
 #include <optional>
 #include <string>
 #include <variant>
 #include <vector>
 
 #include "protocol/enfilade.pb.h"
+#include "server/base/access.hpp"
+#include "server/messages/outgoing_queue.hpp"
 
 namespace enfilade::server {
 
@@ -18,7 +21,14 @@ struct CreateWorldRequest {
   bool dropWhenEmpty = false;
 };
 
-/// Lists, creates and drops worlds. Callable from any thread.
+/// A client in a world, until its destruction.
+class WorldMembership {
+ public:
+  virtual ~WorldMembership() = default;
+  virtual void receive(std::vector<v1::ClientMessage> messages) = 0;
+};
+
+/// Lists, creates, drops and enters worlds. Callable from any thread.
 class WorldDirectory {
  public:
   virtual ~WorldDirectory() = default;
@@ -31,6 +41,10 @@ class WorldDirectory {
   /// (`requestingWorld`), `done` is called before the end, so that the reply can be sent.
   virtual void drop(const std::string& name, const std::string& requestingWorld,
                     std::function<void(std::optional<v1::Error>)> done) = 0;
+  /// Enters a world as a client, whose messages go to `out`, first its Welcome with reply_to = 0.
+  /// Null: there is no such world.
+  virtual std::unique_ptr<WorldMembership> join(const std::string& world, const std::string& name,
+                                                Role role, std::shared_ptr<OutgoingQueue> out) = 0;
 };
 
 }  // namespace enfilade::server

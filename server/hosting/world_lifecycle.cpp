@@ -31,7 +31,7 @@ void resetSubscriptionTimes(Client& client) {
 
 /// Adds a notice for each avatar of `one` that is not in `other`.
 void addPresenceNotices(const scene::Snapshot& one, const scene::Snapshot& other,
-                        v1::Notice::Kind kind, v1::TickEvents& events) {
+                        v1::Notice::Kind kind, const std::string& cause, v1::TickEvents& events) {
   for (const scene::AvatarSnapshot& avatar : one.avatars) {
     if (findAvatar(other, avatar.name)) continue;
     v1::Notice& notice = *events.add_notices();
@@ -40,7 +40,7 @@ void addPresenceNotices(const scene::Snapshot& one, const scene::Snapshot& other
     notice.set_avatar(avatar.name);
     notice.set_id(avatar.id);
     *notice.mutable_position() = toProto(avatar.footPosition);
-    notice.set_text("the recording was sought");
+    notice.set_text(cause);
   }
 }
 
@@ -60,13 +60,14 @@ void resetWorld(HostedWorld& hosted) {
   for (auto& [id, viewer] : hosted.viewers) viewer.onReplaced(hosted.world, hosted.activeContacts);
 }
 
-void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts) {
+void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts,
+                  const std::string& cause) {
   const auto before = hosted.world.snapshot(), after = world.snapshot();
   v1::TickEvents ended = hosted.world.endContacts(v1::ContactEvent::REASON_SEEK);
-  addPresenceNotices(*before, *after, v1::Notice::KIND_LEFT, ended);
+  addPresenceNotices(*before, *after, v1::Notice::KIND_LEFT, cause, ended);
   broadcastEvents(hosted, ended);
   v1::TickEvents begun = activeContacts;
-  addPresenceNotices(*after, *before, v1::Notice::KIND_SPAWNED, begun);
+  addPresenceNotices(*after, *before, v1::Notice::KIND_SPAWNED, cause, begun);
   hosted.world.switchTo(std::move(world));
   resetHorizons(hosted);
   hosted.owners.clear();

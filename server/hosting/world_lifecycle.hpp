@@ -8,9 +8,11 @@ namespace enfilade::server {
 /// Resets the world to tick 0. Clients receive the end of contacts and the leave notices.
 void resetWorld(HostedWorld& hosted);
 
-/// Replaces the world by another one of the same scene (seek). Clients receive the end of the old
-/// contacts, then `activeContacts`, states and frames. Avatars have no owner afterwards.
-void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts);
+/// Replaces the world by another one of the same scene (seek, restore). Clients receive the end of
+/// the old contacts, then `activeContacts`, states and frames; notices of avatars that appear or
+/// vanish name the `cause`. Avatars have no owner afterwards.
+void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts,
+                  const std::string& cause);
 
 v1::Bye makeBye(v1::ErrorCode code, const std::string& reason);
 Buffer encodeBye(const v1::Bye& closeNotice);

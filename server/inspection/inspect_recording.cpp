@@ -72,6 +72,10 @@ const char* getCommandName(const v1::Command& command) {
       return "crouch";
     case v1::Command::kDriveJoints:
       return "drive_joints";
+    case v1::Command::kTurn:
+      return "turn";
+    case v1::Command::kTeleport:
+      return "teleport";
     case v1::Command::kGo:
       return "go";
     default:

@@ -4,8 +4,10 @@
 
 #include "collision/assert.hpp"
 #include "protocol/framing.hpp"
+#include "render/image/depth_noise.hpp"
 #include "render/image/encode.hpp"
 #include "render/image/image.hpp"
+#include "render/lens.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -27,6 +29,8 @@ ViewOrError makeAvatarView(const v1::AvatarEyes& eyes, const scene::Snapshot& sn
   if (eyes.has_fov_y()) view.camera.fovY = eyes.fov_y();
   if (eyes.has_near()) view.camera.near = eyes.near();
   if (eyes.has_far()) view.camera.far = eyes.far();
+  if (eyes.has_height()) view.camera.eye.y() = viewer.footPosition.y() + eyes.height();
+  if (eyes.has_offset()) view.camera.eye += vectorFromProto(eyes.offset());
   return view;
 }
 
@@ -61,16 +65,37 @@ void appendBytes(std::vector<std::uint8_t>& bytes, const std::vector<T>& values)
   if (!values.empty()) std::memcpy(bytes.data() + start, values.data(), values.size() * sizeof(T));
 }
 
+std::vector<float> makeNoisyDepth(const render::Frame& frame, const v1::FrameRequest& request) {
+  std::vector<float> depth = frame.depth;
+  const double scale = request.depth_noise().scale();
+  render::addDepthNoise(depth, frame.camera.width, frame.camera.height,
+                        {request.depth_noise().seed(), scale == 0 ? 1 : scale}, frame.tick);
+  return depth;
+}
+
+/// The intrinsics of a pinhole or fisheye camera.
+std::optional<render::Pinhole> findIntrinsics(const render::Camera& camera) {
+  if (camera.projection != render::Camera::Projection::perspective) return std::nullopt;
+  if (!camera.lens) return render::computeIntrinsics(camera);
+  if (camera.lens->kind != render::Camera::Lens::Kind::fisheye) return std::nullopt;
+  return render::computeFisheyeIntrinsics(camera);
+}
+
 void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
-                   v1::Channel channel, v1::Encoding encoding) {
+                   const scene::Scene& scene, const v1::FrameRequest& request, v1::Channel channel,
+                   v1::Encoding encoding) {
   if (channel == v1::CHANNEL_IDS) {
     appendBytes(bytes, frame.ids);
+  } else if (channel == v1::CHANNEL_CLASS) {
+    appendBytes(bytes, scene.objectClasses().classesOf(frame.ids));
+  } else if (channel == v1::CHANNEL_THING) {
+    appendBytes(bytes, scene.objectClasses().thingsOf(frame.ids));
   } else if (channel == v1::CHANNEL_NORMALS) {
     appendBytes(bytes, frame.normals);
   } else if (channel == v1::CHANNEL_RANGE) {
     appendBytes(bytes, render::computeRange(frame));
   } else if (channel == v1::CHANNEL_DEPTH) {
-    appendBytes(bytes, frame.depth);
+    appendBytes(bytes, request.has_depth_noise() ? makeNoisyDepth(frame, request) : frame.depth);
   } else if (encoding == v1::ENCODING_JPEG) {
     const render::Camera& camera = frame.camera;
     appendBytes(bytes,
@@ -83,7 +108,8 @@ void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
 }
 
 void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const render::Frame& frame,
-              v1::Channel channel, v1::Encoding rgbEncoding) {
+              const scene::Scene& scene, const v1::FrameRequest& request, v1::Channel channel) {
+  const v1::Encoding rgbEncoding = request.rgb_encoding();
   const bool compressed = channel == v1::CHANNEL_RGB &&
                           (rgbEncoding == v1::ENCODING_PNG || rgbEncoding == v1::ENCODING_JPEG);
   v1::Plane& plane = *message.add_planes();
@@ -92,7 +118,7 @@ void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const r
   plane.set_width(message.width());
   plane.set_height(message.height());
   plane.set_offset(attachment.size());
-  appendChannel(attachment, frame, channel, plane.encoding());
+  appendChannel(attachment, frame, scene, request, channel, plane.encoding());
   plane.set_length(attachment.size() - plane.offset());
 }
 
@@ -104,6 +130,7 @@ std::string fieldFromRefusal(const std::string& refusal) {
   const std::string pinhole = "pinhole";
   if (field == "fovY") return "fov_y";
   if (field == "heightY") return "height_y";
+  if (field == "lens.k" || field == "lens.width") return "lens.fisheye";
   return field.starts_with(pinhole) ? "intrinsics" + field.substr(pinhole.size()) : field;
 }
 
@@ -113,7 +140,8 @@ std::optional<v1::Error> validateChannels(const v1::FrameRequest& request) {
     const bool known = v1::Channel_IsValid(channel) && channel != v1::CHANNEL_UNSPECIFIED;
     if (!known || requested[channel]) {
       return makeError(v1::ERROR_BAD_MESSAGE,
-                       "channels: give rgb, ids, depth, normals and range each at most once, not " +
+                       "channels: give rgb, ids, depth, normals, range, class and thing each at "
+                       "most once, not " +
                            std::to_string(channel),
                        "channels");
     }
@@ -127,7 +155,8 @@ render::Channels channelsFromProto(const v1::FrameRequest& request) {
   render::Channels channels{false, false, false, false};
   for (const int channel : request.channels()) {
     if (channel == v1::CHANNEL_RGB) channels.rgb = true;
-    if (channel == v1::CHANNEL_IDS) channels.ids = true;
+    if (channel == v1::CHANNEL_IDS || channel == v1::CHANNEL_CLASS || channel == v1::CHANNEL_THING)
+      channels.ids = true;
     if (channel == v1::CHANNEL_DEPTH || channel == v1::CHANNEL_RANGE) channels.depth = true;
     if (channel == v1::CHANNEL_NORMALS) channels.normals = true;
   }
@@ -148,6 +177,29 @@ std::optional<v1::Error> applyIntrinsics(render::Camera& camera, const v1::Frame
   const v1::Intrinsics& given = request.intrinsics();
   camera.pinhole = render::Pinhole{given.fx(), given.fy(), given.cx(), given.cy()};
   return std::nullopt;
+}
+
+/// Applies the requested lens to the camera, after its intrinsics.
+std::optional<v1::Error> applyLens(render::Camera& camera, const v1::FrameRequest& request) {
+  if (!request.has_lens()) return std::nullopt;
+  using Kind = render::Camera::Lens::Kind;
+  const v1::Lens& given = request.lens();
+  if (given.kind_case() == v1::Lens::KIND_NOT_SET)
+    return makeError(v1::ERROR_BAD_CAMERA, "lens: give fisheye or equirectangular", "lens.kind");
+  if (request.renderer() == v1::RENDERER_GL)
+    return makeError(v1::ERROR_BAD_CAMERA,
+                     "lens: OpenGL draws none: leave renderer out, or give rays", "lens");
+  const v1::Lens::Fisheye& fisheye = given.fisheye();
+  camera.lens = render::Camera::Lens{given.has_fisheye() ? Kind::fisheye : Kind::equirectangular,
+                                     {fisheye.k1(), fisheye.k2(), fisheye.k3(), fisheye.k4()}};
+  if (fisheye.width() != 0) camera.lens->width = fisheye.width();
+  return std::nullopt;
+}
+
+std::optional<v1::Error> validateNoise(const v1::FrameRequest& request) {
+  const double scale = request.depth_noise().scale();
+  if (scale >= 0 && scale <= 10) return std::nullopt;
+  return makeError(v1::ERROR_BAD_MESSAGE, "scale: give 0 to 10", "depth_noise.scale");
 }
 
 std::optional<v1::Error> validateEnums(const v1::FrameRequest& request) {
@@ -205,6 +257,7 @@ ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot
     return makeError(v1::ERROR_BAD_CAMERA, "width and height: give 1 to 4096 pixels", "width");
   }
   if (auto error = validateSize(request)) return *error;
+  if (auto error = validateNoise(request)) return *error;
   const int width = static_cast<int>(request.width());
   const int height = static_cast<int>(request.height());
   ViewOrError view = makeError(v1::ERROR_BAD_CAMERA, "view is missing: give eyes or free", "view");
@@ -217,6 +270,7 @@ ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot
     frameView->options.shadows = request.shadows();
     frameView->renderer = rendererFromProto(request);
     if (auto error = applyIntrinsics(frameView->camera, request)) return *error;
+    if (auto error = applyLens(frameView->camera, request)) return *error;
     if (const auto problem = render::validateCamera(frameView->camera)) {
       return makeError(v1::ERROR_BAD_CAMERA, *problem, fieldFromRefusal(*problem));
     }
@@ -225,7 +279,7 @@ ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot
 }
 
 v1::Frame toProto(const render::Frame& frame, double time, const v1::FrameRequest& request,
-                  std::vector<std::uint8_t>& attachment) {
+                  const scene::Scene& scene, std::vector<std::uint8_t>& attachment) {
   v1::Frame message;
   message.set_tick(frame.tick);
   message.set_time(time);
@@ -235,23 +289,22 @@ v1::Frame toProto(const render::Frame& frame, double time, const v1::FrameReques
   *message.mutable_camera() = toProto(frame.camera);
   message.set_width(static_cast<std::uint32_t>(frame.camera.width));
   message.set_height(static_cast<std::uint32_t>(frame.camera.height));
-  if (frame.camera.projection == render::Camera::Projection::perspective) {
-    const render::Pinhole pinhole = render::computeIntrinsics(frame.camera);
+  if (const auto pinhole = findIntrinsics(frame.camera)) {
     v1::Intrinsics& intrinsics = *message.mutable_intrinsics();
-    intrinsics.set_fx(pinhole.fx);
-    intrinsics.set_fy(pinhole.fy);
-    intrinsics.set_cx(pinhole.cx);
-    intrinsics.set_cy(pinhole.cy);
+    intrinsics.set_fx(pinhole->fx);
+    intrinsics.set_fy(pinhole->fy);
+    intrinsics.set_cx(pinhole->cx);
+    intrinsics.set_cy(pinhole->cy);
   }
   message.set_glass(request.glass() == v1::GLASS_SOLID ? v1::GLASS_SOLID : v1::GLASS_CLEAR);
   message.set_shadows(request.shadows());
   attachment.reserve(attachment.size() +
                      computeBytesPerPixel(request) * message.width() * message.height());
   for (const int channel : request.channels()) {
-    addPlane(message, attachment, frame, static_cast<v1::Channel>(channel), request.rgb_encoding());
+    addPlane(message, attachment, frame, scene, request, static_cast<v1::Channel>(channel));
   }
   if (request.channels().empty()) {
-    addPlane(message, attachment, frame, v1::CHANNEL_RGB, request.rgb_encoding());
+    addPlane(message, attachment, frame, scene, request, v1::CHANNEL_RGB);
   }
   return message;
 }

@@ -24,9 +24,10 @@ struct FrameView {
 std::variant<FrameView, v1::Error> viewFromProto(const v1::FrameRequest& request,
                                                  const scene::Snapshot& snapshot);
 
-/// Appends the pixels to `attachment`. `time` is the simulated time in seconds.
+/// Appends the pixels to `attachment`. `time` is the simulated time in seconds, `scene` that of the
+/// frame.
 v1::Frame toProto(const render::Frame& frame, double time, const v1::FrameRequest& request,
-                  std::vector<std::uint8_t>& attachment);
+                  const scene::Scene& scene, std::vector<std::uint8_t>& attachment);
 
 /// The frame request for an avatar's view in a recording.
 v1::FrameRequest makeRecordedViewRequest(const std::string& avatar);

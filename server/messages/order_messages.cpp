@@ -104,6 +104,23 @@ scene::Order driveJointsFromProto(const v1::DriveJoints& message) {
   return drive;
 }
 
+OrderOrError turnFromProto(const v1::Turn& message) {
+  if (message.angle_case() == v1::Turn::ANGLE_NOT_SET)
+    return makeMissingFieldError("turn.by", "by or facing, in degrees");
+  scene::Turn turn;
+  turn.relative = message.has_by();
+  turn.angle = message.has_by() ? message.by() : message.facing();
+  if (message.has_rate()) turn.rate = message.rate();
+  return scene::Order(turn);
+}
+
+OrderOrError teleportFromProto(const v1::Teleport& message) {
+  if (!message.has_at()) return makeMissingFieldError("teleport.at");
+  scene::Teleport teleport{vectorFromProto(message.at()), std::nullopt};
+  if (message.has_facing()) teleport.facing = message.facing();
+  return scene::Order(teleport);
+}
+
 OrderOrError orderFromProto(const v1::Command& message) {
   switch (message.order_case()) {
     case v1::Command::kSpawn:
@@ -131,6 +148,10 @@ OrderOrError orderFromProto(const v1::Command& message) {
       return crouchFromProto(message.crouch());
     case v1::Command::kDriveJoints:
       return driveJointsFromProto(message.drive_joints());
+    case v1::Command::kTurn:
+      return turnFromProto(message.turn());
+    case v1::Command::kTeleport:
+      return teleportFromProto(message.teleport());
     case v1::Command::kGo:  // the server submits the Walk
       return makeError(v1::ERROR_REFUSED_COMMAND, "go needs a server that finds the path", "go");
     case v1::Command::ORDER_NOT_SET:
@@ -139,7 +160,7 @@ OrderOrError orderFromProto(const v1::Command& message) {
   return makeError(
       v1::ERROR_BAD_MESSAGE,
       "order is missing: give spawn, walk, look, wait, capture, leave, drive, jump, fly, "
-      "crouch or drive_joints",
+      "crouch, drive_joints, go, turn or teleport",
       "order");
 }
 

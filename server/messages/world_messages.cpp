@@ -190,6 +190,22 @@ void describeObject(const scene::Model& model, scene::EntityId entity, v1::Entit
   if (object.storey) into.set_storey(model.storeys[*object.storey].name);
 }
 
+void describeDetails(const scene::Scene& scene, scene::EntityId entity, v1::Entity& into) {
+  const scene::Model& model = scene.model();
+  const scene::ObjectClasses& classes = scene.objectClasses();
+  into.set_class_id(classes.classOf(entity));
+  into.set_class_name(classes.names[classes.classOf(entity)]);
+  into.set_thing(classes.thingOf(entity));
+  if (entity > model.objects.size()) return;
+  const scene::Object& object = model.objects[entity - 1];
+  if (const scene::Aabb box = scene.objectBoxes()[entity - 1]; !box.empty()) {
+    *into.mutable_box()->mutable_min() = toProto(box.min);
+    *into.mutable_box()->mutable_max() = toProto(box.max);
+  }
+  if (!object.meshes.empty())
+    into.set_material(model.materials[model.meshes[object.meshes.front()].material].name);
+}
+
 v1::ContactEvent toProto(const scene::World& world, const scene::ContactEvent& event) {
   v1::ContactEvent message;
   message.set_tick(event.tick);
@@ -254,6 +270,7 @@ v1::AvatarState toProto(const scene::World& world, const scene::AvatarSnapshot& 
   message.set_flying(avatar.flying);
   message.set_stands_on(avatar.groundEntity);
   message.set_height(avatar.height);
+  message.set_facing(avatar.facing);
   for (const scene::JointSnapshot& joint : avatar.joints) {
     v1::JointState& state = *message.add_joints();
     state.set_value(joint.value);

@@ -38,6 +38,8 @@ void setSeparation(const collision::SeparationResult& separation, Message& messa
 const std::string& findGlobalId(const scene::Model& model, scene::EntityId entity);
 /// Fills in what the model knows of an object. `entity` is an object's id.
 void describeObject(const scene::Model& model, scene::EntityId entity, v1::Entity& into);
+/// Fills in the details of DescribeEntities, also of avatars.
+void describeDetails(const scene::Scene& scene, scene::EntityId entity, v1::Entity& into);
 
 v1::Error makeError(v1::ErrorCode code, std::string message, std::string field = {});
 

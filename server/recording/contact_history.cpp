@@ -7,6 +7,11 @@
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
+namespace {
+
+constexpr std::size_t kMaxTimelineEvents = 50'000;  // about 25 MB
+
+}  // namespace
 
 /// Parses only the start and the events: states are most of a recording and are skipped.
 ContactHistory::ContactHistory(const std::filesystem::path& recording, std::uint32_t run,
@@ -23,16 +28,47 @@ ContactHistory::ContactHistory(const std::filesystem::path& recording, std::uint
       firstTick_ = start->parent().tick();
     if (const auto* events = std::get_if<v1::TickEvents>(&*item)) {
       if (events->tick() > lastTick) return;
-      addBegins(*events);
+      addEvents(*events);
     }
   }
 }
 
-void ContactHistory::addBegins(const v1::TickEvents& events) {
-  for (const v1::ContactEvent& event : events.contacts())
-    if (event.kind() == v1::ContactEvent::KIND_BEGIN ||
-        event.kind() == v1::ContactEvent::KIND_ENTER)
-      begins_[{event.kind(), event.a(), event.b()}].push_back(event);
+void ContactHistory::addEvents(const v1::TickEvents& events) {
+  using Event = v1::ContactEvent;
+  for (const Event& event : events.contacts()) {
+    const bool begins = event.kind() == Event::KIND_BEGIN || event.kind() == Event::KIND_ENTER;
+    if (begins) begins_[{event.kind(), event.a(), event.b()}].push_back(event);
+    const bool isShown = begins || event.kind() == Event::KIND_BLOCKED ||
+                         (event.kind() == Event::KIND_NEAR && event.phase() == Event::PHASE_BEGIN);
+    if (!isShown || event.tick() > completeTo_) continue;
+    if (events_.size() < kMaxTimelineEvents) {
+      events_.push_back(event);
+    } else {
+      completeTo_ = event.tick() - 1;
+    }
+  }
+}
+
+v1::RecordedEvents ContactHistory::eventsAfter(std::uint64_t tick, std::size_t maxBytes) const {
+  constexpr std::size_t kFieldBytes = 8;  // maximum size of an event's tag and length
+  v1::RecordedEvents reply;
+  reply.set_complete_to(completeTo_);
+  std::size_t bytes = 0;
+  const auto first = std::ranges::upper_bound(events_, tick, {}, &v1::ContactEvent::tick);
+  for (const v1::ContactEvent& event : std::ranges::subrange(first, events_.end())) {
+    bytes += event.ByteSizeLong() + kFieldBytes;
+    if (event.tick() > completeTo_) break;
+    if (bytes > maxBytes) {
+      reply.set_complete_to(event.tick() - 1);
+      break;
+    }
+    *reply.add_contacts() = event;
+  }
+  // An incomplete tick would be asked for again.
+  while (!reply.contacts().empty() &&
+         reply.contacts(reply.contacts_size() - 1).tick() > reply.complete_to())
+    reply.mutable_contacts()->RemoveLast();
+  return reply;
 }
 
 /// The last begin or enter event of a contact up to `tick`; null: unknown.

@@ -1,5 +1,6 @@
-// Start times of the contacts of a recorded run. A world knows its active contacts, but not when
-// they began. Playback from the middle of a recording takes these times from here.
+// The contacts of a recorded run: their start times, and the events of a timeline. A world knows
+// its active contacts, but not when they began. Playback from the middle of a recording takes these
+// times from here.
 #pragma once
 
 #include <cstdint>
@@ -26,14 +27,19 @@ class ContactHistory {
   /// of branches lack the initial contacts: these get the branch's first tick, and no KIND_ENTER.
   v1::TickEvents activeContactsAt(const scene::World& world) const;
 
+  /// The events that a timeline shows (RecordedEventsRequest) after a tick, up to `maxBytes`.
+  v1::RecordedEvents eventsAfter(std::uint64_t tick, std::size_t maxBytes) const;
+
  private:
   using Key = std::tuple<v1::ContactEvent::Kind, std::uint32_t, std::uint32_t>;  ///< kind, a, b
 
-  void addBegins(const v1::TickEvents& events);
+  void addEvents(const v1::TickEvents& events);
   const v1::ContactEvent* findLastBegin(const Key& key, std::uint64_t tick) const;
 
   std::uint64_t firstTick_ = 0;
   std::map<Key, std::vector<v1::ContactEvent>> begins_;  ///< ascending ticks
+  std::vector<v1::ContactEvent> events_;                 ///< those of a timeline, ascending ticks
+  std::uint64_t completeTo_ = std::numeric_limits<std::uint64_t>::max();  ///< tick; of events_
 };
 
 }  // namespace enfilade::server

@@ -25,6 +25,11 @@ class Replay {
     return contacts_.activeContactsAt(world);
   }
 
+  /// As ContactHistory::eventsAfter().
+  v1::RecordedEvents eventsAfter(std::uint64_t tick, std::size_t maxBytes) const {
+    return contacts_.eventsAfter(tick, maxBytes);
+  }
+
   /// Runs the next tick of `world`, which seek() returned: the recorded tick, or a free one after
   /// branch(). nullopt: the replay has stopped (stopReason()), and the world is after the last tick
   /// that matched. Throws RecordingError if that world cannot be restored.

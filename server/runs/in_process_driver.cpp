@@ -90,7 +90,8 @@ protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) 
         renderer_->render(*snapshot, frameView.camera, frameView.options, frameView.renderer);
     ++frames_;
     protocol::ReceivedFrame received;
-    received.description = toProto(rendered, snapshot->time, request, received.pixels);
+    received.description =
+        toProto(rendered, snapshot->time, request, world_.scene(), received.pixels);
     return received;
   } catch (const render::RenderError& error) {
     throw protocol::ProtocolError(v1::ERROR_INTERNAL, error.what());

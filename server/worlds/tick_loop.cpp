@@ -134,6 +134,13 @@ void TickLoop::receive(ClientId id, v1::ClientMessage message, RequestPermit per
            HostedWorld& hosted) mutable { enqueueRequest(hosted, id, std::move(request)); });
 }
 
+void TickLoop::receive(ClientId id, std::vector<v1::ClientMessage> messages) {
+  post([id, messages = std::move(messages)](HostedWorld& hosted) mutable {
+    for (v1::ClientMessage& message : messages)
+      enqueueRequest(hosted, id, {std::move(message), nullptr});
+  });
+}
+
 void TickLoop::leave(ClientId id) {
   post([id](HostedWorld& hosted) { removeClient(hosted, id); });
   bool empty = false;

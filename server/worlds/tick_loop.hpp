@@ -49,6 +49,8 @@ class TickLoop {
   ClientId join(std::string name, Role role, std::shared_ptr<OutgoingQueue> out,
                 std::uint64_t requestId, bool guest = false);
   void receive(ClientId id, v1::ClientMessage message, RequestPermit permit);
+  /// Several requests at once, without permits.
+  void receive(ClientId id, std::vector<v1::ClientMessage> messages);
   void leave(ClientId id);
   /// Runs a job between two ticks. Returns false if the world has ended.
   bool post(TickInbox::Job job) { return inbox_->post(std::move(job)); }

@@ -145,6 +145,32 @@ void WorldRegistry::drop(const std::string& name, const std::string& requestingW
   if (!postWork(work)) done(makeShuttingDownError());
 }
 
+namespace {
+
+class TickLoopMembership final : public WorldMembership {
+ public:
+  TickLoopMembership(std::shared_ptr<TickLoop> world, ClientId id)
+      : world_(std::move(world)), id_(id) {}
+  ~TickLoopMembership() override { world_->leave(id_); }
+  void receive(std::vector<v1::ClientMessage> messages) override {
+    world_->receive(id_, std::move(messages));
+  }
+
+ private:
+  std::shared_ptr<TickLoop> world_;
+  ClientId id_;
+};
+
+}  // namespace
+
+std::unique_ptr<WorldMembership> WorldRegistry::join(const std::string& world,
+                                                     const std::string& name, Role role,
+                                                     std::shared_ptr<OutgoingQueue> out) {
+  const TickLoopPtr found = find(world);
+  const ClientId id = found ? found->join(name, role, std::move(out), 0) : 0;
+  return id == 0 ? nullptr : std::make_unique<TickLoopMembership>(found, id);
+}
+
 void WorldRegistry::dropIfEmpty(const std::string& name, const TickLoopPtr& world,
                                 const std::string& cause) {
   const std::string reason = "the world '" + name + "' was dropped " + cause;

@@ -64,6 +64,8 @@ class WorldRegistry : public WorldDirectory {
               std::function<void(std::variant<v1::World, v1::Error>)> done) override;
   void drop(const std::string& name, const std::string& requestingWorld,
             std::function<void(std::optional<v1::Error>)> done) override;
+  std::unique_ptr<WorldMembership> join(const std::string& world, const std::string& name,
+                                        Role role, std::shared_ptr<OutgoingQueue> out) override;
 
   /// Ends all worlds. Later calls do nothing.
   void stop();

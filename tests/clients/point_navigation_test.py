@@ -17,7 +17,7 @@ def follow(env, path):
     seconds = env.ticks_per_step * env.client.tick_seconds
     at, result = 1, None
     while result is None or not (result[2] or result[3]):
-        feet = np.array(env._state.feet)
+        feet = np.array(env._feet)
         while at + 1 < len(path) and math.hypot(*(path[at] - feet)[[0, 2]]) < 0.02:
             at += 1
         x, _, z = path[at] - feet

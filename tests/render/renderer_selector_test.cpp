@@ -19,7 +19,8 @@ TEST(RendererSelector, TheWordsOfTheKindsAreReadAsTheyAreWritten) {
 TEST(RendererSelector, AGpuIsAlwaysPreferred) {
   for (const int size : {1, 256, 4096})
     for (const Channels& channels : {kColour, kMeasured})
-      EXPECT_EQ(chooseRendererKind(false, squareCamera(size), channels), RendererKind::gl);
+      EXPECT_EQ(chooseRendererKind(false, squareCamera(size), channels, 1'000'000),
+                RendererKind::gl);
 }
 
 TEST(RendererSelector, EachKindDrawsWithItsOwnAndARequestGoesBeforeIt) {
@@ -37,13 +38,19 @@ TEST(RendererSelector, EachKindDrawsWithItsOwnAndARequestGoesBeforeIt) {
   EXPECT_EQ(rays.render({}, camera).renderer, raysName);
 }
 
-TEST(RendererSelector, OnACpuRaysMeasureSmallPicturesAndGlDrawsAllColours) {
+TEST(RendererSelector, OnACpuRaysDrawSmallPicturesButForColoursOfFewTriangles) {
   for (const int size : {1, 128, 256}) {
-    EXPECT_EQ(chooseRendererKind(true, squareCamera(size), kMeasured), RendererKind::rays) << size;
-    EXPECT_EQ(chooseRendererKind(true, squareCamera(size), kColour), RendererKind::gl) << size;
+    const auto camera = squareCamera(size);
+    const std::size_t many = 4u * static_cast<std::size_t>(size) * static_cast<std::size_t>(size);
+    EXPECT_EQ(chooseRendererKind(true, camera, kMeasured, 0), RendererKind::rays) << size;
+    EXPECT_EQ(chooseRendererKind(true, camera, kColour, many - 1), RendererKind::gl) << size;
+    EXPECT_EQ(chooseRendererKind(true, camera, kColour, many), RendererKind::rays) << size;
   }
   for (const int size : {257, 640, 4096})
-    EXPECT_EQ(chooseRendererKind(true, squareCamera(size), kMeasured), RendererKind::gl) << size;
+    for (const Channels& channels : {kColour, kMeasured})
+      EXPECT_EQ(chooseRendererKind(true, squareCamera(size), channels, 100'000'000),
+                RendererKind::gl)
+          << size;
 }
 
 TEST(RendererSelector, AutomaticFollowsItsRule) {
@@ -55,7 +62,8 @@ TEST(RendererSelector, AutomaticFollowsItsRule) {
       options.channels = channels;
       const Camera camera = squareCamera(size);
       const bool rays = renderer.render({}, camera, options).renderer.rfind("Embree", 0) == 0;
-      const RendererKind expected = chooseRendererKind(renderer.software(), camera, channels);
+      const RendererKind expected =
+          chooseRendererKind(renderer.software(), camera, channels, 50 * 12);
       EXPECT_EQ(rays, expected == RendererKind::rays);
     }
   }

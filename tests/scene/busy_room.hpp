@@ -92,6 +92,8 @@ struct BusyRoom {
     order("jumper", Jump{number(0.2, 1), velocity()});
     order("pushed", Crouch{number(0, 1) < 0.5 ? 0.0 : 1.0});
     order("arm", DriveJoints{{number(-3, 3), number(-3, 3), number(-3, 3)}, 2, true});
+    order("arm", Turn{number(-120, 120), true, 90});
+    order("walker", Look{Vec3(number(-5, 5), 1, number(-5, 5))});
     const auto submit = [this](BodyCommand command) {
       EXPECT_FALSE(submitBodyCommand(world, command));
     };

@@ -92,7 +92,11 @@ TEST_F(Roles, EachRoleHasItsPermissions) {
   EXPECT_EQ(looker.command(spawn("a", 0, 0, 0))->code(), v1::ERROR_NOT_ALLOWED);
   EXPECT_EQ(looker.metrics().ticks(), 0u);
   EXPECT_EQ(driver.step().tick(), 1u);
-  EXPECT_EQ(codeOf([&] { driver.request(restart); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(codeOf([&] { looker.request(restart); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(driver.request(restart).restart().tick(), 0u);
+  protocol::Client admin = client("admin", kAdmin);
+  EXPECT_FALSE(admin.command(spawn("a", 0, 0, 0)));
+  EXPECT_EQ(codeOf([&] { driver.request(restart); }), v1::ERROR_NOT_ALLOWED) << "admin's avatar";
 }
 
 TEST_F(Roles, TheAdminRestartsTheWorld) {

@@ -138,9 +138,11 @@ TEST(Instances, DescribeAnIfcProductAndItsOperation) {
   EXPECT_EQ(instances.at(std::to_string(kLeaf)), json({{"path", "leaf"},
                                                        {"global_id", "2O2Fr$t4X7Zf8NOew3FNtn"},
                                                        {"class", "IfcDoor"},
+                                                       {"class_id", 1},
+                                                       {"thing", kLeaf},
                                                        {"operation", "SINGLE_SWING_LEFT"},
                                                        {"body", "door"}}));
-  EXPECT_EQ(instances.at(std::to_string(kEnd)), json({{"path", "end"}}));
+  EXPECT_EQ(instances.at(std::to_string(kEnd)), json({{"path", "end"}, {"thing", kEnd}}));
 }
 
 TEST_F(Capture, TransformsSayWhereAPixelLies) {

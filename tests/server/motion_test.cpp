@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "server/app/command_line.hpp"
+#include "server/base/server_limits.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/runs/in_process_driver.hpp"
 #include "tests/server/small_room.hpp"
@@ -144,7 +145,7 @@ TEST(CommandLine, MoreScenesThanAServerHasWorldsAreRefused) {
   const auto read = [&] {
     return readCommandLine(static_cast<int>(arguments.size()), arguments.data());
   };
-  for (int i = 0; i < 64; ++i) arguments.push_back("room.obj");
+  for (std::uint32_t i = 0; i < ServerLimits().worlds; ++i) arguments.push_back("room.obj");
   EXPECT_TRUE(std::holds_alternative<ProgramCommand>(read()));
   arguments.push_back("room.obj");
   ASSERT_TRUE(std::holds_alternative<ExitCode>(read()));

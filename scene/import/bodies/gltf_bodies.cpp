@@ -1,6 +1,7 @@
 #include "scene/import/bodies/gltf_bodies.hpp"
 
 #include <algorithm>
+#include <map>
 #include <set>
 
 #include "scene/import/bodies/body_fields.hpp"
@@ -18,11 +19,38 @@ using Json = nlohmann::json;
 
 constexpr const char* kPrefix = "walk_";
 
+constexpr const char* kClassKey = "walk_class";
+
+/// Whether the node's extras describe a body.
 bool hasWalkKeys(const Json& node) {
   const auto extras = node.find("extras");
   if (extras == node.end() || !extras->is_object()) return false;
-  return std::any_of(extras->items().begin(), extras->items().end(),
-                     [](const auto& item) { return item.key().rfind(kPrefix, 0) == 0; });
+  return std::any_of(extras->items().begin(), extras->items().end(), [](const auto& item) {
+    return item.key().rfind(kPrefix, 0) == 0 && item.key() != kClassKey;
+  });
+}
+
+/// The class in the node's extras; "": none. Other programs use the key without the prefix.
+std::string findClass(const Json& node) {
+  const auto extras = node.find("extras");
+  if (extras == node.end() || !extras->is_object()) return "";
+  for (const char* key : {kClassKey, "class"})
+    if (const auto found = extras->find(key); found != extras->end() && found->is_string())
+      return found->get<std::string>();
+  return "";
+}
+
+/// Sets the class of all objects below a node that has one. They are one thing.
+void applyClasses(GltfTree& tree) {
+  std::map<std::size_t, std::string> classOf;  // by node
+  for (const auto& [number, transform] : tree.transforms())
+    if (std::string name = findClass(tree.node(number)); !name.empty()) classOf[number] = name;
+  for (const auto& [node, objects] : tree.groupObjectsByOwner(classOf))
+    for (const std::uint32_t i : objects) {
+      Object& object = tree.model().objects[i];
+      object.className = classOf.at(node);
+      if (objects.size() > 1) object.thing = objects.front();
+    }
 }
 
 /// Transforms points and directions from the node to the scene. Without an axis in the extras, it
@@ -93,13 +121,15 @@ class ExtrasReader {
 std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, const std::string& text,
                                       const NodeTransforms& transforms, Model& model) {
   const bool says = text.find("walk_") != std::string::npos ||
-                    text.find("KHR_physics_rigid_bodies") != std::string::npos;
+                    text.find("KHR_physics_rigid_bodies") != std::string::npos ||
+                    text.find("\"class\"") != std::string::npos;
   if (!says) return {};
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return {};
   std::set<std::uint32_t> staticObjects;
   try {
     GltfTree tree(json, transforms, model);
+    applyClasses(tree);
     mergeLowerPriorityBodies(model, readPhysicsBodies(tree), {});
     std::vector<BodySpec> ofExtras = ExtrasReader(file, tree).read(staticObjects);
     mergeLowerPriorityBodies(model, std::move(ofExtras), staticObjects);

@@ -1,6 +1,7 @@
 #include "scene/import/bodies/sidecar.hpp"
 
 #include <algorithm>
+#include <map>
 
 #include "scene/import/bodies/body_fields.hpp"
 #include "scene/import/bodies/implicit_shapes.hpp"
@@ -147,6 +148,32 @@ std::set<std::uint32_t> readStaticObjects(const JsonCursor& cursor, const Model&
   return staticObjects;
 }
 
+/// Reads `classes`: lists of objects by class name.
+void readClasses(const JsonCursor& cursor, Model& model) {
+  if (!cursor.value.is_object())
+    cursor.fail("must be an object of lists, as {\"chair\": [\"Cafe/Chair*\"]}, not " +
+                formatExcerpt(cursor.value));
+  std::map<std::string, std::vector<std::uint32_t>> objects;
+  for (const auto& [name, list] : cursor.value.items()) {
+    if (name.empty()) cursor.fail("has a class without a name");
+    objects[name] = readObjectList({list, cursor.name + "." + name}, model);
+  }
+  for (const auto& [name, members] : objects)
+    for (const std::uint32_t object : members) model.objects[object].className = name;
+}
+
+/// Reads `things`: each entry lists the objects of one thing.
+void readThings(const JsonCursor& cursor, Model& model) {
+  if (!cursor.value.is_array())
+    cursor.fail("must be a list of lists of objects, not " + formatExcerpt(cursor.value));
+  std::vector<std::vector<std::uint32_t>> things;
+  for (std::size_t i = 0; i < cursor.value.size(); ++i)
+    things.push_back(readObjectList(cursor.at(i), model));
+  for (const auto& members : things)
+    for (const std::uint32_t object : members)
+      model.objects[object].thing = *std::ranges::min_element(members);
+}
+
 /// Sizes of the lists that a sidecar may extend.
 struct ModelSizes {
   std::size_t materials, meshes, objects, bodies;
@@ -173,7 +200,7 @@ std::filesystem::path sidecarPath(const std::filesystem::path& model) {
 Sidecar applySidecar(Model& model, std::string_view text, const std::string& source) {
   const json whole = parseJson(text, source);
   const JsonCursor cursor{whole, source};
-  requireKnownKeys(cursor, {"walk", "bodies", "still"});
+  requireKnownKeys(cursor, {"walk", "bodies", "still", "classes", "things"});
   if (!cursor.has("walk") || whole["walk"] != 1)
     cursor.fail("must say \"walk\":1, the format's version");
   Sidecar sidecar;
@@ -182,6 +209,8 @@ Sidecar applySidecar(Model& model, std::string_view text, const std::string& sou
     if (cursor.has("bodies")) readBodies(cursor.at("bodies"), model);
     if (cursor.has("still")) sidecar.staticObjects = readStaticObjects(cursor.at("still"), model);
     if (const auto reason = validateBodies(model)) throw SidecarError(source + ": " + *reason);
+    if (cursor.has("classes")) readClasses(cursor.at("classes"), model);
+    if (cursor.has("things")) readThings(cursor.at("things"), model);
   } catch (...) {
     truncateModel(model, before);
     throw;

@@ -274,6 +274,8 @@ void write(StreamWriter& out, const Object& o) {
   out.put(static_cast<std::uint8_t>(o.usage));
   out.put(o.storey.value_or(kNone));
   out.put(o.partOf.value_or(kNone));
+  out.put(o.className);
+  out.put(o.thing.value_or(kNone));
 }
 
 /// Parts may precede their whole; that index is checked when all objects are read.
@@ -299,6 +301,9 @@ Object readObject(StreamReader& in, std::size_t meshes, std::size_t storeys) {
   o.storey = readStoreyIndex(in, storeys);
   const auto whole = in.get<std::uint32_t>("piece of");
   if (whole != kNone) o.partOf = whole;
+  o.className = in.getText("class");
+  const auto thing = in.get<std::uint32_t>("thing");
+  if (thing != kNone) o.thing = thing;
   return o;
 }
 
@@ -470,6 +475,8 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   for (const Object& object : model.objects) {
     if (object.partOf && *object.partOf >= model.objects.size())
       in.fail("piece of", "no object " + std::to_string(*object.partOf));
+    if (object.thing && *object.thing >= model.objects.size())
+      in.fail("thing", "no object " + std::to_string(*object.thing));
   }
   readAll(in, model.bodies, 215, "bodies", [&] { return readBodySpec(in); });
   if (const auto reason = validateBodies(model)) in.fail("bodies", *reason);

@@ -12,7 +12,7 @@
 namespace enfilade::scene {
 
 /// Increases with every change of the layout; other versions are refused.
-inline constexpr std::uint32_t kModelStreamVersion = 5;
+inline constexpr std::uint32_t kModelStreamVersion = 6;
 
 /// Reports what is wrong and at which byte.
 struct ModelStreamError : std::runtime_error {

@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "scene/world/avatars/joint_motion.hpp"
+#include "scene/world/avatars/turning.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 
 namespace enfilade::scene {
@@ -246,7 +247,8 @@ void moveFlying(AvatarMover& m, const Vec3& desired) {
 
 Aabb computeMotionBounds(const WorldSettings& settings, const Avatar& avatar) {
   const double across = avatar.desiredVelocity.norm() * settings.tickDuration + kMinStepDepth +
-                        computeMaxChainDisplacement(avatar.chain, settings.tickDuration);
+                        computeMaxChainDisplacement(avatar.chain, settings.tickDuration) +
+                        computeMaxTurnDisplacement(settings, avatar);
   const double down = (std::abs(avatar.fallSpeed) + settings.gravity * settings.tickDuration) *
                       settings.tickDuration;
   // Room for restoring the contact offset, and for the search of contacts and near misses.
@@ -272,6 +274,7 @@ void moveAvatar(const WorldData& world, Avatar& avatar, QueryCount& count) {
   avatar.lastDisplacement = m.footPosition - avatar.footPosition;
   avatar.footPosition = m.footPosition;
   avatar.dirty = false;
+  if (avatar.turn.left != 0) turnAvatar(world.settings, avatar, count);
   if (avatar.chain.speed > 0) moveJoints(world, avatar, count);
 }
 

@@ -1,5 +1,8 @@
 #include "scene/world/avatars/avatar_state.hpp"
 
+#include <algorithm>
+#include <cmath>
+
 namespace enfilade::scene {
 namespace {
 
@@ -8,8 +11,17 @@ void hashOptionalState(const Avatar& avatar, Hasher& hash) {
   const bool isCrouching = avatar.height != avatar.spawnHeight;
   hash.add(std::uint64_t{avatar.grounded} | std::uint64_t{avatar.flying} << 1 |
            std::uint64_t{avatar.jumping} << 2 | std::uint64_t{avatar.blockedReported} << 3 |
-           std::uint64_t{isCrouching} << 4 | std::uint64_t{!avatar.chain.links.empty()} << 5);
+           std::uint64_t{isCrouching} << 4 | std::uint64_t{!avatar.chain.links.empty()} << 5 |
+           std::uint64_t{avatar.viewHeld} << 6 | std::uint64_t{avatar.turn.rate > 0} << 7 |
+           std::uint64_t{avatar.teleports} << 32);
   if (isCrouching) hash.add(avatar.height);
+  if (avatar.turn.rate > 0) {
+    hash.add(avatar.turn.heading);
+    hash.add(avatar.turn.left);
+    hash.add(avatar.turn.timeoutLeft);
+  }
+  // The initial facing is part of the commands, as the parts are.
+  if (turnsShape(avatar) && avatar.facing != avatar.spawnOrder->facing) hash.add(avatar.facing);
   if (avatar.chain.links.empty()) return;
   hash.add(avatar.chain.speed);
   hash.add(avatar.chain.timeoutLeft);
@@ -38,6 +50,22 @@ void hashAvatar(const Avatar& avatar, Hasher& hash) {
     hash.add((std::uint64_t{contact.other} << 1) | std::uint64_t{contact.touching});
 }
 
+double computeTurnRadius(const Avatar& avatar) {
+  if (!turnsShape(avatar)) return 0;
+  double radius = 0;
+  const auto& parts = avatar.chain.links.empty() ? avatar.shape->parts : avatar.baseParts;
+  if (avatar.spawnHeight == 0)
+    for (const AvatarPart& part : parts) radius = std::max(radius, part.hull->radius);
+  for (const ChainLink& link : avatar.chain.links) {
+    if (link.parent >= 0) continue;
+    const bool isPrismatic = link.joint.kind == LinkJoint::Kind::prismatic;
+    const double travel =
+        isPrismatic ? std::max(std::abs(link.joint.low), std::abs(link.joint.high)) : 0;
+    radius = std::max(radius, link.joint.anchor.norm() + travel + link.maxRadius);
+  }
+  return radius;
+}
+
 AvatarSnapshot makeAvatarSnapshot(const Avatar& avatar) {
   AvatarSnapshot snapshot;
   snapshot.id = avatar.id;
@@ -55,6 +83,9 @@ AvatarSnapshot makeAvatarSnapshot(const Avatar& avatar) {
                    avatar.blockingHit};
   for (const ChainLink& link : avatar.chain.links)
     snapshot.joints.push_back({link.value, link.blockedBy, computeLeverArm(link)});
+  snapshot.facing = avatar.facing;
+  snapshot.turnRadius = computeTurnRadius(avatar);
+  snapshot.teleports = avatar.teleports;
   return snapshot;
 }
 

@@ -11,6 +11,7 @@
 #include "scene/world/avatars/immediate_orders.hpp"
 #include "scene/world/avatars/order_context.hpp"
 #include "scene/world/avatars/spawn.hpp"
+#include "scene/world/avatars/turning.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
 #include "scene/world/contacts/contacts.hpp"
@@ -67,7 +68,9 @@ OrderStatus executeOrder(const Spawn& spawn, OrderContext& context) {
   }
   Avatar avatar;
   std::string message;
-  if (const auto error = placeAvatar(context.world, spawn, avatar, message, context.count)) {
+  applySpawnShape(spawn, context.world.settings, avatar);
+  if (const auto error =
+          placeOrSuggest(context.world, spawn.position, avatar, message, context.count)) {
     context.emitNotice(Notice::Kind::refused,
                        *error + formatDroppedCount(context.queue.orders.size() - 1));
     dropQueuedOrders(context.queue.orders, 1, context.report.notices.back(), "by a refused Spawn",
@@ -92,6 +95,7 @@ void startWaypoint(Avatar& avatar, const Walk& walk, const WorldSettings& settin
 OrderStatus executeOrder(const Walk& walk, OrderContext& context) {
   Avatar& avatar = *context.findAvatar();
   avatar.driveVelocity = Vec3::Zero();
+  avatar.viewHeld = false;
   if (avatar.walk.minDistance < 0) startWaypoint(avatar, walk, context.world.settings);
   return OrderStatus::running;
 }
@@ -105,6 +109,7 @@ OrderStatus executeOrder(const Look& look, OrderContext& context) {
     return OrderStatus::done;
   }
   avatar.viewDirection = (look.target - eyes) / distance;
+  avatar.viewHeld = !avatar.driveVelocity.isZero(0);
   context.emitNotice(Notice::Kind::done);
   return OrderStatus::done;
 }
@@ -136,6 +141,29 @@ OrderStatus executeOrder(const Leave&, OrderContext& context) {
 /// Does nothing: enqueueCommands() executes a Drive.
 OrderStatus executeOrder(const Drive&, OrderContext&) {
   return OrderStatus::done;
+}
+
+OrderStatus executeOrder(const Teleport& teleport, OrderContext& context) {
+  Avatar& avatar = *context.findAvatar();
+  Avatar moved = avatar;
+  std::string message;
+  if (teleport.facing) setFacing(moved, *teleport.facing);
+  if (const auto error =
+          placeOrSuggest(context.world, teleport.position, moved, message, context.count)) {
+    context.emitNotice(Notice::Kind::refused, *error);
+    return OrderStatus::done;
+  }
+  wakeTouchingBodies(context.world, avatar);
+  moved.grounded = moved.jumping = false;
+  moved.groundEntity = 0;
+  moved.fallSpeed = moved.stalledInAirTime = 0;
+  moved.lastDisplacement = Vec3::Zero();
+  moved.dirty = true;
+  ++moved.teleports;
+  if (teleport.facing) setViewFacing(moved, *teleport.facing);
+  avatar = std::move(moved);
+  context.emitNotice(Notice::Kind::done, message);
+  return OrderStatus::doneThisTick;
 }
 
 OrderStatus executeFrontOrder(OrderContext& context) {
@@ -188,6 +216,7 @@ Avatar* dropPendingOrders(WorldData& world, const Command& command, TickReport& 
   avatar->jumping = false;
   avatar->stalledInAirTime = 0;
   avatar->chain.speed = 0;
+  avatar->turn = {};
   return avatar;
 }
 
@@ -203,6 +232,7 @@ void enqueueCommands(WorldData& world, TickReport& report) {
       continue;
     if (const Drive* drive = std::get_if<Drive>(&command.order)) {
       avatar->driveVelocity = drive->velocity;
+      avatar->viewHeld = false;
     } else {
       ensureQueue(world, command.avatar).orders.push_back({std::move(command.order), command.tag});
     }
@@ -225,7 +255,9 @@ Vec3 computeDesiredVelocity(const WorldData& world, const Avatar& avatar,
                                      walk->speed, world.settings.tickDuration);
   if (const Jump* jump = std::get_if<Jump>(&order); jump && avatar.jumping)
     return jump->velocity ? projectToGround(*jump->velocity) : driveVelocity;
-  return std::holds_alternative<DriveJoints>(order) ? driveVelocity : Vec3(Vec3::Zero());
+  const bool keepsDriving =
+      std::holds_alternative<DriveJoints>(order) || std::holds_alternative<Turn>(order);
+  return keepsDriving ? driveVelocity : Vec3(Vec3::Zero());
 }
 
 void endWalk(OrderContext& context, Notice::Kind kind, std::string text = {}) {
@@ -272,7 +304,7 @@ void reportBlockedDrives(WorldData& world, TickReport& report, QueryCount& count
     Avatar* avatar = world.findAvatar(queue.avatar);
     if (!avatar) continue;
     const bool driven = !avatar->driveVelocity.isZero(0) && queue.orders.empty();
-    const bool blocked = (driven || avatar->chain.speed > 0) && avatar->blockedBy != 0;
+    const bool blocked = (driven || changesShape(*avatar)) && avatar->blockedBy != 0;
     if (blocked && !avatar->blockedReported) emitBlocked(world, *avatar, report, count);
     avatar->blockedReported = blocked;
   }
@@ -322,7 +354,7 @@ void runOrders(WorldData& world, TickReport& report, QueryCount& count) {
     Avatar* avatar = context.findAvatar();
     if (!avatar) continue;
     avatar->desiredVelocity = computeDesiredVelocity(world, *avatar, queue.orders);
-    if (const double speed = avatar->desiredVelocity.norm(); speed > 0)
+    if (const double speed = avatar->desiredVelocity.norm(); speed > 0 && !avatar->viewHeld)
       avatar->viewDirection = avatar->desiredVelocity / speed;
   }
   std::erase_if(world.queues,

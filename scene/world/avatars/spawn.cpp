@@ -54,7 +54,7 @@ FloorHit findFloorBelow(PlacementSearch& search, const Avatar& avatar) {
   if (!(depth > 0)) return {};
   const Vec3 down{0, -depth, 0};
   const Aabb column = collision::sweptAabb(placeBox(avatar.shape->box, avatar.footPosition), down);
-  ObstacleSet obstacles = collectObstaclesInBox(world, column, 0);
+  ObstacleSet obstacles = collectObstaclesInBox(world, column, avatar.id);
   const double contactOffset = world.settings.contactOffset;
   const ShapeCastHit hit = castAvatarShape(*avatar.shape, avatar.footPosition, down, obstacles,
                                            {0.5 * contactOffset, contactOffset}, search.count);
@@ -94,8 +94,8 @@ std::optional<std::string> tryPlacement(PlacementSearch& search, const Vec3& at,
   const WorldData& world = search.world;
   Aabb searchBox = placeBox(avatar.shape->box, at);
   searchBox.max.y() += kTrialLifts.back();
-  ObstacleSet obstacles =
-      collectObstaclesInBox(world, inflated(searchBox, 2 * world.settings.contactOffset), 0);
+  ObstacleSet obstacles = collectObstaclesInBox(
+      world, inflated(searchBox, 2 * world.settings.contactOffset), avatar.id);
   std::optional<std::string> error;
   for (const double lift : kTrialLifts) {
     avatar.footPosition = at + Vec3(0, lift, 0);
@@ -151,13 +151,32 @@ void applySpawnShape(const Spawn& order, const WorldSettings& settings, Avatar& 
     }
     avatar.shape = makeAvatarShape(std::move(parts));
   }
-  if (!order.parts.empty() || !order.links.empty())
+  if (!order.parts.empty() || !order.links.empty()) {
     avatar.spawnOrder = std::make_shared<const Spawn>(order);
+    avatar.facing = order.facing;
+  }
   avatar.eyeHeight = computeEyeHeight(avatar.shape->box.max.y());
   if (order.links.empty()) return;
   avatar.baseParts = avatar.shape->parts;
   avatar.chain = makeChain(order, rotation);
   avatar.shape = makeChainShape(avatar.baseParts, avatar.chain);
+}
+
+void setFacing(Avatar& avatar, double degrees) {
+  if (!turnsShape(avatar)) return;
+  avatar.facing = degrees;
+  const Mat3 rotation = makeHeadingRotation(makeHeadingFromDegrees(degrees));
+  const bool hasChain = !avatar.chain.links.empty();
+  std::vector<AvatarPart> base = hasChain ? avatar.baseParts : avatar.shape->parts;
+  if (avatar.spawnHeight == 0)
+    for (AvatarPart& part : base) part = makeAvatarPart(part.hull, part.offset, rotation);
+  if (hasChain) {
+    avatar.baseParts = std::move(base);
+    avatar.chain.avatarFromBase = rotation;
+    avatar.shape = makeChainShape(avatar.baseParts, avatar.chain);
+  } else {
+    avatar.shape = makeAvatarShape(std::move(base));
+  }
 }
 
 std::optional<std::string> placeStanding(const WorldData& world, const Vec3& position,
@@ -166,13 +185,12 @@ std::optional<std::string> placeStanding(const WorldData& world, const Vec3& pos
   return tryPlacement(search, position, avatar);
 }
 
-std::optional<std::string> placeAvatar(const WorldData& world, const Spawn& order, Avatar& avatar,
-                                       std::string& message, QueryCount& count) {
-  applySpawnShape(order, world.settings, avatar);
+std::optional<std::string> placeOrSuggest(const WorldData& world, const Vec3& position,
+                                          Avatar& avatar, std::string& message, QueryCount& count) {
   PlacementSearch search{world, count, 0};
-  if (const auto error = tryPlacement(search, order.position, avatar)) {
-    const std::string suggestion = describeFreePlace(search, order.position, avatar);
-    return "at " + formatPoint(order.position) + " " + *error + suggestion;
+  if (const auto error = tryPlacement(search, position, avatar)) {
+    const std::string suggestion = describeFreePlace(search, position, avatar);
+    return "at " + formatPoint(position) + " " + *error + suggestion;
   }
   if (avatar.flying) return std::nullopt;
   const FloorHit floor = findFloorBelow(search, avatar);

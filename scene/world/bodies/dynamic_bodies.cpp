@@ -214,7 +214,7 @@ void stepDynamicBodies(WorldData& world, TickReport& report, QueryCount& count) 
   for (const std::uint32_t i : dynamicBodies.bodyIndices) world.bodies[i].pendingLift = 0;
   if (dynamicBodies.bodyIndices.empty()) return;
   for (const Avatar& avatar : world.avatars)
-    if (!avatar.lastDisplacement.isZero(0) || avatar.chain.speed > 0)
+    if (!avatar.lastDisplacement.isZero(0) || changesShape(avatar))
       wakeTouchingBodies(world, avatar);
   dynamicBodies.activeBodies = collectActiveBodies(world);
   if (dynamicBodies.activeBodies.empty()) return;

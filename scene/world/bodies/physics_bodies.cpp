@@ -95,7 +95,7 @@ std::uint32_t ensureAvatarPart(WorldData& world, const Avatar& avatar, std::uint
   physicsBody.maxPushForce = velocity.isZero(0) ? 0 : world.settings.maxPushForce;
   // A body in contact with a moving avatar does not sleep; with a resting one it may.
   physicsBody.preventsSleep =
-      !(velocity.isZero(0) && avatar.lastDisplacement.isZero(0) && avatar.chain.speed == 0);
+      !(velocity.isZero(0) && avatar.lastDisplacement.isZero(0) && !changesShape(avatar));
   return physicsBodyIndex;
 }
 

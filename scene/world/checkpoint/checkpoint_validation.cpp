@@ -1,7 +1,9 @@
 #include "scene/world/checkpoint/checkpoint_validation.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
+#include <numbers>
 #include <set>
 
 #include "scene/world/avatars/spawn.hpp"
@@ -93,6 +95,9 @@ struct CheckpointChecker {
     const Walk* walk = order ? std::get_if<Walk>(order) : nullptr;
     require(avatar.walk.waypointIndex < (walk ? walk->waypoints.size() : 1),
             avatar.name + " has an unknown waypoint");
+    const TurnProgress& turn = avatar.turn;
+    require((turn.rate == 0 && turn.left == 0) || (order && std::holds_alternative<Turn>(*order)),
+            avatar.name + " turns without a command");
     if (avatar.chain.speed == 0) return;
     const auto* joints = order ? std::get_if<DriveJoints>(order) : nullptr;
     require(joints && joints->targets.size() <= avatar.chain.links.size(),
@@ -112,6 +117,11 @@ struct CheckpointChecker {
               name + " refers to an unknown entity");
       require(a.chain.speed >= 0 && a.chain.speed <= settings().maxJointSpeed,
               name + "'s joints are too fast");
+      require(a.turn.rate >= 0 &&
+                  a.turn.rate <= settings().maxJointSpeed * 180 / std::numbers::pi &&
+                  std::abs(a.turn.left) <= 1e6 && std::abs(a.turn.heading) <= 1e6 &&
+                  isKnown(a.turn.blockedBy),
+              name + " has an impossible turn");
       for (const ChainLink& link : a.chain.links)
         require(isKnown(link.blockedBy) && std::min(link.value, link.target) >= link.joint.low &&
                     std::max(link.value, link.target) <= link.joint.high,
@@ -187,6 +197,9 @@ void restoreAvatarShape(const Reader& a, Avatar& avatar) {
   }
   if (const auto error = validateCommandFields(Command{"avatar", order, 0}, {})) a.refuse(*error);
   const double spawnHeight = avatar.spawnHeight, height = avatar.height, radius = avatar.radius;
+  const double facing = avatar.facing;
+  if (!(std::abs(facing) <= (avatar.spawnOrder ? 1e6 : 0)))
+    a.refuse("an avatar has an impossible facing");
   try {
     applySpawnShape(order, a.settings, avatar);
   } catch (const std::invalid_argument& error) {
@@ -199,6 +212,7 @@ void restoreAvatarShape(const Reader& a, Avatar& avatar) {
     a.refuse("an avatar has an impossible height");
   if (isCrouching) avatar.shape = makePrismShape(radius, height, spawnHeight, a.settings);
   avatar.height = height;
+  if (facing != avatar.facing) setFacing(avatar, facing);
 }
 
 void validateRestoredWorld(const WorldData& world) {

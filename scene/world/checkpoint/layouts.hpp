@@ -2,7 +2,7 @@
 // recomputed when a world is read, or before its next use; a comment says which.
 #pragma once
 
-#include "scene/world/checkpoint/archive.hpp"
+#include "scene/world/checkpoint/order_layouts.hpp"
 #include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {
@@ -22,14 +22,6 @@ struct MaxEnumerator<collision::Feature> {
 template <>
 struct MaxEnumerator<PairCache::NormalSource> {
   static constexpr auto value = PairCache::NormalSource::faceB;
-};
-template <>
-struct MaxEnumerator<LinkJoint::Kind> {
-  static constexpr auto value = LinkJoint::Kind::prismatic;
-};
-template <>
-struct MaxEnumerator<BodyCommand::Action> {
-  static constexpr auto value = BodyCommand::Action::run;
 };
 template <>
 struct MaxEnumerator<Sliding> {
@@ -87,144 +79,8 @@ struct Layout<collision::DepthCache> {
   }
 };
 
-// ---- orders ------------------------------------------------------------------------------------
+// ---- settings ----------------------------------------------------------------------------------
 
-template <>
-struct Layout<LinkJoint> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, LinkJoint>& joint) {
-    auto& [kind, anchor, axis, low, high] = joint;
-    a(kind, anchor, axis, low, high);
-  }
-};
-template <>
-struct Layout<Link> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Link>& link) {
-    auto& [parent, joint, points, value] = link;
-    a(parent, joint, points, value);
-  }
-};
-template <>
-struct Layout<Spawn> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Spawn>& spawn) {
-    auto& [position, facing, radius, height, flying, parts, links, selfContact] = spawn;
-    a(position, facing, radius, height, flying, parts, links, selfContact);
-  }
-};
-template <>
-struct Layout<Walk> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Walk>& walk) {
-    auto& [waypoints, speed] = walk;
-    a(waypoints, speed);
-  }
-};
-template <>
-struct Layout<Look> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Look>& look) {
-    auto& [target] = look;
-    a(target);
-  }
-};
-template <>
-struct Layout<Wait> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Wait>& wait) {
-    auto& [seconds] = wait;
-    a(seconds);
-  }
-};
-template <>
-struct Layout<Capture> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Capture>& capture) {
-    auto& [name] = capture;
-    a(name);
-  }
-};
-template <>
-struct Layout<Leave> {
-  template <class A>
-  static void archive(A&, MaybeConst<A, Leave>&) {
-    static_assert(std::is_empty_v<Leave>);
-  }
-};
-template <>
-struct Layout<Drive> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Drive>& drive) {
-    auto& [velocity] = drive;
-    a(velocity);
-  }
-};
-template <>
-struct Layout<Jump> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Jump>& jump) {
-    auto& [height, velocity] = jump;
-    a(height, velocity);
-  }
-};
-template <>
-struct Layout<Fly> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Fly>& fly) {
-    auto& [on] = fly;
-    a(on);
-  }
-};
-template <>
-struct Layout<Crouch> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Crouch>& crouch) {
-    auto& [height] = crouch;
-    a(height);
-  }
-};
-template <>
-struct Layout<DriveJoints> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, DriveJoints>& drive) {
-    auto& [targets, speed, immediate] = drive;
-    a(targets, speed, immediate);
-  }
-};
-template <>
-struct Layout<Command> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, Command>& command) {
-    auto& [avatar, order, tag] = command;
-    a(avatar, order, tag);
-  }
-};
-template <>
-struct Layout<BodyCommand> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, BodyCommand>& command) {
-    auto& [body, action, target, level, speed] = command;
-    a(body, action, target, level, speed);
-  }
-};
-template <>
-struct Layout<QueuedOrder> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, QueuedOrder>& queued) {
-    auto& [order, tag] = queued;
-    a(order, tag);
-  }
-};
-/// `avatar` follows from the names.
-template <>
-struct Layout<OrderQueue> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, OrderQueue>& queue) {
-    auto& [name, avatar, orders] = queue;
-    a(name, orders);
-  }
-};
 template <>
 struct Layout<WorldSettings> {
   template <class A>
@@ -318,6 +174,15 @@ struct Layout<Chain> {
   }
 };
 
+template <>
+struct Layout<TurnProgress> {
+  template <class A>
+  static void archive(A& a, MaybeConst<A, TurnProgress>& turn) {
+    auto& [heading, left, rate, timeoutLeft, blockedBy] = turn;
+    a(heading, left, rate, timeoutLeft, blockedBy);
+  }
+};
+
 /// Computes shape, base and chain of an avatar from the members that were read. Throws
 /// CheckpointError if no order can have created it (checkpoint_validation.cpp).
 void restoreAvatarShape(const Reader& a, Avatar& avatar);
@@ -328,20 +193,20 @@ struct Layout<Avatar> {
   template <class A>
   static void archive(A& a, MaybeConst<A, Avatar>& avatar) {
     auto& [name, id, shape, spawnOrder, footPosition, viewDirection, eyeHeight, fallSpeed, grounded,
-           groundEntity, flying, jumping, spawnHeight, height, radius, baseParts, chain,
-           driveVelocity, desiredVelocity, walk, waitTimeLeft, stalledInAirTime, lastDisplacement,
-           requestedDisplacement, idle, dirty, blockedBy, pairsChanged, blockingHit,
-           blockedReported, proxy, motionBounds, cachedBounds, obstacles, narrowQueries,
-           partsLookedAt, hasBodyObstacles, contacts] = avatar;
-    a(name, spawnOrder, spawnHeight, height, radius);
+           groundEntity, flying, jumping, spawnHeight, height, radius, baseParts, chain, facing,
+           turn, viewHeld, teleports, driveVelocity, desiredVelocity, walk, waitTimeLeft,
+           stalledInAirTime, lastDisplacement, requestedDisplacement, idle, dirty, blockedBy,
+           pairsChanged, blockingHit, blockedReported, proxy, motionBounds, cachedBounds, obstacles,
+           narrowQueries, partsLookedAt, hasBodyObstacles, contacts] = avatar;
+    a(name, spawnOrder, spawnHeight, height, radius, facing);
     if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // `shape`, `baseParts`
     a(chain);
     if constexpr (!A::kWrites)
       if (!chain.links.empty()) shape = makeChainShape(baseParts, chain);
     a(id, footPosition, viewDirection, eyeHeight, fallSpeed, grounded, groundEntity, flying,
-      jumping, driveVelocity, walk, waitTimeLeft, stalledInAirTime, lastDisplacement,
-      requestedDisplacement, idle, dirty, blockedBy, pairsChanged, blockingHit, blockedReported,
-      proxy, motionBounds, cachedBounds, obstacles, hasBodyObstacles, contacts);
+      jumping, turn, viewHeld, teleports, driveVelocity, walk, waitTimeLeft, stalledInAirTime,
+      lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, pairsChanged, blockingHit,
+      blockedReported, proxy, motionBounds, cachedBounds, obstacles, hasBodyObstacles, contacts);
   }
 };
 

@@ -22,6 +22,15 @@ struct WalkProgress {
   double timeoutLeft = 0;         ///< seconds
 };
 
+/// A turn under way, in degrees.
+struct TurnProgress {
+  double heading = 0;      ///< of the view
+  double left = 0;         ///< counter-clockwise seen from above
+  double rate = 0;         ///< degrees per second; 0: no order
+  double timeoutLeft = 0;  ///< seconds
+  EntityId blockedBy = 0;  ///< in the last tick
+};
+
 struct Avatar {
   std::string name;
   EntityId id = 0;
@@ -40,6 +49,10 @@ struct Avatar {
   double radius = 0;       ///< metres, of the prism
   std::vector<AvatarPart> baseParts;  ///< parts of `shape` that are no links; empty without a chain
   Chain chain;
+  double facing = 0;  ///< degrees, of its parts and links; 0 for a mere prism
+  TurnProgress turn;
+  bool viewHeld = false;                ///< the view does not follow the driven velocity
+  std::uint32_t teleports = 0;          ///< since it spawned
   Vec3 driveVelocity = Vec3::Zero();    ///< m/s, requested by Drive
   Vec3 desiredVelocity = Vec3::Zero();  ///< m/s, requested by its orders in this tick
   WalkProgress walk;
@@ -66,6 +79,18 @@ struct Avatar {
   bool hasBodyObstacles = false;                       ///< `obstacles` contain parts of bodies
   std::vector<Contact> contacts;  ///< ascending `other`; part of the state, not a cache
 };
+
+/// Whether parts or links turn with the avatar. A mere prism does not: only its view turns.
+inline bool turnsShape(const Avatar& avatar) {
+  return avatar.spawnOrder != nullptr;
+}
+/// Whether its joints or a turn change its shape.
+inline bool changesShape(const Avatar& avatar) {
+  return avatar.chain.speed > 0 || (avatar.turn.left != 0 && turnsShape(avatar));
+}
+/// Maximum distance from the vertical through the feet of any point that turns, for all values of
+/// the joints; metres. 0 for a mere prism.
+double computeTurnRadius(const Avatar& avatar);
 
 struct QueuedOrder {
   Order order;

@@ -54,7 +54,8 @@ struct Walk {
   std::vector<Vec3> waypoints;  ///< way points, at least one
   double speed = 1.4;           ///< metres per second, > 0
 };
-/// Turns the view to a point.
+/// Turns the view to a point. While the avatar is driven, the view stays there until the next Drive
+/// or Walk.
 struct Look {
   Vec3 target;
 };
@@ -97,8 +98,22 @@ struct DriveJoints {
   bool immediate = false;  ///< not queued: drops the queue and acts at the next tick
 };
 
-using Order =
-    std::variant<Spawn, Walk, Look, Wait, Capture, Leave, Drive, Jump, Fly, Crouch, DriveJoints>;
+/// Turns the view about the vertical, and with it the parts and links; a prism itself does not
+/// rotate. Obstacles stop parts and links.
+struct Turn {
+  double angle = 0;  ///< degrees; relative: counter-clockwise seen from above; otherwise a facing
+  bool relative = true;
+  double rate = 90;  ///< degrees per second, > 0..WorldSettings::maxJointSpeed
+};
+
+/// Places the avatar elsewhere, if it has room there.
+struct Teleport {
+  Vec3 position = Vec3::Zero();  ///< of the feet, as Spawn::position
+  std::optional<double> facing;  ///< degrees, as Spawn::facing; nullopt: it keeps its own
+};
+
+using Order = std::variant<Spawn, Walk, Look, Wait, Capture, Leave, Drive, Jump, Fly, Crouch,
+                           DriveJoints, Turn, Teleport>;
 
 // Limits of a Spawn order.
 inline constexpr std::size_t kMaxParts = 32;

@@ -297,6 +297,26 @@ void Scene::prefetchCollisionGeometry(std::span<const std::uint32_t> objects) co
   if (!missing.empty()) prefetcher_->add(missing);
 }
 
+const ObjectClasses& Scene::objectClasses() const {
+  std::call_once(classesBuilt_, [this] { classes_ = computeObjectClasses(model_); });
+  return classes_;
+}
+
+const std::vector<Aabb>& Scene::objectBoxes() const {
+  std::call_once(boxesBuilt_, [this] {
+    objectBoxes_.resize(model_.objects.size());
+    for (std::size_t i = 0; i < objectBoxes_.size(); ++i) {
+      const Object& object = model_.objects[i];
+      for (const std::uint32_t m : object.meshes) {
+        const Mesh& mesh = model_.meshes[m];
+        for (std::uint32_t v = 0; v < mesh.positions.size(); ++v)
+          objectBoxes_[i].include(computeWorldPosition(object, mesh, v));
+      }
+    }
+  });
+  return objectBoxes_;
+}
+
 Scene::Memory Scene::memory() const {
   Memory memory;
   memory.geometry = shapes_->bytes();

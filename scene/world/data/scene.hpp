@@ -3,10 +3,12 @@
 #pragma once
 
 #include <memory>
+#include <mutex>
 #include <span>
 #include <vector>
 
 #include "scene/model/model.hpp"
+#include "scene/model/object_classes.hpp"
 #include "scene/model/shapes/collision_geometry.hpp"
 #include "scene/world/data/body_shape.hpp"
 
@@ -46,6 +48,12 @@ class Scene {
   /// Indices into solidObjects() of those that have many triangles.
   const std::vector<std::uint32_t>& denseIndices() const { return denseIndices_; }
 
+  /// Class and thing of each object. Built at the first call, from any thread.
+  const ObjectClasses& objectClasses() const;
+  /// The initial box of each object, scene frame, metres; empty without a mesh. Built at the first
+  /// call, from any thread.
+  const std::vector<Aabb>& objectBoxes() const;
+
   std::size_t shapeCount() const { return meshesOfShape_.size(); }
   /// Index of the object's shape, < shapeCount().
   std::uint32_t shapeIndex(std::uint32_t object) const { return shapeIndexOfObject_[object]; }
@@ -76,6 +84,9 @@ class Scene {
   std::unique_ptr<LazyArray<Shape>> shapes_;
   std::unique_ptr<LazyArray<CollisionGeometry>> collisionGeometries_;
   std::vector<std::uint32_t> denseIndices_;
+  mutable std::once_flag classesBuilt_, boxesBuilt_;
+  mutable ObjectClasses classes_;
+  mutable std::vector<Aabb> objectBoxes_;
   std::unique_ptr<Prefetcher> prefetcher_;  ///< last: its thread uses all others
 };
 

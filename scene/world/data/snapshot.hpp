@@ -46,6 +46,9 @@ struct AvatarSnapshot {
   double spawnHeight = 0;     ///< metres, height of the prism at spawn; 0 for a shape made of parts
   MoveResult move;
   std::vector<JointSnapshot> joints;  ///< empty without a chain
+  double facing = 0;                  ///< degrees, of its parts and links; 0 for a mere prism
+  double turnRadius = 0;              ///< as computeTurnRadius()
+  std::uint32_t teleports = 0;        ///< since it spawned
 };
 
 struct BodySnapshot {

@@ -4,6 +4,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <numbers>
 
 #include "scene/model/names.hpp"
 
@@ -148,6 +149,17 @@ OptionalError validateOrder(const DriveJoints& drive, const WorldSettings& setti
                                      -kMaxJointAngle, kMaxJointAngle))
         return error;
   return validatePositive("speed", drive.speed, settings.maxJointSpeed);
+}
+
+OptionalError validateOrder(const Turn& turn, const WorldSettings& settings) {
+  if (auto error = validateRange(turn.relative ? "by" : "facing", turn.angle, -1e6, 1e6))
+    return error;
+  return validatePositive("rate", turn.rate, settings.maxJointSpeed * 180 / std::numbers::pi);
+}
+
+OptionalError validateOrder(const Teleport& teleport, const WorldSettings&) {
+  if (auto error = validatePoint("at", teleport.position)) return error;
+  return validateRange("facing", teleport.facing.value_or(0), -1e6, 1e6);
 }
 
 }  // namespace

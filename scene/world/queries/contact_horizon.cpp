@@ -5,7 +5,8 @@
 //    speed limits of both give a new proof (motion_limits.hpp). Boxes that are far apart suffice.
 // 3. The search is repeated when its time is over.
 // A proof covers all commands, so commands do not invalidate it. What does:
-//  - An avatar joins: it is paired with all avatars that it may reach before their next search.
+//  - An avatar joins or is teleported: it is paired with all avatars that it may reach before their
+//    next search.
 //  - An avatar leaves: its pairs go.
 //  - An avatar steps onto or off a dynamic body: its pairs are due at once, because distant bodies
 //    may carry it. (A proof excludes what dynamic bodies carry, see ContactHorizon::unbounded.)
@@ -181,7 +182,7 @@ void ContactHorizons::updateSelection() {
       tracked_.try_emplace(avatar.id, Tracked{now(), true, {}});
 }
 
-/// Earlier bounds do not cover avatars that joined, nor those that a distant body may now carry.
+/// Earlier bounds do not cover avatars that joined or were teleported, nor those that a distant body may now carry.
 void ContactHorizons::restartUnbounded() {
   for (const EntityId id : state_.unbounded()) {
     schedule_.scheduleBodyNow(id, now());

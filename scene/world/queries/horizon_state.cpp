@@ -96,7 +96,8 @@ void HorizonState::updateAvatars(const Snapshot& next, bool consecutive) {
     const auto [known, isNew] = avatarMotion_.try_emplace(avatar.id, next.tick);
     const AvatarSnapshot* last = isNew ? nullptr : findAvatarSnapshot(before, avatar.id);
     if (last && hasMoved(*last, avatar)) known->second = next.tick;
-    if (!last || (standsOnDynamicBody(now, avatar) && !standsOnDynamicBody(before, *last)))
+    if (!last || last->teleports != avatar.teleports ||
+        (standsOnDynamicBody(now, avatar) && !standsOnDynamicBody(before, *last)))
       unbounded_.push_back(avatar.id);
   }
 }

@@ -12,7 +12,7 @@ bool standsOnDynamicBody(const SceneAt& sceneAt, const AvatarSnapshot& avatar) {
 }
 
 double sumJointSpeeds(const AvatarSnapshot& avatar, const WorldSettings& settings) {
-  double speed = 0;
+  double speed = settings.maxJointSpeed * avatar.turnRadius;
   for (const JointSnapshot& joint : avatar.joints) speed += settings.maxJointSpeed * joint.leverArm;
   return speed;
 }

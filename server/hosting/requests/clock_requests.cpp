@@ -6,9 +6,7 @@
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
-namespace {
 
-/// Makes the client the driver if the clock has no driver; an error if another client drives it.
 std::optional<v1::Error> acquireClock(const RequestContext& context) {
   std::optional<ClientId>& driver = context.hosted.clock.driver;
   if (!driver) driver = context.clientId;
@@ -17,7 +15,15 @@ std::optional<v1::Error> acquireClock(const RequestContext& context) {
   return makeError(v1::ERROR_NOT_ALLOWED, "another client drives the clock: wait until it leaves");
 }
 
-}  // namespace
+std::optional<v1::Error> validateOwnsAvatars(const RequestContext& context) {
+  if (context.client.role == Role::admin) return std::nullopt;
+  for (const auto& [avatar, owner] : context.hosted.owners)
+    if (owner != context.clientId)
+      return makeError(v1::ERROR_NOT_ALLOWED,
+                       "avatar '" + avatar +
+                           "' belongs to another client: this needs a token with the role admin");
+  return std::nullopt;
+}
 
 void handleStep(const RequestContext& context, const v1::Step& step) {
   const std::uint32_t maxTicks = context.hosted.limits.ticksPerStep;
@@ -77,7 +83,9 @@ void handleRestart(const RequestContext& context) {
     return replyError(context, v1::ERROR_NOT_ALLOWED,
                       "a world restarts only in lockstep: set the clock to lockstep first");
   }
-  if (auto error = acquireClock(context)) return replyError(context, std::move(*error));
+  auto error = validateOwnsAvatars(context);
+  if (!error) error = acquireClock(context);
+  if (error) return replyError(context, std::move(*error));
   resetWorld(context.hosted);
   publishStatus(context.hosted);
   const auto snapshot = context.hosted.world.snapshot();
@@ -97,6 +105,14 @@ void handleSeek(const RequestContext& context, const v1::Seek& request) {
   message.mutable_seek()->set_tick(snapshot->tick);
   message.mutable_seek()->set_time(snapshot->time);
   message.mutable_seek()->set_state_hash(snapshot->stateHash);
+  sendReply(context, std::move(message));
+}
+
+void handleRecordedEvents(const RequestContext& context, const v1::RecordedEventsRequest& request) {
+  if (auto error = validateHasReplay(context.hosted)) return replyError(context, std::move(*error));
+  v1::ServerMessage message;
+  *message.mutable_recorded_events() =
+      context.hosted.replay->eventsAfter(request.after_tick(), context.hosted.limits.replyBytes);
   sendReply(context, std::move(message));
 }
 

@@ -5,6 +5,7 @@
 #include "collision/assert.hpp"
 #include "protocol/framing.hpp"
 #include "protocol/unknown_enums.hpp"
+#include "server/hosting/requests/checkpoint_requests.hpp"
 #include "server/hosting/requests/clock_requests.hpp"
 #include "server/hosting/requests/command_requests.hpp"
 #include "server/hosting/requests/frame_requests.hpp"
@@ -39,6 +40,9 @@ Role requiredRole(v1::ClientMessage::BodyCase body) {
     case v1::ClientMessage::kDescribe:
     case v1::ClientMessage::kMetrics:
     case v1::ClientMessage::kListWorlds:
+    case v1::ClientMessage::kRecordedEvents:
+    case v1::ClientMessage::kStepMany:
+    case v1::ClientMessage::kSave:
     case v1::ClientMessage::kBye:
     case v1::ClientMessage::BODY_NOT_SET:
       return Role::observe;
@@ -48,8 +52,9 @@ Role requiredRole(v1::ClientMessage::BodyCase body) {
     case v1::ClientMessage::kSetClock:
     case v1::ClientMessage::kSeek:
     case v1::ClientMessage::kTakeOver:
-      return Role::drive;
     case v1::ClientMessage::kRestart:
+    case v1::ClientMessage::kRestore:
+      return Role::drive;
     case v1::ClientMessage::kCreateWorld:
     case v1::ClientMessage::kDropWorld:
       return Role::admin;
@@ -95,6 +100,12 @@ void dispatchRequest(const RequestContext& context) {
       return handleSeek(context, message.seek());
     case v1::ClientMessage::kTakeOver:
       return handleTakeOver(context, message.take_over());
+    case v1::ClientMessage::kRecordedEvents:
+      return handleRecordedEvents(context, message.recorded_events());
+    case v1::ClientMessage::kSave:
+      return handleSaveWorld(context);
+    case v1::ClientMessage::kRestore:
+      return handleRestoreWorld(context, message.restore());
     case v1::ClientMessage::kSubscribe:
       return handleSubscribe(context, message.subscribe());
     case v1::ClientMessage::kFrame:
@@ -121,6 +132,8 @@ void dispatchRequest(const RequestContext& context) {
       return handleDropWorld(context, message.drop_world());
     case v1::ClientMessage::kListWorlds:
       return handleListWorlds(context);
+    case v1::ClientMessage::kStepMany:
+      return handleStepMany(context, message.step_many());
     case v1::ClientMessage::kHello:
       return replyError(context, v1::ERROR_NOT_ALLOWED,
                         "hello was already sent: reconnect to send another");

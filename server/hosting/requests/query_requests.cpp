@@ -20,7 +20,7 @@ void forwardQuery(const RequestContext& context, const Query& query, const char*
       deferReply(context));
 }
 
-v1::Entity makeEntity(const scene::World& world, std::uint32_t id) {
+v1::Entity makeEntity(const scene::World& world, std::uint32_t id, bool details) {
   const auto& objects = world.scene().model().objects;
   v1::Entity entity;
   entity.set_id(id);
@@ -30,19 +30,21 @@ v1::Entity makeEntity(const scene::World& world, std::uint32_t id) {
   } else if (!entity.name().empty()) {
     entity.set_kind(v1::Entity::KIND_AVATAR);
   }
+  if (details && entity.kind() != v1::Entity::KIND_UNSPECIFIED)
+    describeDetails(world.scene(), id, entity);
   return entity;
 }
 
 /// Adds entities to a reply up to ServerLimits::replyBytes.
 class BoundedNames {
  public:
-  BoundedNames(const HostedWorld& hosted, v1::EntityNames& names)
-      : hosted_(hosted), names_(names) {}
+  BoundedNames(const HostedWorld& hosted, bool details, v1::EntityNames& names)
+      : hosted_(hosted), details_(details), names_(names) {}
 
   /// Returns false and adds nothing if the reply would become too large.
   bool addEntity(std::uint32_t id) {
     constexpr std::size_t kFieldBytes = 8;  // maximum size of an entity's tag and length
-    v1::Entity entity = makeEntity(hosted_.world, id);
+    v1::Entity entity = makeEntity(hosted_.world, id, details_);
     bytes_ += entity.ByteSizeLong() + kFieldBytes;
     if (bytes_ > hosted_.limits.replyBytes) return false;
     *names_.add_entities() = std::move(entity);
@@ -60,6 +62,7 @@ class BoundedNames {
 
  private:
   const HostedWorld& hosted_;
+  const bool details_;
   v1::EntityNames& names_;
   std::size_t bytes_ = 0;
 };
@@ -92,7 +95,7 @@ void handleDescribe(const RequestContext& context, const v1::DescribeEntities& r
                       "ids has " + std::to_string(count) + " ids: " + remedy, "describe.ids");
   }
   v1::ServerMessage message;
-  BoundedNames names(context.hosted, *message.mutable_names());
+  BoundedNames names(context.hosted, request.details(), *message.mutable_names());
   const bool allNamed = count == 0
                             ? names.addAllEntities()
                             : std::all_of(request.ids().begin(), request.ids().end(),

@@ -21,6 +21,7 @@ v1::Welcome makeWelcome(const HostedWorld& hosted) {
   welcome.add_capabilities("persists");
   welcome.add_capabilities("contact_horizon");
   welcome.add_capabilities("restart");
+  welcome.add_capabilities("checkpoints");
   if (!hosted.frames.deviceName().empty()) {
     welcome.add_capabilities("frames");
     welcome.add_capabilities("shadows");
@@ -62,6 +63,7 @@ v1::Welcome makeWelcome(const HostedWorld& hosted) {
   welcome.set_world(hosted.identity.name);
   if (hosted.identity.directory) {
     welcome.add_capabilities("worlds");
+    welcome.add_capabilities("step_many");
     for (const std::string& scene : hosted.identity.directory->sceneNames())
       welcome.add_scenes(scene);
   }

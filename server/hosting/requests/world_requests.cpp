@@ -1,6 +1,6 @@
 #include "server/hosting/requests/world_requests.hpp"
 
-#include "server/hosting/world_directory.hpp"
+#include "server/hosting/requests/world_group.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -40,6 +40,17 @@ void handleDropWorld(const RequestContext& context, const v1::DropWorld& request
     done(encodeShared(message));
   };
   identity.directory->drop(request.name(), identity.name, onDone);
+}
+
+void handleStepMany(const RequestContext& context, const v1::StepMany& request) {
+  const WorldIdentity& identity = context.hosted.identity;
+  if (!identity.directory) return replyWorldsUnsupported(context);
+  if (auto error = WorldGroup::validate(request, context.hosted.limits.worlds))
+    return replyError(context, std::move(*error));
+  Client& client = context.client;
+  if (!client.group)
+    client.group = std::make_shared<WorldGroup>(*identity.directory, client.name, client.role);
+  client.group->submit(request, context.message.request_id(), deferReply(context));
 }
 
 void handleListWorlds(const RequestContext& context) {

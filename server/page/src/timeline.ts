@@ -49,6 +49,7 @@ export class Timeline {
       this.#marked.clear();
       this.#marks.replaceChildren();
       this.#mark(app.connection.recordedEvents ?? []);
+      if (app.replay && !app.connection.isFile) app.attempt(this.#fetchMarks());
       const speed = app.clock?.speed ?? 0;
       if (speed > 0 && SPEEDS.includes(speed)) this.#speed.value = String(speed);
       this.#update();
@@ -147,7 +148,7 @@ export class Timeline {
     return clock?.mode === Clock_Mode.PAUSED ? "paused" : "";
   }
 
-  /** Marks on the track of a recording: all of its events, or those seen so far. Near ones share a mark. */
+  /** Marks on the track of a recording. Near ones share a mark. */
   #mark(events: ContactEvent[]): void {
     const { replay } = this.#app;
     if (!replay) return;
@@ -170,6 +171,19 @@ export class Timeline {
       mark.style.left = `${(100 * place) / MARK_PLACES}%`;
       this.#marks.append(mark);
       this.#marked.set(`${place} ${classOf(event)}`, { mark, text, others: 0 });
+    }
+  }
+
+  /** Marks the events of the recording that the server plays. */
+  async #fetchMarks(): Promise<void> {
+    const { connection } = this.#app;
+    const lastTick = this.#app.replay?.lastTick ?? 0n;
+    let after = 0n;
+    for (;;) {
+      const reply = await connection.request("recordedEvents", { afterTick: after });
+      this.#mark(reply.contacts);
+      if (reply.completeTo >= lastTick || reply.completeTo <= after) return;
+      after = reply.completeTo;
     }
   }
 

@@ -16,19 +16,23 @@ Metres, seconds, radians; right-handed, Y up. PROTOCOL.md describes the wire pro
 
 from . import messages
 from .avatar import Avatar
+from .cameras import Camera
 from .client import Client, connect
 from .environment import WalkEnv
 from .episodes import Episode, draw_episode, read_episodes, write_episodes
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
 from .navigation import Map, Navigation, Obstacle, Path, Spot
 from .process import Server, serve
-from .results import (Apart, AvatarState, Contact, Frame, Hits, Horizon, Notice, Pair, Replay, Scan,
-                      State, Step, Touching, World)
+from .results import (Apart, AvatarState, Contact, Frame, Hits, Horizon, Notice, ObjectInfo, Pair,
+                      Replay, Scan, State, Step, Touching, World)
 from .vector_environment import VectorWalkEnv
+from .video import Video
+from .world_group import WorldGroup
 
 __all__ = [
-    "Apart", "Avatar", "AvatarState", "Client", "ConnectionFailed", "Contact", "EnfiladeError", "Episode", "Frame",
-    "Hits", "Horizon", "Map", "Navigation", "Notice", "Obstacle", "OrderFailed", "Pair", "Path", "Replay", "Scan",
-    "Server", "ServerError", "Spot", "StartFailed", "State", "Step", "Touching", "VectorWalkEnv", "WalkEnv", "World", "connect", "draw_episode", "messages", "read_episodes",
-    "serve", "write_episodes",
+    "Apart", "Avatar", "AvatarState", "Camera", "Client", "ConnectionFailed", "Contact", "EnfiladeError",
+    "Episode", "Frame", "Hits", "Horizon", "Map", "Navigation", "Notice", "ObjectInfo", "Obstacle",
+    "OrderFailed", "Pair", "Path", "Replay", "Scan", "Server", "ServerError", "Spot", "StartFailed",
+    "State", "Step", "Touching", "VectorWalkEnv", "Video", "WalkEnv", "World", "WorldGroup",
+    "connect", "draw_episode", "messages", "read_episodes", "serve", "write_episodes",
 ]

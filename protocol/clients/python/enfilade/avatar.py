@@ -77,7 +77,20 @@ class Avatar:
                     if one.kind in ("refused", "dropped"):
                         raise OrderFailed(f"avatar {self.name!r}: {one.text}")
 
+    def turn(self, by: Optional[float] = None, *, facing: Optional[float] = None,
+             rate: Optional[float] = None) -> int:
+        """Turns the view, parts and links `by` DEGREES to the left, or to a facing, at `rate` degrees
+        a second."""
+        if (by is None) == (facing is None):
+            raise ValueError("turn: give either by or facing, in degrees")
+        return self._client.command(self.name, turn=messages.Turn(by=by, facing=facing, rate=rate))
+
+    def teleport(self, at: Point, *, facing: Optional[float] = None) -> int:
+        """Places it elsewhere, if it has room there."""
+        return self._client.command(self.name, teleport=messages.Teleport(at=vec(at), facing=facing))
+
     def look(self, at: Point) -> int:
+        """Looks at a point; while driven, until the next drive() or walk()."""
         return self._client.command(self.name, look=messages.Look(at=vec(at)))
 
     def wait(self, seconds: float) -> int:

@@ -59,7 +59,21 @@ class Client:
 
     def __init__(self, host: str, port: int, *, name: str = "enfilade python", token: str = "",
                  timeout: float = 30.0, world: str = "main") -> None:
-        self._connection = Connection(host, port, timeout)
+        self._start(Connection(host, port, timeout))
+        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token,
+                               world=world)
+        try:
+            self.welcome: Any = self.request(hello=hello)[0].welcome
+        except BaseException:
+            self._connection.close()
+            raise
+        self._connection.max_message = self.limits.max_message
+        if self._replay is None and self.welcome.HasField("replay"):
+            self._replay = results.replay(self.welcome.replay)
+
+    def _start(self, connection: Any) -> None:
+        """Initializes all but `welcome`."""
+        self._connection = connection
         self._ids = itertools.count(1)
         self._tags = itertools.count(1)
         self._contacts: Deque[Contact] = deque()
@@ -71,16 +85,6 @@ class Client:
         self._subscribed: Any = messages.Subscribe()
         self._sequence = 0  # of the last events
         self._answered = 0  # the request of the last reply taken
-        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token,
-                               world=world)
-        try:
-            self.welcome: Any = self.request(hello=hello)[0].welcome
-        except BaseException:
-            self._connection.close()
-            raise
-        self._connection.max_message = self.limits.max_message
-        if self._replay is None and self.welcome.HasField("replay"):
-            self._replay = results.replay(self.welcome.replay)
 
     # ---- the server --------------------------------------------------------------------------
 
@@ -115,12 +119,20 @@ class Client:
 
     def post(self, requests: Iterable[Dict[str, Any]]) -> List[int]:
         """The first half of pipeline(): sends without waiting. Returns the request ids."""
-        asked = [messages.ClientMessage(request_id=next(self._ids), **body) for body in requests]
-        self._send(asked)
+        asked = [messages.ClientMessage(**body) for body in requests]
+        posted = self._post(asked)
         for one in asked:
             if one.HasField("subscribe"):
                 self._subscribed = one.subscribe
-        return [one.request_id for one in asked]
+        return posted
+
+    def _post(self, asked: List[Any]) -> List[int]:
+        """Numbers and sends ClientMessages, which the caller may use again."""
+        posted = [next(self._ids) for _ in asked]
+        for one, number in zip(asked, posted):
+            one.request_id = number
+        self._send(asked)
+        return posted
 
     def _send(self, asked: List[Any]) -> None:
         try:
@@ -273,6 +285,20 @@ class Client:
         reply, _ = self.request(seek=messages.Seek(tick=tick))
         self._horizons.clear()
         return Step(reply.seek.tick, reply.seek.time, reply.seek.state_hash, False)
+
+    def recorded_events(self) -> List[Contact]:
+        """Returns the contact events of the recording that a timeline shows: begins, blocked moves,
+        entered triggers and the begins of near misses."""
+        found: List[Contact] = []
+        after, last = 0, self.welcome.replay.last_tick
+        while True:
+            reply, _ = self.request(
+                recorded_events=messages.RecordedEventsRequest(after_tick=after))
+            page = reply.recorded_events
+            found += [results.contact(one) for one in page.contacts]
+            if page.complete_to >= last or page.complete_to <= after:
+                return found
+            after = page.complete_to
 
     def take_over(self, avatar: str = "") -> Optional[Avatar]:
         """Leaves the recording at the present tick; orders are accepted from now on. `avatar`
@@ -448,19 +474,23 @@ class Client:
               fov_y: Optional[float] = None, intrinsics: Optional[Sequence[float]] = None,
               height_y: Optional[float] = None, near: Optional[float] = None,
               far: Optional[float] = None, channels: Sequence[str] = ("rgb",), glass: str = "",
-              renderer: str = "", shadows: bool = False,
+              renderer: str = "", shadows: bool = False, lens: str = "",
+              distortion: Sequence[float] = (), depth_noise: Optional[int] = None,
               tick: Optional[int] = None) -> Frame:
         """Returns a picture of the last tick. It is taken from the eyes of `avatar` (along `forward`
         if given), or from `eye` towards `target` or along `forward`; `avatar` is then invisible.
         `up` (with an eye) must not be parallel to the view: straight down needs one. The lens:
         `fov_y` radians, or `intrinsics` (fx, fy, cx, cy) in pixels from the top left corner, or,
         with an eye, `height_y` metres of an orthographic picture. `channels`: some of "rgb",
-        "depth", "ids", "normals", "range". `glass`: "clear" or "solid". `renderer`: "gl" or "rays".
-        `shadows`: of the sun, in the colour."""
+        "depth", "ids", "normals", "range", "class", "thing". `glass`: "clear" or "solid". `renderer`: "gl" or "rays".
+        `shadows`: of the sun, in the colour. `lens`: "fisheye" (OpenCV's model; `fov_y` is then the
+        angle of the whole width, default pi; `distortion` k1 to k4) or "equirectangular".
+        `depth_noise`: the seed of a structured-light camera's noise in "depth"."""
         asked = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
                               height=height, fov_y=fov_y, intrinsics=intrinsics, height_y=height_y,
                               near=near, far=far, channels=channels, glass=glass,
-                              renderer=renderer, shadows=shadows, tick=tick)
+                              renderer=renderer, shadows=shadows, lens=lens, distortion=distortion,
+                              depth_noise=depth_noise, tick=tick)
         if shadows and "shadows" not in self.welcome.capabilities:
             warnings.warn("frame: this server draws no shadows; start a newer one", stacklevel=2)
         reply, attachment = self.request(frame=asked)
@@ -601,6 +631,31 @@ class Client:
                 describe=messages.DescribeEntities(ids=wanted[start:start + page]))
             found.update((one.id, one.name) for one in reply.names.entities)
         return found
+
+    def objects(self) -> List[results.ObjectInfo]:
+        """Returns all objects of the scene, in the order of their ids, with path, class, thing, box,
+        storey and material."""
+        count, page = self.welcome.scene.objects, 8192
+        found: List[results.ObjectInfo] = []
+        for first in range(1, count + 1, page):
+            ids = range(first, min(first + page, count + 1))
+            reply, _ = self.request(describe=messages.DescribeEntities(ids=ids, details=True))
+            found += [results.object_info(one) for one in reply.names.entities]
+        return found
+
+    # ---- checkpoints ------------------------------------------------------------------------
+
+    def save(self) -> bytes:
+        """Returns the complete state of the world after the last tick, for restore()."""
+        _, attachment = self.request(save=messages.SaveWorld())
+        return bytes(attachment)
+
+    def restore(self, checkpoint: bytes) -> Step:
+        """Continues from a state that save() returned, in any server of the same version with the
+        same scene. This client must drive the clock; it owns all avatars of the restored world."""
+        reply, _ = self.request(restore=messages.RestoreWorld(checkpoint=checkpoint))
+        self._horizons.clear()
+        return Step(reply.restore.tick, reply.restore.time, reply.restore.state_hash, False)
 
     def metrics(self) -> Any:
         return self.request(metrics=messages.MetricsRequest())[0].metrics

@@ -15,16 +15,15 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import messages, results, spaces
+from .cameras import Camera, CameraRequest
 from .client import Client, Reply, connect
 from .connection import raise_refusal
 from .episodes import Episode, draw_episode
 from .errors import OrderFailed
 from .process import Server, serve
-from .questions import frame_request
 
 Observation = Dict[str, np.ndarray]
 
-_CHANNELS = ("rgb", "depth", "ids")
 _DISCRETE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 
 
@@ -59,8 +58,10 @@ class WalkEnv(spaces.EnvBase):
     goal: the walk succeeds within `goal_radius` metres of it, on the ground.
     goals: goals instead, of which each reset chooses one that can be reached, or "anywhere". Distances
         are then geodesic, at least `min_distance` at the start. Or `episodes`, which take turns.
-    radius, height: size of the avatar in metres. pitch: of the camera in radians, upwards positive.
-    size: (width, height) of the pictures in pixels; `channels` of "rgb", "depth", "ids", or none.
+    radius, height: size of the avatar in metres. eye_height: of the camera above the feet, metres.
+    pitch: of the camera in radians, upwards positive. size: (width, height) of the pictures in pixels;
+        `channels` of "rgb", "depth", "ids", or none. Or `cameras` instead: Cameras, whose observations
+        have the names NAME_rgb, NAME_depth, ...
     ticks_per_step: 1/60 s each. speed: metres per second. turn_speed: radians per second.
     discrete: actions are 0 stand, 1 walk ahead, 2 turn left, 3 turn right; else two numbers in -1..1,
         ahead and turn (left is positive).
@@ -84,7 +85,9 @@ class WalkEnv(spaces.EnvBase):
                  goal: Optional[Sequence[float]] = None,
                  goals: Union[None, str, Sequence[Sequence[float]]] = None,
                  episodes: Optional[Sequence[Episode]] = None, min_distance: float = 1.0,
-                 radius: Optional[float] = None, height: Optional[float] = None, pitch: float = 0.0,
+                 radius: Optional[float] = None, height: Optional[float] = None,
+                 eye_height: Optional[float] = None, pitch: float = 0.0,
+                 cameras: Sequence[Camera] = (),
                  goal_radius: float = 0.5, size: Tuple[int, int] = (128, 128),
                  channels: Sequence[str] = ("rgb", "depth"), ticks_per_step: int = 6,
                  speed: float = 1.4, turn_speed: float = math.pi / 2, max_steps: int = 1000,
@@ -100,24 +103,21 @@ class WalkEnv(spaces.EnvBase):
         self.episodes = None if episodes is None else list(episodes)
         self.goal = None if goal is None else np.array(_numbers(goal, "goal", (3,)))
         self._first_goal = self.goal
-        if not abs(pitch) < math.pi / 2:
-            raise ValueError(f"pitch: give radians between -pi/2 and pi/2, not {pitch}")
-        self.min_distance, self.pitch = min_distance, pitch
+        self._name = "walker"
+        self._drive = messages.ClientMessage(command=messages.Command(
+            avatar=self._name, drive=messages.Drive(velocity=messages.Vec3())))
+        self._velocity = self._drive.command.drive.velocity
+        self._run = messages.ClientMessage(step=messages.Step(ticks=ticks_per_step, avatars=True))
+        self.min_distance = min_distance
         self._size = {"radius": radius, "height": height}
         self.is_geodesic = goals is not None or episodes is not None
-        if isinstance(channels, str) or set(channels) - set(_CHANNELS):
-            raise ValueError(f"channels: give some of {_CHANNELS}, not {channels!r}")
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode: give None or 'rgb_array', not {render_mode!r}")
         for name, count in (("ticks_per_step", ticks_per_step), ("max_steps", max_steps)):
             if operator.index(count) < 1:
                 raise ValueError(f"{name}: give at least 1, not {count}")
-        if any(side < 1 or side != int(side) for side in _numbers(size, "size", (2,))):
-            raise ValueError(f"size: give whole numbers of pixels, at least 1, not {size!r}")
         if not 0 < goal_radius < math.inf:
             raise ValueError(f"goal_radius: give metres above 0, not {goal_radius}")
-        if not 0 < fov_y < math.pi:
-            raise ValueError(f"fov_y: give radians between 0 and pi, not {fov_y}")
         if not (0 < speed < math.inf and 0 <= turn_speed < math.inf):
             raise ValueError("speed, turn_speed: give a number above 0 and one not below 0, "
                              f"not {speed}, {turn_speed}")
@@ -125,17 +125,20 @@ class WalkEnv(spaces.EnvBase):
             raise ValueError("server_arguments: give a list of strings")
         if sum(one is not None for one in (scene, address or None, client)) != 1:
             raise ValueError("give one of scene, address and client")
-        self.goal_radius, self.channels = goal_radius, tuple(channels)
-        self.size = (int(size[0]), int(size[1]))
+        self.goal_radius = goal_radius
+        self.cameras = [CameraRequest(one, self._name) for one in cameras] or \
+            [CameraRequest(Camera("", size, channels, fov_y, pitch=pitch, height=eye_height), self._name)]
+        self.cameras = [one for one in self.cameras if one.channels]
+        self._picture_key = next((one.prefix + "rgb" for one in self.cameras if "rgb" in one.channels),
+                                 "rgb")
         self.ticks_per_step, self.speed, self.turn_speed = ticks_per_step, speed, turn_speed
-        self.max_steps, self.fov_y, self.discrete = max_steps, fov_y, discrete
+        self.max_steps, self.discrete = max_steps, discrete
         self.render_mode = render_mode
         self.observation_space = self._observation_space()
         self.action_space = spaces.Discrete(4) if discrete else \
             spaces.Box(-1.0, 1.0, (2,), np.float32)
         if not spaces.HAVE_GYMNASIUM:
             self.np_random = np.random.default_rng()
-        self._name = "walker"
         self._heading = 0.0
         self._steps = 0
         self._start: Sequence[float] = ()  # of the episode
@@ -144,7 +147,8 @@ class WalkEnv(spaces.EnvBase):
         self._walked = 0.0  # metres in this episode
         self._left = math.inf  # geodesic distance to the goal, metres
         self._tag = 0  # of the last reset()'s spawn
-        self._state: Optional[results.AvatarState] = None
+        self._feet: Optional[np.ndarray] = None  # metres; None: no episode has begun
+        self._stopped_by = ""
         self._rgb: Optional[np.ndarray] = None
         self._seen: Observation = {}  # of the last step
         self.server: Optional[Server] = None
@@ -178,15 +182,10 @@ class WalkEnv(spaces.EnvBase):
         return self.server.connect(name="enfilade environment", **options)
 
     def _observation_space(self) -> Any:
-        width, height = self.size
         box = spaces.Box
         parts: Dict[str, Any] = {}
-        if "rgb" in self.channels:
-            parts["rgb"] = box(0, 255, (height, width, 3), np.uint8)
-        if "depth" in self.channels:
-            parts["depth"] = box(0.0, np.inf, (height, width), np.float32)
-        if "ids" in self.channels:
-            parts["ids"] = box(0, 2**32 - 1, (height, width), np.uint32)
+        for camera in self.cameras:
+            parts.update(camera.spaces())
         parts["position"] = box(-np.inf, np.inf, (3,), np.float64)
         parts["heading"] = box(-1.0, 1.0, (2,), np.float64)
         if self.goal is not None or self.is_geodesic:
@@ -239,15 +238,19 @@ class WalkEnv(spaces.EnvBase):
 
     def render(self) -> Optional[np.ndarray]:
         """Returns the last colour picture; None before reset() and after close()."""
-        if self.render_mode is None or self._state is None:
+        if self.render_mode is None or self._feet is None:
             return None
         if self._rgb is not None:
             return self._rgb.copy()
-        return self.client.frame(self._name, forward=self._gaze(), width=self.size[0],
-                                 height=self.size[1], fov_y=self.fov_y).rgb
+        look = Camera("", (128, 128), ("rgb",)) if not self.cameras else self.cameras[0].camera
+        request = CameraRequest(Camera("", look.size, ("rgb",), look.fov_y, look.yaw, look.pitch,
+                                       look.height, look.ahead, look.left), self._name)
+        request.aim(self._heading)
+        reply, attachment = self.client.request(frame=request.request.frame)
+        return results.frame(reply.frame, attachment).rgb
 
     def close(self) -> None:
-        self._state = None
+        self._feet = None
         if self._own_client and hasattr(self, "client"):
             self.client.close()
         if self.server is not None:
@@ -264,17 +267,18 @@ class WalkEnv(spaces.EnvBase):
     def _post_reset(self, seed: Optional[int], options: Dict[str, Any]) -> List[int]:
         start, self.goal = self._chosen(seed, options)
         facing = start[3] if len(start) > 3 else float(self.np_random.uniform(0, 360))
-        self._state = self._rgb = None  # until the spawn succeeds
+        self._feet = self._rgb = None  # until the spawn succeeds
         self._heading = math.radians(facing)
         self._steps = 0
         self._tag += 1
         self._start = start
         spawn = messages.Spawn(at=messages.Vec3(x=start[0], y=start[1], z=start[2]), facing=facing,
                                **self._size)
-        return self.client.post([
-            {"restart": messages.Restart()},
-            {"command": messages.Command(avatar=self._name, tag=self._tag, spawn=spawn)},
-            {"step": messages.Step(ticks=1, avatars=True)}, *self._picture()])
+        return self.client._post([
+            messages.ClientMessage(restart=messages.Restart()),
+            messages.ClientMessage(command=messages.Command(avatar=self._name, tag=self._tag,
+                                                            spawn=spawn)),
+            messages.ClientMessage(step=messages.Step(ticks=1, avatars=True)), *self._pictures()])
 
     def _chosen(self, seed: Optional[int], options: Dict[str, Any]) -> Tuple[Any, Any]:
         """Returns the start and the goal of the episode."""
@@ -315,15 +319,14 @@ class WalkEnv(spaces.EnvBase):
         replies = self.client.replies(posted)
         for reply, _ in replies[:3]:
             raise_refusal(reply)
-        entered = results.step(replies[2][0].step)
+        entered = replies[2][0].step
         contacts = [one for one in self.client._kept_contacts() if one.reason != "restart"]
         why = self._refusals()
-        if self._name not in entered.avatars:
+        if not self._take_avatar(entered):
             where = ", ".join(f"{metres:g}" for metres in self._start[:3])
             raise OrderFailed(f"the avatar could not spawn at ({where}): {' '.join(why)}")
         for reply, _ in replies[3:]:
             raise_refusal(reply)
-        self._state = entered.avatars[self._name]
         info = self._info(entered, contacts)
         if self.is_geodesic:
             info["geodesic_distance"] = self._left
@@ -337,8 +340,18 @@ class WalkEnv(spaces.EnvBase):
         kept.clear()
         return why
 
+    def _take_avatar(self, step: Any) -> bool:
+        """Keeps the avatar's state of a StepReply; False if it is not in the world."""
+        for one in step.avatars:
+            if one.name == self._name:
+                feet = one.feet
+                self._feet = np.array((feet.x, feet.y, feet.z))
+                self._stopped_by = one.move.stopped_by_name
+                return True
+        return False
+
     def _check_begun(self) -> None:
-        if self._state is None:
+        if self._feet is None:
             raise RuntimeError("call reset() first: no episode has begun, the last reset() or step() "
                                "failed, or the environment was closed")
 
@@ -348,47 +361,45 @@ class WalkEnv(spaces.EnvBase):
         self._heading = math.remainder(self._heading + turn * self.turn_speed * self._seconds,
                                        math.tau)
         x, _, z = self._forward()
-        velocity = messages.Vec3(x=ahead * self.speed * x, z=ahead * self.speed * z)
-        drive = messages.Command(avatar=self._name, drive=messages.Drive(velocity=velocity))
-        return self.client.post([
-            {"command": drive},
-            {"step": messages.Step(ticks=self.ticks_per_step, avatars=True)}, *self._picture(),
-            *self._distance_query()])
+        self._velocity.x, self._velocity.z = ahead * self.speed * x, ahead * self.speed * z
+        return self.client._post([self._drive, self._run, *self._pictures(),
+                                  *self._distance_query()])
 
-    def _distance_query(self) -> List[Dict[str, Any]]:
+    def _distance_query(self) -> List[Any]:
         if not self.is_geodesic:
             return []
         assert self.goal is not None
-        return [{"navigation": self.navigation.query([self.goal], avatar=self._name)}]
+        return [messages.ClientMessage(
+            navigation=self.navigation.query([self.goal], avatar=self._name))]
 
     def _take_step(self, posted: List[int]) -> Tuple[Observation, float, bool, bool,
                                                      Dict[str, Any]]:
         replies = self.client.replies(posted)
-        old, contacts = self._state, self.client._kept_contacts()
+        before, contacts = self._feet, self.client._kept_contacts()
         left = any(one.kind == "left" and one.avatar == self._name for one in self.client._notices)
         self.client._notices.clear()
-        self._state = None  # in case this fails
+        self._feet = None  # in case this fails
         for reply, _ in replies[:2]:
             raise_refusal(reply)
-        assert old is not None
-        made = results.step(replies[1][0].step)
+        assert before is not None
+        made = replies[1][0].step
         self._steps += 1
-        if self._name not in made.avatars:
+        if not self._take_avatar(made):
             if not left:
                 raise OrderFailed("the avatar is no longer in the world: another client commands it")
-            self._state = old
+            self._feet = before
             return self._seen, 0.0, True, False, self._fallen(made, contacts)
         for reply, _ in replies[2:]:
             raise_refusal(reply)
-        self._state = made.avatars[self._name]
         info = self._info(made, contacts)
-        before, after = np.array(old.feet), np.array(self._state.feet)
+        after = self._feet
+        assert after is not None
         if self.is_geodesic:
             self._add_measures(info, before, after, replies.pop()[0].navigation.paths[0])
         return (self._observation(replies[2:]), self.reward(before, after, info),
                 self.is_over(after, info), self._steps >= self.max_steps, info)
 
-    def _fallen(self, made: results.Step, contacts: List[results.Contact]) -> Dict[str, Any]:
+    def _fallen(self, made: Any, contacts: List[results.Contact]) -> Dict[str, Any]:
         """The info of the step in which the avatar fell out of the scene."""
         info = {**self._info(made, contacts), "fell": True}
         if self.is_geodesic:
@@ -427,33 +438,25 @@ class WalkEnv(spaces.EnvBase):
     def _forward(self) -> Tuple[float, float, float]:
         return (math.cos(self._heading), 0.0, -math.sin(self._heading))
 
-    def _gaze(self) -> Tuple[float, float, float]:
-        x, _, z = self._forward()
-        across = math.cos(self.pitch)
-        return (across * x, math.sin(self.pitch), across * z)
-
-    def _picture(self) -> List[Dict[str, Any]]:
-        if not self.channels:
-            return []
-        return [{"frame": frame_request(self._name, forward=self._gaze(), width=self.size[0],
-                                        height=self.size[1], fov_y=self.fov_y,
-                                        channels=self.channels)}]
+    def _pictures(self) -> List[Any]:
+        """The requests for the cameras' pictures along the present heading."""
+        for camera in self.cameras:
+            camera.aim(self._heading)
+        return [camera.request for camera in self.cameras]
 
     def _observation(self, pictures: Sequence[Reply]) -> Observation:
-        assert self._state is not None
+        assert self._feet is not None
         seen: Observation = {}
-        if pictures:
-            reply, attachment = pictures[0]
+        for camera, (reply, attachment) in zip(self.cameras, pictures):
             frame = results.frame(reply.frame, attachment)
-            for name in ("rgb", "depth", "ids"):
-                if name in self.channels:
-                    seen[name] = getattr(frame, name)
-            if "rgb" in seen and self.render_mode is not None:
-                self._rgb = seen["rgb"].copy()  # the observation belongs to its reader
-            if "depth" in seen:
-                depth = seen["depth"]
-                depth[np.isnan(depth)] = np.inf
-        seen["position"] = np.array(self._state.feet)
+            for name in camera.channels:
+                seen[camera.prefix + name] = frame.channel(name)
+            if "depth" in camera.channels:
+                depth = seen[camera.prefix + "depth"]
+                np.copyto(depth, np.inf, where=np.isnan(depth))
+        if self.render_mode is not None and self._picture_key in seen:
+            self._rgb = seen[self._picture_key].copy()  # the observation belongs to its reader
+        seen["position"] = self._feet.copy()
         x, _, z = self._forward()
         seen["heading"] = np.array([x, -z])
         if self.goal is not None:
@@ -464,7 +467,6 @@ class WalkEnv(spaces.EnvBase):
         self._seen = seen
         return seen
 
-    def _info(self, made: results.Step, contacts: List[results.Contact]) -> Dict[str, Any]:
-        assert self._state is not None
+    def _info(self, made: Any, contacts: List[results.Contact]) -> Dict[str, Any]:
         return {"tick": made.tick, "state_hash": made.state_hash, "contacts": contacts,
-                "stopped_by": self._state.stopped_by_name}
+                "stopped_by": self._stopped_by}

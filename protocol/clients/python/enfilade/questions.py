@@ -53,13 +53,31 @@ def cannot_touch_query(a: Any, b: Any, assume: str, least: float, tick: Optional
                                      tick=tick)
 
 
+def _set_lens(asked: Any, lens: str, width: Optional[float], distortion: Sequence[float]) -> None:
+    if lens not in ("fisheye", "equirectangular"):
+        raise ValueError(f"lens: give \"fisheye\" or \"equirectangular\", not {lens!r}")
+    if lens == "equirectangular":
+        if width is not None or len(distortion):
+            raise ValueError("lens: an equirectangular picture has neither fov_y nor distortion")
+        asked.lens.equirectangular.SetInParent()
+        return
+    if len(distortion) > 4:
+        raise ValueError("distortion: give at most four coefficients, k1 to k4")
+    asked.lens.fisheye.SetInParent()
+    if width is not None:
+        asked.lens.fisheye.width = width
+    for name, value in zip(("k1", "k2", "k3", "k4"), distortion):
+        setattr(asked.lens.fisheye, name, value)
+
+
 def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Optional[Point] = None,
                   forward: Optional[Point] = None, up: Optional[Point] = None, width: int = 640,
                   height: int = 480, fov_y: Optional[float] = None,
                   intrinsics: Optional[Sequence[float]] = None, height_y: Optional[float] = None,
                   near: Optional[float] = None, far: Optional[float] = None,
                   channels: Sequence[str] = ("rgb",), glass: str = "", renderer: str = "",
-                  shadows: bool = False, tick: Optional[int] = None) -> Any:
+                  shadows: bool = False, lens: str = "", distortion: Sequence[float] = (),
+                  depth_noise: Optional[int] = None, tick: Optional[int] = None) -> Any:
     """Returns the FrameRequest that Client.frame() sends."""
     if sum(one is not None for one in (fov_y, intrinsics, height_y)) > 1:
         raise ValueError("frame: give one of fov_y, intrinsics and height_y")
@@ -82,12 +100,16 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
     for name, point in (("target", target), ("forward", forward), ("up", up)):
         if point is not None:
             getattr(view, name).CopyFrom(vec(point))
-    for name, value in (("fov_y", fov_y), ("height_y", height_y), ("near", near), ("far", far)):
+    for name, value in (("fov_y", None if lens else fov_y), ("height_y", height_y), ("near", near), ("far", far)):
         if value is not None:
             setattr(view, name, value)
     if intrinsics is not None:
         fx, fy, cx, cy = intrinsics
         asked.intrinsics.CopyFrom(messages.Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy))
+    if lens or len(distortion):
+        _set_lens(asked, lens, fov_y, distortion)
+    if depth_noise is not None:
+        asked.depth_noise.seed = depth_noise
     if glass:
         asked.glass = _named("GLASS_", glass, "glass")
     if renderer:

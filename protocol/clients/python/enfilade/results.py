@@ -102,6 +102,7 @@ class AvatarState:
     stopped_by: int  # entity id of the first obstacle; 0: none
     stopped_by_name: str
     joints: Tuple[float, ...] = ()
+    facing: float = 0.0  # DEGREES, of parts and links
 
     @property
     def eyes(self) -> Vector:
@@ -114,7 +115,8 @@ def avatar_state(message: Any) -> AvatarState:
         id=message.id, name=message.name, feet=vector(message.feet), gaze=vector(message.gaze),
         eye_height=message.eye_height, grounded=message.grounded, flying=message.flying,
         asked=vector(move.asked), made=vector(move.made), stopped_by=move.stopped_by,
-        stopped_by_name=move.stopped_by_name, joints=tuple(j.value for j in message.joints))
+        stopped_by_name=move.stopped_by_name, joints=tuple(j.value for j in message.joints),
+        facing=message.facing)
 
 
 @dataclass(frozen=True)
@@ -163,6 +165,12 @@ class Frame:
     normals: Optional[np.ndarray]  # height x width x 3, float32: unit, facing the eye; 0: none
     range: Optional[np.ndarray]  # height x width, float32: metres along the ray; NaN: none
     message: Any  # the Frame of the .proto, with the camera as used
+    class_ids: Optional[np.ndarray] = None  # height x width, uint32: ObjectInfo.class_id; 0: none
+    things: Optional[np.ndarray] = None  # height x width, uint32: ObjectInfo.thing; 0: background
+
+    def channel(self, name: str) -> Any:
+        """Returns the array of a channel by its name in requests."""
+        return getattr(self, {"class": "class_ids", "thing": "things"}.get(name, name))
 
 
 # By name: number, type and values per pixel. The bytes of rgb come last, so that the other channels
@@ -170,6 +178,8 @@ class Frame:
 _CHANNELS = {"depth": (messages.CHANNEL_DEPTH, np.dtype(np.float32), 1),
              "ids": (messages.CHANNEL_IDS, np.dtype(np.uint32), 1),
              "range": (messages.CHANNEL_RANGE, np.dtype(np.float32), 1),
+             "class": (messages.CHANNEL_CLASS, np.dtype(np.uint32), 1),
+             "thing": (messages.CHANNEL_THING, np.dtype(np.uint32), 1),
              "normals": (messages.CHANNEL_NORMALS, np.dtype(np.float32), 3),
              "rgb": (messages.CHANNEL_RGB, np.dtype(np.uint8), 3)}
 _BY_NUMBER = {number: (name, kind, depth) for name, (number, kind, depth) in _CHANNELS.items()}
@@ -199,7 +209,7 @@ def frame(message: Any, attachment: memoryview) -> Frame:
         found[name] = np.frombuffer(attachment, kind, count, plane.offset).reshape(shape)
     return Frame(message.tick, message.time, message.renderer, message.software, found.get("rgb"),
                  found.get("depth"), found.get("ids"), found.get("normals"), found.get("range"),
-                 message)
+                 message, found.get("class"), found.get("thing"))
 
 
 @dataclass(frozen=True, eq=False)  # arrays do not compare as one
@@ -306,6 +316,27 @@ def scan(reply: Any, attachment: memoryview) -> Scan:
     distance = np.frombuffer(attachment, np.float32, count, 0).reshape(shape)
     entity = np.frombuffer(attachment, np.uint32, count, 4 * count).reshape(shape)
     return Scan(reply.tick, distance, entity)
+
+
+@dataclass(frozen=True)
+class ObjectInfo:
+    """An object of the scene: Entity of the .proto."""
+
+    id: int
+    path: str
+    class_name: str  # the IFC class, or that of the sidecar or the extras ("chair"); or ""
+    class_id: int  # in pictures; 0: no class
+    thing: int  # the id of the first object of what a person would call one object
+    box: Optional[Tuple[Vector, Vector]]  # initial corners, metres; None without a mesh
+    storey: str
+    material: str
+    global_id: str  # IFC GlobalId, or ""
+
+
+def object_info(message: Any) -> ObjectInfo:
+    box = (vector(message.box.min), vector(message.box.max)) if message.HasField("box") else None
+    return ObjectInfo(message.id, message.name, message.class_name, message.class_id, message.thing,
+                      box, message.storey, message.material, message.global_id)
 
 
 @dataclass(frozen=True)

@@ -13,12 +13,14 @@ from .client import Client, connect
 from .environment import Observation, WalkEnv
 from .errors import OrderFailed
 from .process import Server, serve
+from .world_group import WorldGroup
 
 MAX_DRAWS = 32  # of a start, for one episode
 
 
 class VectorWalkEnv(spaces.VectorEnvBase):
-    """Several WalkEnvs that run at the same time, in worlds of one server that share its scene.
+    """Several WalkEnvs that run at the same time, in worlds of one server that share its scene: one
+    message steps all of them.
     A VectorEnv of Gymnasium if that is installed, with its methods and attributes everywhere.
 
     scene or address: a model, for which a server process is started, or HOST:PORT of a running
@@ -58,15 +60,15 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         self.num_envs = num_envs
         self.closed = False
         self.server: Optional[Server] = None
-        self._clients: List[Client] = []
+        self._maker: Optional[Client] = None
         self.envs: List[WalkEnv] = []
         make = make or (lambda _, client: WalkEnv(client=client, **options))
         try:
             if scene is not None:
                 self.server = serve(scene, *server_arguments)
                 address = self.server.address
-            self._clients = self._in_worlds(address, world_scene, token)
-            for number, client in enumerate(self._clients):
+            self._maker = connect(address, name="enfilade environments", token=token)
+            for number, client in enumerate(self._in_worlds(self._maker, world_scene)):
                 self.envs.append(make(number, client))
         except BaseException:
             self.close()
@@ -79,23 +81,15 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         self.action_space = spaces.batched(self.single_action_space, num_envs)
         self._over: Optional[np.ndarray] = None  # None: reset() is next
 
-    def _in_worlds(self, address: str, scene: str, token: str) -> List[Client]:
-        """Creates num_envs worlds with a client in each."""
-        name = "enfilade environments"
-        with connect(address, name=name, token=token) as maker:
-            most = maker.limits.max_worlds - len(maker.worlds())
-            if self.num_envs > most:
-                raise ValueError(f"num_envs: the server accepts {most} more worlds, "
-                                 f"not {self.num_envs}")
-            for _ in range(self.num_envs):
-                world = maker.create_world(scene=scene or maker.scenes[0], drop_when_empty=True)
-                try:
-                    self._clients.append(connect(address, name=name, token=token,
-                                                 world=world.name))
-                except BaseException:
-                    maker.drop_world(world.name)
-                    raise
-        return self._clients
+    def _in_worlds(self, maker: Client, scene: str) -> Sequence[Client]:
+        """Creates num_envs worlds, and a client in each: all on one connection."""
+        most = maker.limits.max_worlds - len(maker.worlds())
+        if self.num_envs > most:
+            raise ValueError(f"num_envs: the server accepts {most} more worlds, "
+                             f"not {self.num_envs}")
+        worlds = [maker.create_world(scene=scene or maker.scenes[0], drop_when_empty=True).name
+                  for _ in range(self.num_envs)]
+        return WorldGroup(maker, worlds).members
 
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
@@ -200,8 +194,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         self._over = None
         for env in self.envs:
             env.close()
-        for client in self._clients:
-            client.close()
+        if self._maker is not None:
+            self._maker.close()
         if self.server is not None:
             self.server.stop()
 

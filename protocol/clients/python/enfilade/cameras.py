@@ -1,0 +1,92 @@
+"""Cameras of an environment's avatar."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, Dict, Optional, Sequence, Tuple
+
+import numpy as np
+
+from . import messages, spaces
+from .questions import frame_request
+
+_CHANNELS = ("rgb", "depth", "ids", "class", "thing", "normals", "range")
+_BOXES = {"rgb": (0, 255, (3,), np.uint8), "depth": (0.0, np.inf, (), np.float32),
+          "range": (0.0, np.inf, (), np.float32), "ids": (0, 2**32 - 1, (), np.uint32),
+          "class": (0, 2**32 - 1, (), np.uint32), "thing": (0, 2**32 - 1, (), np.uint32),
+          "normals": (-1.0, 1.0, (3,), np.float32)}
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera on an avatar: where it sits and looks, seen from the avatar's heading.
+
+    size: (width, height) in pixels. channels: some of "rgb", "depth", "ids", "class", "thing",
+    "normals", "range". yaw, pitch: radians, left and upwards positive. height: metres above the feet;
+    None: the avatar's eyes. ahead, left: metres from its axis."""
+
+    name: str
+    size: Tuple[int, int] = (128, 128)
+    channels: Sequence[str] = ("rgb", "depth")
+    fov_y: float = 1.2
+    yaw: float = 0.0
+    pitch: float = 0.0
+    height: Optional[float] = None
+    ahead: float = 0.0
+    left: float = 0.0
+
+    def __post_init__(self) -> None:
+        if isinstance(self.channels, str) or set(self.channels) - set(_CHANNELS):
+            raise ValueError(f"channels: give some of {_CHANNELS}, not {self.channels!r}")
+        try:
+            width, height = self.size
+            good = width == int(width) >= 1 and height == int(height) >= 1
+        except (TypeError, ValueError):
+            good = False
+        if not good:
+            raise ValueError(f"size: give two whole numbers of pixels, at least 1, not {self.size!r}")
+        if not 0 < self.fov_y < math.pi:
+            raise ValueError(f"fov_y: give radians between 0 and pi, not {self.fov_y}")
+        if not abs(self.pitch) < math.pi / 2:
+            raise ValueError(f"pitch: give radians between -pi/2 and pi/2, not {self.pitch}")
+
+
+class CameraRequest:
+    """The request for a camera's picture, which aim() turns."""
+
+    def __init__(self, camera: Camera, avatar: str) -> None:
+        self.camera = camera
+        self.channels = tuple(camera.channels)
+        self.prefix = camera.name + "_" if camera.name else ""
+        width, height = map(int, camera.size)
+        self.request = messages.ClientMessage(frame=frame_request(
+            avatar, forward=(1, 0, 0), width=width, height=height, fov_y=camera.fov_y,
+            channels=camera.channels))
+        self._eyes = self.request.frame.eyes
+        self._forward = self._eyes.forward
+        if camera.height is not None:
+            self._eyes.height = camera.height
+        self._is_aside = camera.ahead != 0 or camera.left != 0
+        self._across, self._up = math.cos(camera.pitch), math.sin(camera.pitch)
+
+    def aim(self, heading: float) -> None:
+        """Looks along the avatar's heading, radians."""
+        yaw = heading + self.camera.yaw
+        forward = self._forward
+        forward.x, forward.y, forward.z = \
+            self._across * math.cos(yaw), self._up, -self._across * math.sin(yaw)
+        if self._is_aside:
+            c, s = math.cos(heading), math.sin(heading)
+            ahead, left = self.camera.ahead, self.camera.left
+            self._eyes.offset.x = ahead * c - left * s
+            self._eyes.offset.z = -ahead * s - left * c
+
+    def spaces(self) -> Dict[str, Any]:
+        """The spaces of its observations, by name."""
+        width, height = map(int, self.camera.size)
+        parts: Dict[str, Any] = {}
+        for name in self.channels:
+            low, high, more, kind = _BOXES[name]
+            parts[self.prefix + name] = spaces.Box(low, high, (height, width, *more), kind)
+        return parts

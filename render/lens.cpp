@@ -1,0 +1,84 @@
+#include "render/lens.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "collision/assert.hpp"
+
+namespace enfilade::render {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+/// OpenCV's fisheye model: distance from the centre, in focal lengths, of a direction at `angle`.
+double distort(const std::array<double, 4>& k, double angle) {
+  const double square = angle * angle;
+  return angle * (1 + square * (k[0] + square * (k[1] + square * (k[2] + square * k[3]))));
+}
+
+double distortionSlope(const std::array<double, 4>& k, double angle) {
+  const double square = angle * angle;
+  return 1 + square * (3 * k[0] + square * (5 * k[1] + square * (7 * k[2] + square * 9 * k[3])));
+}
+
+/// The angle up to which the model increases, at most pi; to 1e-6 of pi.
+double findMaxAngle(const std::array<double, 4>& k) {
+  constexpr int kSteps = 1'000'000;
+  if (k == std::array<double, 4>{}) return kPi;
+  for (int i = 1; i <= kSteps; ++i)
+    if (!(distortionSlope(k, kPi * i / kSteps) > 0)) return kPi * (i - 1) / kSteps;
+  return kPi;
+}
+
+}  // namespace
+
+Pinhole computeFisheyeIntrinsics(const Camera& camera) {
+  ENFILADE_ASSERT(camera.lens && camera.lens->kind == Camera::Lens::Kind::fisheye);
+  if (camera.pinhole) return *camera.pinhole;
+  const double focal = 0.5 * camera.width / distort(camera.lens->k, 0.5 * camera.lens->width);
+  return {focal, focal, 0.5 * camera.width, 0.5 * camera.height};
+}
+
+LensMapping::LensMapping(const Camera& camera)
+    : lens_(*camera.lens), width_(camera.width), height_(camera.height) {
+  forward_ = camera.forward.stableNormalized();
+  right_ = forward_.cross(camera.up.stableNormalized()).normalized();
+  up_ = right_.cross(forward_);
+  if (lens_.kind == Camera::Lens::Kind::fisheye) {
+    pinhole_ = computeFisheyeIntrinsics(camera);
+    pixelsPerRadian_ = std::max(pinhole_.fx, pinhole_.fy);
+    maxAngle_ = findMaxAngle(lens_.k);
+  } else {
+    pixelsPerRadian_ = std::max(width_ / (2 * kPi), height_ / kPi);
+  }
+}
+
+/// The inverse of distort(), by bisection; nullopt: beyond the model.
+std::optional<double> LensMapping::findAngle(double radius) const {
+  double low = 0, high = maxAngle_;
+  if (radius > distort(lens_.k, high)) return std::nullopt;
+  if (lens_.k == std::array<double, 4>{}) return radius;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (distort(lens_.k, middle) < radius ? low : high) = middle;
+  }
+  return 0.5 * (low + high);
+}
+
+std::optional<Vec3> LensMapping::directionAt(double x, double y) const {
+  if (lens_.kind == Camera::Lens::Kind::equirectangular) {
+    const double yaw = (x / width_ - 0.5) * 2 * kPi, pitch = (0.5 - y / height_) * kPi;
+    return Vec3(std::cos(pitch) * (std::cos(yaw) * forward_ + std::sin(yaw) * right_) +
+                std::sin(pitch) * up_);
+  }
+  const double u = (x - pinhole_.cx) / pinhole_.fx, v = (y - pinhole_.cy) / pinhole_.fy;
+  const double radius = std::hypot(u, v);
+  const auto angle = findAngle(radius);
+  if (!angle) return std::nullopt;
+  if (radius == 0) return forward_;
+  const double across = std::sin(*angle) / radius;
+  return Vec3(std::cos(*angle) * forward_ + across * (u * right_ - v * up_));
+}
+
+}  // namespace enfilade::render

@@ -1,0 +1,217 @@
+// Each member has an outgoing queue, as a connection has. While a round is under way, messages are
+// taken from the queues as they come; the round ends with the last reply. Between rounds they stay
+// in the queues, whose limits hold as for a connection that does not read.
+#include "server/hosting/requests/world_group.hpp"
+
+#include <atomic>
+#include <mutex>
+#include <set>
+#include <vector>
+
+#include "collision/assert.hpp"
+#include "protocol/framing.hpp"
+#include "server/base/server_limits.hpp"
+#include "server/hosting/world_lifecycle.hpp"
+#include "server/messages/world_messages.hpp"
+
+namespace enfilade::server {
+namespace {
+
+/// Whether the message replies to a request: field 1, which is written first, is not 0.
+bool isReply(const EncodedMessage& message) {
+  constexpr std::uint8_t kTagOfReplyTo = 1 << 3;
+  const std::vector<std::uint8_t>& head = *message.head;
+  return head.size() > protocol::kPrefixBytes && head[protocol::kPrefixBytes] == kTagOfReplyTo;
+}
+
+/// Appends header and attachment of a message. The header may extend into the second piece.
+void appendMessage(const EncodedMessage& message, std::string& header,
+                   std::vector<std::uint8_t>& attachment) {
+  constexpr std::size_t kAlignment = 64;
+  const std::size_t length = protocol::readHeaderLength(*message.head);
+  header.assign(message.head->begin() + protocol::kPrefixBytes, message.head->end());
+  if (!message.body) return;
+  const auto rest = static_cast<std::ptrdiff_t>(length - header.size());
+  header.append(message.body->begin(), message.body->begin() + rest);
+  if (message.body->begin() + rest == message.body->end()) return;
+  attachment.resize((attachment.size() + kAlignment - 1) / kAlignment * kAlignment);
+  attachment.insert(attachment.end(), message.body->begin() + rest, message.body->end());
+}
+
+v1::Error makeGoneError(const std::string& world) {
+  return makeError(v1::ERROR_UNKNOWN_WORLD,
+                   "there is no world '" + world + "', or it has ended: create it first",
+                   "step_many.worlds.world");
+}
+
+}  // namespace
+
+/// A client in one world.
+struct WorldGroup::Member : std::enable_shared_from_this<Member> {
+  std::string world;
+  std::shared_ptr<OutgoingQueue> out;
+  std::unique_ptr<WorldMembership> membership;
+
+  std::mutex mutex;              // guards the members below
+  std::shared_ptr<Round> round;  // null: none is under way
+  std::uint64_t expected = 0, replies = 0;
+  std::vector<EncodedMessage> messages;
+  bool welcomed = false;  // the Welcome was taken, or none will come
+  bool ended = false;     // the world said Bye
+
+  void begin(const std::shared_ptr<Round>& next, std::uint64_t requests);
+  void collect();
+  void answerRest();
+};
+
+/// One StepMany under way.
+struct WorldGroup::Round {
+  std::uint64_t requestId = 0;
+  std::function<void(EncodedMessage)> done;
+  std::vector<std::shared_ptr<Member>> members;  ///< in the order of the request
+  std::atomic<std::size_t> unfinished = 0;
+
+  void finishOne() {
+    if (--unfinished == 0) done(encodeReply());
+  }
+  EncodedMessage encodeReply();
+};
+
+void WorldGroup::Member::begin(const std::shared_ptr<Round>& next, std::uint64_t requests) {
+  const std::lock_guard lock(mutex);
+  round = next;
+  expected = requests;
+  replies = 0;
+  messages.clear();
+}
+
+/// Takes what the world has sent; the last reply ends the round. Called from the threads of the
+/// world, of its pictures and of its queries.
+void WorldGroup::Member::collect() {
+  std::shared_ptr<Round> finished;
+  {
+    const std::lock_guard lock(mutex);
+    if (!round) return;
+    while (true) {
+      OutgoingQueue::Next next = out->pop();
+      if (!next.message) break;
+      if (isReply(next.message)) ++replies;
+      welcomed = true;
+      messages.push_back(std::move(next.message));
+      if (!next.last) continue;
+      ended = true;
+      answerRest();
+    }
+    if (welcomed && replies == expected) finished = std::exchange(round, nullptr);
+  }
+  if (finished) finished->finishOne();
+}
+
+/// Errors for the requests that the world did not answer before it ended. The caller holds the
+/// lock.
+void WorldGroup::Member::answerRest() {
+  while (replies < expected) messages.emplace_back(makeErrorReply(++replies, makeGoneError(world)));
+}
+
+/// The messages are copied as they are encoded: on the wire, a serialized message is a field of
+/// another one. The thread of the last world does this, while all members are at rest.
+EncodedMessage WorldGroup::Round::encodeReply() {
+  std::vector<std::uint8_t> attachment;
+  v1::ServerMessage reply;
+  reply.set_reply_to(requestId);
+  for (const auto& member : members) {
+    v1::StepManyReply::World& world = *reply.mutable_step_many()->add_worlds();
+    auto& fields = *world.GetReflection()->MutableUnknownFields(&world);
+    for (const EncodedMessage& message : member->messages) {
+      appendMessage(message,
+                    *fields.AddLengthDelimited(v1::StepManyReply::World::kMessagesFieldNumber),
+                    attachment);
+      world.add_attachment_ends(attachment.size());
+      if (attachment.size() > protocol::kClientLimits.total / 2)
+        return makeErrorReply(requestId,
+                              makeError(v1::ERROR_TOO_LARGE,
+                                        "the pictures do not fit into one reply: request fewer "
+                                        "worlds at a time",
+                                        "step_many.worlds"));
+    }
+  }
+  return encodeShared(reply, std::move(attachment));
+}
+
+WorldGroup::WorldGroup(WorldDirectory& directory, std::string name, Role role)
+    : directory_(directory), name_(std::move(name)), role_(role) {}
+
+WorldGroup::~WorldGroup() = default;
+
+std::optional<v1::Error> WorldGroup::validate(const v1::StepMany& request,
+                                              std::uint32_t maxWorlds) {
+  const auto count = static_cast<std::uint32_t>(request.worlds_size());
+  if (count < 1 || count > maxWorlds)
+    return makeError(
+        v1::ERROR_BAD_MESSAGE,
+        "worlds: give 1 to " + std::to_string(maxWorlds) + ", not " + std::to_string(count),
+        "step_many.worlds");
+  std::set<std::string_view> names;
+  for (int i = 0; i < request.worlds_size(); ++i) {
+    const v1::StepMany::World& world = request.worlds(i);
+    const std::string field = "step_many.worlds[" + std::to_string(i) + "]";
+    if (!names.insert(world.world()).second)
+      return makeError(v1::ERROR_BAD_MESSAGE, "world: '" + world.world() + "' is in it twice",
+                       field + ".world");
+    for (int k = 0; k < world.requests_size(); ++k) {
+      const v1::ClientMessage& one = world.requests(k);
+      if (!one.has_hello() && !one.has_bye() && !one.has_step_many()) continue;
+      return makeError(v1::ERROR_BAD_MESSAGE, "requests: hello, bye and step_many cannot be in it",
+                       field + ".requests[" + std::to_string(k) + "]");
+    }
+  }
+  return std::nullopt;
+}
+
+/// The member of a world; enters the world if necessary. A world that does not exist gives a member
+/// without membership.
+std::shared_ptr<WorldGroup::Member> WorldGroup::enter(const std::string& world) {
+  std::shared_ptr<Member>& member = members_[world];
+  if (member && member->membership && !member->ended) return member;
+  member = std::make_shared<Member>();
+  member->world = world;
+  const ServerLimits limits;
+  member->out = std::make_shared<OutgoingQueue>(
+      OutgoingLimits{limits.outgoingBytes, limits.outgoingFrames, limits.outgoingFrameBytes},
+      encodeBye(makeBye(v1::ERROR_TOO_SLOW, "its messages were not read in time")),
+      [weak = std::weak_ptr(member)] {
+        if (const auto self = weak.lock()) self->collect();
+      });
+  member->membership = directory_.join(world, name_, role_, member->out);
+  if (!member->membership) member->welcomed = true;
+  return member;
+}
+
+void WorldGroup::submit(const v1::StepMany& request, std::uint64_t requestId,
+                        std::function<void(EncodedMessage)> done) {
+  const auto round = std::make_shared<Round>();
+  round->requestId = requestId;
+  round->done = std::move(done);
+  round->unfinished = static_cast<std::size_t>(request.worlds_size()) + 1;
+  for (const v1::StepMany::World& world : request.worlds())
+    round->members.push_back(enter(world.world()));
+  for (int i = 0; i < request.worlds_size(); ++i) {
+    const v1::StepMany::World& world = request.worlds(i);
+    Member& member = *round->members[static_cast<std::size_t>(i)];
+    member.begin(round, static_cast<std::uint64_t>(world.requests_size()));
+    if (!member.membership) {
+      const std::lock_guard lock(member.mutex);
+      member.answerRest();
+    } else {
+      std::vector<v1::ClientMessage> requests(world.requests().begin(), world.requests().end());
+      for (std::size_t k = 0; k < requests.size(); ++k) requests[k].set_request_id(k + 1);
+      member.membership->receive(std::move(requests));
+    }
+    member.collect();  // what was queued between rounds; ends the round if there are no requests
+  }
+  for (const v1::StepMany::World& world : request.worlds())
+    if (world.leave()) members_.erase(world.world());
+  round->finishOne();
+}
+
+}  // namespace enfilade::server

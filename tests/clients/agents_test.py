@@ -1,0 +1,303 @@
+"""Many worlds in one round trip, orders that turn and teleport, checkpoints, objects and cameras."""
+
+import math
+import os
+import tempfile
+import unittest
+import unittest.mock
+from pathlib import Path
+
+import numpy as np
+
+import enfilade
+from room import COLUMN, FLOOR, WALL, RoomCase
+
+_STARTS = [(0, 0, 0), (-3, 0, -3), (-5, 0, 2)]
+
+
+class GroupTest(RoomCase):
+    def group(self, count):
+        names = [self.client.create_world(drop_when_empty=True).name for _ in range(count)]
+        base = self.server.connect()
+        self.addCleanup(base.close)
+        return enfilade.WorldGroup(base, names), names
+
+    def test_members_are_as_clients_of_their_worlds(self):
+        group, names = self.group(3)
+        self.assertEqual([one.world for one in group.members], names)
+        for number, client in enumerate(group.members):
+            client.lockstep()
+            client.subscribe(contacts=True, notices=True)
+            client.spawn("ann", at=(number, 0, 0)).enter()
+        posted = [one.post([{"command": enfilade.messages.Command(
+            avatar="ann", drive=enfilade.messages.Drive(velocity=enfilade.messages.Vec3(x=1.4)))},
+            {"step": enfilade.messages.Step(ticks=60 * (i + 1), avatars=True)}])
+            for i, one in enumerate(group.members)]
+        for number, (client, ids) in enumerate(zip(group.members, posted)):
+            step = client.take(ids)[1][0].step
+            self.assertEqual(step.tick, 60 * (number + 1) + 1)
+            self.assertGreater(step.avatars[0].feet.x, number + 1)
+            self.assertIn("floor", [one.b_name for one in client.contacts()])
+        self.assertEqual(self.client.step().tick, 1, "the world of the others did not move")
+
+    def test_a_world_steps_in_a_group_as_alone(self):
+        group, _ = self.group(2)
+        hashes = []
+        for client in (*group.members, self.client):
+            client.lockstep()
+            ann = client.spawn("ann", at=(0, 0, 0))
+            ann.walk((4, 0, 2), (-3, 0, 1))
+            hashes.append(client.run_until_idle().state_hash)
+        self.assertEqual(len(set(hashes)), 1)
+
+    def test_a_refusal_harms_nobody(self):
+        group, names = self.group(3)
+        for client in group.members:
+            client.lockstep()
+        def post(client, number):
+            client.subscribe(notices=True)
+            spawn = enfilade.messages.Spawn(at=enfilade.messages.Vec3(z=6 if number == 1 else 0))
+            return client.post([
+                {"command": enfilade.messages.Command(avatar="ann", spawn=spawn)},
+                {"step": enfilade.messages.Step(ticks=1, avatars=True)},
+                {"frame": enfilade.messages.FrameRequest(
+                    eyes=enfilade.messages.AvatarEyes(avatar="ann"), width=16, height=8)}])
+        posted = [post(client, i) for i, client in enumerate(group.members)]
+        replies = [client.replies(ids) for client, ids in zip(group.members, posted)]
+        for number in (0, 2):
+            frame, attachment = replies[number][2]
+            self.assertEqual(len(attachment), 16 * 8 * 3)
+            self.assertEqual(len(frame.frame.planes), 1)
+        self.assertEqual(replies[1][2][0].error.code, enfilade.messages.ERROR_UNKNOWN_AVATAR)
+        self.assertIn("column", [one.text for one in group.members[1].notices()][0])
+
+    def test_a_dropped_world_is_an_error_and_the_others_go_on(self):
+        group, names = self.group(2)
+        for client in group.members:
+            client.lockstep()
+        self.client.drop_world(names[0])
+        posted = [one.post([{"step": enfilade.messages.Step(ticks=1)}]) for one in group.members]
+        with self.assertRaises(enfilade.ServerError):
+            group.members[0].take(posted[0])
+        self.assertEqual(group.members[1].take(posted[1])[0][0].step.tick, 1)
+
+    def test_unusable_requests_are_named(self):
+        m = enfilade.messages
+        step = m.ClientMessage(step=m.Step(ticks=1))
+        for many, words in ((m.StepMany(), "worlds"),
+                            (m.StepMany(worlds=[m.StepMany.World(world="main")] * 2), "twice"),
+                            (m.StepMany(worlds=[m.StepMany.World(world="main", requests=[
+                                m.ClientMessage(step_many=m.StepMany())])]), "step_many")):
+            with self.assertRaisesRegex(enfilade.ServerError, words):
+                self.client.request(step_many=many)
+        reply, _ = self.client.request(step_many=m.StepMany(worlds=[
+            m.StepMany.World(world="nowhere", requests=[step, step])]))
+        messages = reply.step_many.worlds[0].messages
+        self.assertEqual([one.reply_to for one in messages], [1, 2])
+        self.assertEqual(messages[0].error.code, m.ERROR_UNKNOWN_WORLD)
+
+    def test_a_hundred_environments(self):
+        vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=100, starts=_STARTS,
+                                        channels=())
+        self.addCleanup(vector.close)
+        vector.reset(seed=1)
+        seen = vector.step(np.ones((100, 2)))[0]
+        self.assertEqual(seen["position"].shape, (100, 3))
+        vector.close()
+
+
+class OrdersTest(RoomCase):
+    def setUp(self):
+        super().setUp()
+        self.client.lockstep()
+
+    def test_an_avatar_turns_with_a_rate(self):
+        ann = self.client.spawn("ann", at=(0, 0, 0))
+        ann.turn(90, rate=180)
+        step = self.client.run_until_idle()
+        np.testing.assert_allclose(step.avatars["ann"].gaze, (0, 0, -1), atol=1e-9)
+        ann.turn(facing=0)
+        np.testing.assert_allclose(self.client.run_until_idle().avatars["ann"].gaze, (1, 0, 0), atol=1e-9)
+        with self.assertRaisesRegex(enfilade.ServerError, "rate"):
+            ann.turn(90, rate=0)
+        with self.assertRaisesRegex(enfilade.ServerError, "turn.by"):
+            self.client.command("ann", turn=enfilade.messages.Turn())
+
+    def test_parts_turn_until_something_stops_them(self):
+        self.client.subscribe(notices=True)
+        box = enfilade.messages.Box(min=enfilade.messages.Vec3(x=-0.2, z=-0.2),
+                                    max=enfilade.messages.Vec3(x=2, y=1, z=0.2))
+        bar = self.client.spawn("bar", at=(0, 0.002, 4.8), facing=90,
+                                parts=[enfilade.messages.ConvexPart(box=box)])
+        bar.turn(-170)
+        step = self.client.run_until_idle()
+        blocked = [one for one in self.client.notices() if one.kind == "blocked"]
+        self.assertEqual([one.obstacle_name for one in blocked], ["column"])
+        self.assertTrue(-90 < step.avatars["bar"].facing < 0)
+        self.assertEqual(self.client.metrics().worst_penetration, 0)
+
+    def test_a_teleport_needs_room(self):
+        self.client.subscribe(notices=True)
+        ann = self.client.spawn("ann", at=(0, 0, 0))
+        ann.enter()
+        ann.teleport((0, 0, 6))
+        ann.teleport((-4, 0, 3), facing=180)
+        step = self.client.run_until_idle()
+        kinds = [(one.kind, one.text) for one in self.client.notices()]
+        self.assertIn("column", dict(kinds)["refused"])
+        self.assertIn("done", dict(kinds))
+        np.testing.assert_allclose(step.avatars["ann"].feet, (-4, 0, 3), atol=2e-3)
+        np.testing.assert_allclose(step.avatars["ann"].gaze, (-1, 0, 0), atol=1e-9)
+
+    def test_a_driver_resets_a_world_without_being_admin(self):
+        with tempfile.TemporaryDirectory() as folder:
+            tokens = Path(folder) / "tokens"
+            tokens.write_text("drive driver-0123456789ab\ndrive other-0123456789abc\n")
+            with enfilade.serve(self.scene, "--token-file", str(tokens)) as server:
+                with server.connect(token="driver-0123456789ab") as driver:
+                    driver.lockstep()
+                    driver.spawn("ann", at=(0, 0, 0)).enter()
+                    driver.restart()
+                    self.assertEqual(driver.step().tick, 1)
+                    with server.connect(token="other-0123456789abc") as other:
+                        other.spawn("bob", at=(2, 0, 0))
+                        with self.assertRaisesRegex(enfilade.ServerError, "bob.*admin"):
+                            driver.restart()
+
+    def test_a_world_continues_from_saved_bytes(self):
+        ann = self.client.spawn("ann", at=(0, 0, 0))
+        ann.walk((4.9, 0, 3), (-3, 0, 0))
+        self.client.step(90)
+        saved = self.client.save()
+        expected = [self.client.step(30).state_hash for _ in range(8)]
+        self.client.subscribe(contacts=True)
+        back = self.client.restore(saved)
+        self.assertEqual(back.tick, 90)
+        self.assertIn(("end", "seek"), [(one.kind, one.reason) for one in self.client.contacts()])
+        self.assertEqual([self.client.step(30).state_hash for _ in range(8)], expected)
+        enfilade.Avatar(self.client, "ann").drive((1, 0, 0))  # it belongs to this client
+        with enfilade.serve(self.scene) as server, server.connect() as other:
+            other.lockstep()
+            other.restore(saved)
+            self.assertEqual([other.step(30).state_hash for _ in range(8)], expected)
+            for damaged in (b"", saved[:-9], saved[:100] + b"\x80" + saved[101:]):
+                with self.assertRaisesRegex(enfilade.ServerError, "restore.checkpoint|checkpoint"):
+                    other.restore(damaged)
+            self.assertEqual(other.step(1).tick, 90 + 8 * 30 + 1, "a refused one changes nothing")
+
+    def test_a_recorded_world_is_not_restored(self):
+        with tempfile.TemporaryDirectory() as folder:
+            with enfilade.serve(self.scene, "--record", str(Path(folder) / "w.mcap")) as server:
+                with server.connect() as client:
+                    client.lockstep()
+                    saved = client.save()
+                    with self.assertRaisesRegex(enfilade.ServerError, "--record"):
+                        client.restore(saved)
+
+
+class ObjectsTest(RoomCase):
+    def test_objects_have_boxes_and_are_things(self):
+        objects = {one.path: one for one in self.client.objects()}
+        self.assertEqual(sorted(objects), ["column", "floor", "wall"])
+        wall = objects["wall"]
+        self.assertEqual((wall.id, wall.thing, wall.class_id, wall.class_name), (WALL, WALL, 0, ""))
+        np.testing.assert_allclose(wall.box, ((5, 0, -4), (5.2, 3, 4)), atol=1e-6)
+
+    def test_classes_and_things_of_the_sidecar_are_channels(self):
+        (Path(self.scene).parent / "room.walk.json").write_text(
+            '{"walk":1,"classes":{"wall":["wall","column"],"floor":["floor"]},'
+            '"things":[["wall","column"]]}')
+        self.addCleanup((Path(self.scene).parent / "room.walk.json").unlink)
+        with enfilade.serve(self.scene) as server, server.connect() as client:
+            objects = {one.path: one for one in client.objects()}
+            self.assertEqual(objects["column"].class_name, "wall")
+            self.assertEqual((objects["floor"].class_id, objects["wall"].class_id), (1, 2))
+            self.assertEqual(objects["wall"].thing, objects["column"].thing)
+            frame = client.frame(eye=(0, 1.5, 0), target=(5, 1, 5), width=64, height=48,
+                                 channels=("ids", "class", "thing"))
+            self.assertEqual(sorted(np.unique(frame.ids)), [0, FLOOR, WALL, COLUMN])
+            self.assertTrue((frame.class_ids[frame.ids == COLUMN] == 2).all())
+            self.assertTrue((frame.class_ids[frame.ids == FLOOR] == 1).all())
+            self.assertTrue((frame.things[frame.ids == COLUMN] == objects["wall"].thing).all())
+            self.assertTrue((frame.class_ids[frame.ids == 0] == 0).all())
+
+
+class CamerasTest(RoomCase):
+    def test_cameras_have_their_places_and_channels(self):
+        cameras = [enfilade.Camera("front", (32, 24), ("rgb", "depth")),
+                   enfilade.Camera("left", (16, 16), ("ids", "depth"), yaw=math.pi / 2, height=0.5)]
+        env = enfilade.WalkEnv(self.scene, starts=[(0, 0, 0, 0)], cameras=cameras)
+        self.addCleanup(env.close)
+        seen, _ = env.reset(seed=1)
+        self.assertIn(seen, env.observation_space)
+        self.assertEqual(seen["front_rgb"].shape, (24, 32, 3))
+        self.assertAlmostEqual(float(seen["front_depth"][12, 16]), 5.0, places=3)  # the wall
+        self.assertTrue(np.isinf(seen["left_depth"][0]).all())
+        seen = env.step((0, 0))[0]
+        # Half a metre above the floor, the lowest row looks down by fov/2 less half a pixel.
+        down = math.tan(0.6) * 15 / 16
+        self.assertAlmostEqual(float(seen["left_depth"][15, 8]), 0.5 / down, delta=0.01)
+        self.assertEqual(env.render().shape, (24, 32, 3))
+
+    def test_eye_height_is_above_the_feet(self):
+        env = enfilade.WalkEnv(self.scene, starts=[(0, 0, 0, 180)], eye_height=0.4, size=(9, 9),
+                               channels=("depth",))
+        self.addCleanup(env.close)
+        depth = env.reset(seed=1)[0]["depth"]
+        self.assertAlmostEqual(float(depth[8, 4]), 0.4 / (math.tan(0.6) * 8 / 9), delta=0.01)
+
+    def test_a_lens_sees_all_around_and_noise_is_seeded(self):
+        whole = self.client.frame(eye=(0, 1, 0), forward=(1, 0, 0), width=64, height=32,
+                                  channels=("range", "ids"), lens="equirectangular")
+        self.assertAlmostEqual(float(whole.range[15:17, 32].mean()), 5.0, delta=0.02)
+        self.assertEqual(whole.ids[31, 3], FLOOR)
+        self.assertAlmostEqual(float(whole.range[31, 3]), 1.0, delta=0.01)
+        fisheye = self.client.frame(eye=(0, 1, 0), forward=(0, -1, 0), up=(1, 0, 0), width=33,
+                                    height=33, channels=("range", "depth"), lens="fisheye")
+        self.assertAlmostEqual(float(fisheye.range[16, 16]), 1.0, delta=1e-3)
+        with self.assertRaisesRegex(enfilade.ServerError, "lens"):
+            self.client.frame(eye=(0, 1, 0), forward=(1, 0, 0), width=8, height=8, lens="fisheye",
+                              renderer="gl")
+        view = dict(eye=(0, 1, 0), forward=(1, 0, 0), width=32, height=32, channels=("depth",))
+        noisy = [self.client.frame(**view, depth_noise=seed).depth for seed in (1, 1, 2)]
+        np.testing.assert_array_equal(noisy[0], noisy[1])
+        self.assertFalse(np.array_equal(noisy[0], noisy[2], equal_nan=True))
+
+
+class VideoTest(unittest.TestCase):
+    def setUp(self):
+        """Puts an ffmpeg first that writes its input to its last argument."""
+        tools = tempfile.TemporaryDirectory()
+        self.addCleanup(tools.cleanup)
+        tool = Path(tools.name) / "ffmpeg"
+        tool.write_text('#!/bin/sh\nfor last; do :; done\ncat > "$last"\n')
+        tool.chmod(0o755)
+        change = unittest.mock.patch.dict(os.environ, PATH=f"{tools.name}:{os.environ['PATH']}")
+        change.start()
+        self.addCleanup(change.stop)
+
+    def test_without_ffmpeg_it_says_so(self):
+        with unittest.mock.patch.dict(os.environ, PATH="/nowhere"):
+            with self.assertRaisesRegex(enfilade.EnfiladeError, "install"):
+                enfilade.Video("walk.mp4")
+
+    def test_pictures_become_a_film(self):
+        with tempfile.TemporaryDirectory() as folder:
+            path = Path(folder) / "walk.mp4"
+            with enfilade.Video(path, fps=10) as video:
+                for i in range(5):
+                    video.add(np.full((33, 51, 3), 40 * i, np.uint8))
+                with self.assertRaisesRegex(ValueError, "pixels"):
+                    video.add(np.zeros((10, 10, 3), np.uint8))
+                self.assertFalse(path.exists())
+            self.assertEqual(path.stat().st_size, 5 * 33 * 51 * 3)
+            self.assertEqual(list(Path(folder).iterdir()), [path])
+            with self.assertRaises(KeyError):
+                with enfilade.Video(Path(folder) / "not.mp4") as video:
+                    video.add(np.zeros((8, 8, 3), np.uint8))
+                    raise KeyError
+            self.assertEqual(list(Path(folder).iterdir()), [path])
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,204 @@
+// Fisheye and equirectangular frames against closed formulas and rays in double precision.
+#include "render/lens.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "render/image/depth_noise.hpp"
+#include "render/raytrace/ray_renderer.hpp"
+#include "scene/world/queries/ray_caster.hpp"
+#include "tests/render/render_fixtures.hpp"
+
+namespace enfilade::render {
+namespace {
+
+constexpr double kPi = std::numbers::pi;
+
+Camera lensCamera(Camera::Lens::Kind kind, int width, int height) {
+  Camera camera;
+  camera.eye = {0.3, 0.2, -0.1};
+  camera.forward = {1, 0.3, -0.4};
+  camera.up = {0.1, 1, 0.2};
+  camera.width = width;
+  camera.height = height;
+  camera.lens = Camera::Lens{kind};
+  return camera;
+}
+
+/// cv::fisheye::projectPoints of a direction in OpenCV's camera frame (x right, y down, z ahead).
+std::pair<double, double> projectFisheye(const Vec3& point, const Pinhole& pinhole,
+                                         const std::array<double, 4>& k) {
+  const double r = std::hypot(point.x(), point.y());
+  const double angle = std::atan2(r, point.z());
+  double distorted = angle;
+  for (std::size_t i = 0; i < 4; ++i)
+    distorted += k[i] * std::pow(angle, static_cast<double>(2 * i + 3));
+  const double scale = r > 0 ? distorted / r : 1;
+  return {pinhole.fx * scale * point.x() + pinhole.cx, pinhole.fy * scale * point.y() + pinhole.cy};
+}
+
+TEST(Lens, AFisheyeInvertsOpenCvsProjection) {
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  for (const std::array<double, 4>& k :
+       {std::array<double, 4>{}, {0.05, -0.01, 0.002, -0.0003}, {-0.02, 0.003, 0, 0}}) {
+    Camera camera = lensCamera(Camera::Lens::Kind::fisheye, 640, 480);
+    camera.pinhole = Pinhole{200, 190, 310, 250};
+    camera.lens->k = k;
+    ASSERT_FALSE(validateCamera(camera));
+    const LensMapping lens(camera);
+    const Vec3 forward = camera.forward.normalized(), right = forward.cross(camera.up).normalized(),
+               down = forward.cross(right);
+    int checked = 0;
+    for (int i = 0; i < 2000; ++i) {
+      const Vec3 point(normal(random), normal(random), normal(random));
+      if (std::atan2(std::hypot(point.x(), point.y()), point.z()) > 1.9) continue;
+      const auto [x, y] = projectFisheye(point, *camera.pinhole, k);
+      const auto direction = lens.directionAt(x, y);
+      ASSERT_TRUE(direction);
+      const Vec3 expected = point.x() * right + point.y() * down + point.z() * forward;
+      EXPECT_LT((*direction - expected.normalized()).norm(), 1e-9);
+      ++checked;
+    }
+    EXPECT_GT(checked, 1000);
+  }
+}
+
+TEST(Lens, WidthOfAFisheyeAndTheRimOfItsModel) {
+  Camera camera = lensCamera(Camera::Lens::Kind::fisheye, 200, 100);
+  const Vec3 forward = camera.forward.normalized();
+  EXPECT_NEAR(LensMapping(camera).directionAt(0, 50)->dot(forward), 0, 1e-12);
+  EXPECT_LT((*LensMapping(camera).directionAt(100, 50) - forward).norm(), 1e-12);
+  camera.lens->width = 2 * kPi;
+  EXPECT_NEAR(LensMapping(camera).directionAt(0, 50)->dot(forward), -1, 1e-12);
+  EXPECT_FALSE(LensMapping(camera).directionAt(0, 0)) << "beyond half a turn";
+  camera.pinhole = Pinhole{100, 100, 100, 50};
+  camera.lens->k = {-0.3, 0, 0, 0};  // increases up to 1.054 radians
+  EXPECT_TRUE(LensMapping(camera).directionAt(100 + 70, 50));
+  EXPECT_FALSE(LensMapping(camera).directionAt(100 + 71, 50));
+}
+
+TEST(Lens, AnEquirectangularPictureHasAnglesAsARangeScan) {
+  const Camera camera = lensCamera(Camera::Lens::Kind::equirectangular, 720, 360);
+  const LensMapping lens(camera);
+  scene::RangeScan scan;
+  scan.forward = camera.forward;
+  scan.up = camera.up;
+  scan.width = 2 * kPi;
+  scan.height = kPi;
+  scan.columns = 24;
+  scan.rows = 13;
+  const std::vector<scene::Ray> rays = makeScanRays(scan);
+  for (std::uint32_t row = 0; row < scan.rows; ++row)
+    for (std::uint32_t column = 0; column < scan.columns; ++column) {
+      const auto direction = lens.directionAt(30.0 * column, 30.0 * row);
+      EXPECT_LT((*direction - rays[row * scan.columns + column].direction).norm(), 1e-12);
+    }
+}
+
+TEST(Lens, FramesShowWhatRaysInDoublesMeet) {
+  const auto scene = sceneOf(crowd(60));
+  scene::RayCaster caster(scene);
+  caster.update({});
+  RayRenderer renderer(scene);
+  for (const auto kind : {Camera::Lens::Kind::fisheye, Camera::Lens::Kind::equirectangular}) {
+    Camera camera = lensCamera(kind, 96, 64);
+    camera.lens->width = 1.6 * kPi;
+    FrameOptions options;
+    options.channels = {true, true, true, true};
+    const Frame frame = renderer.render({}, camera, options);
+    const std::vector<float> range = computeRange(frame);
+    const LensMapping lens(camera);
+    int hits = 0, differing = 0;
+    for (int y = 0; y < camera.height; ++y)
+      for (int x = 0; x < camera.width; ++x) {
+        const auto pixel = static_cast<std::size_t>(y * camera.width + x);
+        const auto direction = lens.directionAt(x + 0.5, y + 0.5);
+        const auto hit =
+            direction ? caster.firstHit({camera.eye, *direction}, {.ignoreTransparent = true})
+                      : std::nullopt;
+        if (!hit || hit->distance < camera.near) continue;
+        ++hits;
+        if (frame.ids[pixel] != hit->entity) {
+          ++differing;  // at edges single precision selects another surface
+          continue;
+        }
+        EXPECT_NEAR(range[pixel], hit->distance, 1e-6 * hit->distance);
+        const double depth = hit->distance * direction->dot(camera.forward.normalized());
+        EXPECT_NEAR(frame.depth[pixel], depth, 1e-6 * hit->distance);
+        for (std::size_t i = 0; i < 3; ++i)
+          EXPECT_NEAR(frame.normals[3 * pixel + i], hit->normal[static_cast<int>(i)], 1e-5);
+      }
+    EXPECT_GT(hits, 400);
+    EXPECT_LE(differing, hits / 500);
+    RayRenderer alone(scene, {.threads = 1});
+    const Frame again = alone.render({}, camera, options);
+    EXPECT_EQ(again.rgb, frame.rgb);
+    EXPECT_EQ(again.ids, frame.ids);
+  }
+}
+
+TEST(Lens, InTheMiddleColoursAreThoseOfAPinhole) {
+  const auto scene = sceneOf(crowd(60));
+  RayRenderer renderer(scene);
+  Camera pinhole = lensCamera(Camera::Lens::Kind::fisheye, 64, 64);
+  pinhole.pinhole = Pinhole{600, 600, 32, 32};  // 6 degrees: almost no distortion
+  Camera fisheye = pinhole;
+  pinhole.lens.reset();
+  FrameOptions options;
+  const Frame a = renderer.render({}, pinhole, options), b = renderer.render({}, fisheye, options);
+  std::size_t close = 0;
+  for (std::size_t i = 0; i < a.rgb.size(); ++i) close += std::abs(a.rgb[i] - b.rgb[i]) <= 12;
+  EXPECT_GT(close, a.rgb.size() * 95 / 100) << "but for ambient occlusion and edges";
+}
+
+TEST(Lens, UnusableLensesAreNamed) {
+  Camera camera = lensCamera(Camera::Lens::Kind::fisheye, 64, 64);
+  camera.lens->width = 7;
+  EXPECT_NE(validateCamera(camera).value_or("").find("lens.width"), std::string::npos);
+  camera.lens = Camera::Lens{Camera::Lens::Kind::equirectangular};
+  camera.pinhole = Pinhole{60, 60, 32, 32};
+  EXPECT_NE(validateCamera(camera).value_or("").find("pinhole"), std::string::npos);
+  camera.pinhole.reset();
+  camera.projection = Camera::Projection::orthographic;
+  EXPECT_NE(validateCamera(camera).value_or("").find("lens"), std::string::npos);
+}
+
+TEST(DepthNoise, DependsOnSeedFrameAndPixelAlone) {
+  const std::vector<float> clean(64 * 48, 2.5f);
+  const auto noisy = [&](std::uint64_t seed, std::uint64_t frame) {
+    std::vector<float> depth = clean;
+    addDepthNoise(depth, 64, 48, {seed, 1}, frame);
+    return depth;
+  };
+  EXPECT_EQ(noisy(1, 7), noisy(1, 7));
+  EXPECT_NE(noisy(1, 7), noisy(2, 7));
+  EXPECT_NE(noisy(1, 7), noisy(1, 8));
+}
+
+TEST(DepthNoise, HasTheDeviationAndTheStepsOfTheModel) {
+  constexpr double kDisparity = 11.75;  // 94 steps of an eighth: rounding is symmetric
+  std::vector<float> depth(200 * 200, static_cast<float>(35.13 / kDisparity));
+  addDepthNoise(depth, 200, 200, {4, 1}, 0);
+  double sum = 0, squares = 0;
+  for (const float d : depth) {
+    const double steps = 35.13 * 8 / static_cast<double>(d);
+    EXPECT_NEAR(steps, std::round(steps), 1e-4);
+    sum += 35.13 / static_cast<double>(d);
+    squares += std::pow(35.13 / static_cast<double>(d), 2);
+  }
+  const double count = 200 * 200, mean = sum / count;
+  EXPECT_NEAR(mean, kDisparity, 0.001);
+  // Half a step is 9/4 deviations of 1/36: rarely more, and then one step is made.
+  const double expected = std::sqrt(std::erfc(2.25 / std::sqrt(2.0))) / 8;
+  EXPECT_NEAR(std::sqrt(squares / count - mean * mean), expected, 0.1 * expected);
+  std::vector<float> far{12.0f, std::numeric_limits<float>::quiet_NaN()};
+  addDepthNoise(far, 2, 1, {4, 1}, 0);
+  EXPECT_TRUE(std::isnan(far[0]) && std::isnan(far[1]));
+}
+
+}  // namespace
+}  // namespace enfilade::render
