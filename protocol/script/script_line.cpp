@@ -168,6 +168,11 @@ void readGo(const json& line, v1::Go* go) {
     readPoint(to, "to", go->mutable_to()->mutable_point());
   }
   if (line.contains("speed")) go->set_speed(readSpeed(line));
+  if (!line.contains("doors")) return;
+  if (line["doors"] == "open")
+    go->set_doors(v1::NavigationQuery::DOORS_OPEN);
+  else if (line["doors"] != "as_they_are")
+    refuse("doors", R"(must be "open" or "as_they_are", not )" + excerpt(line["doors"]));
 }
 
 void readLook(const json& line, v1::Look* look) {
@@ -249,7 +254,7 @@ const std::vector<Verb>& verbs() {
   static const std::vector<Verb> all{
       {"spawn", {"at", "facing", "radius", "height", "flying", "parts", "links", "self_contact"}},
       {"walk", {"to", "along", "speed"}},
-      {"go", {"to", "speed"}},
+      {"go", {"to", "speed", "doors"}},
       {"look", {"at"}},
       {"wait", {"for"}},
       {"capture", {"as"}},

@@ -13,12 +13,6 @@ namespace {
 /// metres. Places are measured that are closer than the prism is wide.
 constexpr double kThinRadius = 0.05, kWidthSpacing = 0.08;
 
-std::shared_ptr<const AvatarShape> makeThinShape(const WorldData& world,
-                                                 const NavigationAgent& agent) {
-  const double height = agent.height - world.settings.stepHeight;
-  return makePrismShape(kThinRadius, height, height, world.settings);
-}
-
 /// Distance that a thin prism at `position` can be moved across `direction`, and its own width,
 /// metres.
 double measureClearWidth(const WorldData& world, const AvatarShape& shape, const Vec3& position,
@@ -43,7 +37,7 @@ double measureClearWidth(const WorldData& world, const AvatarShape& shape, const
 NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agent,
                              const std::vector<Vec3>& points, const Vec3& near,
                              double maxDistance) {
-  const auto shape = makeThinShape(world, agent);
+  const auto shape = makeThinShape(world.settings, agent);
   NarrowPlace narrowest{Vec3::Zero(), std::numeric_limits<double>::infinity()};
   for (std::size_t i = 1; i < points.size(); ++i) {
     const Vec3 leg = points[i] - points[i - 1];
@@ -61,11 +55,17 @@ NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agen
   return narrowest;
 }
 
+std::shared_ptr<const AvatarShape> makeThinShape(const WorldSettings& settings,
+                                                 const NavigationAgent& agent) {
+  const double height = agent.height - settings.stepHeight;
+  return makePrismShape(kThinRadius, height, height, settings);
+}
+
 ObstacleDistance measureObstacle(const WorldData& world, const NavigationAgent& agent,
                                  const Vec3& footPosition, double maxDistance) {
   constexpr double kPrecision = 1e-4;  // metres
-  const auto shape = makeThinShape(world, agent);
-  const Vec3 feet = footPosition + Vec3(0, world.settings.stepHeight + kPrecision, 0);
+  const auto shape = makeThinShape(world.settings, agent);
+  const Vec3 feet = placeThinShape(world.settings, footPosition);
   const double limit = std::max(kPrecision, maxDistance - kThinRadius);
   ObstacleSet obstacles =
       collectObstaclesInBox(world, inflated(placeBox(shape->box, feet), limit), 0);

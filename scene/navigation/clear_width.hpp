@@ -22,6 +22,14 @@ struct ObstacleDistance {
   EntityId entity = 0;  ///< 0: none within the searched distance
 };
 
+/// A thin prism from the step height to the height of the agent, and where its feet are for an
+/// agent at `footPosition`.
+std::shared_ptr<const AvatarShape> makeThinShape(const WorldSettings& settings,
+                                                 const NavigationAgent& agent);
+inline Vec3 placeThinShape(const WorldSettings& settings, const Vec3& footPosition) {
+  return footPosition + Vec3(0, settings.stepHeight + 1e-4, 0);
+}
+
 /// The narrowest place of a line of places, of those within `maxDistance` metres of `near`.
 /// Infinite width: none was measured.
 NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agent,

@@ -214,7 +214,7 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
   verb.option_defaults()->group("Files");
   verb.add_option("--channels", into.channels,
                   "Comma-separated list of rgb, depth, ids, "
-                  "normals, range")
+                  "normals, range, class, thing")
       ->capture_default_str()
       ->check(CLI::Validator(validateChannels, "LIST"));
   verb.add_option("--rgb", into.rgb)->capture_default_str()->check(CLI::IsMember({"png", "jpeg"}));

@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "render/service/renderer_selector.hpp"
+#include "scene/navigation/doors.hpp"
 #include "scene/navigation/navigation.hpp"
-#include "scene/navigation/open_doors.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "server/base/progress.hpp"
 #include "server/base/standard_output.hpp"
@@ -60,7 +60,9 @@ Json toJson(const Vec3& point) {
 }
 
 Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
-                const std::optional<scene::NarrowPlace>& narrowest, scene::Navigation& navigation) {
+                const std::optional<scene::NarrowPlace>& narrowest,
+                const std::vector<scene::DoorOnPath>& doors, const scene::Scene& scene,
+                scene::Navigation& navigation) {
   const scene::NavigationReport mesh = navigation.report();
   Json report{{"found", path.found()}};
   if (path.found()) {
@@ -68,6 +70,11 @@ Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
     report["seconds"] = path.length / command.agent.speed;
     report["points"] = Json::array();
     for (const Vec3& point : path.points) report["points"].push_back(toJson(point));
+    report["doors"] = Json::array();
+    for (const scene::DoorOnPath& door : doors)
+      report["doors"].push_back({{"name", scene.model().bodies[door.body].name},
+                                 {"distance", door.distance},
+                                 {"seconds_to_open", door.secondsToOpen}});
     if (narrowest)
       report["narrowest"] = {{"at", toJson(narrowest->position)},
                              {"clear_width", narrowest->clearWidth}};
@@ -93,7 +100,8 @@ Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
 }
 
 std::string formatText(const RouteCommand& command, const scene::NavigationPath& path,
-                       const std::optional<scene::NarrowPlace>& narrowest) {
+                       const std::optional<scene::NarrowPlace>& narrowest,
+                       const std::vector<scene::DoorOnPath>& doors, const scene::Scene& scene) {
   if (!path.found())
     return fmt::format("no way from {} to {}: {}\n", command.from, command.to, path.reason);
   std::string text =
@@ -102,6 +110,9 @@ std::string formatText(const RouteCommand& command, const scene::NavigationPath&
   if (narrowest)
     text += fmt::format("narrowest: {:.3f} m at {:.2f}, {:.2f}, {:.2f}\n", narrowest->clearWidth,
                         narrowest->position.x(), narrowest->position.y(), narrowest->position.z());
+  for (const scene::DoorOnPath& door : doors)
+    text += fmt::format("door: {}, after {:.2f} m\n", scene.model().bodies[door.body].name,
+                        door.distance);
   for (const Vec3& point : path.points)
     text += fmt::format("  {:9.3f} {:9.3f} {:9.3f}\n", point.x(), point.y(), point.z());
   return text;
@@ -152,12 +163,19 @@ ExitCode route(const RouteCommand& command) {
   const scene::NavigationPath path = navigation.findPath(from, to);
   const auto narrowest =
       path.found() ? navigation.findNarrowest(path.points) : std::optional<scene::NarrowPlace>();
+  scene::EntityIndex index(scene);
+  const std::vector<scene::DoorOnPath> doors =
+      path.found() && !command.doorsAsTheyAre
+          ? scene::findDoorsOnPath(index, command.settings,
+                                   *scene::World(scene, command.settings).snapshot(), command.agent,
+                                   path.points)
+          : std::vector<scene::DoorOnPath>();
   constexpr auto kReplace = Json::error_handler_t::replace;
-  writeToStdout(
-      command.json
-          ? makeReport(command, path, narrowest, navigation).dump(-1, ' ', false, kReplace) + "\n"
-          : formatText(command, path, narrowest),
-      "the path was found");
+  writeToStdout(command.json ? makeReport(command, path, narrowest, doors, *scene, navigation)
+                                       .dump(-1, ' ', false, kReplace) +
+                                   "\n"
+                             : formatText(command, path, narrowest, doors, *scene),
+                "the path was found");
   if (path.found() && !command.plan.empty()) writePlan(scene, snapshot, path, command);
   return path.found() ? ExitCode::success : ExitCode::violations;
 }

@@ -91,6 +91,8 @@ void broadcastTick(HostedWorld& hosted, const RecordableWorld::TickResult& resul
   hosted.statistics.addTick(report);
   logFindings(hosted.world, report);
   hosted.idle = report.idle;
+  hosted.recentSnapshots.push_back(report.snapshot);
+  if (hosted.recentSnapshots.size() > kKeptSnapshots) hosted.recentSnapshots.pop_front();
   publishStatus(hosted);
   releaseOwners(hosted, report.notices);
   updateActiveContacts(hosted, events);

@@ -29,8 +29,10 @@ EncodedMessage encodeFrameReply(PendingFrame& pending, const scene::Scene& scene
   std::vector<std::uint8_t> attachment;
   v1::ServerMessage reply;
   reply.set_reply_to(pending.job.requestId);
+  const FrameJob& job = pending.job;
   *reply.mutable_frame() =
-      toProto(frame, pending.job.snapshot->time, pending.job.request, scene, attachment);
+      toProto(frame, {job.request, scene, *job.snapshot, job.earlier ? &*job.earlier : nullptr},
+              attachment);
   reply.mutable_frame()->set_watch(pending.job.subscription);
   reply.mutable_frame()->set_dropped(pending.job.dropped);
   if (pending.job.onRendered) pending.job.onRendered(reply.frame(), attachment);

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "scene/world/data/scene.hpp"
 #include "server/base/drawing_options.hpp"
@@ -21,13 +22,14 @@ struct FrameJob {
   /// Owners take turns, so that one with many large frames does not delay the others. Unique per
   /// client of all worlds; null: the recordings.
   std::shared_ptr<const void> owner = nullptr;
-  std::uint64_t requestId = 0;     ///< 0: the frame belongs to a subscription
-  std::uint32_t subscription = 0;  ///< number of the subscription; 0: none
-  std::uint64_t dropped = 0;       ///< Frame.dropped
+  std::uint64_t requestId = 0;                        ///< 0: the frame belongs to a subscription
+  std::uint32_t subscription = 0;                     ///< number of the subscription; 0: none
+  std::uint64_t dropped = 0;                          ///< Frame.dropped
   /// Incremented per frame; may be null.
   std::shared_ptr<std::atomic<std::uint64_t>> renderedCount;
   /// Receives the frame before its reply is encoded, on a thread of the service; may be empty.
   std::function<void(const v1::Frame&, std::span<const std::uint8_t> attachment)> onRendered = {};
+  std::optional<EarlierView> earlier = std::nullopt;  ///< for the flow channel
 };
 
 class FrameService {

@@ -97,6 +97,9 @@ std::optional<v1::Error> updateFrameSubscription(HostedWorld& hosted, ClientId i
   }
   if (hosted.frames.deviceName().empty())
     return makeError(v1::ERROR_NO_RENDERER, hosted.frames.unavailableReason());
+  if (hasFlow(request.frame()))
+    return makeError(v1::ERROR_BAD_MESSAGE, "channels: flow is only for FrameRequest",
+                     "watch_frames.frame.channels");
   const auto view = viewFromProto(request.frame(), *hosted.world.snapshot());
   const auto* error = std::get_if<v1::Error>(&view);
   // An unknown avatar may be spawned later; all other errors are permanent.

@@ -30,6 +30,8 @@ namespace enfilade::server {
 using ClientId = std::uint64_t;
 class WorldGroup;
 
+inline constexpr std::size_t kKeptSnapshots = 32;  ///< HostedWorld::recentSnapshots
+
 /// A Step in progress; the client's later requests wait for it.
 struct PendingStep {
   std::uint64_t requestId = 0;
@@ -136,6 +138,8 @@ struct HostedWorld {
   std::map<std::string, ClientId> owners;
   std::set<std::string> pendingRelease;  ///< names in `owners` that may become free
   ActiveContacts activeContacts;
+  /// Of the last ticks, the latest one last; for flow channels.
+  std::deque<std::shared_ptr<const scene::Snapshot>> recentSnapshots;
   std::map<ClientId, ViewerFeed> viewers;            ///< of clients that are viewers
   std::unique_ptr<scene::ContactHorizons> horizons;  ///< null before the first subscriber
   bool horizonSelectionChanged = false;              ///< a client subscribed or left

@@ -56,6 +56,7 @@ void resetWorld(HostedWorld& hosted) {
   hosted.owners.clear();
   hosted.pendingRelease.clear();
   hosted.activeContacts.clear();
+  hosted.recentSnapshots = {hosted.world.snapshot()};
   hosted.idle = true;
   for (auto& [id, viewer] : hosted.viewers) viewer.onReplaced(hosted.world, hosted.activeContacts);
 }
@@ -73,6 +74,7 @@ void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents&
   hosted.owners.clear();
   hosted.pendingRelease.clear();
   hosted.activeContacts.clear();
+  hosted.recentSnapshots = {hosted.world.snapshot()};
   updateActiveContacts(hosted, activeContacts);
   publishStatus(hosted);
   TickBroadcast shared{begun};

@@ -1,5 +1,6 @@
 #include "server/messages/frame_messages.hpp"
 
+#include <algorithm>
 #include <cstring>
 
 #include "collision/assert.hpp"
@@ -8,6 +9,7 @@
 #include "render/image/encode.hpp"
 #include "render/image/image.hpp"
 #include "render/lens.hpp"
+#include "render/optical_flow.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -82,14 +84,19 @@ std::optional<render::Pinhole> findIntrinsics(const render::Camera& camera) {
 }
 
 void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
-                   const scene::Scene& scene, const v1::FrameRequest& request, v1::Channel channel,
-                   v1::Encoding encoding) {
+                   const FrameSource& source, v1::Channel channel, v1::Encoding encoding) {
+  const v1::FrameRequest& request = source.request;
   if (channel == v1::CHANNEL_IDS) {
     appendBytes(bytes, frame.ids);
   } else if (channel == v1::CHANNEL_CLASS) {
-    appendBytes(bytes, scene.objectClasses().classesOf(frame.ids));
+    appendBytes(bytes, source.scene.objectClasses().classesOf(frame.ids));
   } else if (channel == v1::CHANNEL_THING) {
-    appendBytes(bytes, scene.objectClasses().thingsOf(frame.ids));
+    appendBytes(bytes, source.scene.objectClasses().thingsOf(frame.ids));
+  } else if (channel == v1::CHANNEL_FLOW) {
+    ENFILADE_ASSERT(source.earlier);
+    appendBytes(bytes,
+                render::computeOpticalFlow(frame, source.scene, source.snapshot,
+                                           *source.earlier->snapshot, source.earlier->camera));
   } else if (channel == v1::CHANNEL_NORMALS) {
     appendBytes(bytes, frame.normals);
   } else if (channel == v1::CHANNEL_RANGE) {
@@ -108,8 +115,8 @@ void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
 }
 
 void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const render::Frame& frame,
-              const scene::Scene& scene, const v1::FrameRequest& request, v1::Channel channel) {
-  const v1::Encoding rgbEncoding = request.rgb_encoding();
+              const FrameSource& source, v1::Channel channel) {
+  const v1::Encoding rgbEncoding = source.request.rgb_encoding();
   const bool compressed = channel == v1::CHANNEL_RGB &&
                           (rgbEncoding == v1::ENCODING_PNG || rgbEncoding == v1::ENCODING_JPEG);
   v1::Plane& plane = *message.add_planes();
@@ -118,7 +125,7 @@ void addPlane(v1::Frame& message, std::vector<std::uint8_t>& attachment, const r
   plane.set_width(message.width());
   plane.set_height(message.height());
   plane.set_offset(attachment.size());
-  appendChannel(attachment, frame, scene, request, channel, plane.encoding());
+  appendChannel(attachment, frame, source, channel, plane.encoding());
   plane.set_length(attachment.size() - plane.offset());
 }
 
@@ -139,11 +146,12 @@ std::optional<v1::Error> validateChannels(const v1::FrameRequest& request) {
   for (const int channel : request.channels()) {
     const bool known = v1::Channel_IsValid(channel) && channel != v1::CHANNEL_UNSPECIFIED;
     if (!known || requested[channel]) {
-      return makeError(v1::ERROR_BAD_MESSAGE,
-                       "channels: give rgb, ids, depth, normals, range, class and thing each at "
-                       "most once, not " +
-                           std::to_string(channel),
-                       "channels");
+      return makeError(
+          v1::ERROR_BAD_MESSAGE,
+          "channels: give rgb, ids, depth, normals, range, class, thing and flow each at "
+          "most once, not " +
+              std::to_string(channel),
+          "channels");
     }
     requested[channel] = true;
   }
@@ -159,6 +167,7 @@ render::Channels channelsFromProto(const v1::FrameRequest& request) {
       channels.ids = true;
     if (channel == v1::CHANNEL_DEPTH || channel == v1::CHANNEL_RANGE) channels.depth = true;
     if (channel == v1::CHANNEL_NORMALS) channels.normals = true;
+    if (channel == v1::CHANNEL_FLOW) channels.ids = channels.depth = true;
   }
   return channels;
 }
@@ -222,6 +231,8 @@ std::uint64_t computeBytesPerPixel(const v1::FrameRequest& request) {
   for (const int channel : request.channels()) {
     if (channel == v1::CHANNEL_NORMALS)
       bytes += 12;
+    else if (channel == v1::CHANNEL_FLOW)
+      bytes += 8;
     else
       bytes += channel == v1::CHANNEL_RGB ? 3 : 4;
   }
@@ -278,11 +289,30 @@ ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot
   return view;
 }
 
-v1::Frame toProto(const render::Frame& frame, double time, const v1::FrameRequest& request,
-                  const scene::Scene& scene, std::vector<std::uint8_t>& attachment) {
+bool hasFlow(const v1::FrameRequest& request) {
+  return std::ranges::find(request.channels(), v1::CHANNEL_FLOW) != request.channels().end();
+}
+
+std::variant<EarlierView, v1::Error> earlierViewFromProto(
+    const v1::FrameRequest& request, const std::shared_ptr<const scene::Snapshot>& snapshot) {
+  v1::FrameRequest then = request;
+  if (request.has_eyes() && request.has_flow_forward())
+    *then.mutable_eyes()->mutable_forward() = request.flow_forward();
+  auto view = viewFromProto(then, *snapshot);
+  if (auto* error = std::get_if<v1::Error>(&view)) return std::move(*error);
+  const render::Camera& camera = std::get<FrameView>(view).camera;
+  if (camera.lens || camera.projection != render::Camera::Projection::perspective)
+    return makeError(v1::ERROR_BAD_CAMERA,
+                     "channels: flow is only for perspective pictures without a lens", "channels");
+  return EarlierView{snapshot, camera};
+}
+
+v1::Frame toProto(const render::Frame& frame, const FrameSource& source,
+                  std::vector<std::uint8_t>& attachment) {
+  const v1::FrameRequest& request = source.request;
   v1::Frame message;
   message.set_tick(frame.tick);
-  message.set_time(time);
+  message.set_time(source.snapshot.time);
   message.set_renderer(frame.renderer);
   message.set_software(frame.software);
   message.set_drawing_seconds(frame.statistics.seconds);
@@ -301,10 +331,10 @@ v1::Frame toProto(const render::Frame& frame, double time, const v1::FrameReques
   attachment.reserve(attachment.size() +
                      computeBytesPerPixel(request) * message.width() * message.height());
   for (const int channel : request.channels()) {
-    addPlane(message, attachment, frame, scene, request, static_cast<v1::Channel>(channel));
+    addPlane(message, attachment, frame, source, static_cast<v1::Channel>(channel));
   }
   if (request.channels().empty()) {
-    addPlane(message, attachment, frame, scene, request, v1::CHANNEL_RGB);
+    addPlane(message, attachment, frame, source, v1::CHANNEL_RGB);
   }
   return message;
 }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -20,14 +21,31 @@ struct FrameView {
   render::RendererKind renderer = render::RendererKind::automatic;
 };
 
+/// Where a flow channel begins.
+struct EarlierView {
+  std::shared_ptr<const scene::Snapshot> snapshot;
+  render::Camera camera;
+};
+
 /// Returns the requested view, or an error that names the field.
 std::variant<FrameView, v1::Error> viewFromProto(const v1::FrameRequest& request,
                                                  const scene::Snapshot& snapshot);
+/// Returns the same view at an earlier tick, for the flow channel.
+std::variant<EarlierView, v1::Error> earlierViewFromProto(
+    const v1::FrameRequest& request, const std::shared_ptr<const scene::Snapshot>& snapshot);
+bool hasFlow(const v1::FrameRequest& request);
 
-/// Appends the pixels to `attachment`. `time` is the simulated time in seconds, `scene` that of the
-/// frame.
-v1::Frame toProto(const render::Frame& frame, double time, const v1::FrameRequest& request,
-                  const scene::Scene& scene, std::vector<std::uint8_t>& attachment);
+/// What a message is made of in addition to its frame.
+struct FrameSource {
+  const v1::FrameRequest& request;
+  const scene::Scene& scene;
+  const scene::Snapshot& snapshot;
+  const EarlierView* earlier = nullptr;  ///< for the flow channel
+};
+
+/// Appends the pixels to `attachment`.
+v1::Frame toProto(const render::Frame& frame, const FrameSource& source,
+                  std::vector<std::uint8_t>& attachment);
 
 /// The frame request for an avatar's view in a recording.
 v1::FrameRequest makeRecordedViewRequest(const std::string& avatar);

@@ -4,11 +4,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 #include <random>
 #include <string>
 
-#include "scene/navigation/open_doors.hpp"
+#include "scene/navigation/doors.hpp"
+#include "scene/navigation/ghost.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -53,7 +55,18 @@ struct Answer {
   const scene::Scene& scene;
   scene::Navigation& navigation;
   v1::NavigationReply& reply;
-  const scene::Snapshot& snapshot;
+  const NavigationState& state;
+  bool doorsOpen;
+  const scene::Snapshot& meshSnapshot;  ///< the poses of bodies that the meshes have
+  /// The same with open doors; builds meshes at the first call. Only if there are doors.
+  std::function<scene::Navigation&()> withOpenDoors;
+  std::optional<scene::EntityIndex>& lazyIndex;
+  const std::shared_ptr<const scene::Scene>& shared;
+
+  scene::EntityIndex& index() const {
+    if (!lazyIndex) lazyIndex.emplace(shared);
+    return *lazyIndex;
+  }
 
   std::variant<Vec3, v1::Error> resolve(const v1::NavigationPlace& place,
                                         const std::string& field) const {
@@ -62,7 +75,7 @@ struct Answer {
       return vectorFromProto(place.point());
     }
     if (place.has_avatar()) {
-      const scene::AvatarSnapshot* avatar = findAvatar(snapshot, place.avatar());
+      const scene::AvatarSnapshot* avatar = findAvatar(*state.snapshot, place.avatar());
       if (!avatar) return makeUnknownAvatarError(place.avatar(), "navigation." + field + ".avatar");
       return avatar->footPosition;
     }
@@ -89,8 +102,37 @@ struct Answer {
     if (const auto island = navigation.islandOf(*place)) spot.set_island(*island);
   }
 
-  void addPath(const scene::NavigationPath& path, bool measuresWidth) const {
-    v1::NavigationPath& message = *reply.add_paths();
+  /// The closed doors that stand on a path through open ones.
+  void addDoors(const scene::NavigationPath& path, v1::NavigationPath& message) const {
+    for (const scene::DoorOnPath& found : scene::findDoorsOnPath(
+             index(), state.settings, *state.snapshot, navigation.agent(), path.points)) {
+      const scene::BodySpec& spec = scene.model().bodies[found.body];
+      v1::NavigationDoor& door = *message.add_doors();
+      door.set_id(spec.objects.front() + 1);
+      door.set_name(spec.name);
+      door.set_distance(found.distance);
+      door.set_seconds(found.secondsToOpen);
+      door.set_by_touch(spec.openedBy == scene::OpenedBy::touch);
+    }
+  }
+
+  /// Gives a closed door as the reason, if a path leads through it when it is open.
+  void explainByDoors(const Vec3& from, const Vec3& to, v1::NavigationPath& message) const {
+    if (doorsOpen || !withOpenDoors) return;
+    const scene::NavigationPath through = withOpenDoors().findPath(from, to);
+    if (!through.found()) return;
+    const auto doors = scene::findDoorsOnPath(index(), state.settings, *state.snapshot,
+                                              navigation.agent(), through.points);
+    if (doors.empty()) return;
+    const scene::BodySpec& spec = scene.model().bodies[doors.front().body];
+    message.set_reason("the door '" + spec.name + "' is closed: open it, or ask with open doors");
+    message.set_obstacle(spec.objects.front() + 1);
+    message.set_obstacle_name(spec.name);
+  }
+
+  void writePath(const Vec3& from, const Vec3& to, bool measuresWidth,
+                 v1::NavigationPath& message) const {
+    const scene::NavigationPath path = navigation.findPath(from, to);
     message.set_found(path.found());
     for (const Vec3& point : path.points) *message.add_points() = toProto(point);
     message.set_length(path.length);
@@ -101,6 +143,8 @@ struct Answer {
       *message.mutable_obstacle_at() = toProto(path.obstruction->position);
       message.set_clear_width(path.obstruction->clearWidth);
     }
+    if (path.found() && doorsOpen) addDoors(path, message);
+    if (!path.found()) explainByDoors(from, to, message);
     if (!path.found() || !measuresWidth) return;
     const auto narrowest = navigation.findNarrowest(path.points);
     if (!narrowest) return;
@@ -115,7 +159,7 @@ struct Answer {
     for (int i = 0; i < query.to_size(); ++i) {
       const auto to = resolve(query.to(i), "path.to[" + std::to_string(i) + "]");
       if (const auto* error = std::get_if<v1::Error>(&to)) return *error;
-      addPath(navigation.findPath(std::get<Vec3>(from), std::get<Vec3>(to)), query.narrowest());
+      writePath(std::get<Vec3>(from), std::get<Vec3>(to), query.narrowest(), *reply.add_paths());
     }
     return std::nullopt;
   }
@@ -184,6 +228,37 @@ struct Answer {
       obstacle.set_distance(found->distance);
       obstacle.set_entity(found->entity);
       obstacle.set_name(navigation.findEntityName(found->entity));
+      if (found->entity != 0) addClosestPoint(vectorFromProto(query.points(i)), obstacle);
+    }
+    return std::nullopt;
+  }
+
+  void addClosestPoint(const Vec3& place, v1::NavigationReply::Obstacle& obstacle) const {
+    const auto standing = navigation.snap(place, 0);
+    const auto separation = scene::computeSeparationFromShape(
+        index(), meshSnapshot, scene::makeThinShape(state.settings, navigation.agent()),
+        scene::placeThinShape(state.settings, standing.value_or(place)), obstacle.entity());
+    if (!separation) return;
+    *obstacle.mutable_point() = toProto(separation->pointB);
+    *obstacle.mutable_normal() = toProto(Vec3(-separation->normal));
+  }
+
+  std::optional<v1::Error> operator()(const v1::NavigationQuery::Islands& query) const {
+    if (auto error = validateCount("islands.count", query.count(), 50)) return error;
+    const std::vector<double> areas = navigation.report().islandAreas;
+    const auto count = std::min(static_cast<std::size_t>(query.count()), areas.size());
+    std::optional<Vec3> largest;
+    for (std::size_t i = 0; i < count; ++i) {
+      std::mt19937_64 random(i);
+      scene::RandomPlace wanted;
+      wanted.island = static_cast<std::uint32_t>(i);
+      const auto place = navigation.findRandomPlace(random, wanted);
+      v1::NavigationIsland& island = *reply.add_islands();
+      island.set_area(areas[i]);
+      if (!place) continue;
+      *island.mutable_at() = toProto(*place);
+      if (i == 0) largest = place;
+      if (i > 0 && largest) writePath(*place, *largest, false, *island.mutable_path());
     }
     return std::nullopt;
   }
@@ -216,15 +291,18 @@ void addReport(scene::Navigation& navigation, v1::NavigationReply& reply) {
 
 }  // namespace
 
-scene::Navigation& NavigationService::prepare(const scene::NavigationAgent& agent, bool doorsOpen,
-                                              const NavigationState& state) {
+NavigationService::Entry& NavigationService::prepare(const scene::NavigationAgent& agent,
+                                                     bool doorsOpen, const NavigationState& state) {
   const auto known = std::ranges::find_if(entries_, [&](const Entry& entry) {
     return entry.agent == agent && entry.doorsOpen == doorsOpen && entry.settings == state.settings;
   });
   if (known != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, known);
-    if (!doorsOpen) known->navigation->update(*state.snapshot);
-    return *known->navigation;
+    if (!doorsOpen) {
+      known->navigation->update(*state.snapshot);
+      known->snapshot = state.snapshot;
+    }
+    return *known;
   }
   const auto snapshot =
       doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
@@ -233,9 +311,9 @@ scene::Navigation& NavigationService::prepare(const scene::NavigationAgent& agen
   const scene::NavigationReport report = navigation->report();
   spdlog::info("navigation: radius {} m, height {} m: {:.1f} m2 in {} islands, built in {:.2f} s",
                agent.radius, agent.height, report.area, report.islandAreas.size(), report.seconds);
-  entries_.push_front({agent, state.settings, doorsOpen, std::move(navigation)});
+  entries_.push_front({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
   if (entries_.size() > kMaxEntries) entries_.pop_back();
-  return *entries_.front().navigation;
+  return entries_.front();
 }
 
 std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
@@ -249,13 +327,20 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   if (auto error = validateNumber("height", agent.height, 0.2, 10)) return std::move(*error);
   if (auto error = validateNumber("speed", agent.speed, 0.01, 20)) return std::move(*error);
   if (query.query_case() == v1::NavigationQuery::QUERY_NOT_SET)
-    return makeFieldError("query", "give path, random, snap, steps, clearance or map");
+    return makeFieldError("query", "give path, random, snap, steps, clearance, map or islands");
   const bool doorsOpen = query.doors() == v1::NavigationQuery::DOORS_OPEN;
-  scene::Navigation& navigation = prepare(agent, doorsOpen, state);
+  Entry& entry = prepare(agent, doorsOpen, state);
+  scene::Navigation& navigation = *entry.navigation;
   v1::NavigationReply reply;
   reply.set_tick(state.snapshot->tick);
   reply.set_time(state.snapshot->time);
-  const Answer answer{*scene_, navigation, reply, *state.snapshot};
+  const bool hasDoors = std::ranges::any_of(
+      scene_->model().bodies, [](const auto& body) { return scene::getTraits(body.kind).isDoor; });
+  std::function<scene::Navigation&()> withOpenDoors;
+  if (hasDoors)
+    withOpenDoors = [&]() -> scene::Navigation& { return *prepare(agent, true, state).navigation; };
+  const Answer answer{*scene_,         navigation,    reply,  state, doorsOpen,
+                      *entry.snapshot, withOpenDoors, index_, scene_};
   std::optional<v1::Error> error;
   switch (query.query_case()) {
     case v1::NavigationQuery::kPath:
@@ -272,6 +357,9 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
       break;
     case v1::NavigationQuery::kClearance:
       error = answer(query.clearance());
+      break;
+    case v1::NavigationQuery::kIslands:
+      error = answer(query.islands());
       break;
     case v1::NavigationQuery::kMap:
       error = answer.writeMap(query.map(), attachment);

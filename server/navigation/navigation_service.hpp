@@ -5,11 +5,13 @@
 #include <cstdint>
 #include <list>
 #include <memory>
+#include <optional>
 #include <variant>
 #include <vector>
 
 #include "protocol/enfilade.pb.h"
 #include "scene/navigation/navigation.hpp"
+#include "scene/world/queries/entity_index.hpp"
 
 namespace enfilade::server {
 
@@ -35,14 +37,15 @@ class NavigationService {
     scene::NavigationAgent agent;
     scene::WorldSettings settings;
     bool doorsOpen = false;
+    std::shared_ptr<const scene::Snapshot> snapshot;  ///< the poses of bodies
     std::unique_ptr<scene::Navigation> navigation;
   };
   /// The navigation of a size, brought to the state of the query.
-  scene::Navigation& prepare(const scene::NavigationAgent& agent, bool doorsOpen,
-                             const NavigationState& state);
+  Entry& prepare(const scene::NavigationAgent& agent, bool doorsOpen, const NavigationState& state);
 
   std::shared_ptr<const scene::Scene> scene_;
-  std::list<Entry> entries_;  ///< most recently used first
+  std::optional<scene::EntityIndex> index_;  ///< built at first use
+  std::list<Entry> entries_;                 ///< most recently used first
 };
 
 }  // namespace enfilade::server

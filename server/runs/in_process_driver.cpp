@@ -23,11 +23,15 @@ std::optional<v1::Error> InProcessDriver::go(const v1::Command& command) {
   if (auto* error = std::get_if<v1::Error>(&query)) return std::move(*error);
   if (!navigation_) navigation_.emplace(static_cast<const scene::World&>(world_).data().scene);
   std::vector<std::uint8_t> attachment;
-  auto walk =
-      makeWalk(command, navigation_->answer(std::get<v1::NavigationQuery>(query),
-                                            {world_.snapshot(), world_.settings()}, attachment));
-  if (auto* error = std::get_if<v1::Error>(&walk)) return std::move(*error);
-  return world_.submit(std::get<v1::Command>(walk));
+  auto made = makeGoOrders(command,
+                           navigation_->answer(std::get<v1::NavigationQuery>(query),
+                                               {world_.snapshot(), world_.settings()}, attachment));
+  if (auto* error = std::get_if<v1::Error>(&made)) return std::move(*error);
+  for (const v1::BodyCommand& door : std::get<GoOrders>(made).doors)
+    if (auto error = world_.submit(door)) return error;
+  for (const v1::Command& order : std::get<GoOrders>(made).orders)
+    if (auto error = world_.submit(order)) return error;
+  return std::nullopt;
 }
 
 std::optional<v1::Error> InProcessDriver::submit(const v1::BodyCommand& command) {
@@ -80,6 +84,8 @@ void InProcessDriver::recordImages() {
 protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) {
   if (!renderer_) throw protocol::ProtocolError(v1::ERROR_NO_RENDERER, "no renderer is available");
   const auto snapshot = world_.snapshot();
+  if (hasFlow(request))
+    throw protocol::ProtocolError(v1::ERROR_UNSUPPORTED, "flow needs a server", "channels");
   const std::variant<FrameView, v1::Error> view = viewFromProto(request, *snapshot);
   if (const auto* error = std::get_if<v1::Error>(&view)) {
     throw protocol::ProtocolError(error->code(), error->message(), error->field());
@@ -90,8 +96,7 @@ protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) 
         renderer_->render(*snapshot, frameView.camera, frameView.options, frameView.renderer);
     ++frames_;
     protocol::ReceivedFrame received;
-    received.description =
-        toProto(rendered, snapshot->time, request, world_.scene(), received.pixels);
+    received.description = toProto(rendered, {request, world_.scene(), *snapshot}, received.pixels);
     return received;
   } catch (const render::RenderError& error) {
     throw protocol::ProtocolError(v1::ERROR_INTERNAL, error.what());

@@ -96,6 +96,42 @@ class GroupTest(RoomCase):
         self.assertEqual([one.reply_to for one in messages], [1, 2])
         self.assertEqual(messages[0].error.code, m.ERROR_UNKNOWN_WORLD)
 
+    def test_pictures_come_through_shared_memory(self):
+        names = [self.client.create_world(drop_when_empty=True).name for _ in range(2)]
+        pictures = {}
+        for shared in (False, True):
+            base = self.server.connect()
+            self.addCleanup(base.close)
+            group = enfilade.WorldGroup(base, names, shared_memory=shared)
+            request = {"frame": enfilade.questions.frame_request(
+                eye=(0, 1, 0), forward=(1, 0, 0.2), width=33, height=21, channels=("rgb", "depth"))}
+            taken = []
+            for _ in range(3):
+                posted = [one.post([request]) for one in group.members]
+                replies = [one.take(ids)[0] for one, ids in zip(group.members, posted)]
+                taken.append([enfilade.results.frame(reply.frame, attachment)
+                              for reply, attachment in replies])
+            self.assertEqual(group._is_shared, shared)
+            self.assertEqual(taken[2][0].depth.flags.writeable, not shared)
+            pictures[shared] = taken
+        for before, after in zip(pictures[False][2], pictures[True][2]):
+            np.testing.assert_array_equal(before.rgb, after.rgb)
+            np.testing.assert_array_equal(before.depth, after.depth)
+        # The round before is still there.
+        np.testing.assert_array_equal(pictures[True][1][1].depth, pictures[True][2][1].depth)
+
+    def test_memory_that_cannot_be_opened_is_done_without(self):
+        names = [self.client.create_world(drop_when_empty=True).name]
+        base = self.server.connect()
+        self.addCleanup(base.close)
+        with unittest.mock.patch("builtins.open", side_effect=OSError):
+            group = enfilade.WorldGroup(base, names, shared_memory=True)
+        member = group.members[0]
+        self.assertFalse(group._is_shared)
+        frame = member.frame(eye=(0, 1, 0), forward=(1, 0, 0), width=8, height=8)
+        self.assertEqual(frame.rgb.shape, (8, 8, 3))
+        self.assertTrue(frame.rgb.flags.writeable)
+
     def test_a_hundred_environments(self):
         vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=100, starts=_STARTS,
                                         channels=())
@@ -262,6 +298,64 @@ class CamerasTest(RoomCase):
         noisy = [self.client.frame(**view, depth_noise=seed).depth for seed in (1, 1, 2)]
         np.testing.assert_array_equal(noisy[0], noisy[1])
         self.assertFalse(np.array_equal(noisy[0], noisy[2], equal_nan=True))
+
+
+class FlowTest(RoomCase):
+    VIEW = dict(width=48, height=36, channels=("flow", "depth", "ids"))
+
+    def test_a_driven_avatars_flow_is_the_motion_of_points(self):
+        self.client.lockstep()
+        ann = self.client.spawn("ann", at=(0, 0, 0), facing=0)
+        ann.enter()
+        self.client.step(5)
+        before = self.client.step(1, avatars=True)
+        old = before.avatars["ann"]
+        ann.drive((1, 0, 0.5))
+        now = self.client.step(6, avatars=True).avatars["ann"]
+        frame = ann.frame(forward=(1, 0, 0.1), flow_from=before.tick, flow_forward=(1, 0, -0.2),
+                          **self.VIEW)
+        f = 18 / math.tan(0.6)
+        def axes(forward):
+            forward = np.array(forward, float) / np.linalg.norm(forward)
+            right = np.cross(forward, (0, 1, 0))
+            right /= np.linalg.norm(right)
+            return forward, right, np.cross(right, forward)
+        forward, right, up = axes((1, 0, 0.1))
+        x, y = np.meshgrid(np.arange(48) + 0.5, np.arange(36) + 0.5)
+        rays = forward + (x - 24)[..., None] / f * right - (y - 18)[..., None] / f * up
+        points = np.array(now.eyes) + frame.depth[..., None].astype(float) * rays
+        forward, right, up = axes((1, 0, -0.2))
+        then = points - np.array(old.eyes)
+        z = then @ forward
+        expected = np.stack([x - (24 + f * (then @ right) / z), y - (18 - f * (then @ up) / z)], -1)
+        seen = frame.ids != 0
+        self.assertGreater(seen.sum(), 500)
+        np.testing.assert_allclose(frame.flow[seen], expected[seen], atol=2e-3)
+        self.assertTrue(np.isnan(frame.flow[~seen]).all())
+        self.assertGreater(np.abs(frame.flow[seen]).max(), 1)
+
+    def test_moving_avatars_flow_and_ticks_that_are_gone_are_refused(self):
+        self.client.lockstep()
+        bob = self.client.spawn("bob", at=(2, 0, 0))
+        bob.enter()
+        first = self.client.step(5).tick
+        bob.drive((0, 0, 1.2))
+        self.client.step(10)
+        view = dict(eye=(-1, 1, 0), forward=(1, 0, 0), intrinsics=(40, 40, 24, 18), **self.VIEW)
+        frame = self.client.frame(flow_from=first, **view)
+        names = self.client.names(frame.ids)
+        moving = np.isin(frame.ids, [one for one, name in names.items() if name == "bob"])
+        self.assertGreater(moving.sum(), 20)
+        # 0.2 m to the right at a distance of at least 2.7 m.
+        self.assertTrue((frame.flow[moving][:, 0] > 2).all())
+        still = (frame.ids != 0) & ~moving
+        np.testing.assert_allclose(frame.flow[still], 0, atol=1e-4)
+        self.client.step(40)
+        for options, words in (({"flow_from": first}, "not among the last"), ({}, "flow_from")):
+            with self.assertRaisesRegex(enfilade.ServerError, words):
+                self.client.frame(**options, **view)
+        with self.assertRaisesRegex(enfilade.ServerError, "lens"):
+            self.client.frame(eye=(0, 1, 0), forward=(1, 0, 0), lens="fisheye", flow_from=56, **self.VIEW)
 
 
 class VideoTest(unittest.TestCase):

@@ -1,13 +1,15 @@
 """Navigation by the Python client: paths, places, maps, and habitat-sim's names."""
 
 import math
+import tempfile
 import unittest
+from pathlib import Path
 
 import numpy as np
 
 import enfilade
-from enfilade.compat import MultiGoalShortestPath, PathFinder, ShortestPath
-from room import RoomCase
+from enfilade.compat import GreedyGeodesicFollower, MultiGoalShortestPath, PathFinder, ShortestPath
+from room import RoomCase, obj
 
 
 class NavigationTest(RoomCase):
@@ -142,6 +144,102 @@ class CompatTest(RoomCase):
         stop = self.finder.try_step_no_sliding((3, 0, 1), (6, 0, 2))
         self.assertGreater(end[2], stop[2])
         self.assertEqual(self.finder.get_topdown_view(0.1, 0).dtype, bool)
+
+
+class DoorsTest(unittest.TestCase):
+    """Two rooms with a door between them, and a platform that no step reaches."""
+
+    BOXES = {
+        "floor": ((-6, -0.5, -4), (6, 0, 4)),
+        "left": ((-0.1, 0, -4), (0.1, 2.5, -0.5)),
+        "right": ((-0.1, 0, 0.5), (0.1, 2.5, 4)),
+        "leaf": ((-0.04, 0.02, -0.48), (0.04, 2.2, 0.48)),
+        "platform": ((-5, 0, -3), (-3, 1, -1)),
+    }
+    SIDECAR = """{"walk":1,"bodies":[{"name":"door","kind":"sliding","objects":["leaf"],"axis":[0,0,1],
+        "limits":[0,1.0],"speed":0.5%s}]}"""
+
+    def server(self, more=""):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        (Path(folder.name) / "rooms.obj").write_text(obj(self.BOXES))
+        (Path(folder.name) / "rooms.walk.json").write_text(self.SIDECAR % more)
+        server = enfilade.serve(Path(folder.name) / "rooms.obj")
+        self.addCleanup(server.stop)
+        client = server.connect()
+        self.addCleanup(client.close)
+        client.lockstep()
+        return client
+
+    def test_a_path_names_its_closed_doors(self):
+        client = self.server()
+        self.assertFalse(client.navigation().path((-2, 0, 0), (2, 0, 0)).found)
+        navigation = client.navigation(doors="open")
+        path = navigation.path((-2, 0, 0), (2, 0, 0))
+        self.assertEqual([one.name for one in path.doors], ["door"])
+        self.assertAlmostEqual(path.doors[0].seconds, 2.0, places=6)
+        self.assertLessEqual(path.doors[0].distance, 2)
+        self.assertFalse(path.doors[0].by_touch)
+        self.assertEqual(navigation.path((-2, 0, 0), (-2, 0, 3)).doors, ())
+        client.body("door", open=True)
+        client.step(180)
+        self.assertEqual(navigation.path((-2, 0, 0), (2, 0, 0)).doors, ())
+
+    def test_go_opens_the_doors_on_its_path_and_waits_for_them(self):
+        client = self.server()
+        client.subscribe(contacts=True)
+        ann = client.spawn("ann", at=(-1, 0, 0))
+        with self.assertRaises(enfilade.ServerError):
+            ann.go((2, 0, 0))
+        self.assertEqual(ann.go_and_wait((2, 0, 0), doors="open"), "arrived")
+        self.assertNotIn("door", [one.b_name for one in client.contacts()])
+        with self.assertRaisesRegex(ValueError, "doors"):
+            ann.go((2, 0, 0), doors="closed")
+
+    def test_a_door_that_opens_by_touch_needs_no_command(self):
+        client = self.server(',"opened_by":"touch"')
+        path = client.navigation(doors="open").path((-2, 0, 0), (2, 0, 0))
+        self.assertTrue(path.doors[0].by_touch)
+        ann = client.spawn("ann", at=(-1, 0, 0))
+        self.assertEqual(ann.go_and_wait((2, 0, 0), doors="open"), "arrived")
+
+    def test_islands_have_the_reason_that_separates_them(self):
+        islands = self.server().navigation().islands(3)
+        self.assertIsNone(islands[0].path)
+        self.assertEqual(len(islands), 3)
+        reasons = {(round(one.at[1]), one.path.obstacle_name) for one in islands[1:]}
+        self.assertIn((0, "door"), reasons)
+        self.assertIn(1, [height for height, _ in reasons])
+        self.assertTrue(all(one.path.reason for one in islands[1:]))
+
+    def test_the_closest_point_of_an_obstacle(self):
+        client = self.server()
+        obstacle = client.navigation().clearance((-1, 0, 2))
+        self.assertEqual(obstacle.name, "right")
+        self.assertAlmostEqual(obstacle.point[0], -0.1, places=3)
+        np.testing.assert_allclose(obstacle.normal, (-1, 0, 0), atol=1e-3)
+        record = PathFinder(client.navigation()).closest_obstacle_surface_point((-1, 0, 2))
+        self.assertAlmostEqual(record.hit_dist, 0.6, delta=0.01)
+        self.assertAlmostEqual(record.hit_pos[0], -0.1, places=3)
+
+
+class FollowerTest(RoomCase):
+    def test_greedy_actions_lead_to_the_goal(self):
+        pathfinder = PathFinder(self.client.navigation())
+        follower = GreedyGeodesicFollower(pathfinder)
+        place, heading = np.array((2.0, 0.0, 0.0)), 0.3
+        for _ in range(200):
+            action = follower.next_action_along(place, heading, (8, 0, 0))
+            if action is None:
+                break
+            if action == "move_forward":
+                step = 0.25 * np.array((math.cos(heading), 0, -math.sin(heading)))
+                place = pathfinder.try_step(place, place + step)
+            heading += {"turn_left": 1, "turn_right": -1}.get(action, 0) * math.radians(10)
+        self.assertIsNone(action)
+        self.assertLess(math.hypot(place[0] - 8, place[2]), 0.25)
+        with self.assertRaisesRegex(ValueError, "no path"):
+            follower.next_action_along(place, heading, (5.1, 3.1, 0))
 
 
 if __name__ == "__main__":

@@ -16,9 +16,9 @@ _FACES = ((0, 4, 6, 2), (1, 3, 7, 5), (0, 1, 5, 4), (2, 6, 7, 3), (0, 2, 3, 1), 
 FLOOR, WALL, COLUMN = 1, 2, 3
 
 
-def obj() -> str:
+def obj(boxes=_BOXES) -> str:
     lines, first = [], 1
-    for name, (low, high) in _BOXES.items():
+    for name, (low, high) in boxes.items():
         lines.append(f"o {name}")
         for corner in range(8):
             x, y, z = ((high if corner >> axis & 1 else low)[axis] for axis in range(3))

@@ -3,14 +3,21 @@
 // in the queues, whose limits hold as for a connection that does not read.
 #include "server/hosting/requests/world_group.hpp"
 
+#include <unistd.h>
+
+#include <algorithm>
 #include <atomic>
+#include <bit>
 #include <mutex>
 #include <set>
+#include <span>
+#include <system_error>
 #include <vector>
 
 #include "collision/assert.hpp"
 #include "protocol/framing.hpp"
 #include "server/base/server_limits.hpp"
+#include "server/hosting/requests/shared_memory.hpp"
 #include "server/hosting/world_lifecycle.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -24,18 +31,20 @@ bool isReply(const EncodedMessage& message) {
   return head.size() > protocol::kPrefixBytes && head[protocol::kPrefixBytes] == kTagOfReplyTo;
 }
 
-/// Appends header and attachment of a message. The header may extend into the second piece.
-void appendMessage(const EncodedMessage& message, std::string& header,
-                   std::vector<std::uint8_t>& attachment) {
-  constexpr std::size_t kAlignment = 64;
+constexpr std::size_t kAlignment = 64;  // bytes, of attachments
+
+std::size_t align(std::size_t offset) {
+  return (offset + kAlignment - 1) / kAlignment * kAlignment;
+}
+
+/// Appends the header of a message, which may extend into the second piece. Returns the attachment.
+std::span<const std::uint8_t> splitMessage(const EncodedMessage& message, std::string& header) {
   const std::size_t length = protocol::readHeaderLength(*message.head);
   header.assign(message.head->begin() + protocol::kPrefixBytes, message.head->end());
-  if (!message.body) return;
-  const auto rest = static_cast<std::ptrdiff_t>(length - header.size());
-  header.append(message.body->begin(), message.body->begin() + rest);
-  if (message.body->begin() + rest == message.body->end()) return;
-  attachment.resize((attachment.size() + kAlignment - 1) / kAlignment * kAlignment);
-  attachment.insert(attachment.end(), message.body->begin() + rest, message.body->end());
+  if (!message.body) return {};
+  const std::size_t rest = length - header.size();
+  header.append(message.body->begin(), message.body->begin() + static_cast<std::ptrdiff_t>(rest));
+  return std::span(*message.body).subspan(rest);
 }
 
 v1::Error makeGoneError(const std::string& world) {
@@ -64,15 +73,44 @@ struct WorldGroup::Member : std::enable_shared_from_this<Member> {
   void answerRest();
 };
 
+/// The shared memory of a group: two halves that take turns.
+struct WorldGroup::Memory {
+  std::unique_ptr<SharedMemory> current, last;  ///< `last`: replaced, but may still be read
+  std::uint64_t rounds = 0;
+
+  /// Space for an attachment, and where it is. Throws std::system_error.
+  std::span<std::uint8_t> reserve(std::size_t bytes, v1::SharedMemory& place) {
+    constexpr std::size_t kMinHalf = 1 << 16;
+    const std::size_t half = current ? current->bytes().size() / 2 : 0;
+    if (!current || bytes > half) {
+      last = std::move(current);
+      current = std::make_unique<SharedMemory>(2 * std::bit_ceil(std::max(kMinHalf, bytes)));
+    }
+    const std::size_t offset = ++rounds % 2 * (current->bytes().size() / 2);
+    place.set_process(static_cast<std::uint32_t>(::getpid()));
+    place.set_file(static_cast<std::uint32_t>(current->descriptor()));
+    place.set_bytes(current->bytes().size());
+    place.set_offset(offset);
+    return current->bytes().subspan(offset, bytes);
+  }
+};
+
 /// One StepMany under way.
 struct WorldGroup::Round {
   std::uint64_t requestId = 0;
   std::function<void(EncodedMessage)> done;
   std::vector<std::shared_ptr<Member>> members;  ///< in the order of the request
+  std::shared_ptr<Memory> memory;                ///< null: not requested
   std::atomic<std::size_t> unfinished = 0;
 
   void finishOne() {
-    if (--unfinished == 0) done(encodeReply());
+    if (--unfinished != 0) return;
+    try {
+      done(encodeReply());
+    } catch (const std::system_error& error) {
+      done(makeErrorReply(requestId, makeError(v1::ERROR_INTERNAL,
+                                               std::string("no shared memory: ") + error.what())));
+    }
   }
   EncodedMessage encodeReply();
 };
@@ -116,26 +154,41 @@ void WorldGroup::Member::answerRest() {
 /// The messages are copied as they are encoded: on the wire, a serialized message is a field of
 /// another one. The thread of the last world does this, while all members are at rest.
 EncodedMessage WorldGroup::Round::encodeReply() {
-  std::vector<std::uint8_t> attachment;
   v1::ServerMessage reply;
   reply.set_reply_to(requestId);
+  std::vector<std::span<const std::uint8_t>> attachments;
+  std::size_t bytes = 0;
   for (const auto& member : members) {
     v1::StepManyReply::World& world = *reply.mutable_step_many()->add_worlds();
     auto& fields = *world.GetReflection()->MutableUnknownFields(&world);
     for (const EncodedMessage& message : member->messages) {
-      appendMessage(message,
-                    *fields.AddLengthDelimited(v1::StepManyReply::World::kMessagesFieldNumber),
-                    attachment);
-      world.add_attachment_ends(attachment.size());
-      if (attachment.size() > protocol::kClientLimits.total / 2)
-        return makeErrorReply(requestId,
-                              makeError(v1::ERROR_TOO_LARGE,
-                                        "the pictures do not fit into one reply: request fewer "
-                                        "worlds at a time",
-                                        "step_many.worlds"));
+      attachments.push_back(splitMessage(
+          message, *fields.AddLengthDelimited(v1::StepManyReply::World::kMessagesFieldNumber)));
+      if (!attachments.back().empty()) bytes = align(bytes) + attachments.back().size();
+      world.add_attachment_ends(bytes);
     }
   }
-  return encodeShared(reply, std::move(attachment));
+  if (bytes > protocol::kClientLimits.total / 2)
+    return makeErrorReply(requestId, makeError(v1::ERROR_TOO_LARGE,
+                                               "the pictures do not fit into one reply: request "
+                                               "fewer worlds at a time",
+                                               "step_many.worlds"));
+  std::vector<std::uint8_t> own;
+  std::span<std::uint8_t> target;
+  if (memory) {
+    target = memory->reserve(bytes, *reply.mutable_step_many()->mutable_memory());
+  } else {
+    own.resize(bytes);
+    target = own;
+  }
+  std::size_t at = 0;
+  for (const auto& attachment : attachments) {
+    if (attachment.empty()) continue;
+    at = align(at);
+    std::ranges::copy(attachment, target.begin() + static_cast<std::ptrdiff_t>(at));
+    at += attachment.size();
+  }
+  return encodeShared(reply, std::move(own));
 }
 
 WorldGroup::WorldGroup(WorldDirectory& directory, std::string name, Role role)
@@ -192,6 +245,10 @@ void WorldGroup::submit(const v1::StepMany& request, std::uint64_t requestId,
   const auto round = std::make_shared<Round>();
   round->requestId = requestId;
   round->done = std::move(done);
+  if (request.shared_memory()) {
+    if (!memory_) memory_ = std::make_shared<Memory>();
+    round->memory = memory_;
+  }
   round->unfinished = static_cast<std::size_t>(request.worlds_size()) + 1;
   for (const v1::StepMany::World& world : request.worlds())
     round->members.push_back(enter(world.world()));

@@ -29,6 +29,7 @@ class WorldGroup {
 
  private:
   struct Member;
+  struct Memory;
   struct Round;
   std::shared_ptr<Member> enter(const std::string& world);
 
@@ -36,6 +37,7 @@ class WorldGroup {
   const std::string name_;
   const Role role_;
   std::map<std::string, std::shared_ptr<Member>> members_;  ///< by world
+  std::shared_ptr<Memory> memory_;                          ///< null: not requested yet
 };
 
 }  // namespace enfilade::server

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any, Optional, Sequence, Union
 
 from . import messages
 from .errors import OrderFailed
-from .questions import Point, vec
+from .questions import Point, doors_value, vec
 from .results import AvatarState, Frame
 
 if TYPE_CHECKING:
@@ -48,20 +48,22 @@ class Avatar:
             order.speed = speed
         return self._client.command(self.name, walk=order)
 
-    def go(self, to: Union[Point, str], *, speed: Optional[float] = None) -> int:
-        """Walks along a path to a point, or to a room, a storey or an object by name. Raises ServerError
-        with the reason if there is no path."""
+    def go(self, to: Union[Point, str], *, speed: Optional[float] = None,
+           doors: str = "as_they_are") -> int:
+        """Walks along a path to a point, or to a room, a storey or an object by name. With doors="open" it
+        opens the closed ones on the path. Raises ServerError with the reason if there is no path."""
         place = messages.NavigationPlace(name=to) if isinstance(to, str) else \
             messages.NavigationPlace(point=vec(to))
-        return self._client.command(self.name, go=messages.Go(to=place, speed=speed))
+        return self._client.command(self.name, go=messages.Go(to=place, speed=speed, doors=doors_value(doors)))
 
     def walk_and_wait(self, *along: Point, speed: Optional[float] = None) -> str:
         """walk(), then ticks in lockstep until it ends. Returns "arrived", or "blocked by NAME"."""
         return self._wait_for(self.walk(*along, speed=speed))
 
-    def go_and_wait(self, to: Union[Point, str], *, speed: Optional[float] = None) -> str:
+    def go_and_wait(self, to: Union[Point, str], *, speed: Optional[float] = None,
+                    doors: str = "as_they_are") -> str:
         """go(), then ticks in lockstep until it ends; as walk_and_wait()."""
-        return self._wait_for(self.go(to, speed=speed))
+        return self._wait_for(self.go(to, speed=speed, doors=doors))
 
     def _wait_for(self, tag: int) -> str:
         with self._client._with_notices():

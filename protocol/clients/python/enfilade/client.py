@@ -476,6 +476,7 @@ class Client:
               far: Optional[float] = None, channels: Sequence[str] = ("rgb",), glass: str = "",
               renderer: str = "", shadows: bool = False, lens: str = "",
               distortion: Sequence[float] = (), depth_noise: Optional[int] = None,
+              flow_from: Optional[int] = None, flow_forward: Optional[Point] = None,
               tick: Optional[int] = None) -> Frame:
         """Returns a picture of the last tick. It is taken from the eyes of `avatar` (along `forward`
         if given), or from `eye` towards `target` or along `forward`; `avatar` is then invisible.
@@ -485,12 +486,14 @@ class Client:
         "depth", "ids", "normals", "range", "class", "thing". `glass`: "clear" or "solid". `renderer`: "gl" or "rays".
         `shadows`: of the sun, in the colour. `lens`: "fisheye" (OpenCV's model; `fov_y` is then the
         angle of the whole width, default pi; `distortion` k1 to k4) or "equirectangular".
-        `depth_noise`: the seed of a structured-light camera's noise in "depth"."""
+        `depth_noise`: the seed of a structured-light camera's noise in "depth". `flow_from`: the earlier tick of the channel "flow", of the last 32, and
+        `flow_forward` the direction in which the avatar looked then, if `forward` is given."""
         asked = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
                               height=height, fov_y=fov_y, intrinsics=intrinsics, height_y=height_y,
                               near=near, far=far, channels=channels, glass=glass,
                               renderer=renderer, shadows=shadows, lens=lens, distortion=distortion,
-                              depth_noise=depth_noise, tick=tick)
+                              depth_noise=depth_noise, flow_from=flow_from,
+                              flow_forward=flow_forward, tick=tick)
         if shadows and "shadows" not in self.welcome.capabilities:
             warnings.warn("frame: this server draws no shadows; start a newer one", stacklevel=2)
         reply, attachment = self.request(frame=asked)

@@ -14,7 +14,8 @@ Paths are walked by the server before they are returned. docs/coming_from_habita
 from __future__ import annotations
 
 import math
-from typing import List, Optional, Sequence
+from dataclasses import dataclass
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -42,6 +43,46 @@ class MultiGoalShortestPath:
         self.points: List[np.ndarray] = []
         self.geodesic_distance = math.inf
         self.closest_end_point_index = -1
+
+
+@dataclass(frozen=True)
+class HitRecord:
+    """As habitat_sim.HitRecord."""
+
+    hit_pos: np.ndarray
+    hit_normal: np.ndarray
+    hit_dist: float
+
+
+class GreedyGeodesicFollower:
+    """Actions that lead along the path to a goal, as habitat_sim.GreedyGeodesicFollower. The agent has
+    `forward_amount` metres and `turn_amount` radians per action."""
+
+    def __init__(self, pathfinder: "PathFinder", goal_radius: float = 0.25, *,
+                 forward_key: str = "move_forward", left_key: str = "turn_left",
+                 right_key: str = "turn_right", stop_key: Optional[str] = None,
+                 forward_amount: float = 0.25, turn_amount: float = math.radians(10)) -> None:
+        self.pathfinder = pathfinder
+        self.goal_radius = goal_radius
+        self.keys = {"forward": forward_key, "left": left_key, "right": right_key, "stop": stop_key}
+        self.forward_amount, self.turn_amount = forward_amount, turn_amount
+
+    def next_action_along(self, position: Sequence[float], heading: float,
+                          goal: Sequence[float]) -> Optional[str]:
+        """Returns the key of the next action of an agent with a heading in radians (0 along +X, left
+        positive); the stop key at the goal. Raises ValueError if there is no path."""
+        path = self.pathfinder.navigation.path(position, goal)
+        if not path.found:
+            raise ValueError(f"no path: {path.reason}")
+        if path.length <= self.goal_radius:
+            return self.keys["stop"]
+        here = np.asarray(position, float)
+        ahead = next((p for p in path.points[1:]
+                      if math.hypot(p[0] - here[0], p[2] - here[2]) > 0.05), path.points[-1])
+        turn = math.remainder(math.atan2(here[2] - ahead[2], ahead[0] - here[0]) - heading, math.tau)
+        if abs(turn) <= self.turn_amount / 2 + 1e-9:
+            return self.keys["forward"]
+        return self.keys["left" if turn > 0 else "right"]
 
 
 class PathFinder:
@@ -116,6 +157,28 @@ class PathFinder:
         """From the agent's surface, as in habitat-sim; NaN: no agent can stand there."""
         obstacle = self.navigation.clearance(pt, max_search_radius)
         return math.nan if obstacle is None else max(0.0, obstacle.distance - self.navigation.radius)
+
+    def closest_obstacle_surface_point(self, pt: Sequence[float],
+                                       max_search_radius: float = 2.0) -> "HitRecord":
+        """`hit_dist` as distance_to_closest_obstacle(); infinite without an obstacle."""
+        obstacle = self.navigation.clearance(pt, max_search_radius)
+        if obstacle is None or obstacle.point is None or obstacle.normal is None:
+            return HitRecord(_NOWHERE.copy(), _NOWHERE.copy(), math.inf)
+        distance = max(0.0, obstacle.distance - self.navigation.radius)
+        return HitRecord(np.array(obstacle.point), np.array(obstacle.normal), distance)
+
+    def get_bounds(self) -> Tuple[np.ndarray, np.ndarray]:
+        """Of the scene."""
+        bounds = self.navigation._client.welcome.scene.bounds
+        return tuple(np.array((p.x, p.y, p.z)) for p in (bounds.min, bounds.max))  # type: ignore[return-value]
+
+    def island_radius(self, point: Sequence[float]) -> float:
+        """The distance from the point to the farthest of 1000 random places of its island; 0: none."""
+        island = self.get_island(point)
+        if island < 0:
+            return 0.0
+        spots = self.navigation.random_places(1000, 1, island=island)
+        return max(float(np.linalg.norm(spot.at - np.asarray(point))) for spot in spots if spot)
 
     def get_topdown_view(self, meters_per_pixel: float, height: float) -> np.ndarray:
         return self.navigation.top_down(height, meters_per_pixel).cells

@@ -453,7 +453,7 @@ class WalkEnv(spaces.EnvBase):
                 seen[camera.prefix + name] = frame.channel(name)
             if "depth" in camera.channels:
                 depth = seen[camera.prefix + "depth"]
-                np.copyto(depth, np.inf, where=np.isnan(depth))
+                seen[camera.prefix + "depth"] = np.where(np.isnan(depth), np.float32(np.inf), depth)
         if self.render_mode is not None and self._picture_key in seen:
             self._rgb = seen[self._picture_key].copy()  # the observation belongs to its reader
         seen["position"] = self._feet.copy()

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import messages
-from .questions import Point, points, vec
+from .questions import Point, doors_value, points, vec
 
 if TYPE_CHECKING:
     from .avatar import Avatar
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 # A point of the feet, an Avatar, or the name of a room, a storey or an object.
 Place = Union[Point, str, "Avatar"]
 
-_DOORS = {"as_they_are": 1, "open": 2}
 _MOST_POINTS = 10_000  # of one query
 _MOST_GOALS = 100
 
@@ -36,6 +35,26 @@ class Path:
     obstacle_at: Optional[Tuple[float, float, float]] = None
     clear_width: Optional[float] = None  # metres: at the obstacle, or at the narrowest place of the path
     narrowest_at: Optional[Tuple[float, float, float]] = None
+    doors: Tuple["Door", ...] = ()  # with doors="open": the closed ones on the path, in order
+
+
+@dataclass(frozen=True)
+class Door:
+    """A closed door on a path."""
+    id: int
+    name: str  # for Client.body()
+    distance: float  # metres from the start of the path
+    seconds: float  # that it takes to open
+    by_touch: bool  # an avatar that walks into it opens it
+
+
+@dataclass(frozen=True)
+class Island:
+    """A part of the navigable floor. `path` is one to the largest island, mostly without way points: its
+    reason, obstacle and clear width say why not. None for the largest."""
+    area: float  # square metres
+    at: Tuple[float, float, float]  # a place on it
+    path: Optional[Path]
 
 
 @dataclass(frozen=True)
@@ -51,6 +70,8 @@ class Obstacle:
     distance: float  # metres from the avatar's axis
     entity: int = 0
     name: str = ""
+    point: Optional[Tuple[float, float, float]] = None  # the closest one on it
+    normal: Optional[Tuple[float, float, float]] = None  # unit, towards the avatar
 
 
 @dataclass(frozen=True)
@@ -80,7 +101,8 @@ def _path(one: Any) -> Path:
         obstacle_name=one.obstacle_name,
         obstacle_at=_xyz(one.obstacle_at) if one.HasField("obstacle_at") else None,
         clear_width=one.clear_width or None,
-        narrowest_at=_xyz(one.narrowest_at) if one.HasField("narrowest_at") else None)
+        narrowest_at=_xyz(one.narrowest_at) if one.HasField("narrowest_at") else None,
+        doors=tuple(Door(d.id, d.name, d.distance, d.seconds, d.by_touch) for d in one.doors))
 
 
 def _spot(one: Any) -> Optional[Spot]:
@@ -94,11 +116,10 @@ class Navigation:
 
     def __init__(self, client: "Client", radius: Optional[float], height: Optional[float],
                  speed: Optional[float], doors: str) -> None:
-        if doors not in _DOORS:
-            raise ValueError(f"doors: unknown value {doors!r}; give as_they_are or open")
         self._client = client
         self.radius = 0.3 if radius is None else radius  # metres
-        self._options = {"radius": radius, "height": height, "speed": speed, "doors": _DOORS[doors]}
+        self._options = {"radius": radius, "height": height, "speed": speed, 
+                         "doors": doors_value(doors)}
         self._report: Any = None  # the last reply
 
     def _ask(self, **query: Any) -> Tuple[Any, memoryview]:
@@ -175,7 +196,17 @@ class Navigation:
         """Returns the closest obstacle; None: an avatar cannot stand there."""
         query = messages.NavigationQuery.Clearance(points=[vec(point)], max_distance=max_distance)
         one = self._ask(clearance=query)[0].obstacles[0]
-        return Obstacle(one.distance, one.entity, one.name) if one.found else None
+        if not one.found:
+            return None
+        return Obstacle(one.distance, one.entity, one.name,
+                        _xyz(one.point) if one.HasField("point") else None,
+                        _xyz(one.normal) if one.HasField("normal") else None)
+
+    def islands(self, count: int = 10) -> List[Island]:
+        """Returns the largest islands, and why no path leads from each to the largest."""
+        query = messages.NavigationQuery.Islands(count=count)
+        return [Island(one.area, _xyz(one.at), _path(one.path) if one.HasField("path") else None)
+                for one in self._ask(islands=query)[0].islands]
 
     def top_down(self, height: float, cell: float = 0.05) -> Map:
         """Returns a map of the floors within 0.5 m of a height."""

@@ -28,6 +28,15 @@ def points(points: Any, name: str) -> np.ndarray:
     return array
 
 
+def doors_value(name: str) -> int:
+    """Returns the value of NavigationQuery.Doors."""
+    values = messages.NavigationQuery.DESCRIPTOR.enum_types_by_name["Doors"].values_by_name
+    value = values.get("DOORS_" + name.upper())
+    if value is None or value.number == 0:
+        raise ValueError(f"doors: unknown value {name!r}; give as_they_are or open")
+    return int(value.number)
+
+
 def entity(which: Any) -> Any:
     """Returns the EntityRef of an id, a name, a path, or an object with a name, as an Avatar."""
     if isinstance(which, str):
@@ -77,7 +86,8 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
                   near: Optional[float] = None, far: Optional[float] = None,
                   channels: Sequence[str] = ("rgb",), glass: str = "", renderer: str = "",
                   shadows: bool = False, lens: str = "", distortion: Sequence[float] = (),
-                  depth_noise: Optional[int] = None, tick: Optional[int] = None) -> Any:
+                  depth_noise: Optional[int] = None, flow_from: Optional[int] = None,
+                  flow_forward: Optional[Point] = None, tick: Optional[int] = None) -> Any:
     """Returns the FrameRequest that Client.frame() sends."""
     if sum(one is not None for one in (fov_y, intrinsics, height_y)) > 1:
         raise ValueError("frame: give one of fov_y, intrinsics and height_y")
@@ -108,6 +118,10 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
         asked.intrinsics.CopyFrom(messages.Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy))
     if lens or len(distortion):
         _set_lens(asked, lens, fov_y, distortion)
+    if flow_from is not None:
+        asked.flow_from = flow_from
+    if flow_forward is not None:
+        asked.flow_forward.CopyFrom(vec(flow_forward))
     if depth_noise is not None:
         asked.depth_noise.seed = depth_noise
     if glass:

@@ -167,6 +167,7 @@ class Frame:
     message: Any  # the Frame of the .proto, with the camera as used
     class_ids: Optional[np.ndarray] = None  # height x width, uint32: ObjectInfo.class_id; 0: none
     things: Optional[np.ndarray] = None  # height x width, uint32: ObjectInfo.thing; 0: background
+    flow: Optional[np.ndarray] = None  # height x width x 2, float32: pixels to the right and down; NaN
 
     def channel(self, name: str) -> Any:
         """Returns the array of a channel by its name in requests."""
@@ -180,6 +181,7 @@ _CHANNELS = {"depth": (messages.CHANNEL_DEPTH, np.dtype(np.float32), 1),
              "range": (messages.CHANNEL_RANGE, np.dtype(np.float32), 1),
              "class": (messages.CHANNEL_CLASS, np.dtype(np.uint32), 1),
              "thing": (messages.CHANNEL_THING, np.dtype(np.uint32), 1),
+             "flow": (messages.CHANNEL_FLOW, np.dtype(np.float32), 2),
              "normals": (messages.CHANNEL_NORMALS, np.dtype(np.float32), 3),
              "rgb": (messages.CHANNEL_RGB, np.dtype(np.uint8), 3)}
 _BY_NUMBER = {number: (name, kind, depth) for name, (number, kind, depth) in _CHANNELS.items()}
@@ -209,7 +211,7 @@ def frame(message: Any, attachment: memoryview) -> Frame:
         found[name] = np.frombuffer(attachment, kind, count, plane.offset).reshape(shape)
     return Frame(message.tick, message.time, message.renderer, message.software, found.get("rgb"),
                  found.get("depth"), found.get("ids"), found.get("normals"), found.get("range"),
-                 message, found.get("class"), found.get("thing"))
+                 message, found.get("class"), found.get("thing"), found.get("flow"))
 
 
 @dataclass(frozen=True, eq=False)  # arrays do not compare as one

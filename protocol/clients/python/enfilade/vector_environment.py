@@ -18,6 +18,23 @@ from .world_group import WorldGroup
 MAX_DRAWS = 32  # of a start, for one episode
 
 
+class _Batch:
+    """Observations of all environments. Each is copied at once, because the server's shared memory is
+    valid for two rounds only."""
+
+    def __init__(self, envs: List[WalkEnv]) -> None:
+        self._envs = envs
+        self.observations: Observation = {}
+
+    def add(self, i: int, seen: Observation) -> None:
+        if not self.observations:
+            self.observations = {name: np.empty((len(self._envs), *one.shape), one.dtype)
+                                 for name, one in seen.items()}
+        for name, one in seen.items():
+            self.observations[name][i] = one
+        self._envs[i]._seen = {name: all_[i] for name, all_ in self.observations.items()}
+
+
 class VectorWalkEnv(spaces.VectorEnvBase):
     """Several WalkEnvs that run at the same time, in worlds of one server that share its scene: one
     message steps all of them.
@@ -89,7 +106,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                              f"not {self.num_envs}")
         worlds = [maker.create_world(scene=scene or maker.scenes[0], drop_when_empty=True).name
                   for _ in range(self.num_envs)]
-        return WorldGroup(maker, worlds).members
+        return WorldGroup(maker, worlds, shared_memory=True).members
 
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
@@ -97,12 +114,19 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         seeds = self._seeds(seed)
         self._over = None
         is_drawn = "start" not in (options or {})
-        taken, failures = self._each(lambda i: self.envs[i]._post_reset(seeds[i], options or {}),
-                                     lambda i, ids: self._entered(i, ids, is_drawn))
+        batch = _Batch(self.envs)
+
+        def take(i: int, ids: List[int]) -> Dict[str, Any]:
+            seen, info = self._entered(i, ids, is_drawn)
+            batch.add(i, seen)
+            return info
+
+        infos, failures = self._each(
+            lambda i: self.envs[i]._post_reset(seeds[i], options or {}), take)
         if failures:
             raise self._numbered(failures)
         self._over = np.zeros(self.num_envs, bool)
-        return self._stacked([one[0] for one in taken]), self._gathered([one[1] for one in taken])
+        return batch.observations, self._gathered(infos)
 
     def _seeds(self, seed: Any) -> List[Optional[int]]:
         if seed is None:
@@ -129,20 +153,25 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             env = self.envs[i]
             return env._post_reset(None, {}) if over[i] else env._post_step(meanings[i])
 
-        def take(i: int, ids: List[int]) -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
-            if not over[i]:
-                return self.envs[i]._take_step(ids)
-            seen, info = self._entered(i, ids, True)
-            return seen, 0.0, False, False, info
+        batch = _Batch(self.envs)
+
+        def take(i: int, ids: List[int]) -> Tuple[float, bool, bool, Dict[str, Any]]:
+            if over[i]:
+                seen, info = self._entered(i, ids, True)
+                result = (0.0, False, False, info)
+            else:
+                seen, *result = self.envs[i]._take_step(ids)
+            batch.add(i, seen)
+            return result
 
         self._over = None
         taken, failures = self._each(post, take)
         if failures:
-            self._over = np.array([one is None or one[2] or one[3] for one in taken])
+            self._over = np.array([one is None or one[1] or one[2] for one in taken])
             raise self._numbered(failures)
-        observations, rewards, terminated, truncated, infos = zip(*taken)
+        rewards, terminated, truncated, infos = zip(*taken)
         self._over = np.array(terminated, bool) | np.array(truncated, bool)
-        return (self._stacked(observations), np.array(rewards), np.array(terminated),
+        return (batch.observations, np.array(rewards), np.array(terminated),
                 np.array(truncated), self._gathered(infos))
 
     def _entered(self, i: int, ids: List[int], is_drawn: bool) -> Tuple[Observation, Dict[str, Any]]:
@@ -198,10 +227,6 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             self._maker.close()
         if self.server is not None:
             self.server.stop()
-
-    @staticmethod
-    def _stacked(observations: Sequence[Observation]) -> Observation:
-        return {name: np.stack([one[name] for one in observations]) for name in observations[0]}
 
     @staticmethod
     def _gathered(infos: Sequence[Dict[str, Any]]) -> Dict[str, Any]:

@@ -1,0 +1,95 @@
+"""Steps per second of Python environments: worlds stepped together (StepMany) against one connection per
+world, in turns in one run. The observations of both must be equal.
+
+    python3 environments.py SCENE [--quick]
+"""
+
+import argparse
+import statistics
+import time
+
+import numpy as np
+
+import enfilade
+
+OPTIONS = {"starts": "anywhere", "size": (128, 128), "max_steps": 10 ** 6}
+
+
+class Separate:
+    """One connection per world: every request is sent to all before a reply is taken."""
+
+    def __init__(self, server: enfilade.Server, count: int, channels: tuple) -> None:
+        self.maker = server.connect()
+        worlds = [self.maker.create_world(drop_when_empty=True).name for _ in range(count)]
+        self.clients = [enfilade.connect(server.address, world=world) for world in worlds]
+        self.envs = [enfilade.WalkEnv(client=one, channels=channels, **OPTIONS) for one in self.clients]
+
+    def reset(self, seed: int) -> None:
+        for i, env in enumerate(self.envs):
+            env.reset(seed=seed + i)
+
+    def step(self, actions: np.ndarray) -> dict:
+        posted = [env._post_step(env._meaning(action)) for env, action in zip(self.envs, actions)]
+        seen = [env._take_step(ids)[0] for env, ids in zip(self.envs, posted)]
+        return {name: np.stack([one[name] for one in seen]) for name in seen[0]}
+
+    def close(self) -> None:
+        for client in (*self.clients, self.maker):
+            client.close()
+
+
+class Together:
+    """VectorWalkEnv."""
+
+    def __init__(self, server: enfilade.Server, count: int, channels: tuple) -> None:
+        self.vector = enfilade.VectorWalkEnv(address=server.address, num_envs=count, channels=channels,
+                                             **OPTIONS)
+
+    def reset(self, seed: int) -> None:
+        self.vector.reset(seed=seed)
+
+    def step(self, actions: np.ndarray) -> dict:
+        return self.vector.step(actions)[0]
+
+    def close(self) -> None:
+        self.vector.close()
+
+
+def measure(server: enfilade.Server, count: int, channels: tuple, steps: int, rounds: int) -> str:
+    both = [Separate(server, count, channels), Together(server, count, channels)]
+    random = np.random.default_rng(1)
+    rates: list = [[], []]
+    for one in both:
+        one.reset(1)
+    for _ in range(rounds):
+        actions = random.uniform(-1, 1, (steps, count, 2))
+        seen = []
+        for one, rate in zip(both, rates):
+            start = time.perf_counter()
+            for action in actions:
+                last = one.step(action)
+            rate.append(count * steps / (time.perf_counter() - start))
+            seen.append(last)
+        for name in seen[0]:
+            np.testing.assert_array_equal(seen[0][name], seen[1][name])
+    for one in both:
+        one.close()
+    separate, together = (statistics.median(rate) for rate in rates)
+    return (f"{count:4} worlds, {'+'.join(channels) or 'no pictures':12} separate {separate:8.0f}/s   "
+            f"together {together:8.0f}/s   ratio {together / separate:.2f}")
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("scene")
+    parser.add_argument("--quick", action="store_true")
+    arguments = parser.parse_args()
+    with enfilade.serve(arguments.scene) as server:
+        for channels, steps in (((), 200), (("depth",), 40)):
+            for count in (1, 16) if arguments.quick else (1, 4, 16, 64):
+                print(measure(server, count, channels, max(8, steps * 16 // max(count, 4) // 4),
+                              3 if arguments.quick else 7), flush=True)
+
+
+if __name__ == "__main__":
+    main()
