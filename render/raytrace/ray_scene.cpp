@@ -51,7 +51,8 @@ RayScene::RayScene(std::shared_ptr<const scene::Scene> scene, bool robust,
   for (const scene::Mesh& mesh : model.meshes) materials_.push_back(makeMaterialData(model, mesh));
   for (const DrawItem& item : items_)
     hasMaskTextures_ |= item.alphaMode == AlphaMode::mask && item.texture >= 0;
-  worldFromItem_.resize(model.bodies.empty() ? 0 : items_.size());
+  for (std::size_t i = 0; i < items_.size(); ++i)
+    if (items_[i].body != kNoBody) bodyItems_.push_back(i);
   chooseInstancing();
 }
 
@@ -70,14 +71,18 @@ void RayScene::chooseInstancing() {
 
 std::vector<TriangleBatch> RayScene::collectBatches(bool isDynamic, bool transparent) const {
   std::vector<TriangleBatch> batches;
-  for (std::size_t i = 0; i < items_.size(); ++i) {
+  const auto add = [&](std::size_t i, const Eigen::Affine3d& worldFromMesh) {
     const DrawItem& item = items_[i];
-    if ((item.body != kNoBody) != isDynamic || (item.alphaMode == AlphaMode::blend) != transparent)
-      continue;
-    batches.push_back({&model().meshes[item.mesh],
-                       isDynamic ? &worldFromItem_[i] : &model().objects[item.object].worldFromMesh,
-                       &materials_[item.mesh], item.object + 1, item.texture, item.alphaMode,
-                       instanced_[i]});
+    if ((item.alphaMode == AlphaMode::blend) != transparent) return;
+    batches.push_back({&model().meshes[item.mesh], &worldFromMesh, &materials_[item.mesh],
+                       item.object + 1, item.texture, item.alphaMode, instanced_[i]});
+  };
+  if (isDynamic) {
+    for (std::size_t k = 0; k < bodyItems_.size(); ++k)
+      add(bodyItems_[k], bodyStates_.front().worldFromItem[k]);
+  } else {
+    for (std::size_t i = 0; i < items_.size(); ++i)
+      if (items_[i].body == kNoBody) add(i, model().objects[items_[i].object].worldFromMesh);
   }
   return batches;
 }
@@ -93,21 +98,29 @@ void RayScene::update(const scene::Snapshot& snapshot) {
 }
 
 void RayScene::updateBodies(const scene::Snapshot& snapshot) {
-  if (worldFromItem_.empty()) return;
-  if (currentBodies_ && currentBodies_ == snapshot.bodies) return;
-  currentBodies_ = snapshot.bodies;
-  // Worlds of one scene take turns; in most of them the bodies are at the same place.
-  std::vector<BodyPlacement> bodies = computeBodyPlacements(*scene_, snapshot);
-  if (bodies == currentPlacements_) return;
-  for (std::size_t i = 0; i < items_.size(); ++i) {
-    const DrawItem& item = items_[i];
-    if (item.body == kNoBody) continue;
-    worldFromItem_[i] = model().objects[item.object].worldFromMesh;
-    if (!bodies[item.body].displaced) continue;
-    worldFromItem_[i] = bodies[item.body].sceneFromAuthored * worldFromItem_[i];
+  constexpr std::size_t kMaxStates = 64;
+  if (bodyItems_.empty()) return;
+  auto known = std::ranges::find_if(bodyStates_, [&](const BodyState& state) {
+    return snapshot.bodies && state.snapshot == snapshot.bodies;
+  });
+  std::vector<BodyPlacement> placements;
+  if (known == bodyStates_.end()) {
+    placements = computeBodyPlacements(*scene_, snapshot);
+    known = std::ranges::find(bodyStates_, placements, &BodyState::placements);
   }
-  for (LazyTree& trees : bodyTrees_) trees = {};
-  currentPlacements_ = std::move(bodies);
+  if (known != bodyStates_.end()) {
+    bodyStates_.splice(bodyStates_.begin(), bodyStates_, known);
+    bodyStates_.front().snapshot = snapshot.bodies;
+    return;
+  }
+  BodyState state{snapshot.bodies, std::move(placements), {}, {}};
+  for (const std::size_t i : bodyItems_) {
+    const BodyPlacement& body = state.placements[items_[i].body];
+    const Eigen::Affine3d& authored = model().objects[items_[i].object].worldFromMesh;
+    state.worldFromItem.push_back(body.displaced ? body.sceneFromAuthored * authored : authored);
+  }
+  bodyStates_.push_front(std::move(state));
+  if (bodyStates_.size() > kMaxStates) bodyStates_.pop_back();
 }
 
 void RayScene::updateAvatars(const scene::Snapshot& snapshot) {
@@ -142,7 +155,8 @@ void RayScene::buildAvatarTree() {
 std::vector<const RayTree*> RayScene::opaqueTrees(scene::EntityId hiddenEntity) {
   std::vector<const RayTree*> trees;
   for (const bool isDynamic : {false, true}) {
-    LazyTree& lazyTree = (isDynamic ? bodyTrees_ : staticTrees_)[0];
+    if (isDynamic && bodyItems_.empty()) continue;
+    LazyTree& lazyTree = (isDynamic ? bodyStates_.front().trees : staticTrees_)[0];
     if (!lazyTree.built) lazyTree = {true, buildTree(collectBatches(isDynamic, false))};
     if (lazyTree.tree) trees.push_back(&*lazyTree.tree);
   }
@@ -157,7 +171,8 @@ std::vector<const RayTree*> RayScene::opaqueTrees(scene::EntityId hiddenEntity) 
 std::vector<const RayTree*> RayScene::transparentTrees() {
   std::vector<const RayTree*> trees;
   for (const bool isDynamic : {false, true}) {
-    LazyTree& lazyTree = (isDynamic ? bodyTrees_ : staticTrees_)[1];
+    if (isDynamic && bodyItems_.empty()) continue;
+    LazyTree& lazyTree = (isDynamic ? bodyStates_.front().trees : staticTrees_)[1];
     if (!lazyTree.built) lazyTree = {true, buildTree(collectBatches(isDynamic, true))};
     if (lazyTree.tree) trees.push_back(&*lazyTree.tree);
   }

@@ -2,6 +2,7 @@
 // surfaces separately. Trees are built on demand.
 #pragma once
 
+#include <list>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -48,10 +49,6 @@ class RayScene {
   std::vector<bool> instanced_;          ///< one per item
   bool hasMaskTextures_ = false;
 
-  /// Valid for items of bodies; empty if the model has no bodies.
-  std::vector<Eigen::Affine3d> worldFromItem_;
-  std::shared_ptr<const std::vector<scene::BodySnapshot>> currentBodies_;
-  std::vector<BodyPlacement> currentPlacements_;
   std::vector<scene::AvatarSnapshot> currentAvatars_;
   std::vector<scene::Mesh> avatarMeshes_;
   std::vector<Eigen::Affine3d> worldFromAvatars_;
@@ -61,7 +58,18 @@ class RayScene {
     bool built = false;
     std::optional<RayTree> tree;  ///< nullopt: no such items
   };
-  LazyTree staticTrees_[2], bodyTrees_[2];  ///< opaque, transparent
+  LazyTree staticTrees_[2];  ///< opaque, transparent
+  /// Bodies at one set of places, and their trees. Worlds of one scene take turns in the renderer,
+  /// so several are kept.
+  struct BodyState {
+    std::shared_ptr<const std::vector<scene::BodySnapshot>>
+        snapshot;  ///< the last with these places
+    std::vector<BodyPlacement> placements;
+    std::vector<Eigen::Affine3d> worldFromItem;  ///< by number in bodyItems_
+    LazyTree trees[2];                           ///< opaque, transparent
+  };
+  std::list<BodyState> bodyStates_;     ///< the current one first, then by last use
+  std::vector<std::size_t> bodyItems_;  ///< indices into items_, of bodies; empty: there are none
   LazyTree avatarTree_;
 };
 

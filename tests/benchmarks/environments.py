@@ -27,10 +27,15 @@ class Separate:
     def reset(self, seed: int) -> None:
         for i, env in enumerate(self.envs):
             env.reset(seed=seed + i)
+        self.over = [False] * len(self.envs)
 
     def step(self, actions: np.ndarray) -> dict:
-        posted = [env._post_step(env._meaning(action)) for env, action in zip(self.envs, actions)]
-        seen = [env._take_step(ids)[0] for env, ids in zip(self.envs, posted)]
+        posted = [env._post_reset(None, {}) if over else env._post_step(env._meaning(action))
+                  for env, action, over in zip(self.envs, actions, self.over)]
+        taken = [env._take_reset(ids) if over else env._take_step(ids)
+                 for env, ids, over in zip(self.envs, posted, self.over)]
+        self.over = [len(one) > 2 and bool(one[2] or one[3]) for one in taken]
+        seen = [one[0] for one in taken]
         return {name: np.stack([one[name] for one in seen]) for name in seen[0]}
 
     def close(self) -> None:
