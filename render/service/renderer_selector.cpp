@@ -49,7 +49,7 @@ struct RendererSelector::State {
   RendererKind chooseKind(const Camera& camera, const FrameOptions& options,
                           RendererKind requested) const {
     if (camera.lens) {
-      if (requested == RendererKind::gl || device.requireGpu)
+      if (requested == RendererKind::gl)
         throw RenderError("camera: lens is given; it must be absent with OpenGL: request rays");
       return RendererKind::rays;
     }

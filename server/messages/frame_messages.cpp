@@ -198,6 +198,13 @@ std::optional<v1::Error> applyLens(render::Camera& camera, const v1::FrameReques
   if (request.renderer() == v1::RENDERER_GL)
     return makeError(v1::ERROR_BAD_CAMERA,
                      "lens: OpenGL draws none: leave renderer out, or give rays", "lens");
+  const bool hasFieldOfView =
+      request.has_eyes() ? request.eyes().has_fov_y()
+                         : request.free().projection_case() != v1::FreeCamera::PROJECTION_NOT_SET;
+  if (hasFieldOfView)
+    return makeError(v1::ERROR_BAD_CAMERA,
+                     "lens: leave fov_y and height_y out; a fisheye has intrinsics or a width",
+                     "lens");
   const v1::Lens::Fisheye& fisheye = given.fisheye();
   camera.lens = render::Camera::Lens{given.has_fisheye() ? Kind::fisheye : Kind::equirectangular,
                                      {fisheye.k1(), fisheye.k2(), fisheye.k3(), fisheye.k4()}};

@@ -39,7 +39,7 @@ void ContactHistory::addEvents(const v1::TickEvents& events) {
     const bool begins = event.kind() == Event::KIND_BEGIN || event.kind() == Event::KIND_ENTER;
     if (begins) begins_[{event.kind(), event.a(), event.b()}].push_back(event);
     const bool isShown = begins || event.kind() == Event::KIND_BLOCKED ||
-                         (event.kind() == Event::KIND_NEAR && event.phase() == Event::PHASE_BEGIN);
+                         (event.kind() == Event::KIND_NEAR && event.phase() == Event::PHASE_MIN);
     if (!isShown || event.tick() > completeTo_) continue;
     if (events_.size() < kMaxTimelineEvents) {
       events_.push_back(event);

@@ -92,6 +92,22 @@ TEST(Extras, MistakesNameTheFileTheNodeAndTheField) {
   has(failureOf(R"({"walk_kind":"rigid","walk_mass":-1})"), "mass is -1");
 }
 
+TEST(Extras, AClassMakesTheObjectsBelowOneThing) {
+  const Model model =
+      modelOf("0,3", R"({"name":"bed","children":[1,2],"extras":{"walk_class":"bed"}},)"
+                     R"({"name":"frame","mesh":0},{"name":"mattress","mesh":0},)"
+                     R"({"name":"lamp","mesh":0,"extras":{"class":"lamp","walk_class":7}})");
+  EXPECT_TRUE(model.bodies.empty());
+  for (const Diagnostic& one : model.diagnostics) EXPECT_NE(one.kind, "extras_without_kind");
+  const std::uint32_t frame = objectOf(model, "bed/frame"), lamp = objectOf(model, "lamp");
+  EXPECT_EQ(model.objects[frame].className, "bed");
+  EXPECT_EQ(model.objects[frame].thing, frame);
+  EXPECT_EQ(model.objects[objectOf(model, "bed/mattress")].className, "bed");
+  EXPECT_EQ(model.objects[objectOf(model, "bed/mattress")].thing, frame);
+  EXPECT_EQ(model.objects[lamp].className, "lamp") << "a class is a text";
+  EXPECT_EQ(model.objects[lamp].thing, std::nullopt);
+}
+
 TEST(Extras, WithoutAKindAreReportedAndDefineNoBody) {
   const Model model = modelOf("0", R"({"name":"a","mesh":0,"extras":{"walk_speed":3}})");
   EXPECT_TRUE(model.bodies.empty());

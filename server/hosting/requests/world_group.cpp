@@ -16,7 +16,6 @@
 
 #include "collision/assert.hpp"
 #include "protocol/framing.hpp"
-#include "server/base/server_limits.hpp"
 #include "server/hosting/requests/shared_memory.hpp"
 #include "server/hosting/world_lifecycle.hpp"
 #include "server/messages/world_messages.hpp"
@@ -168,11 +167,15 @@ EncodedMessage WorldGroup::Round::encodeReply() {
       world.add_attachment_ends(bytes);
     }
   }
-  if (bytes > protocol::kClientLimits.total / 2)
-    return makeErrorReply(requestId, makeError(v1::ERROR_TOO_LARGE,
-                                               "the pictures do not fit into one reply: request "
-                                               "fewer worlds at a time",
-                                               "step_many.worlds"));
+  if (bytes > protocol::kClientLimits.total / 2 ||
+      reply.ByteSizeLong() > protocol::kClientLimits.header / 2) {
+    for (const auto& member : members) member->ended = true;  // it has lost events
+    return makeErrorReply(
+        requestId, makeError(v1::ERROR_TOO_LARGE,
+                             "the events or pictures do not fit into one reply: request fewer "
+                             "worlds at a time; this connection has left them",
+                             "step_many.worlds"));
+  }
   std::vector<std::uint8_t> own;
   std::span<std::uint8_t> target;
   if (memory) {
@@ -191,8 +194,13 @@ EncodedMessage WorldGroup::Round::encodeReply() {
   return encodeShared(reply, std::move(own));
 }
 
-WorldGroup::WorldGroup(WorldDirectory& directory, std::string name, Role role)
-    : directory_(directory), name_(std::move(name)), role_(role) {}
+WorldGroup::WorldGroup(WorldDirectory& directory, std::string name, Role role,
+                       const ServerLimits& limits)
+    : directory_(directory),
+      name_(std::move(name)),
+      role_(role),
+      limits_{limits.outgoingBytes, limits.outgoingFrames, limits.outgoingFrameBytes,
+              std::make_shared<OutgoingBudget>(limits.outgoingBytes)} {}
 
 WorldGroup::~WorldGroup() = default;
 
@@ -228,10 +236,8 @@ std::shared_ptr<WorldGroup::Member> WorldGroup::enter(const std::string& world) 
   if (member && member->membership && !member->ended) return member;
   member = std::make_shared<Member>();
   member->world = world;
-  const ServerLimits limits;
   member->out = std::make_shared<OutgoingQueue>(
-      OutgoingLimits{limits.outgoingBytes, limits.outgoingFrames, limits.outgoingFrameBytes},
-      encodeBye(makeBye(v1::ERROR_TOO_SLOW, "its messages were not read in time")),
+      limits_, encodeBye(makeBye(v1::ERROR_TOO_SLOW, "its messages were not read in time")),
       [weak = std::weak_ptr(member)] {
         if (const auto self = weak.lock()) self->collect();
       });
@@ -266,8 +272,10 @@ void WorldGroup::submit(const v1::StepMany& request, std::uint64_t requestId,
     }
     member.collect();  // what was queued between rounds; ends the round if there are no requests
   }
-  for (const v1::StepMany::World& world : request.worlds())
-    if (world.leave()) members_.erase(world.world());
+  for (const v1::StepMany::World& world : request.worlds()) {
+    const auto member = members_.find(world.world());
+    if (world.leave() || !member->second->membership) members_.erase(member);
+  }
   round->finishOne();
 }
 

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "server/base/access.hpp"
+#include "server/base/server_limits.hpp"
 #include "server/hosting/world_directory.hpp"
 #include "server/messages/outgoing_queue.hpp"
 
@@ -14,8 +15,9 @@ namespace enfilade::server {
 
 class WorldGroup {
  public:
-  /// `name` and `role`: of the client in all worlds. `directory` must outlive the group.
-  WorldGroup(WorldDirectory& directory, std::string name, Role role);
+  /// `name` and `role`: of the client in all worlds. `directory` must outlive the group. All worlds
+  /// together may leave as much unread as one connection.
+  WorldGroup(WorldDirectory& directory, std::string name, Role role, const ServerLimits& limits);
   ~WorldGroup();  ///< leaves all worlds
   WorldGroup(const WorldGroup&) = delete;
   WorldGroup& operator=(const WorldGroup&) = delete;
@@ -36,6 +38,7 @@ class WorldGroup {
   WorldDirectory& directory_;
   const std::string name_;
   const Role role_;
+  const OutgoingLimits limits_;
   std::map<std::string, std::shared_ptr<Member>> members_;  ///< by world
   std::shared_ptr<Memory> memory_;                          ///< null: not requested yet
 };

@@ -49,7 +49,8 @@ void handleStepMany(const RequestContext& context, const v1::StepMany& request) 
     return replyError(context, std::move(*error));
   Client& client = context.client;
   if (!client.group)
-    client.group = std::make_shared<WorldGroup>(*identity.directory, client.name, client.role);
+    client.group = std::make_shared<WorldGroup>(*identity.directory, client.name, client.role,
+                                                context.hosted.limits);
   client.group->submit(request, context.message.request_id(), deferReply(context));
 }
 

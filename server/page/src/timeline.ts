@@ -3,7 +3,7 @@ import type { App } from "./app";
 import { classOf, wordOf } from "./contacts";
 import { button, element, setText } from "./dom";
 import { clockTime, shortName } from "./format";
-import { Clock_Mode, ContactEvent_Kind as Kind, type ContactEvent } from "./generated/enfilade_pb";
+import { Clock_Mode, ContactEvent_Kind as Kind, ContactEvent_Phase as Phase, type ContactEvent } from "./generated/enfilade_pb";
 import type { Walk } from "./walk";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 10];
@@ -155,7 +155,7 @@ export class Timeline {
     const first = Number(replay.firstTick);
     const span = Math.max(1, Number(replay.lastTick) - first);
     for (const event of events) {
-      const isShown = event.kind === Kind.BEGIN && (event.normal?.y ?? 0) > -0.7 || event.kind === Kind.BLOCKED || event.kind === Kind.NEAR || event.kind === Kind.ENTER;
+      const isShown = event.kind === Kind.BEGIN && (event.normal?.y ?? 0) > -0.7 || event.kind === Kind.BLOCKED || (event.kind === Kind.NEAR && event.phase === Phase.MIN) || event.kind === Kind.ENTER;
       const key = `${event.tick} ${event.kind} ${event.phase} ${event.a} ${event.b}`;
       if (!isShown || this.#seen.has(key)) continue;
       this.#seen.add(key);

@@ -288,7 +288,7 @@ class Client:
 
     def recorded_events(self) -> List[Contact]:
         """Returns the contact events of the recording that a timeline shows: begins, blocked moves,
-        entered triggers and the begins of near misses."""
+        entered triggers and the closest moments of near misses."""
         found: List[Contact] = []
         after, last = 0, self.welcome.replay.last_tick
         while True:
