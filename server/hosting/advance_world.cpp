@@ -86,7 +86,21 @@ void releaseOwners(HostedWorld& hosted, const std::vector<scene::Notice>& notice
   }
 }
 
-void broadcastTick(HostedWorld& hosted, const RecordableWorld::TickResult& result) {
+/// Gives the TakeOver as the cause of dropped orders: the world knows only the Drive that stops the
+/// avatar.
+void renameTakeOvers(HostedWorld& hosted, v1::TickEvents& events) {
+  for (v1::Notice& notice : *events.mutable_notices()) {
+    if (notice.kind() != v1::Notice::KIND_DROPPED || !hosted.takenOver.contains(notice.avatar()))
+      continue;
+    const std::string cause = "by a Drive";
+    if (notice.text().starts_with(cause))
+      notice.set_text("by a TakeOver" + notice.text().substr(cause.size()));
+  }
+  hosted.takenOver.clear();
+}
+
+void broadcastTick(HostedWorld& hosted, RecordableWorld::TickResult& result) {
+  if (!hosted.takenOver.empty()) renameTakeOvers(hosted, result.events);
   const auto& [report, events] = result;
   hosted.statistics.addTick(report);
   logFindings(hosted.world, report);
@@ -123,7 +137,7 @@ void pauseReplay(HostedWorld& hosted) {
 }  // namespace
 
 void advance(HostedWorld& hosted) {
-  const auto result =
+  auto result =
       hosted.replay ? hosted.replay->tick(hosted.world) : std::optional(hosted.world.tick());
   if (result) broadcastTick(hosted, *result);
   const bool stopped = !result || (hosted.replay && hosted.replay->atEnd());

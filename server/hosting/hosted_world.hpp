@@ -137,6 +137,7 @@ struct HostedWorld {
   /// order until the avatar and its orders are gone.
   std::map<std::string, ClientId> owners;
   std::set<std::string> pendingRelease;  ///< names in `owners` that may become free
+  std::set<std::string> takenOver;       ///< avatars that the next tick stops for a TakeOver
   ActiveContacts activeContacts;
   /// Of the last ticks, the latest one last; for flow channels.
   std::deque<std::shared_ptr<const scene::Snapshot>> recentSnapshots;

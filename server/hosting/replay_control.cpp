@@ -155,6 +155,7 @@ std::optional<v1::Error> takeOverReplay(HostedWorld& hosted, ClientId id,
   }
   if (request.avatar().empty()) return std::nullopt;
   stopAvatar(hosted, request.avatar());
+  hosted.takenOver.insert(request.avatar());
   hosted.owners[request.avatar()] = id;
   return std::nullopt;
 }

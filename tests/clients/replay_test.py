@@ -68,7 +68,11 @@ class Replay(unittest.TestCase):
         branch = self.folder / "branch.mcap"
         with self.play("--record", str(branch)) as server, server.connect() as client:
             client.seek(300)
+            client.subscribe(notices=True)
             ann = client.take_over("ann")
+            client.step()
+            dropped = [one.text for one in client.notices() if one.kind == "dropped"]
+            self.assertEqual(set(dropped), {"by a TakeOver"})
             ann.walk((0, 0, 5))
             client.spawn("bob", at=(0, 0, -3))
             last = client.run_until_idle()
