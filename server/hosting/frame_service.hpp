@@ -22,9 +22,9 @@ struct FrameJob {
   /// Owners take turns, so that one with many large frames does not delay the others. Unique per
   /// client of all worlds; null: the recordings.
   std::shared_ptr<const void> owner = nullptr;
-  std::uint64_t requestId = 0;                        ///< 0: the frame belongs to a subscription
-  std::uint32_t subscription = 0;                     ///< number of the subscription; 0: none
-  std::uint64_t dropped = 0;                          ///< Frame.dropped
+  std::uint64_t requestId = 0;     ///< 0: the frame belongs to a subscription
+  std::uint32_t subscription = 0;  ///< number of the subscription; 0: none
+  std::uint64_t dropped = 0;       ///< Frame.dropped
   /// Incremented per frame; may be null.
   std::shared_ptr<std::atomic<std::uint64_t>> renderedCount;
   /// Receives the frame before its reply is encoded, on a thread of the service; may be empty.

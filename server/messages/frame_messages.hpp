@@ -11,6 +11,7 @@
 
 #include "protocol/enfilade.pb.h"
 #include "render/renderer_kind.hpp"
+#include "scene/world/data/scene.hpp"
 
 namespace enfilade::server {
 

@@ -54,8 +54,9 @@ v1::RecordedEvents ContactHistory::eventsAfter(std::uint64_t tick, std::size_t m
   v1::RecordedEvents reply;
   reply.set_complete_to(completeTo_);
   std::size_t bytes = 0;
-  const auto first = std::ranges::upper_bound(events_, tick, {}, &v1::ContactEvent::tick);
-  for (const v1::ContactEvent& event : std::ranges::subrange(first, events_.end())) {
+  auto next = std::ranges::upper_bound(events_, tick, {}, &v1::ContactEvent::tick);
+  for (; next != events_.end(); ++next) {
+    const v1::ContactEvent& event = *next;
     bytes += event.ByteSizeLong() + kFieldBytes;
     if (event.tick() > completeTo_) break;
     if (bytes > maxBytes) {

@@ -7,8 +7,8 @@
 #include <queue>
 
 #include "assets/building.hpp"
-#include "scene/navigation/floor_faces.hpp"
 #include "scene/navigation/doors.hpp"
+#include "scene/navigation/floor_faces.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 #include "tests/scene/body_fixture.hpp"

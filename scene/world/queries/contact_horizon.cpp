@@ -182,7 +182,8 @@ void ContactHorizons::updateSelection() {
       tracked_.try_emplace(avatar.id, Tracked{now(), true, {}});
 }
 
-/// Earlier bounds do not cover avatars that joined or were teleported, nor those that a distant body may now carry.
+/// Earlier bounds do not cover avatars that joined or were teleported, nor those that a distant
+/// body may now carry.
 void ContactHorizons::restartUnbounded() {
   for (const EntityId id : state_.unbounded()) {
     schedule_.scheduleBodyNow(id, now());
