@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "scene/navigation/agent.hpp"
+#include "scene/navigation/mesh/agent.hpp"
 #include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {

@@ -4,7 +4,7 @@
 #include <memory>
 #include <vector>
 
-#include "scene/navigation/agent.hpp"
+#include "scene/navigation/mesh/agent.hpp"
 #include "scene/world/data/scene.hpp"
 #include "scene/world/data/snapshot.hpp"
 #include "scene/world/data/world_settings.hpp"

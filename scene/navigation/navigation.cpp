@@ -216,7 +216,8 @@ NavigationMap Navigation::drawMap(double cell, double height) {
   const double width = std::ceil(bounds.size().x() / cell);
   const double depth = std::ceil(bounds.size().z() / cell);
   if (!(width * depth <= kMaxCells))
-    throw std::invalid_argument("the map would have " + std::to_string(width * depth) +
+    throw std::invalid_argument("the map would have " +
+                                std::to_string(std::llround(width * depth)) +
                                 " cells; at most 4 million: give larger cells");
   NavigationMap map{bounds.min,
                     cell,

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "scene/navigation/clear_width.hpp"
-#include "scene/navigation/navigation_mesh.hpp"
+#include "scene/navigation/mesh/navigation_mesh.hpp"
 #include "scene/navigation/path_finder.hpp"
 #include "scene/navigation/walker.hpp"
 #include "scene/world/world.hpp"

@@ -9,6 +9,7 @@
 
 #include "scene/navigation/clear_width.hpp"
 #include "scene/navigation/grid_search.hpp"
+#include "scene/navigation/mesh/shortest_corridor.hpp"
 #include "scene/navigation/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -22,6 +23,7 @@ constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way aro
 constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
 constexpr int kRefutations = 4;            // failures at a portal after which it is not tried again
 constexpr int kMaxRepairs = 12;            // of a leg
+constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
 
@@ -149,6 +151,26 @@ bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
   return true;
 }
 
+double computeHorizontalLength(std::vector<Vec3> points) {
+  for (Vec3& point : points) point.y() = 0;
+  return computeLength(points);
+}
+
+/// A* through the middles of portals is quick. Where its line bends, another corridor may have a
+/// shorter one.
+std::optional<Corridor> findCorridor(const NavigationMesh& mesh, const MeshPoint& from,
+                                     const MeshPoint& to) {
+  std::optional<Corridor> corridor = mesh.findCorridor(from, to);
+  if (!corridor) return corridor;
+  const std::vector<Vec3> line = mesh.straighten(*corridor, from.point, to.point);
+  const double length = computeHorizontalLength(line);
+  if (length < kNearlyStraight * computeHorizontalLength({from.point, to.point})) return corridor;
+  std::optional<Corridor> other = findShortestCorridor(mesh, from, to, length / kNearlyStraight);
+  if (other && computeLength(mesh.straighten(*other, from.point, to.point)) < computeLength(line))
+    return other;
+  return corridor;
+}
+
 NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Clearance clearance,
                           const Vec3& from, const Vec3& to, Proof& proof) {
   const Vec3 extent(3 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
@@ -158,7 +180,7 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
   if (!start || !goal) return path;
   PortalClosures closures(mesh);
   for (int proposal = 0; proposal < kMaxProposals; ++proposal) {
-    const auto corridor = mesh.findCorridor(*start, *goal);
+    const auto corridor = findCorridor(mesh, *start, *goal);
     if (!corridor) return path;
     std::vector<Vec3> corners = mesh.straighten(*corridor, start->point, goal->point);
     if (corners.size() > 1) corners.erase(corners.begin(), corners.begin() + 1);
@@ -249,7 +271,7 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
                     finder.agent.radius);
   const auto first = finder.scarce.findNearest(start, extent),
              last = finder.scarce.findNearest(goal, extent);
-  const auto shortcut = first && last ? finder.scarce.findCorridor(*first, *last) : std::nullopt;
+  const auto shortcut = first && last ? findCorridor(finder.scarce, *first, *last) : std::nullopt;
   if (shortcut && (!best.found() ||
                    computeLength(finder.scarce.straighten(*shortcut, first->point, last->point)) *
                            kWorthTrying <

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/navigation/navigation_mesh.hpp"
+#include "scene/navigation/mesh/navigation_mesh.hpp"
 #include "scene/navigation/walker.hpp"
 
 namespace enfilade::scene {

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "scene/navigation/agent.hpp"
+#include "scene/navigation/mesh/agent.hpp"
 #include "scene/world/data/world_settings.hpp"
 #include "server/base/exit_code.hpp"
 #include "server/base/load_scene.hpp"

@@ -58,6 +58,7 @@ const std::vector<std::string> kRooms{
     "scene/world/avatars",
     "scene/world",
     "scene/world/checkpoint",
+    "scene/navigation/mesh",
     "scene/navigation",
     "render",
     "render/image",

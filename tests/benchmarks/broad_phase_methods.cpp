@@ -31,7 +31,8 @@ class OurSortAndSweep : public BroadPhase {
   bool inserted_ = false;
 };
 
-void append(std::vector<BroadPhaseMethod>& to, std::vector<BroadPhaseMethod> some) {
+[[maybe_unused]] void append(std::vector<BroadPhaseMethod>& to,
+                             std::vector<BroadPhaseMethod> some) {
   for (BroadPhaseMethod& method : some) to.push_back(std::move(method));
 }
 

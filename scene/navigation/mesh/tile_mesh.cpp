@@ -1,4 +1,4 @@
-#include "scene/navigation/tile_mesh.hpp"
+#include "scene/navigation/mesh/tile_mesh.hpp"
 
 #include <DetourAlloc.h>
 #include <DetourNavMesh.h>

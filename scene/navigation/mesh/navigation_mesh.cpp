@@ -1,4 +1,4 @@
-#include "scene/navigation/navigation_mesh.hpp"
+#include "scene/navigation/mesh/navigation_mesh.hpp"
 
 #include <DetourAlloc.h>
 #include <DetourCommon.h>
@@ -118,15 +118,29 @@ void NavigationMesh::collectPortals() {
       Vec3 b = toVec3(&tile.verts[polygon->verts[(to.edge + 1) % polygon->vertCount] * 3]);
       if (to.side != 0xff) {  // a portal to another tile may be a part of the edge
         const double low = to.bmin / 255.0, high = to.bmax / 255.0;
-        const Vec3 start = a;
-        a = start + low * (b - start);
-        b = start + high * (b - start);
+        const Vec3 start = a, edge = b - a;
+        a = snapToVertex(to.ref, start + low * edge, edge.norm() / 255);
+        b = snapToVertex(to.ref, start + high * edge, edge.norm() / 255);
       }
-      portals_.push_back({indexOf(to.ref), 0.5 * (a + b)});
+      const Vec3 &inside = centres_[indexOf(reference)], toA = a - inside, toB = b - inside;
+      if (toA.x() * toB.z() < toA.z() * toB.x()) std::swap(a, b);
+      portals_.push_back({.to = indexOf(to.ref), .low = a, .high = b});
     }
   }
   firstPortal_.push_back(static_cast<std::uint32_t>(portals_.size()));
   bytes_ += portals_.size() * sizeof(Portal) + centres_.size() * (sizeof(Vec3) + 16);
+}
+
+Vec3 NavigationMesh::snapToVertex(std::uint32_t reference, const Vec3& point,
+                                  double distance) const {
+  const dtPoly* polygon = nullptr;
+  const dtMeshTile& tile = detour_->tile(reference, &polygon);
+  for (int k = 0; k < polygon->vertCount; ++k) {
+    const Vec3 vertex = toVec3(&tile.verts[polygon->verts[k] * 3]);
+    if (std::hypot(vertex.x() - point.x(), vertex.z() - point.z()) <= distance)
+      return {vertex.x(), point.y(), vertex.z()};
+  }
+  return point;
 }
 
 std::uint32_t NavigationMesh::indexOf(std::uint32_t reference) const {
@@ -209,9 +223,9 @@ std::optional<Corridor> NavigationMesh::findCorridor(const MeshPoint& from,
     for (std::uint32_t p = firstPortal_[current]; p < firstPortal_[current + 1]; ++p) {
       const Portal& portal = portals_[p];
       if (portal.closed) continue;
-      const Vec3 point = portal.to == to.polygon ? to.point : portal.middle;
-      const double through = portal.to == to.polygon ? (portal.middle - here.point).norm() +
-                                                           (to.point - portal.middle).norm()
+      const Vec3 point = portal.to == to.polygon ? to.point : portal.middle();
+      const double through = portal.to == to.polygon ? (portal.middle() - here.point).norm() +
+                                                           (to.point - portal.middle()).norm()
                                                      : (point - here.point).norm();
       Node& next = node(portal.to);
       if (next.done || !(here.cost + through < next.cost)) continue;
@@ -250,7 +264,7 @@ std::vector<Vec3> NavigationMesh::straighten(const Corridor& corridor, const Vec
 
 Vec3 NavigationMesh::portalMiddle(std::uint32_t from, std::uint32_t to) const {
   for (std::uint32_t p = firstPortal_[from]; p < firstPortal_[from + 1]; ++p)
-    if (portals_[p].to == to) return portals_[p].middle;
+    if (portals_[p].to == to) return portals_[p].middle();
   return centres_[from];
 }
 

@@ -5,9 +5,10 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
-#include "scene/navigation/tile_mesh.hpp"
+#include "scene/navigation/mesh/tile_mesh.hpp"
 
 namespace enfilade::scene {
 
@@ -21,6 +22,18 @@ struct MeshPoint {
 struct Corridor {
   std::vector<std::uint32_t> polygons;
   double cost = 0;  ///< metres, through the middles of the portals
+};
+
+/// The way from a polygon to a neighbour. From inside of the polygon, `low` to `high` turns from +X
+/// towards +Z.
+struct Portal {
+  std::uint32_t to = 0;
+  Vec3 low = Vec3::Zero();
+  Vec3 high = Vec3::Zero();
+  bool closed = false;
+  std::uint8_t failures = 0;
+
+  Vec3 middle() const { return 0.5 * (low + high); }
 };
 
 /// Copies share nothing. Const functions may be called from several threads.
@@ -43,7 +56,11 @@ class NavigationMesh {
   std::optional<MeshPoint> findNearest(const Vec3& point, const Vec3& extent) const;
   /// The polygons within `extent` metres of a point on each axis, in no order.
   std::vector<std::uint32_t> findPolygons(const Vec3& point, const Vec3& extent) const;
-  /// The cheapest corridor through open portals; nullopt: not connected.
+  std::span<const Portal> portals(std::uint32_t polygon) const {
+    return std::span(portals_).subspan(firstPortal_[polygon],
+                                       firstPortal_[polygon + 1] - firstPortal_[polygon]);
+  }
+  /// The cheapest corridor through the middles of open portals; nullopt: not connected.
   std::optional<Corridor> findCorridor(const MeshPoint& from, const MeshPoint& to) const;
   /// The corners of the shortest line within a corridor, with both ends.
   std::vector<Vec3> straighten(const Corridor& corridor, const Vec3& from, const Vec3& to) const;
@@ -65,13 +82,10 @@ class NavigationMesh {
 
  private:
   struct Detour;
-  struct Portal {
-    std::uint32_t to = 0;
-    Vec3 middle = Vec3::Zero();
-    bool closed = false;
-    std::uint8_t failures = 0;
-  };
   void collectPortals();
+  /// The vertex of a polygon above or below a point, within `distance` metres, or the point. Detour
+  /// stores the ends of portals between tiles in 255ths of an edge.
+  Vec3 snapToVertex(std::uint32_t reference, const Vec3& point, double distance) const;
   std::uint32_t indexOf(std::uint32_t reference) const;
 
   std::unique_ptr<Detour> detour_;
