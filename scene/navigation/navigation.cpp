@@ -217,7 +217,7 @@ NavigationMap Navigation::drawMap(double cell, double height) {
   const double depth = std::ceil(bounds.size().z() / cell);
   if (!(width * depth <= kMaxCells))
     throw std::invalid_argument("the map would have " +
-                                std::to_string(std::llround(width * depth)) +
+                                std::to_string(std::llround(std::min(width * depth, 1e15))) +
                                 " cells; at most 4 million: give larger cells");
   NavigationMap map{bounds.min,
                     cell,

@@ -69,8 +69,8 @@ class Grid:
         return bool(self.walkable[rows, columns].all())
 
     def pulled(self, points):
-        """The length of the path, pulled straight: first the shortest over all pairs of its points that see
-        each other."""
+        """The length of the path pulled straight: the shortest chain of its points of which neighbours see each
+        other."""
         points = points[:1] + points[1:-1:max(1, len(points) // 150)] + points[-1:]
         best = [0.0] + [math.inf] * (len(points) - 1)
         for j in range(1, len(points)):
@@ -115,4 +115,5 @@ def main():
             print(f"  {ratio:.4f} from {np.round(start, 3).tolist()} to {np.round(goal, 3).tolist()}")
 
 
-main()
+if __name__ == "__main__":
+    main()
