@@ -17,18 +17,24 @@ double distort(const std::array<double, 4>& k, double angle) {
   return angle * (1 + square * (k[0] + square * (k[1] + square * (k[2] + square * k[3]))));
 }
 
-double distortionSlope(const std::array<double, 4>& k, double angle) {
-  const double square = angle * angle;
-  return 1 + square * (3 * k[0] + square * (5 * k[1] + square * (7 * k[2] + square * 9 * k[3])));
+/// A lower bound of the slope of distort() between two angles.
+double boundSlope(const std::array<double, 4>& k, double low, double high) {
+  double slope = 1, lowPower = 1, highPower = 1;
+  for (std::size_t i = 0; i < k.size(); ++i) {
+    lowPower *= low * low;
+    highPower *= high * high;
+    slope += (2 * static_cast<double>(i) + 3) * k[i] * (k[i] > 0 ? lowPower : highPower);
+  }
+  return slope;
 }
 
-/// The angle up to which the model increases, at most pi; to 1e-6 of pi.
-double findMaxAngle(const std::array<double, 4>& k) {
-  constexpr int kSteps = 1'000'000;
-  if (k == std::array<double, 4>{}) return kPi;
-  for (int i = 1; i <= kSteps; ++i)
-    if (!(distortionSlope(k, kPi * i / kSteps) > 0)) return kPi * (i - 1) / kSteps;
-  return kPi;
+/// The angle between `low` and `high` up to which the model increases; to 1e-6 of pi.
+double findMaxAngle(const std::array<double, 4>& k, double low, double high) {
+  if (boundSlope(k, low, high) > 0) return high;
+  if (high - low < 1e-6 * kPi) return low;
+  const double middle = 0.5 * (low + high);
+  const double angle = findMaxAngle(k, low, middle);
+  return angle < middle ? angle : findMaxAngle(k, middle, high);
 }
 
 }  // namespace
@@ -48,7 +54,7 @@ LensMapping::LensMapping(const Camera& camera)
   if (lens_.kind == Camera::Lens::Kind::fisheye) {
     pinhole_ = computeFisheyeIntrinsics(camera);
     pixelsPerRadian_ = std::max(pinhole_.fx, pinhole_.fy);
-    maxAngle_ = findMaxAngle(lens_.k);
+    maxAngle_ = findMaxAngle(lens_.k, 0, kPi);
   } else {
     pixelsPerRadian_ = std::max(width_ / (2 * kPi), height_ / kPi);
   }

@@ -32,26 +32,29 @@ double computeSecondsToOpen(const BodySpec& door, double position) {
 
 }  // namespace
 
+bool hasDoors(const Scene& scene) {
+  return std::ranges::any_of(scene.model().bodies,
+                             [](const BodySpec& body) { return getTraits(body.kind).isDoor; });
+}
+
 std::shared_ptr<const Snapshot> makeSnapshotWithOpenDoors(std::shared_ptr<const Scene> scene,
                                                           const WorldSettings& settings) {
   constexpr double kMaxSeconds = 30;  // a door that takes longer stays where it is
   World world(std::move(scene), settings);
-  bool hasDoors = false;
   for (const BodySpec& body : world.scene().model().bodies) {
-    if (body.kind != BodyKind::hinged && body.kind != BodyKind::sliding) continue;
+    if (!getTraits(body.kind).isDoor) continue;
     BodyCommand command;
     command.body = body.name;
     command.action = BodyCommand::Action::open;
     submitBodyCommand(world, std::move(command));
-    hasDoors = true;
   }
-  const int maxTicks = hasDoors ? static_cast<int>(kMaxSeconds / settings.tickDuration) : 0;
+  const int maxTicks =
+      hasDoors(world.scene()) ? static_cast<int>(kMaxSeconds / settings.tickDuration) : 0;
   for (int tick = 0; tick < maxTicks; ++tick) {
     tickWorld(world);
     const auto& bodies = *world.snapshot()->bodies;
     if (std::ranges::none_of(bodies, [&](const BodySnapshot& body) {
-          const BodyKind kind = world.scene().model().bodies[body.index].kind;
-          return body.moving && (kind == BodyKind::hinged || kind == BodyKind::sliding);
+          return body.moving && getTraits(world.scene().model().bodies[body.index].kind).isDoor;
         }))
       break;
   }
@@ -63,21 +66,22 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
                                         const std::vector<Vec3>& points) {
   std::vector<DoorOnPath> doors;
   const std::vector<BodySpec>& bodies = index.scene().model().bodies;
-  const bool anyDoor =
-      std::ranges::any_of(bodies, [](const BodySpec& body) { return getTraits(body.kind).isDoor; });
-  if (!anyDoor || points.size() < 2) return doors;
+  if (!hasDoors(index.scene()) || points.size() < 2) return doors;
   const auto prism = makePrismShape(agent.radius, agent.height, agent.height, settings);
   double distance = 0;
   for (std::size_t i = 1; i < points.size(); ++i) {
     const Vec3 leg = points[i] - points[i - 1];
-    const auto swept = makeSweptShape(*prism, leg);
-    const Aabb box = inflated(placeBox(swept->box, points[i - 1]), settings.contactOffset);
+    Aabb box = placeBox(prism->box, points[i - 1]);
+    box.include(placeBox(prism->box, points[i]));
+    box = inflated(box, settings.contactOffset);
+    std::shared_ptr<const AvatarShape> swept;  // built for the first door that is near
     for (const BodySnapshot& body : *snapshot.bodies) {
       const BodySpec& spec = bodies[body.index];
       if (!getTraits(spec.kind).isDoor ||
           std::ranges::any_of(doors, [&](const DoorOnPath& d) { return d.body == body.index; }))
         continue;
       if (!overlaps(box, computeBodyAabb({index, snapshot}, body))) continue;
+      if (!swept) swept = makeSweptShape(*prism, leg);
       const auto separation =
           computeSeparationFromShape(index, snapshot, swept, points[i - 1], body.id);
       if (separation && separation->distance < computeContactThreshold(settings))

@@ -12,7 +12,9 @@
 
 namespace enfilade::scene {
 
-/// Opens all hinged and sliding bodies of a new world, waits until they stand still, and returns
+bool hasDoors(const Scene& scene);
+
+/// Opens all doors of a new world, waits until they stand still, and returns
 /// its state.
 std::shared_ptr<const Snapshot> makeSnapshotWithOpenDoors(std::shared_ptr<const Scene> scene,
                                                           const WorldSettings& settings);

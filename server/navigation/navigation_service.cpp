@@ -334,10 +334,8 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   v1::NavigationReply reply;
   reply.set_tick(state.snapshot->tick);
   reply.set_time(state.snapshot->time);
-  const bool hasDoors = std::ranges::any_of(
-      scene_->model().bodies, [](const auto& body) { return scene::getTraits(body.kind).isDoor; });
   std::function<scene::Navigation&()> withOpenDoors;
-  if (hasDoors)
+  if (scene::hasDoors(*scene_))
     withOpenDoors = [&]() -> scene::Navigation& { return *prepare(agent, true, state).navigation; };
   const Answer answer{*scene_,         navigation,    reply,  state, doorsOpen,
                       *entry.snapshot, withOpenDoors, index_, scene_};

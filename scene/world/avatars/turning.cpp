@@ -80,6 +80,7 @@ OrderStatus executeOrder(const Turn& order, OrderContext& context) {
 }
 
 double computeMaxTurnDisplacement(const WorldSettings& settings, const Avatar& avatar) {
+  if (avatar.turn.left == 0) return 0;
   const double angle =
       std::min(std::abs(avatar.turn.left), avatar.turn.rate * settings.tickDuration);
   return angle * kRadiansPerDegree * computeTurnRadius(avatar);

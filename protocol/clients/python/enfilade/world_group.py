@@ -58,7 +58,6 @@ class WorldGroup:
             start = connection.receive(world, attachment, start)
         self._under_way = None
 
-
     def _shared(self, place: Any) -> memoryview:
         """Returns the server's memory from the attachment on. If this process cannot read it, the
         group does without from now on."""
