@@ -13,9 +13,16 @@ constexpr std::size_t kMaxTimelineEvents = 50'000;  // about 25 MB
 
 }  // namespace
 
-/// Parses only the start and the events: states are most of a recording and are skipped.
 ContactHistory::ContactHistory(const std::filesystem::path& recording, std::uint32_t run,
                                std::uint64_t lastTick) {
+  readRun(recording, run, lastTick);
+  // The minimum of a near miss is reported when it ends, with its own, earlier tick.
+  std::ranges::stable_sort(events_, {}, &v1::ContactEvent::tick);
+}
+
+/// Parses only the start and the events: states are most of a recording and are skipped.
+void ContactHistory::readRun(const std::filesystem::path& recording, std::uint32_t run,
+                             std::uint64_t lastTick) {
   protocol::mcap::Reader file(recording);
   std::uint32_t runIndex = 0;
   while (const auto message = file.next()) {

@@ -33,6 +33,7 @@ class ContactHistory {
  private:
   using Key = std::tuple<v1::ContactEvent::Kind, std::uint32_t, std::uint32_t>;  ///< kind, a, b
 
+  void readRun(const std::filesystem::path& recording, std::uint32_t run, std::uint64_t lastTick);
   void addEvents(const v1::TickEvents& events);
   const v1::ContactEvent* findLastBegin(const Key& key, std::uint64_t tick) const;
 

@@ -430,6 +430,18 @@ async function testReplay(record) {
     await page.getByRole("button", { name: "Play" }).click();
     await page.waitForFunction(() => enfilade.app.tick > 200);
     assert.equal(await page.evaluate(() => enfilade.timeline.markedEvents), marked);
+    // A seek ends the near misses of the moment with their minima so far: these are not of the recording.
+    const distances = await page.evaluate(async () => {
+      const { contacts } = await enfilade.app.connection.request("recordedEvents", { afterTick: 0n });
+      const minima = contacts.filter((event) => event.phase === 2 && Number(event.tick) > enfilade.app.replay.firstTick);
+      for (const event of minima) await enfilade.app.connection.request("seek", { tick: event.tick - 1n });
+      await enfilade.app.connection.request("seek", { tick: enfilade.app.replay.firstTick });
+      return minima.map((event) => event.separation);
+    });
+    assert.ok(distances.length > 0, "the walk has no near miss");
+    assert.equal(await page.evaluate(() => enfilade.timeline.markedEvents), marked);
+    await page.getByRole("button", { name: "Play" }).click();
+    await page.waitForFunction(() => enfilade.app.tick > 200);
     await page.getByRole("tab", { name: "Avatars" }).click();
     await page.getByRole("button", { name: "Follow" }).first().click();
     await page.waitForTimeout(1500);

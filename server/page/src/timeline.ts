@@ -28,6 +28,7 @@ export class Timeline {
   #seeking: number | null = null;
   #wanted: number | null = null;
   #seen = new Set<string>(); // events that have a mark
+  #knownTo = 0n; // tick: the recording's own events have their marks up to here
   #marked = new Map<string, { mark: HTMLButtonElement; text: string; others: number }>(); // by place and class
 
   constructor(app: App, walk: Walk) {
@@ -48,13 +49,18 @@ export class Timeline {
       this.#seen.clear();
       this.#marked.clear();
       this.#marks.replaceChildren();
-      this.#mark(app.connection.recordedEvents ?? []);
-      if (app.replay && !app.connection.isFile) app.attempt(this.#fetchMarks());
+      this.#knownTo = 0n;
+      if (app.connection.recordedEvents) {
+        this.#mark(app.connection.recordedEvents);
+        this.#knownTo = app.replay?.lastTick ?? 0n;
+      } else if (app.replay) {
+        app.attempt(this.#fetchMarks());
+      }
       const speed = app.clock?.speed ?? 0;
       if (speed > 0 && SPEEDS.includes(speed)) this.#speed.value = String(speed);
       this.#update();
     });
-    app.contactEvents.listen((events) => this.#mark(events));
+    app.contactEvents.listen((events) => this.#mark(events.filter((event) => !app.isPlayback || event.tick > this.#knownTo)));
   }
 
   toggle(): void {
@@ -148,7 +154,10 @@ export class Timeline {
     return clock?.mode === Clock_Mode.PAUSED ? "paused" : "";
   }
 
-  /** Marks on the track of a recording. Near ones share a mark. */
+  /**
+   * Marks on the track of a recording. Near ones share a mark. While the recording plays, events that it has are
+   * not marked again: a seek ends the near misses of the moment with minima that the recording does not have.
+   */
   #mark(events: ContactEvent[]): void {
     const { replay } = this.#app;
     if (!replay) return;
@@ -182,6 +191,7 @@ export class Timeline {
     for (;;) {
       const reply = await connection.request("recordedEvents", { afterTick: after });
       this.#mark(reply.contacts);
+      this.#knownTo = reply.completeTo;
       if (reply.completeTo >= lastTick || reply.completeTo <= after) return;
       after = reply.completeTo;
     }
