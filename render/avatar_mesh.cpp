@@ -22,23 +22,37 @@ void addPolygon(AvatarMeshes& meshes, const MeshRange& range, const std::vector<
   }
 }
 
-AvatarMeshes::Item beginItem(const AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar,
-                             const Eigen::Vector3f& colour, float glow) {
+MaterialData makeAvatarMaterial(const Eigen::Vector3f& colour, float glow) {
   scene::Material material;
   material.baseColour.head<3>() = colour;
   material.emissive = glow * colour;
   material.roughness = 0.6f;
+  return makeMaterialData(material);
+}
+
+/// A range that begins at the end of the buffers.
+MeshRange beginRange(const AvatarMeshes& meshes) {
   MeshRange range;
   range.firstIndex = static_cast<std::uint32_t>(meshes.indices.size());
   range.baseVertex = static_cast<std::int32_t>(meshes.vertices.size());
-  return {range, avatar.footPosition, {}, makeMaterialData(material), avatar.id};
+  return range;
+}
+
+AvatarMeshes::Item beginItem(const AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar,
+                             const Eigen::Vector3f& colour, float glow) {
+  return {beginRange(meshes),
+          nullptr,
+          Eigen::Affine3d(Eigen::Translation3d(avatar.footPosition)),
+          {},
+          makeAvatarMaterial(colour, glow),
+          avatar.id};
 }
 
 void endItem(AvatarMeshes& meshes, AvatarMeshes::Item item) {
   item.range.indexCount = static_cast<std::uint32_t>(meshes.indices.size()) - item.range.firstIndex;
   for (auto v = static_cast<std::size_t>(item.range.baseVertex); v < meshes.vertices.size(); ++v) {
     const float* p = meshes.vertices[v].position;
-    item.box.include(item.footPosition + Vec3(p[0], p[1], p[2]));
+    item.box.include(item.worldFromMesh * Vec3(p[0], p[1], p[2]));
   }
   if (item.range.indexCount > 0) meshes.items.push_back(item);
 }
@@ -83,6 +97,34 @@ void addVisor(AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar) {
   endItem(meshes, item);
 }
 
+/// The range of a figure's mesh, which is added for its first avatar.
+MeshRange findOrAddRange(AvatarMeshes& meshes, const scene::Mesh& mesh) {
+  const auto same = std::ranges::find(meshes.items, &mesh, &AvatarMeshes::Item::figure);
+  if (same != meshes.items.end()) return same->range;
+  MeshRange range = beginRange(meshes);
+  range.indexCount = static_cast<std::uint32_t>(mesh.indices.size());
+  for (std::size_t v = 0; v < mesh.positions.size(); ++v) {
+    const Eigen::Vector3f& p = mesh.positions[v];
+    meshes.vertices.push_back({{p.x(), p.y(), p.z()}, packNormal(mesh.normals[v]), {0, 0}});
+  }
+  meshes.indices.insert(meshes.indices.end(), mesh.indices.begin(), mesh.indices.end());
+  return range;
+}
+
+void addFigure(AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar) {
+  const Figure figure = placeFigure(avatar);
+  const double width = figure.worldFromMesh.linear().col(0).norm();
+  AvatarMeshes::Item item{findOrAddRange(meshes, *figure.mesh),
+                          figure.mesh,
+                          figure.worldFromMesh,
+                          {},
+                          makeAvatarMaterial(avatarColour(avatar.id), 0.05f),
+                          avatar.id};
+  item.box.include(avatar.footPosition - Vec3(width, 0, width));
+  item.box.include(avatar.footPosition + Vec3(width, avatar.height, width));
+  meshes.items.push_back(item);
+}
+
 }  // namespace
 
 Eigen::Vector3f avatarColour(scene::EntityId id) {
@@ -96,15 +138,20 @@ Eigen::Vector3f avatarColour(scene::EntityId id) {
 
 bool hasSameAppearance(const scene::AvatarSnapshot& a, const scene::AvatarSnapshot& b) {
   return a.id == b.id && a.shape == b.shape && a.footPosition == b.footPosition &&
-         a.viewDirection == b.viewDirection && a.eyeHeight == b.eyeHeight;
+         a.viewDirection == b.viewDirection && a.eyeHeight == b.eyeHeight && a.height == b.height &&
+         a.spawnHeight == b.spawnHeight;
 }
 
-AvatarMeshes buildAvatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hiddenEntity) {
+AvatarMeshes buildAvatarMeshes(const std::vector<scene::AvatarSnapshot>& avatars, AvatarForm form) {
   AvatarMeshes meshes;
-  for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
-    if (avatar.id == hiddenEntity || !avatar.shape) continue;
-    addBody(meshes, avatar);
-    addVisor(meshes, avatar);
+  for (const scene::AvatarSnapshot& avatar : avatars) {
+    if (!avatar.shape) continue;
+    if (form == AvatarForm::figure && isPerson(avatar)) {
+      addFigure(meshes, avatar);
+    } else {
+      addBody(meshes, avatar);
+      addVisor(meshes, avatar);
+    }
   }
   return meshes;
 }
@@ -116,11 +163,9 @@ DrawList buildAvatarDrawList(const AvatarMeshes& avatars, const Camera& camera,
   for (const std::uint32_t index : items) {
     ENFILADE_ASSERT(index < avatars.items.size());
     const AvatarMeshes::Item& item = avatars.items[index];
-    Eigen::Affine3d worldFromBody = Eigen::Affine3d::Identity();
-    worldFromBody.translation() = item.footPosition;
     const auto instance = static_cast<std::uint32_t>(list.instances.size());
     list.instances.push_back(
-        makeInstance(worldFromBody, Vec3::Zero(), camera.eye, item.material, item.id));
+        makeInstance(item.worldFromMesh, Vec3::Zero(), camera.eye, item.material, item.id));
     list.commands.push_back(
         {item.range.indexCount, 1, item.range.firstIndex, item.range.baseVertex, instance});
     ++list.batches.back().commandCount;

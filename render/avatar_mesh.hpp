@@ -1,19 +1,21 @@
-// Meshes of avatars: the collision hull with a visor that shows the view direction.
+// Meshes of avatars: figures, or the collision hulls with a visor that shows the view direction.
 #pragma once
 
 #include <vector>
 
 #include "render/draw_list.hpp"
+#include "render/figure.hpp"
 #include "render/vertex.hpp"
 
 namespace enfilade::render {
 
-/// Flat-shaded triangles of all avatars, in the order of the snapshot.
+/// Triangles of all avatars, in the order of the snapshot. Hulls are flat-shaded.
 struct AvatarMeshes {
-  /// One draw item: a hull or a visor.
+  /// One draw item: a figure, a hull or a visor.
   struct Item {
-    MeshRange range;  ///< positions relative to footPosition
-    Vec3 footPosition;
+    MeshRange range;                      ///< figures of equal poses share one
+    const scene::Mesh* figure = nullptr;  ///< the source of `range`; null: a hull or a visor
+    Eigen::Affine3d worldFromMesh;
     scene::Aabb box;  ///< world
     MaterialData material;
     scene::EntityId id;
@@ -26,8 +28,8 @@ struct AvatarMeshes {
 /// Whether both avatars have the same meshes.
 bool hasSameAppearance(const scene::AvatarSnapshot& a, const scene::AvatarSnapshot& b);
 
-/// Meshes of all avatars except `hiddenEntity`.
-AvatarMeshes buildAvatarMeshes(const scene::Snapshot& snapshot, scene::EntityId hiddenEntity);
+/// Meshes of all avatars.
+AvatarMeshes buildAvatarMeshes(const std::vector<scene::AvatarSnapshot>& avatars, AvatarForm form);
 
 /// Linear RGB; consecutive ids have very different colours.
 Eigen::Vector3f avatarColour(scene::EntityId id);

@@ -25,11 +25,17 @@ enum class Culling : std::uint8_t {
   none  ///< frustum culling with one draw call per item: the reference for tests and benchmarks
 };
 
+/// Drawn shape of avatars, in all channels and shadows. `figure`: a person, if isPerson(); other
+/// avatars are drawn as with `collision`. `collision`: the convex parts that the world moves, with
+/// a wedge at the eyes.
+enum class AvatarForm : std::uint8_t { figure, collision };
+
 /// Options of one frame.
 struct FrameOptions {
   scene::EntityId hiddenEntity = 0;  ///< not drawn (the avatar whose camera this is); 0: none
   Channels channels = {};
   TransparencyMode transparency = TransparencyMode::blend;
+  AvatarForm avatars = AvatarForm::figure;
   Culling culling = Culling::occlusion;
   /// Whether surfaces cast sun shadows. Transparent surfaces in mode `blend` and geometry clipped
   /// by an orthographic camera cast none; transparent surfaces receive none.
@@ -49,8 +55,9 @@ struct FrameStatistics {
 struct Frame {
   Camera camera;
   std::uint64_t tick = 0;
-  std::string renderer;   ///< the device (GL_RENDERER), or "Embree ..."
-  bool software = false;  ///< rendered on the CPU
+  AvatarForm avatars = AvatarForm::figure;  ///< as drawn
+  std::string renderer;                     ///< the device (GL_RENDERER), or "Embree ..."
+  bool software = false;                    ///< rendered on the CPU
   FrameStatistics statistics;
   std::vector<std::uint8_t> rgb;   ///< sRGB, 3 bytes per pixel
   std::vector<std::uint32_t> ids;  ///< scene::EntityId of the visible surface; 0: background

@@ -8,6 +8,7 @@
 #include "collision/assert.hpp"
 #include "render/camera_basis.hpp"
 #include "render/draw_list.hpp"
+#include "render/figure.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -17,7 +18,8 @@ using Motion = std::optional<Eigen::Affine3d>;  ///< from now to then; nullopt: 
 /// The motions of entities between two snapshots.
 class Motions {
  public:
-  Motions(const scene::Scene& scene, const scene::Snapshot& now, const scene::Snapshot& then)
+  Motions(const scene::Scene& scene, const scene::Snapshot& now, const scene::Snapshot& then,
+          AvatarForm form)
       : objects_(static_cast<scene::EntityId>(scene.model().objects.size())) {
     const std::vector<BodyPlacement> placedNow = computeBodyPlacements(scene, now),
                                      placedThen = computeBodyPlacements(scene, then);
@@ -32,7 +34,7 @@ class Motions {
       const auto before = std::ranges::find(then.avatars, avatar.id, &scene::AvatarSnapshot::id);
       Motion& motion = motions_[avatar.id];
       if (before != then.avatars.end() && before->shape == avatar.shape)
-        motion = Eigen::Affine3d(Eigen::Translation3d(before->footPosition - avatar.footPosition));
+        motion = computeMotion(avatar, *before, form);
     }
   }
 
@@ -43,6 +45,14 @@ class Motions {
   }
 
  private:
+  /// Only the drawn shape of a person turns with the view.
+  static Eigen::Affine3d computeMotion(const scene::AvatarSnapshot& now,
+                                       const scene::AvatarSnapshot& then, AvatarForm form) {
+    if (form == AvatarForm::figure && isPerson(now))
+      return placeFigure(then).worldFromMesh * placeFigure(now).worldFromMesh.inverse();
+    return Eigen::Affine3d(Eigen::Translation3d(then.footPosition - now.footPosition));
+  }
+
   scene::EntityId objects_;
   std::unordered_map<scene::EntityId, Motion> motions_;
 };
@@ -57,7 +67,7 @@ std::vector<float> computeOpticalFlow(const Frame& frame, const scene::Scene& sc
   ENFILADE_ASSERT(frame.ids.size() == frame.depth.size());
   const CameraBasis basis = computeCameraBasis(camera);
   const Pinhole pinhole = computeIntrinsics(camera);
-  const Motions motions(scene, now, then);
+  const Motions motions(scene, now, then, frame.avatars);
   std::vector<float> flow(2 * frame.ids.size(), std::numeric_limits<float>::quiet_NaN());
   scene::EntityId id = 0;
   Motion motion;

@@ -13,7 +13,7 @@ namespace enfilade::render {
 class DynamicInstances {
  public:
   /// Needs a current context.
-  void update(const scene::Scene& scene, const scene::Snapshot& snapshot);
+  void update(const scene::Scene& scene, const scene::Snapshot& snapshot, AvatarForm form);
 
   const std::vector<BodyPlacement>& bodyPlacements() const { return placements_; }
   const AvatarMeshes& avatars() const { return meshes_; }
@@ -27,6 +27,7 @@ class DynamicInstances {
       snapshotBodies_;  ///< source of `placements_`
   std::vector<BodyPlacement> placements_;
   std::vector<scene::AvatarSnapshot> uploadedAvatars_;  ///< source of `meshes_`
+  AvatarForm form_ = AvatarForm::figure;                ///< of `meshes_`
   AvatarMeshes meshes_;
   StreamBuffer vertices_, indices_;
 };

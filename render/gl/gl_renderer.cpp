@@ -418,7 +418,7 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   State& s = *state_;
   s.context.makeCurrent();
   s.prepareScene();
-  s.dynamicInstances.update(*s.scene, snapshot);
+  s.dynamicInstances.update(*s.scene, snapshot, options.avatars);
   if (!s.target.hasSize(camera.width, camera.height)) {
     s.target = RenderTarget(camera.width, camera.height);
   }
@@ -435,6 +435,7 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
   Frame frame;
   frame.camera = camera;
   frame.tick = snapshot.tick;
+  frame.avatars = options.avatars;
   frame.renderer = deviceName();
   frame.software = software();
   frame.statistics = job.statistics;

@@ -318,9 +318,10 @@ RayRenderer::~RayRenderer() = default;
 Frame RayRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                           const FrameOptions& options) {
   if (const auto error = validateCamera(camera)) throw RenderError(*error);
-  state_->scene.update(snapshot);
+  state_->scene.update(snapshot, options.avatars);
   Frame frame = drawFrame(*state_, camera, options);
   frame.tick = snapshot.tick;
+  frame.avatars = options.avatars;
   frame.renderer = state_->name;
   frame.software = true;
   return frame;
@@ -332,7 +333,7 @@ std::vector<std::uint8_t> RayRenderer::computeShadowMask(const scene::Snapshot& 
                                                          const std::vector<float>& depth) {
   if (const auto error = validateCamera(camera)) throw RenderError(*error);
   State& s = *state_;
-  s.scene.update(snapshot);
+  s.scene.update(snapshot, options.avatars);
   const std::vector<const RayTree*> trees = collectFirstHitTrees(s.scene, options);
   const PrimaryRays rays = computePrimaryRays(camera);
   const Shading shading(rays, s.textures);

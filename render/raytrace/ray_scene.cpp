@@ -92,9 +92,9 @@ std::optional<RayTree> RayScene::buildTree(std::vector<TriangleBatch> batches) {
   return orRenderError([&] { return RayTree(meshes_, std::move(batches), origin_, maskFilter_); });
 }
 
-void RayScene::update(const scene::Snapshot& snapshot) {
+void RayScene::update(const scene::Snapshot& snapshot, AvatarForm form) {
   updateBodies(snapshot);
-  updateAvatars(snapshot);
+  updateAvatars(snapshot, form);
 }
 
 void RayScene::updateBodies(const scene::Snapshot& snapshot) {
@@ -123,31 +123,33 @@ void RayScene::updateBodies(const scene::Snapshot& snapshot) {
   if (bodyStates_.size() > kMaxStates) bodyStates_.pop_back();
 }
 
-void RayScene::updateAvatars(const scene::Snapshot& snapshot) {
-  if (std::equal(snapshot.avatars.begin(), snapshot.avatars.end(), currentAvatars_.begin(),
+void RayScene::updateAvatars(const scene::Snapshot& snapshot, AvatarForm form) {
+  if (form == avatarForm_ &&
+      std::equal(snapshot.avatars.begin(), snapshot.avatars.end(), currentAvatars_.begin(),
                  currentAvatars_.end(), hasSameAppearance)) {
     return;
   }
   avatarTree_ = {};
   currentAvatars_ = snapshot.avatars;
+  avatarForm_ = form;
 }
 
 void RayScene::buildAvatarTree() {
   avatarMeshes_.clear();
   worldFromAvatars_.clear();
   avatarMaterials_.clear();
-  scene::Snapshot snapshot;
-  snapshot.avatars = currentAvatars_;
-  const AvatarMeshes all = buildAvatarMeshes(snapshot, 0);
+  const AvatarMeshes all = buildAvatarMeshes(currentAvatars_, avatarForm_);
   for (const AvatarMeshes::Item& avatarItem : all.items) {
-    avatarMeshes_.push_back(extractMesh(all, avatarItem.range));
-    worldFromAvatars_.emplace_back(Eigen::Translation3d(avatarItem.footPosition));
+    avatarMeshes_.push_back(avatarItem.figure ? scene::Mesh{} : extractMesh(all, avatarItem.range));
+    worldFromAvatars_.push_back(avatarItem.worldFromMesh);
     avatarMaterials_.push_back(avatarItem.material);
   }
   std::vector<TriangleBatch> batches;
   for (std::size_t i = 0; i < all.items.size(); ++i) {
-    batches.push_back(
-        {&avatarMeshes_[i], &worldFromAvatars_[i], &avatarMaterials_[i], all.items[i].id});
+    const scene::Mesh* figure = all.items[i].figure;
+    batches.push_back({figure ? figure : &avatarMeshes_[i], &worldFromAvatars_[i],
+                       &avatarMaterials_[i], all.items[i].id});
+    batches.back().instanced = figure != nullptr;
   }
   avatarTree_ = {true, buildTree(std::move(batches))};
 }

@@ -18,7 +18,7 @@ class RayScene {
   RayScene(std::shared_ptr<const scene::Scene> scene, bool robust, scene::EmbreeFilter maskFilter);
 
   /// Moves bodies and avatars to their poses in `snapshot`.
-  void update(const scene::Snapshot& snapshot);
+  void update(const scene::Snapshot& snapshot, AvatarForm form);
 
   /// Non-empty trees, built on the first call. Pointers are valid until the next update(). An
   /// avatar that is hidden may still be in them.
@@ -36,7 +36,7 @@ class RayScene {
   std::vector<TriangleBatch> collectBatches(bool isDynamic, bool transparent) const;
   std::optional<RayTree> buildTree(std::vector<TriangleBatch> batches);  ///< nullopt: no batches
   void updateBodies(const scene::Snapshot& snapshot);
-  void updateAvatars(const scene::Snapshot& snapshot);
+  void updateAvatars(const scene::Snapshot& snapshot, AvatarForm form);
   void buildAvatarTree();
   void chooseInstancing();
 
@@ -50,7 +50,8 @@ class RayScene {
   bool hasMaskTextures_ = false;
 
   std::vector<scene::AvatarSnapshot> currentAvatars_;
-  std::vector<scene::Mesh> avatarMeshes_;
+  AvatarForm avatarForm_ = AvatarForm::figure;
+  std::vector<scene::Mesh> avatarMeshes_;  ///< empty for figures
   std::vector<Eigen::Affine3d> worldFromAvatars_;
   std::vector<MaterialData> avatarMaterials_;
 

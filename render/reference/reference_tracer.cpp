@@ -181,7 +181,7 @@ ReferenceTracer::~ReferenceTracer() = default;
 ReferenceFrame ReferenceTracer::render(const scene::Snapshot& snapshot, const Camera& camera,
                                        const FrameOptions& options) {
   if (const auto error = validateCamera(camera)) throw RenderError(*error);
-  state_->scene.update(snapshot);
+  state_->scene.update(snapshot, options.avatars);
   ReferenceFrameBuilder builder(camera, options, state_->scene, state_->textures);
   constexpr std::size_t kRows = 8;  // per task
   state_->workers.parallelFor(

@@ -251,6 +251,11 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
                   "solid: of the glass, which is then opaque in colour, too")
       ->capture_default_str()
       ->check(CLI::IsMember({"clear", "solid"}));
+  verb.add_option("--avatars", into.avatars,
+                  "Shape of avatars in all channels. people: figures, within the shapes that "
+                  "collide; shapes: the shapes that collide")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"people", "shapes"}));
   verb.add_flag("--shadows", into.shadows,
                 "Draw sun shadows in the colour; clear glass casts "
                 "none");
@@ -327,6 +332,8 @@ PictureOptions makePictureOptions(const CaptureArguments& read) {
   options.renderer =
       render::parseRendererKind(read.renderer).value_or(render::RendererKind::automatic);
   options.shadows = read.shadows;
+  options.avatars =
+      read.avatars == "shapes" ? render::AvatarForm::collision : render::AvatarForm::figure;
   options.glass =
       read.glass == "solid" ? render::TransparencyMode::opaque : render::TransparencyMode::blend;
   return options;

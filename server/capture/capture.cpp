@@ -78,6 +78,7 @@ render::FrameOptions makeFrameOptions(const CaptureFrame& captureFrame,
   frame.channels = {wanted.rgb || marked, wanted.ids || wanted.classes || wanted.things || marked,
                     wanted.depth || wanted.range || marked, wanted.normals};
   frame.transparency = options.glass;
+  frame.avatars = options.avatars;
   frame.shadows = options.shadows;
   return frame;
 }

@@ -64,6 +64,7 @@ struct PictureOptions {
   OverlayChoice overlay;
   render::RendererKind renderer = render::RendererKind::automatic;
   render::TransparencyMode glass = render::TransparencyMode::blend;
+  render::AvatarForm avatars = render::AvatarForm::figure;
   bool shadows = false;
 };
 

@@ -240,6 +240,7 @@ std::string makeManifest(const scene::Scene& scene, const std::filesystem::path&
                         {"names", marks.names},
                         {"paths", marks.paths}};
   all["glass"] = options.glass == render::TransparencyMode::opaque ? "solid" : "clear";
+  all["avatars"] = options.avatars == render::AvatarForm::collision ? "shapes" : "people";
   all["shadows"] = options.shadows;
   return all.dump(1) + "\n";
 }

@@ -286,6 +286,7 @@ ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot
     if (request.glass() == v1::GLASS_SOLID)
       frameView->options.transparency = render::TransparencyMode::opaque;
     frameView->options.shadows = request.shadows();
+    if (request.collision_shapes()) frameView->options.avatars = render::AvatarForm::collision;
     frameView->renderer = rendererFromProto(request);
     if (auto error = applyIntrinsics(frameView->camera, request)) return *error;
     if (auto error = applyLens(frameView->camera, request)) return *error;
@@ -335,6 +336,7 @@ v1::Frame toProto(const render::Frame& frame, const FrameSource& source,
   }
   message.set_glass(request.glass() == v1::GLASS_SOLID ? v1::GLASS_SOLID : v1::GLASS_CLEAR);
   message.set_shadows(request.shadows());
+  message.set_collision_shapes(frame.avatars == render::AvatarForm::collision);
   attachment.reserve(attachment.size() +
                      computeBytesPerPixel(request) * message.width() * message.height());
   for (const int channel : request.channels()) {

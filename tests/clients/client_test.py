@@ -192,6 +192,15 @@ class Seeing(RoomCase):
         self.assertAlmostEqual(frame.depth[10, 16], 5, places=3)
         self.assertTrue(frame.depth.flags.aligned and frame.depth.flags.writeable)
 
+    def test_avatars_are_people_or_the_shapes_that_collide(self):
+        self.need_pictures()
+        ann = self.client.spawn("ann", at=(2, 0.01, 0), facing=90)
+        ann.enter()
+        look = {"eye": (0, 1, 0), "forward": (1, 0, 0), "width": 64, "height": 64, "channels": ("ids",)}
+        person, shape = (self.client.frame(collision_shapes=asked, **look) for asked in (False, True))
+        self.assertEqual((person.message.collision_shapes, shape.message.collision_shapes), (False, True))
+        self.assertGreater((shape.ids > 3).sum(), 1.5 * (person.ids > 3).sum())
+
     def test_eyes_look_along_forward_without_turning_the_avatar(self):
         self.need_pictures()
         ann = self.client.spawn("ann", at=(0, 0.01, 0), facing=0)

@@ -410,6 +410,27 @@ TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
   EXPECT_EQ(captured("walk.jsonl", "unknown", {"--every", "6", "--avatar", "eve"}).code, 1);
 }
 
+TEST_F(Capture, AvatarsAreDrawnAsPeopleOrAsTheirShapes) {
+  write(folder_ / "walk.jsonl", R"({"spawn":"ann","at":[0,0.001,0],"facing":0}
+{"spawn":"bob","at":[2,0.001,0],"facing":180}
+{"capture":"ann","as":"bob"}
+)");
+  const auto pixels = [&](const std::string& avatars) {
+    const Ended ended = captured("walk.jsonl", avatars, {"--avatars", avatars});
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    EXPECT_EQ(json::parse(textOf(folder_ / avatars / "capture.json")).at("avatars"), avatars);
+    const auto ids = readNpy<std::uint32_t>(folder_ / avatars / "ids/000000.npy").values;
+    return std::count_if(ids.begin(), ids.end(), [](std::uint32_t id) { return id > 3; });
+  };
+  const auto people = pixels("people"), shapes = pixels("shapes");
+  EXPECT_GT(people, 50);
+  EXPECT_GT(2 * shapes, 3 * people);
+  const Ended other = captured("walk.jsonl", "other", {"--avatars", "ghosts"});
+  EXPECT_EQ(other.code, 2);
+  EXPECT_NE(other.err.find("--avatars"), std::string::npos) << other.err;
+  EXPECT_NE(other.err.find("shapes"), std::string::npos) << other.err;
+}
+
 TEST_F(Capture, SixteenBitFilesRefuseValuesOutOfRangeByDefault) {
   write(folder_ / "path.txt", ahead(1));
   const Ended fits = captured("path.txt", "fits", {"--depth", "png", "--ids", "png"});

@@ -86,6 +86,26 @@ TEST_F(Frames, AnotherAvatarIsSeenFromAboveUnderItsOwnId) {
   EXPECT_EQ(valuesOf<std::uint32_t>(ann.frame(request), v1::CHANNEL_IDS)[24 * 64 + 32], kFloor);
 }
 
+TEST_F(Frames, AvatarsAreFiguresAndOnRequestTheirCollisionShapes) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 1, 0.001, 1)));
+  const std::uint32_t id = ann.step(30, true).avatars(0).id();
+  v1::FrameRequest request = eyesOf("ann");
+  v1::FreeCamera& camera = *request.mutable_free();
+  *camera.mutable_eye() = vec(-1, 0.9, 1);
+  *camera.mutable_forward() = vec(1, 0, 0);
+  const auto pixels = [&](bool shapes) {
+    request.set_collision_shapes(shapes);
+    const protocol::ReceivedFrame frame = ann.frame(request);
+    EXPECT_EQ(frame.description.collision_shapes(), shapes);
+    const auto ids = valuesOf<std::uint32_t>(frame, v1::CHANNEL_IDS);
+    return std::count(ids.begin(), ids.end(), id);
+  };
+  const auto figure = pixels(false), shape = pixels(true);
+  EXPECT_GT(figure, 100);
+  EXPECT_GT(2 * shape, 3 * figure);
+}
+
 TEST_F(Frames, APngHoldsTheSamePicture) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));

@@ -477,7 +477,7 @@ class Client:
               renderer: str = "", shadows: bool = False, lens: str = "",
               distortion: Sequence[float] = (), depth_noise: Optional[int] = None,
               flow_from: Optional[int] = None, flow_forward: Optional[Point] = None,
-              tick: Optional[int] = None) -> Frame:
+              collision_shapes: bool = False, tick: Optional[int] = None) -> Frame:
         """Returns a picture of the last tick. It is taken from the eyes of `avatar` (along `forward`
         if given), or from `eye` towards `target` or along `forward`; `avatar` is then invisible.
         `up` (with an eye) must not be parallel to the view: straight down needs one. The lens:
@@ -487,13 +487,15 @@ class Client:
         `shadows`: of the sun, in the colour. `lens`: "fisheye" (OpenCV's model; `fov_y` is then the
         angle of the whole width, default pi; `distortion` k1 to k4) or "equirectangular".
         `depth_noise`: the seed of a structured-light camera's noise in "depth". `flow_from`: the earlier tick of the channel "flow", of the last 32, and
-        `flow_forward` the direction in which the avatar looked then, if `forward` is given."""
+        `flow_forward` the direction in which the avatar looked then, if `forward` is given.
+        `collision_shapes` draws avatars as the shapes that collide, not as people."""
         asked = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
                               height=height, fov_y=fov_y, intrinsics=intrinsics, height_y=height_y,
                               near=near, far=far, channels=channels, glass=glass,
                               renderer=renderer, shadows=shadows, lens=lens, distortion=distortion,
                               depth_noise=depth_noise, flow_from=flow_from,
-                              flow_forward=flow_forward, tick=tick)
+                              flow_forward=flow_forward, collision_shapes=collision_shapes,
+                              tick=tick)
         if shadows and "shadows" not in self.welcome.capabilities:
             warnings.warn("frame: this server draws no shadows; start a newer one", stacklevel=2)
         reply, attachment = self.request(frame=asked)

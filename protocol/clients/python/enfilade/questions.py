@@ -87,7 +87,8 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
                   channels: Sequence[str] = ("rgb",), glass: str = "", renderer: str = "",
                   shadows: bool = False, lens: str = "", distortion: Sequence[float] = (),
                   depth_noise: Optional[int] = None, flow_from: Optional[int] = None,
-                  flow_forward: Optional[Point] = None, tick: Optional[int] = None) -> Any:
+                  flow_forward: Optional[Point] = None, collision_shapes: bool = False,
+                  tick: Optional[int] = None) -> Any:
     """Returns the FrameRequest that Client.frame() sends."""
     if sum(one is not None for one in (fov_y, intrinsics, height_y)) > 1:
         raise ValueError("frame: give one of fov_y, intrinsics and height_y")
@@ -99,7 +100,7 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
         raise ValueError("frame: target, up and height_y need an eye; for an avatar's eyes give "
                          "forward")
     asked = messages.FrameRequest(width=width, height=height, channels=results.channels(channels),
-                                  shadows=shadows, tick=tick)
+                                  shadows=shadows, collision_shapes=collision_shapes, tick=tick)
     if eye is None:
         view = asked.eyes
         view.avatar = avatar
