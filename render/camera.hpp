@@ -33,6 +33,8 @@ struct Camera {
     Kind kind = Kind::fisheye;
     std::array<double, 4> k{};              ///< distortion of a fisheye
     double width = 3.14159265358979323846;  ///< of a fisheye without pinhole: radians, 0..2 pi
+    /// Pixels to the right and down from the centre of a pixel to the point that it samples.
+    double offsetX = 0, offsetY = 0;
   };
 
   Projection projection = Projection::perspective;

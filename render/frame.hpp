@@ -40,6 +40,11 @@ struct FrameOptions {
   /// Whether surfaces cast sun shadows. Transparent surfaces in mode `blend` and geometry clipped
   /// by an orthographic camera cast none; transparent surfaces receive none.
   bool shadows = false;
+  /// RendererSelector decides `shadows`, by choosesShadows().
+  bool automaticShadows = false;
+  /// Samples of the colour in each pixel: 1, 4 or 16. Each of them is a picture of its own, and the
+  /// colour their mean in linear light. The other channels have one sample, at the centre.
+  std::uint32_t samples = 1;
 };
 
 /// Culling counts of draw items (meshes of objects) and rendering time.
@@ -56,6 +61,8 @@ struct Frame {
   Camera camera;
   std::uint64_t tick = 0;
   AvatarForm avatars = AvatarForm::figure;  ///< as drawn
+  bool shadows = false;                     ///< in the colour
+  std::uint32_t samples = 1;                ///< of the colour in each pixel
   std::string renderer;                     ///< the device (GL_RENDERER), or "Embree ..."
   bool software = false;                    ///< rendered on the CPU
   FrameStatistics statistics;

@@ -73,6 +73,8 @@ std::optional<double> LensMapping::findAngle(double radius) const {
 }
 
 std::optional<Vec3> LensMapping::directionAt(double x, double y) const {
+  x += lens_.offsetX;
+  y += lens_.offsetY;
   if (lens_.kind == Camera::Lens::Kind::equirectangular) {
     const double yaw = (x / width_ - 0.5) * 2 * kPi, pitch = (0.5 - y / height_) * kPi;
     return Vec3(std::cos(pitch) * (std::cos(yaw) * forward_ + std::sin(yaw) * right_) +

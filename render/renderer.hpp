@@ -17,14 +17,23 @@ class Renderer {
   Renderer& operator=(const Renderer&) = delete;
   virtual ~Renderer() = default;
 
-  /// Throws RenderError for an invalid camera (validateCamera()) and for a scene that is too large.
-  virtual Frame render(const scene::Snapshot& snapshot, const Camera& camera,
-                       const FrameOptions& options = {}) = 0;
+  /// Throws RenderError for an invalid camera (validateCamera()) or number of samples, and for a
+  /// scene that is too large.
+  Frame render(const scene::Snapshot& snapshot, const Camera& camera,
+               const FrameOptions& options = {});
 
   virtual const std::string& deviceName() const = 0;  ///< GL_RENDERER or "Embree 3..."
   virtual bool software() const = 0;                  ///< renders on the CPU
   /// One sentence about better devices that failed; may be empty.
   virtual const std::string& deviceWarning() const = 0;
+
+ private:
+  /// One sample a pixel, whatever `options` has. The camera is valid, except that its principal
+  /// point may be up to a pixel beyond its limits.
+  virtual Frame renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
+                           const FrameOptions& options) = 0;
+  Frame renderSamples(const scene::Snapshot& snapshot, const Camera& camera,
+                      const FrameOptions& options);
 };
 
 }  // namespace enfilade::render

@@ -20,4 +20,9 @@ std::optional<RendererKind> parseRendererKind(const std::string& name);
 RendererKind chooseRendererKind(bool softwareGl, const Camera& camera, const Channels& channels,
                                 std::size_t triangles);
 
+/// The rule for FrameOptions::automaticShadows: whether shadows cost little in comparison with the
+/// rest of the picture. `software`: the renderer's.
+bool choosesShadows(bool software, const Camera& camera, const Channels& channels,
+                    std::size_t triangles);
+
 }  // namespace enfilade::render

@@ -411,9 +411,8 @@ GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceCh
 
 GlRenderer::~GlRenderer() = default;
 
-Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
-                         const FrameOptions& options) {
-  if (const auto error = validateCamera(camera)) throw RenderError(*error);
+Frame GlRenderer::renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
+                             const FrameOptions& options) {
   if (camera.lens) throw RenderError("camera: lens is given; it must be absent with OpenGL");
   State& s = *state_;
   s.context.makeCurrent();
@@ -433,9 +432,6 @@ Frame GlRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                                    : s.drawAllInFrustum(job, s.collectInFrustum(job));
   if (options.channels.rgb) s.drawTransparent(transparent);
   Frame frame;
-  frame.camera = camera;
-  frame.tick = snapshot.tick;
-  frame.avatars = options.avatars;
   frame.renderer = deviceName();
   frame.software = software();
   frame.statistics = job.statistics;

@@ -23,13 +23,14 @@ class GlRenderer final : public Renderer {
                       ShadowMaskFunction shadowMask = {});
   ~GlRenderer() override;
 
-  Frame render(const scene::Snapshot& snapshot, const Camera& camera,
-               const FrameOptions& options = {}) override;
   const std::string& deviceName() const override;
   bool software() const override;
   const std::string& deviceWarning() const override;
 
  private:
+  Frame renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
+                   const FrameOptions& options) override;
+
   struct State;
   std::unique_ptr<State> state_;
 };

@@ -315,13 +315,10 @@ RayRenderer::RayRenderer(std::shared_ptr<const scene::Scene> scene, const RayOpt
 
 RayRenderer::~RayRenderer() = default;
 
-Frame RayRenderer::render(const scene::Snapshot& snapshot, const Camera& camera,
-                          const FrameOptions& options) {
-  if (const auto error = validateCamera(camera)) throw RenderError(*error);
+Frame RayRenderer::renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
+                              const FrameOptions& options) {
   state_->scene.update(snapshot, options.avatars);
   Frame frame = drawFrame(*state_, camera, options);
-  frame.tick = snapshot.tick;
-  frame.avatars = options.avatars;
   frame.renderer = state_->name;
   frame.software = true;
   return frame;
@@ -331,7 +328,6 @@ std::vector<std::uint8_t> RayRenderer::computeShadowMask(const scene::Snapshot& 
                                                          const Camera& camera,
                                                          const FrameOptions& options,
                                                          const std::vector<float>& depth) {
-  if (const auto error = validateCamera(camera)) throw RenderError(*error);
   State& s = *state_;
   s.scene.update(snapshot, options.avatars);
   const std::vector<const RayTree*> trees = collectFirstHitTrees(s.scene, options);

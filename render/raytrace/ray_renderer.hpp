@@ -24,19 +24,21 @@ class RayRenderer final : public Renderer {
   explicit RayRenderer(std::shared_ptr<const scene::Scene> scene, const RayOptions& options = {});
   ~RayRenderer() override;
 
-  Frame render(const scene::Snapshot& snapshot, const Camera& camera,
-               const FrameOptions& options = {}) override;
   const std::string& deviceName() const override;
   bool software() const override { return true; }
   const std::string& deviceWarning() const override;  ///< empty
 
   /// Shadow mask of a frame with this camera: 255 per sunlit pixel, 0 in shadow (see
-  /// FrameOptions::shadows). `depth` is the Frame::depth of any renderer.
+  /// FrameOptions::shadows). `depth` is the Frame::depth of any renderer, which accepted the
+  /// camera.
   std::vector<std::uint8_t> computeShadowMask(const scene::Snapshot& snapshot, const Camera& camera,
                                               const FrameOptions& options,
                                               const std::vector<float>& depth);
 
  private:
+  Frame renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
+                   const FrameOptions& options) override;
+
   struct State;
   std::unique_ptr<State> state_;
 };

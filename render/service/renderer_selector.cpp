@@ -60,6 +60,13 @@ struct RendererSelector::State {
     return chooseRendererKind(gl->software(), camera, options.channels, triangles);
   }
 
+  FrameOptions decideShadows(const Renderer& renderer, const Camera& camera,
+                             FrameOptions options) const {
+    if (options.automaticShadows)
+      options.shadows = choosesShadows(renderer.software(), camera, options.channels, triangles);
+    return options;
+  }
+
   /// Creates the renderer of `one` kind, which is not automatic, on first use.
   Renderer& findOrCreate(RendererKind one) {
     ENFILADE_ASSERT(one != RendererKind::automatic);
@@ -109,9 +116,15 @@ Frame RendererSelector::render(const scene::Snapshot& snapshot, const Camera& ca
   Renderer& renderer = state_->findOrCreate(state_->chooseKind(camera, options, kind));
   using Clock = std::chrono::steady_clock;
   const Clock::time_point start = Clock::now();
-  Frame frame = renderer.render(snapshot, camera, options);
+  Frame frame = renderer.render(snapshot, camera, state_->decideShadows(renderer, camera, options));
   frame.statistics.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   return frame;
+}
+
+const std::string& RendererSelector::deviceNameFor(const Camera& camera,
+                                                   const FrameOptions& options) {
+  return state_->findOrCreate(state_->chooseKind(camera, options, RendererKind::automatic))
+      .deviceName();
 }
 
 const std::string& RendererSelector::deviceName() const {

@@ -28,6 +28,9 @@ class RendererSelector {
   Frame render(const scene::Snapshot& snapshot, const Camera& camera,
                const FrameOptions& options = {}, RendererKind kind = RendererKind::automatic);
 
+  /// Frame::renderer of such a frame.
+  const std::string& deviceNameFor(const Camera& camera, const FrameOptions& options);
+
   // As in Renderer, of the default renderer.
   const std::string& deviceName() const;
   bool software() const;

@@ -256,9 +256,13 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
                   "collide; shapes: the shapes that collide")
       ->capture_default_str()
       ->check(CLI::IsMember({"people", "shapes"}));
-  verb.add_flag("--shadows", into.shadows,
-                "Draw sun shadows in the colour; clear glass casts "
-                "none");
+  verb.add_option("--samples", into.samples,
+                  "Samples of the colour in each pixel, which smooth its edges; the other channels "
+                  "have one. The time of the colour grows with it")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"1", "4", "16"}));
+  verb.add_flag("--no-shadows", into.noShadows, "Draw no shadows of the sun in the colour");
+  verb.add_flag("--shadows")->group("");  // the default, which earlier versions had to be given
 }
 
 void addRun(CLI::App& verb, CaptureArguments& into) {
@@ -331,7 +335,8 @@ PictureOptions makePictureOptions(const CaptureArguments& read) {
   options.overlay = *parseOverlay(read.overlay);
   options.renderer =
       render::parseRendererKind(read.renderer).value_or(render::RendererKind::automatic);
-  options.shadows = read.shadows;
+  options.shadows = !read.noShadows;
+  options.samples = *parseNumber<std::uint32_t>(read.samples);
   options.avatars =
       read.avatars == "shapes" ? render::AvatarForm::collision : render::AvatarForm::figure;
   options.glass =

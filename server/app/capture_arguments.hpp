@@ -17,9 +17,9 @@ struct CaptureArguments {
   std::string rgb = "png", quality = "95", depth = "npy", depthScale, tooFar = "refuse";
   std::string ids = "npy", layout = "plain", axes = "opengl", fps = "30", every = "0", avatar;
   std::string camera, shard = "0/1", limit = "0", progress = "bar", glass = "clear",
-                      renderer = "auto", overlay, avatars = "people";
+                      renderer = "auto", overlay, avatars = "people", samples = "1";
   bool still = false, strict = false, noMp4 = false, dryRun = false, reportDepth = false,
-       shadows = false;
+       noShadows = false;
 };
 
 /// Validates the name of an output folder. Returns the error, or an empty text.

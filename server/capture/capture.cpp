@@ -80,15 +80,8 @@ render::FrameOptions makeFrameOptions(const CaptureFrame& captureFrame,
   frame.transparency = options.glass;
   frame.avatars = options.avatars;
   frame.shadows = options.shadows;
+  frame.samples = options.samples;
   return frame;
-}
-
-/// Describes the renderer for these channels, by which `automatic` chooses. The manifest needs it
-/// before the first frame.
-std::string describeRenderer(render::RendererSelector& renderer, const PictureOptions& options) {
-  render::Camera smallest;
-  smallest.width = smallest.height = 1;
-  return renderer.render({}, smallest, makeFrameOptions({}, options)).renderer;
 }
 
 /// True if the frame shows no object, for example from inside a wall or outside the scene. False if
@@ -214,9 +207,10 @@ ExitCode runCapture(const CaptureCommand& command) {
     return ExitCode::success;
   }
   render::RendererSelector renderer(scene, command.pictures.renderer, command.device);
-  const std::string rendererName = describeRenderer(renderer, command.pictures);
+  const std::string rendererName = renderer.deviceNameFor(
+      plan.frames.front().camera, makeFrameOptions(plan.frames.front(), command.pictures));
   claimFolder(command.out, command.pictures,
-              makeManifest(*scene, command.path, command.pictures, renderer.deviceName()));
+              makeManifest(*scene, command.path, command.pictures, rendererName));
   writeMetadataFiles(command.out, *scene, plan, command.pictures);
   const std::vector<std::size_t> missing = findMissingFrames(command, plan, counts);
   if (counts.existing > 0)

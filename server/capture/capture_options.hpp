@@ -65,7 +65,8 @@ struct PictureOptions {
   render::RendererKind renderer = render::RendererKind::automatic;
   render::TransparencyMode glass = render::TransparencyMode::blend;
   render::AvatarForm avatars = render::AvatarForm::figure;
-  bool shadows = false;
+  bool shadows = true;
+  std::uint32_t samples = 1;  ///< of the colour in each pixel
 };
 
 /// Options of the run that do not affect the pictures.

@@ -242,6 +242,7 @@ std::string makeManifest(const scene::Scene& scene, const std::filesystem::path&
   all["glass"] = options.glass == render::TransparencyMode::opaque ? "solid" : "clear";
   all["avatars"] = options.avatars == render::AvatarForm::collision ? "shapes" : "people";
   all["shadows"] = options.shadows;
+  all["samples"] = options.samples;
   return all.dump(1) + "\n";
 }
 

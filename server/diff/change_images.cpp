@@ -220,6 +220,8 @@ render::Image renderMoment(render::RendererSelector& renderer, const scene::Scen
                            const Moment& moment) {
   render::FrameOptions options;
   options.hiddenEntity = from.hiddenAvatar;
+  options.automaticShadows = true;
+  options.samples = 4;
   const render::Frame frame = renderer.render(snapshot, from.camera, options);
   OverlayChoice choice;
   choice.contacts = true;

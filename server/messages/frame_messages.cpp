@@ -10,6 +10,7 @@
 #include "render/image/image.hpp"
 #include "render/lens.hpp"
 #include "render/optical_flow.hpp"
+#include "render/samples.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -276,6 +277,11 @@ ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot
   }
   if (auto error = validateSize(request)) return *error;
   if (auto error = validateNoise(request)) return *error;
+  if (request.samples() != 0 && !render::isSampleCount(request.samples()))
+    return makeError(v1::ERROR_BAD_MESSAGE,
+                     std::string("samples: give ") + render::kSampleCounts + ", not " +
+                         std::to_string(request.samples()),
+                     "samples");
   const int width = static_cast<int>(request.width());
   const int height = static_cast<int>(request.height());
   ViewOrError view = makeError(v1::ERROR_BAD_CAMERA, "view is missing: give eyes or free", "view");
@@ -286,6 +292,8 @@ ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot
     if (request.glass() == v1::GLASS_SOLID)
       frameView->options.transparency = render::TransparencyMode::opaque;
     frameView->options.shadows = request.shadows();
+    frameView->options.automaticShadows = !request.has_shadows();
+    if (request.samples() != 0) frameView->options.samples = request.samples();
     if (request.collision_shapes()) frameView->options.avatars = render::AvatarForm::collision;
     frameView->renderer = rendererFromProto(request);
     if (auto error = applyIntrinsics(frameView->camera, request)) return *error;
@@ -335,7 +343,8 @@ v1::Frame toProto(const render::Frame& frame, const FrameSource& source,
     intrinsics.set_cy(pinhole->cy);
   }
   message.set_glass(request.glass() == v1::GLASS_SOLID ? v1::GLASS_SOLID : v1::GLASS_CLEAR);
-  message.set_shadows(request.shadows());
+  message.set_shadows(frame.shadows);
+  message.set_samples(frame.samples);
   message.set_collision_shapes(frame.avatars == render::AvatarForm::collision);
   attachment.reserve(attachment.size() +
                      computeBytesPerPixel(request) * message.width() * message.height());

@@ -69,6 +69,7 @@ std::variant<v1::ClientMessage, HttpError> parseMjpegRequest(const Target& targe
   subscription.set_rate(query.number("rate", 10));
   frame.set_width(query.pixels("width", 640));
   frame.set_height(query.pixels("height", 480));
+  frame.set_samples(query.pixels("samples", 1));
   frame.set_rgb_encoding(v1::ENCODING_JPEG);
   if (target.path.starts_with(kAvatar)) {
     frame.mutable_eyes()->set_avatar(target.path.substr(kAvatar.size()));

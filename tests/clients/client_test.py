@@ -201,6 +201,21 @@ class Seeing(RoomCase):
         self.assertEqual((person.message.collision_shapes, shape.message.collision_shapes), (False, True))
         self.assertGreater((shape.ids > 3).sum(), 1.5 * (person.ids > 3).sum())
 
+    def test_samples_smooth_the_colour_and_shadows_are_drawn_in_large_pictures(self):
+        self.need_pictures()
+        look = {"eye": (0, 1, 0), "forward": (1, 0, 0.4), "renderer": "rays", "channels": ("rgb", "ids")}
+        one, four = (self.client.frame(samples=n, width=40, height=30, **look) for n in (1, 4))
+        self.assertEqual((one.message.samples, four.message.samples), (1, 4))
+        np.testing.assert_array_equal(one.ids, four.ids)
+        self.assertTrue((one.rgb != four.rgb).any())
+        with self.assertRaisesRegex(enfilade.ServerError, "samples: give 1, 4 or 16"):
+            self.client.frame(samples=5, width=40, height=30, **look)
+        with self.assertRaisesRegex(ValueError, "samples: give 1, 4 or 16"):
+            enfilade.Camera("front", samples=2)
+        self.assertFalse(one.message.shadows)
+        self.assertTrue(self.client.frame(width=320, height=240, **look).message.shadows)
+        self.assertFalse(self.client.frame(width=320, height=240, shadows=False, **look).message.shadows)
+
     def test_eyes_look_along_forward_without_turning_the_avatar(self):
         self.need_pictures()
         ann = self.client.spawn("ann", at=(0, 0.01, 0), facing=0)

@@ -85,5 +85,32 @@ TEST(RendererSelector, RaysAreRefusedWhereAGpuIsRequired) {
   EXPECT_THROW(RendererSelector(scene, RendererKind::rays, {"", true}), RenderError);
 }
 
+TEST(RendererSelector, NamesTheRendererOfAFrameInAdvance) {
+  RendererSelector selector(sceneOf(crowd(60)));
+  for (const int size : {8, 64, 300}) {
+    for (const bool colour : {false, true}) {
+      const FrameOptions options{.channels = {colour, true, true, false}};
+      const std::string name = selector.deviceNameFor(squareCamera(size), options);
+      EXPECT_EQ(name, selector.render({}, squareCamera(size), options).renderer) << size;
+    }
+  }
+}
+
+TEST(RendererSelector, AutomaticShadowsAreForLargePerspectiveColourByProcessors) {
+  RendererSelector selector(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}), RendererKind::rays);
+  FrameOptions options{.automaticShadows = true};
+  Camera camera = squareCamera(300);
+  EXPECT_TRUE(selector.render({}, camera, options).shadows);
+  options.channels.rgb = false;
+  EXPECT_FALSE(selector.render({}, camera, options).shadows);
+  options.channels.rgb = true;
+  EXPECT_FALSE(selector.render({}, squareCamera(256), options).shadows);
+  camera.projection = Camera::Projection::orthographic;
+  EXPECT_FALSE(selector.render({}, camera, options).shadows);
+  EXPECT_FALSE(choosesShadows(false, squareCamera(300), {}, 12));
+  EXPECT_FALSE(choosesShadows(true, squareCamera(300), {}, 2'000'001));
+  EXPECT_FALSE(selector.render({}, squareCamera(300)).shadows) << "off without the option";
+}
+
 }  // namespace
 }  // namespace enfilade::render

@@ -431,6 +431,31 @@ TEST_F(Capture, AvatarsAreDrawnAsPeopleOrAsTheirShapes) {
   EXPECT_NE(other.err.find("shapes"), std::string::npos) << other.err;
 }
 
+TEST_F(Capture, SamplesAndShadowsChangeOnlyTheColour) {
+  write(folder_ / "path.txt", ahead(1));
+  const auto manifest = [&](const std::string& out, std::vector<std::string> options) {
+    const Ended ended = captured("path.txt", out, std::move(options));
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return json::parse(textOf(folder_ / out / "capture.json"));
+  };
+  const json plain = manifest("plain", {}), smooth = manifest("smooth", {"--samples", "4"}),
+             sunless = manifest("sunless", {"--no-shadows"});
+  EXPECT_EQ(plain.at("samples"), 1);
+  EXPECT_EQ(smooth.at("samples"), 4);
+  EXPECT_EQ(plain.at("shadows"), true);
+  EXPECT_EQ(sunless.at("shadows"), false);
+  for (const char* other : {"smooth", "sunless"}) {
+    EXPECT_NE(textOf(folder_ / other / "rgb/000000.png"), textOf(folder_ / "plain/rgb/000000.png"));
+    for (const char* file : {"ids/000000.npy", "depth/000000.npy"})
+      EXPECT_EQ(textOf(folder_ / other / file), textOf(folder_ / "plain" / file)) << other;
+  }
+  const Ended refused = captured("path.txt", "refused", {"--samples", "3"});
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.err.find("--samples"), std::string::npos) << refused.err;
+  for (const char* allowed : {"1", "4", "16"})
+    EXPECT_NE(refused.err.find(allowed), std::string::npos) << refused.err;
+}
+
 TEST_F(Capture, SixteenBitFilesRefuseValuesOutOfRangeByDefault) {
   write(folder_ / "path.txt", ahead(1));
   const Ended fits = captured("path.txt", "fits", {"--depth", "png", "--ids", "png"});

@@ -106,6 +106,46 @@ TEST_F(Frames, AvatarsAreFiguresAndOnRequestTheirCollisionShapes) {
   EXPECT_GT(2 * shape, 3 * figure);
 }
 
+TEST_F(Frames, SamplesSmoothTheColourAloneAndOtherNumbersAreRefused) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(30);
+  v1::FrameRequest request = eyesOf("ann");
+  const protocol::ReceivedFrame one = ann.frame(request);
+  EXPECT_EQ(one.description.samples(), 1u);
+  request.set_samples(4);
+  const protocol::ReceivedFrame four = ann.frame(request);
+  EXPECT_EQ(four.description.samples(), 4u);
+  for (const v1::Channel channel : {v1::CHANNEL_IDS, v1::CHANNEL_DEPTH}) {
+    const auto a = one.plane(channel), b = four.plane(channel);
+    EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin(), b.end())) << channel;
+  }
+  const auto a = one.plane(v1::CHANNEL_RGB), b = four.plane(v1::CHANNEL_RGB);
+  EXPECT_FALSE(std::equal(a.begin(), a.end(), b.begin(), b.end()));
+  request.set_samples(3);
+  try {
+    ann.frame(request);
+    ADD_FAILURE() << "three samples";
+  } catch (const protocol::ProtocolError& error) {
+    EXPECT_NE(std::string(error.what()).find("samples: give 1, 4 or 16, not 3"), std::string::npos)
+        << error.what();
+  }
+}
+
+TEST_F(Frames, ShadowsAreDrawnByDefaultInLargePictures) {
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
+  ann.step(30);
+  v1::FrameRequest request = eyesOf("ann");
+  request.set_renderer(v1::RENDERER_RAYS);
+  EXPECT_FALSE(ann.frame(request).description.shadows()) << "64 x 48";
+  request.set_width(320);
+  request.set_height(240);
+  EXPECT_TRUE(ann.frame(request).description.shadows());
+  request.set_shadows(false);
+  EXPECT_FALSE(ann.frame(request).description.shadows());
+}
+
 TEST_F(Frames, APngHoldsTheSamePicture) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));

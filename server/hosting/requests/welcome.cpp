@@ -25,6 +25,7 @@ v1::Welcome makeWelcome(const HostedWorld& hosted) {
   if (!hosted.frames.deviceName().empty()) {
     welcome.add_capabilities("frames");
     welcome.add_capabilities("shadows");
+    welcome.add_capabilities("samples");
   }
   *welcome.mutable_scene() = toProto(hosted.world.scene());
   *welcome.mutable_policies() = toProto(hosted.world.settings());

@@ -24,7 +24,8 @@ class Camera:
 
     size: (width, height) in pixels. channels: some of "rgb", "depth", "ids", "class", "thing",
     "normals", "range". yaw, pitch: radians, left and upwards positive. height: metres above the feet;
-    None: the avatar's eyes. ahead, left: metres from its axis."""
+    None: the avatar's eyes. ahead, left: metres from its axis. samples: 1, 4 or 16 of the colour in
+    each pixel."""
 
     name: str
     size: Tuple[int, int] = (128, 128)
@@ -35,6 +36,7 @@ class Camera:
     height: Optional[float] = None
     ahead: float = 0.0
     left: float = 0.0
+    samples: int = 1
 
     def __post_init__(self) -> None:
         if isinstance(self.channels, str) or set(self.channels) - set(_CHANNELS):
@@ -48,6 +50,8 @@ class Camera:
             raise ValueError(f"size: give two whole numbers of pixels, at least 1, not {self.size!r}")
         if not 0 < self.fov_y < math.pi:
             raise ValueError(f"fov_y: give radians between 0 and pi, not {self.fov_y}")
+        if self.samples not in (1, 4, 16):
+            raise ValueError(f"samples: give 1, 4 or 16, not {self.samples}")
         if not abs(self.pitch) < math.pi / 2:
             raise ValueError(f"pitch: give radians between -pi/2 and pi/2, not {self.pitch}")
 
@@ -62,7 +66,7 @@ class CameraRequest:
         width, height = map(int, camera.size)
         self.request = messages.ClientMessage(frame=frame_request(
             avatar, forward=(1, 0, 0), width=width, height=height, fov_y=camera.fov_y,
-            channels=camera.channels))
+            channels=camera.channels, samples=camera.samples))
         self._eyes = self.request.frame.eyes
         self._forward = self._eyes.forward
         if camera.height is not None:

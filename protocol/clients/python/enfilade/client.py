@@ -474,28 +474,31 @@ class Client:
               fov_y: Optional[float] = None, intrinsics: Optional[Sequence[float]] = None,
               height_y: Optional[float] = None, near: Optional[float] = None,
               far: Optional[float] = None, channels: Sequence[str] = ("rgb",), glass: str = "",
-              renderer: str = "", shadows: bool = False, lens: str = "",
+              renderer: str = "", shadows: Optional[bool] = None, lens: str = "",
               distortion: Sequence[float] = (), depth_noise: Optional[int] = None,
               flow_from: Optional[int] = None, flow_forward: Optional[Point] = None,
-              collision_shapes: bool = False, tick: Optional[int] = None) -> Frame:
+              collision_shapes: bool = False, samples: int = 1, tick: Optional[int] = None) -> Frame:
         """Returns a picture of the last tick. It is taken from the eyes of `avatar` (along `forward`
         if given), or from `eye` towards `target` or along `forward`; `avatar` is then invisible.
         `up` (with an eye) must not be parallel to the view: straight down needs one. The lens:
         `fov_y` radians, or `intrinsics` (fx, fy, cx, cy) in pixels from the top left corner, or,
         with an eye, `height_y` metres of an orthographic picture. `channels`: some of "rgb",
         "depth", "ids", "normals", "range", "class", "thing". `glass`: "clear" or "solid". `renderer`: "gl" or "rays".
-        `shadows`: of the sun, in the colour. `lens`: "fisheye" (OpenCV's model; `fov_y` is then the
+        `shadows`: of the sun, in the colour; None: where they cost little. `lens`: "fisheye" (OpenCV's model; `fov_y` is then the
         angle of the whole width, default pi; `distortion` k1 to k4) or "equirectangular".
         `depth_noise`: the seed of a structured-light camera's noise in "depth". `flow_from`: the earlier tick of the channel "flow", of the last 32, and
         `flow_forward` the direction in which the avatar looked then, if `forward` is given.
-        `collision_shapes` draws avatars as the shapes that collide, not as people."""
+        `collision_shapes` draws avatars as the shapes that collide, not as people. `samples`: 1, 4 or
+        16 of the colour in each pixel, which smooth its edges."""
         asked = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
                               height=height, fov_y=fov_y, intrinsics=intrinsics, height_y=height_y,
                               near=near, far=far, channels=channels, glass=glass,
                               renderer=renderer, shadows=shadows, lens=lens, distortion=distortion,
                               depth_noise=depth_noise, flow_from=flow_from,
                               flow_forward=flow_forward, collision_shapes=collision_shapes,
-                              tick=tick)
+                              samples=samples, tick=tick)
+        if samples != 1 and "samples" not in self.welcome.capabilities:
+            warnings.warn("frame: this server draws one sample a pixel; start a newer one", stacklevel=2)
         if shadows and "shadows" not in self.welcome.capabilities:
             warnings.warn("frame: this server draws no shadows; start a newer one", stacklevel=2)
         reply, attachment = self.request(frame=asked)

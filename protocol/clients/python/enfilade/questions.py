@@ -85,10 +85,10 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
                   intrinsics: Optional[Sequence[float]] = None, height_y: Optional[float] = None,
                   near: Optional[float] = None, far: Optional[float] = None,
                   channels: Sequence[str] = ("rgb",), glass: str = "", renderer: str = "",
-                  shadows: bool = False, lens: str = "", distortion: Sequence[float] = (),
+                  shadows: Optional[bool] = None, lens: str = "", distortion: Sequence[float] = (),
                   depth_noise: Optional[int] = None, flow_from: Optional[int] = None,
                   flow_forward: Optional[Point] = None, collision_shapes: bool = False,
-                  tick: Optional[int] = None) -> Any:
+                  samples: int = 1, tick: Optional[int] = None) -> Any:
     """Returns the FrameRequest that Client.frame() sends."""
     if sum(one is not None for one in (fov_y, intrinsics, height_y)) > 1:
         raise ValueError("frame: give one of fov_y, intrinsics and height_y")
@@ -100,7 +100,7 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
         raise ValueError("frame: target, up and height_y need an eye; for an avatar's eyes give "
                          "forward")
     asked = messages.FrameRequest(width=width, height=height, channels=results.channels(channels),
-                                  shadows=shadows, collision_shapes=collision_shapes, tick=tick)
+                                  shadows=shadows, collision_shapes=collision_shapes, samples=samples, tick=tick)
     if eye is None:
         view = asked.eyes
         view.avatar = avatar
