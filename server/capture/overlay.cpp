@@ -1,6 +1,7 @@
 #include "server/capture/overlay.hpp"
 
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <optional>
 
@@ -72,11 +73,37 @@ void drawBox(Canvas& canvas, const ObjectRect& rect) {
                    computeAvatarColour(rect.id));
 }
 
-/// The last part of an object's path, or an avatar's name.
+/// Where a part "_GlobalId" begins: 22 digits of base 64, the first of which is below 4; those of a
+/// word have no letters of both cases. npos: none.
+std::size_t findGlobalId(const std::string& name) {
+  constexpr std::size_t kLength = 22;
+  const auto isDigit = [](char c) {
+    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '$';
+  };
+  const auto isUpper = [](char c) { return c >= 'A' && c <= 'Z'; };
+  const auto isLower = [](char c) { return c >= 'a' && c <= 'z'; };
+  for (std::size_t i = 0; i + kLength < name.size(); ++i) {
+    const auto first = name.begin() + static_cast<std::ptrdiff_t>(i) + 1, end = first + kLength;
+    if (name[i] == '_' && *first >= '0' && *first <= '3' && std::all_of(first, end, isDigit) &&
+        std::any_of(first, end, isUpper) && std::any_of(first, end, isLower) &&
+        (end == name.end() || *end == '_'))
+      return i;
+  }
+  return std::string::npos;
+}
+
+/// Removes `separator` and the number after it from the end of a name.
+void removeNumber(std::string& name, const std::string& separator) {
+  const std::size_t at = name.rfind(separator);
+  if (at == std::string::npos || at == 0) return;
+  const std::size_t digits = name.find_first_not_of("0123456789", at + separator.size());
+  if (digits == std::string::npos && at + separator.size() < name.size()) name.resize(at);
+}
+
+/// The name for people of an object, or an avatar's name.
 std::string findName(const scene::Model& model, const CapturePlan& plan, scene::EntityId id) {
   if (id <= model.objects.size()) {
-    const std::string& path = model.objects[id - 1].path;
-    return path.substr(path.find_last_of('/') + 1);
+    return makeLabelName(model.objects[id - 1].path);
   }
   for (const AvatarName& avatar : plan.avatars)
     if (avatar.id == id) return avatar.name;
@@ -184,6 +211,20 @@ Image drawOverlay(const render::Frame& frame, const OverlayChoice& choice,
   }
   if (choice.contacts) drawContacts(canvas, frame, captureFrame);
   return canvas.toImage();
+}
+
+std::string makeLabelName(const std::string& path) {
+  const std::string whole = path.substr(path.find_last_of('/') + 1);
+  std::string name = whole.substr(0, findGlobalId(whole));
+  removeNumber(name, "_node_");
+  removeNumber(name, ":");  // Revit's "family:type:element"
+  const std::size_t last = name.rfind(':');
+  if (last != std::string::npos && last > 0) {
+    const std::size_t before = name.rfind(':', last - 1);
+    const std::size_t start = before == std::string::npos ? 0 : before + 1;
+    if (name.compare(start, last - start, name, last + 1) == 0) name.resize(last);
+  }
+  return name.empty() ? whole : name;
 }
 
 }  // namespace enfilade::server

@@ -1,6 +1,8 @@
 // Overlays for people: contacts, trajectories, boxes and names on a frame's colour.
 #pragma once
 
+#include <string>
+
 #include "render/image/image.hpp"
 #include "server/capture/capture_plan.hpp"
 
@@ -12,5 +14,9 @@ namespace enfilade::server {
 render::Image drawOverlay(const render::Frame& frame, const OverlayChoice& choice,
                           const scene::Model& model, const CapturePlan& plan,
                           const CaptureFrame& captureFrame);
+
+/// A name for people, of an object's path: its last part without an IFC GlobalId, an authoring
+/// tool's number, a node's number and repeated parts.
+std::string makeLabelName(const std::string& path);
 
 }  // namespace enfilade::server

@@ -410,6 +410,22 @@ TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
   EXPECT_EQ(captured("walk.jsonl", "unknown", {"--every", "6", "--avatar", "eve"}).code, 1);
 }
 
+TEST(LabelName, SaysWhatAPersonWouldSay) {
+  const std::pair<const char*, const char*> names[] = {
+      {"site/IfcSlab_sporenkap_3rT2B46bX7bfYW98$CQ_BF_0_node_1", "IfcSlab_sporenkap"},
+      {"IfcWall_binnenblad_06P8M5eRX7Q8DMqxH3c_wl", "IfcWall_binnenblad"},
+      {"IfcMappedItem_node_389", "IfcMappedItem"},
+      {"Level 2/Basic Wall:Exterior - Brick on Block:143478",
+       "Basic Wall:Exterior - Brick on Block"},
+      {"M_Single-Flush:0762 x 2032mm:0762 x 2032mm:150173", "M_Single-Flush:0762 x 2032mm"},
+      {"room/Chair#4", "Chair#4"},
+      {"hall/_node_3", "_node_3"},
+      {"door_3_of_the_western_wing_1", "door_3_of_the_western_wing_1"},
+      {"stair_3_of_the_western_wings", "stair_3_of_the_western_wings"},
+      {"", ""}};
+  for (const auto& [path, label] : names) EXPECT_EQ(makeLabelName(path), label) << path;
+}
+
 TEST_F(Capture, AvatarsAreDrawnAsPeopleOrAsTheirShapes) {
   write(folder_ / "walk.jsonl", R"({"spawn":"ann","at":[0,0.001,0],"facing":0}
 {"spawn":"bob","at":[2,0.001,0],"facing":180}
