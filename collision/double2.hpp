@@ -3,6 +3,9 @@
 #pragma once
 
 #include <cstring>
+#ifdef __SSE2__
+#include <emmintrin.h>
+#endif
 
 namespace enfilade::collision {
 
@@ -21,6 +24,16 @@ inline unsigned toBits(Mask2 mask) {
   return static_cast<unsigned>(__builtin_ia32_movmskpd(reinterpret_cast<Double2>(mask)));
 #else
   return static_cast<unsigned>((mask[0] & 1) | (mask[1] & 2));
+#endif
+}
+
+/// Whether three masks have no lane set.
+inline bool isNoneSet(Mask2 a, Mask2 b, Mask2 c) {
+#ifdef __SSE2__
+  const auto lanes = [](Mask2 mask) { return reinterpret_cast<__m128d>(mask); };
+  return _mm_movemask_pd(_mm_or_pd(_mm_or_pd(lanes(a), lanes(b)), lanes(c))) == 0;
+#else
+  return (toBits(a) | toBits(b) | toBits(c)) == 0;
 #endif
 }
 

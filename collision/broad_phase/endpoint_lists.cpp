@@ -9,6 +9,7 @@
 #include <algorithm>
 
 #include "collision/assert.hpp"
+#include "collision/broad_phase/box_table.hpp"
 
 namespace enfilade::collision {
 
@@ -45,14 +46,6 @@ void EndpointLists::remove(std::span<const std::uint32_t> proxies) {
     renumber(axis);
   }
   for (const std::uint32_t proxy : proxies) marked_[proxy] = 0;
-}
-
-void EndpointLists::confirmOverlap(std::uint32_t a, std::uint32_t b,
-                                   std::vector<PairChange>& changes) {
-  ENFILADE_ASSERT(a != b);
-  ++aabbTests;
-  if (overlapsByMaxEndpoints(maxEndpoints_[a], maxEndpoints_[b]))
-    changes.push_back({std::min(a, b), std::max(a, b), true});
 }
 
 /// An endpoint of `proxy` was swapped with the opposite endpoint of each of the first `count`
@@ -165,30 +158,36 @@ void EndpointLists::insert(std::span<const std::uint32_t> proxies,
     ENFILADE_ASSERT(std::is_sorted(endpoints.begin(), endpoints.end(), isBefore));
     renumber(axis);
   }
-  sweep(proxies, changes);
+  findNewPairs(proxies, changes);
 }
 
-/// Sweeps the x list once. Pairs of two old proxies are already known and skipped.
-void EndpointLists::sweep(std::span<const std::uint32_t> newProxies,
-                          std::vector<PairChange>& changes) {
+void EndpointLists::findNewPairs(std::span<const std::uint32_t> newProxies,
+                                 std::vector<PairChange>& changes) {
+  constexpr std::size_t kMaxComparedWithAll = 8;
   for (const std::uint32_t proxy : newProxies) marked_[proxy] = 1;
-  for (std::size_t k = 1; k + 1 < endpoints_[0].size(); ++k) {
-    const Endpoint& endpoint = endpoints_[0][k];
-    const std::uint32_t proxy = endpoint.proxy();
-    std::vector<std::uint32_t>& own = open_[marked_[proxy]];
-    if (endpoint.isUpper()) {
-      const auto opened = std::find(own.begin(), own.end(), proxy);
-      ENFILADE_ASSERT(opened != own.end());
-      own.erase(opened);
-      continue;
+  std::vector<std::uint32_t> all;
+  for (std::size_t k = 1; k + 1 < endpoints_[0].size(); ++k)
+    if (!endpoints_[0][k].isUpper()) all.push_back(endpoints_[0][k].proxy());
+  std::vector<BoxTable::IdPair> pairs;
+  if (newProxies.size() <= kMaxComparedWithAll) {
+    aabbTests += newProxies.size() * all.size();
+    for (const std::uint32_t proxy : newProxies) {
+      for (const std::uint32_t other : all) {
+        if ((marked_[other] == 0 || other < proxy) &&
+            overlapsByMaxEndpoints(maxEndpoints_[proxy], maxEndpoints_[other]))
+          pairs.emplace_back(proxy, other);
+      }
     }
-    for (const std::uint32_t other : open_[1]) confirmOverlap(proxy, other, changes);
-    if (marked_[proxy] != 0) {
-      for (const std::uint32_t other : open_[0]) confirmOverlap(proxy, other, changes);
-    }
-    own.push_back(proxy);
+  } else {
+    BoxTable table;
+    table.build(maxEndpoints_, all);
+    table.findPairs(pairs);
+    aabbTests += pairs.size();
   }
-  ENFILADE_ASSERT(open_[0].empty() && open_[1].empty());
+  for (const auto& [a, b] : pairs) {
+    if (marked_[a] != 0 || marked_[b] != 0)
+      changes.push_back({std::min(a, b), std::max(a, b), true});
+  }
   for (const std::uint32_t proxy : newProxies) marked_[proxy] = 0;
 }
 

@@ -69,8 +69,7 @@ class EndpointLists {
   void recordSwaps(std::uint32_t proxy, std::size_t count, bool added,
                    std::vector<PairChange>& changes);
   void renumber(std::size_t axis);
-  void sweep(std::span<const std::uint32_t> newProxies, std::vector<PairChange>& changes);
-  void confirmOverlap(std::uint32_t a, std::uint32_t b, std::vector<PairChange>& changes);
+  void findNewPairs(std::span<const std::uint32_t> newProxies, std::vector<PairChange>& changes);
   std::uint32_t& endpointIndex(std::size_t axis, std::uint32_t tag) {
     return endpointIndices_[tag >> 1][2 * axis + (tag & 1)];
   }
@@ -79,10 +78,9 @@ class EndpointLists {
   std::vector<SignedBounds> committedMaxEndpoints_;  ///< by proxy: as of the last update
   std::array<EndpointList, 3> endpoints_{makeSentinels(), makeSentinels(), makeSentinels()};
   std::vector<std::array<std::uint32_t, 6>>
-      endpointIndices_;                             ///< by proxy: its endpoints in the lists
-  std::vector<std::uint8_t> marked_;                ///< by proxy: removed or new
-  std::vector<std::uint32_t> swapped_;              ///< scratch: proxies of swapped endpoints
-  std::array<std::vector<std::uint32_t>, 2> open_;  ///< sweep: open intervals, old and new proxies
+      endpointIndices_;                 ///< by proxy: its endpoints in the lists
+  std::vector<std::uint8_t> marked_;    ///< by proxy: removed or new
+  std::vector<std::uint32_t> swapped_;  ///< scratch: proxies of swapped endpoints
 };
 
 }  // namespace enfilade::collision

@@ -30,6 +30,18 @@ inline unsigned greaterMask(const SignedBounds& a, const SignedBounds& b) {
          toBits(loadDouble2(&a[4]) > loadDouble2(&b[4])) << 4;
 }
 
+/// Whether a[k] <= b[k] for all k.
+inline bool noneGreater(const SignedBounds& a, const SignedBounds& b) {
+  return isNoneSet(loadDouble2(&a[0]) > loadDouble2(&b[0]), loadDouble2(&a[2]) > loadDouble2(&b[2]),
+                   loadDouble2(&a[4]) > loadDouble2(&b[4]));
+}
+
+/// The minimum endpoints of a box that is given by its maximum endpoints.
+inline SignedBounds minEndpointsOf(const SignedBounds& maxEndpoints) {
+  return {-maxEndpoints[3], -maxEndpoints[4], -maxEndpoints[5],
+          -maxEndpoints[0], -maxEndpoints[1], -maxEndpoints[2]};
+}
+
 inline bool overlaps(const SignedBounds& minEndpoints, const SignedBounds& maxEndpoints) {
   return greaterMask(minEndpoints, maxEndpoints) == 0;
 }

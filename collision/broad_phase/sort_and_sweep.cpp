@@ -19,13 +19,17 @@
 // 3. A proxy that leaves its window gets a new one; a grid finds the static boxes near it
 //    (static_grid.cpp). Some windows are rebuilt in advance, in turn, so that rebuilds are spread
 //    over the ticks.
-// 4. Dynamic proxies are tested against each other (sort_and_sweep_dynamic.cpp).
+// 4. Dynamic proxies are tested against each other: with endpoint lists of their windows
+//    (sort_and_sweep_dynamic.cpp) or, where these would exchange too many endpoints, in a batch
+//    (sort_and_sweep_batch.cpp).
 //
 // Departures from the source: each proxy has its own lists instead of three for the whole scene. A
 // walker thus crosses only endpoints near it, and static objects cost nothing. Between two builds
 // of a window, pairs follow from endpoint swaps alone. A build (a jump forces one at once) replaces
 // the pairs of the proxy by the overlaps among the gathered boxes. Endpoint lists of the windows
-// find the windows that overlap; the boxes of two such proxies are compared when one moves.
+// find the windows that overlap; the boxes of two such proxies are compared when one moves. Where
+// everything moves, exchanges grow with the square of the proxies, and a batch finds all pairs of
+// dynamic proxies without the lists; the pairs and the order of their changes are the same.
 //
 // Limits: 2^31 - 1 dynamic proxies, 2^32 - 2 static boxes, 2^32 - 2 cells; otherwise memory.
 
@@ -145,7 +149,7 @@ void moveOutsideBrackets(SweepState& sweep, ProxyId id, const Aabb& box) {
   DynamicProxy& proxy = requireProxy(sweep.proxies, id);
   requireValidAabb(box, "dynamic proxy", id);
   const SignedBounds maxEndpoints = toMaxEndpoints(box);
-  if (!proxy.neighbours.empty()) markMoved(sweep, id, &maxEndpoints);
+  if (sweep.batch.isActive || !proxy.neighbours.empty()) markMoved(sweep, id, &maxEndpoints);
   sweep.proxyMaxEndpoints[id] = maxEndpoints;
   if (proxy.leftBrackets || proxy.state == ProxyState::added) return;
   proxy.leftBrackets = true;
@@ -155,6 +159,8 @@ void moveOutsideBrackets(SweepState& sweep, ProxyId id, const Aabb& box) {
 void removeAllOverlaps(SweepState& sweep, ProxyId id) {
   DynamicProxy& proxy = sweep.proxies[id];
   while (!proxy.neighbours.empty()) removeNeighbours(sweep, id, proxy.neighbours.back().id);
+  while (!proxy.overlaps.empty() && proxy.overlaps.back().isDynamic)
+    removeDynamicOverlap(sweep, id, proxy.overlaps.back().id);
   sweep.overlappingStatics.clear();
   replaceStaticOverlaps(sweep, id);
 }
@@ -205,7 +211,8 @@ void SortAndSweep::move(ProxyId id, const Aabb& box) {
     DynamicProxy& proxy = s.proxies[id];
     // Brackets are finite, so endpoints inside them are finite, too.
     if (moved.isWithin(proxy.bracketLow, proxy.bracketHigh) && moved.notEmpty) {
-      if (!proxy.neighbours.empty()) markMoved(s, id, moved.maxEndpoints.data());
+      if (s.batch.isActive || !proxy.neighbours.empty())
+        markMoved(s, id, moved.maxEndpoints.data());
       std::memcpy(&s.proxyMaxEndpoints[id], &moved.maxEndpoints, sizeof(SignedBounds));
       return;
     }
@@ -257,9 +264,10 @@ void SortAndSweep::update() {
   s.addedPairs.clear();
   s.removedPairs.clear();
   s.counters = {};
+  s.travel.fill(0);
   ++s.tick;
   for (const ProxyId id : s.removed) removeAllOverlaps(s, id);
-  s.windowLists.remove(s.removed);
+  if (!s.batch.isActive) s.windowLists.remove(s.removed);
   applyStaticEdits(s);
   updateStaticOverlaps(s);
   for (const ProxyId id : s.added) rebuildWindow(s, id);

@@ -32,6 +32,7 @@ struct SweepCounters {
   std::uint64_t windowsBuilt = 0;  ///< proxy windows that were built
   std::uint64_t staticEdits = 0;   ///< static boxes inserted or removed
   std::uint64_t rebuilds = 0;      ///< 1 if the whole static grid was rebuilt
+  std::uint64_t batched = 0;       ///< dynamic proxies in a batch update (sort_and_sweep_batch.cpp)
   std::uint64_t aabbTests = 0;  ///< full box tests: of window builds and of nearby dynamic proxies
 };
 

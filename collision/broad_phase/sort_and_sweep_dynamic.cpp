@@ -8,8 +8,10 @@
 
 #include <algorithm>
 #include <array>
+#include <utility>
 
 #include "collision/assert.hpp"
+#include "collision/broad_phase/sort_and_sweep_batch.hpp"
 #include "collision/broad_phase/sort_and_sweep_pairs.hpp"
 
 namespace enfilade::collision {
@@ -44,23 +46,9 @@ auto findNeighbour(std::vector<Neighbour>& neighbours, ProxyId id) {
                           [](const Neighbour& n, ProxyId sought) { return n.id < sought; });
 }
 
-void addNeighbours(SweepState& sweep, ProxyId a, ProxyId b) {
-  ENFILADE_ASSERT(a != b);
-  std::vector<Neighbour>&ofA = sweep.proxies[a].neighbours, &ofB = sweep.proxies[b].neighbours;
-  const auto at = findNeighbour(ofA, b);
-  if (at != ofA.end() && at->id == b) return;
-  const std::uint8_t separatingAxis =
-      findSeparatingAxis(sweep.proxyMaxEndpoints[a], sweep.proxyMaxEndpoints[b]);
-  ++sweep.counters.aabbTests;
-  ofA.insert(at, {b, separatingAxis});
-  const auto other = findNeighbour(ofB, a);
-  ENFILADE_ASSERT(other == ofB.end() || other->id != a);  // neighbours are symmetric
-  ofB.insert(other, {a, oppositeAxis(separatingAxis)});
-  if (separatingAxis == Neighbour::kOverlapping) addDynamicOverlap(sweep, a, b);
-}
-
 void testNeighbours(SweepState& sweep, ProxyId id) {
   const SignedBounds& maxEndpoints = sweep.proxyMaxEndpoints[id];
+  sweep.neighbourTests += sweep.proxies[id].neighbours.size();
   for (Neighbour& neighbour : sweep.proxies[id].neighbours) {
     if (neighbour.id < id && sweep.hasMoved[neighbour.id] != 0)
       continue;  // the other tests this pair
@@ -85,6 +73,21 @@ void testNeighbours(SweepState& sweep, ProxyId id) {
 
 }  // namespace
 
+void addNeighbours(SweepState& sweep, ProxyId a, ProxyId b) {
+  ENFILADE_ASSERT(a != b);
+  std::vector<Neighbour>&ofA = sweep.proxies[a].neighbours, &ofB = sweep.proxies[b].neighbours;
+  const auto at = findNeighbour(ofA, b);
+  if (at != ofA.end() && at->id == b) return;
+  const std::uint8_t separatingAxis =
+      findSeparatingAxis(sweep.proxyMaxEndpoints[a], sweep.proxyMaxEndpoints[b]);
+  ++sweep.counters.aabbTests;
+  ofA.insert(at, {b, separatingAxis});
+  const auto other = findNeighbour(ofB, a);
+  ENFILADE_ASSERT(other == ofB.end() || other->id != a);  // neighbours are symmetric
+  ofB.insert(other, {a, oppositeAxis(separatingAxis)});
+  if (separatingAxis == Neighbour::kOverlapping) addDynamicOverlap(sweep, a, b);
+}
+
 void removeNeighbours(SweepState& sweep, ProxyId a, ProxyId b) {
   std::vector<Neighbour>&ofA = sweep.proxies[a].neighbours, &ofB = sweep.proxies[b].neighbours;
   const auto at = findNeighbour(ofA, b);
@@ -96,8 +99,10 @@ void removeNeighbours(SweepState& sweep, ProxyId a, ProxyId b) {
   ofB.erase(other);
 }
 
-void updateDynamicOverlaps(SweepState& sweep) {
-  sweep.windowLists.swaps = sweep.windowLists.aabbTests = 0;
+namespace {
+
+/// Updates the endpoint lists of the windows and tests the neighbours of moved proxies.
+void updateLists(SweepState& sweep) {
   sweep.changes.clear();
   for (const ProxyId id : sweep.rebuilt)
     sweep.windowLists.setMaxEndpoints(id, sweep.proxies[id].window.maxBounds);
@@ -113,14 +118,26 @@ void updateDynamicOverlaps(SweepState& sweep) {
       removeNeighbours(sweep, change.a, change.b);
     }
   }
+  sweep.neighbourTests = 0;
   for (std::size_t k = 0; k < sweep.moved.size(); ++k) {
     if (k + kPrefetchDistance < sweep.moved.size()) {
       __builtin_prefetch(sweep.proxies[sweep.moved[k + kPrefetchDistance]].neighbours.data());
     }
     testNeighbours(sweep, sweep.moved[k]);
   }
-  sweep.counters.swaps += sweep.windowLists.swaps;
-  sweep.counters.aabbTests += sweep.windowLists.aabbTests;
+}
+
+}  // namespace
+
+void updateDynamicOverlaps(SweepState& sweep) {
+  if (!sweep.batch.isActive && isBatchCheaper(sweep)) enterBatch(sweep);
+  if (sweep.batch.isActive) {
+    updateBatch(sweep);
+  } else {
+    updateLists(sweep);
+  }
+  sweep.counters.swaps += std::exchange(sweep.windowLists.swaps, 0);
+  sweep.counters.aabbTests += std::exchange(sweep.windowLists.aabbTests, 0);
 }
 
 }  // namespace enfilade::collision

@@ -8,6 +8,8 @@ namespace enfilade::collision {
 /// Updates neighbours and pairs of the moved, added and rebuilt proxies (step 4).
 void updateDynamicOverlaps(SweepState& sweep);
 
+/// Two proxies whose windows overlap become neighbours, and their boxes may be a pair.
+void addNeighbours(SweepState& sweep, ProxyId a, ProxyId b);
 /// Two proxies whose windows no longer overlap cease to be neighbours, and their pair ends.
 void removeNeighbours(SweepState& sweep, ProxyId a, ProxyId b);
 

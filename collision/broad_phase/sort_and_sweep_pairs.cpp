@@ -67,20 +67,29 @@ void replaceStaticOverlaps(SweepState& sweep, ProxyId id) {
   overlapList.assign(sweep.merged.begin(), sweep.merged.end());
 }
 
+void changePartner(SweepState& sweep, ProxyId id, ProxyId other, bool added) {
+  std::vector<Overlap>& overlapList = sweep.proxies[id].overlaps;
+  [[maybe_unused]] const bool changed =
+      added ? insertOverlap(overlapList, {other, true}) : eraseOverlap(overlapList, {other, true});
+  ENFILADE_ASSERT(changed);
+}
+
+void recordDynamicChange(SweepState& sweep, ProxyId a, ProxyId b, bool added) {
+  (added ? sweep.addedPairs : sweep.removedPairs).push_back({std::min(a, b), std::max(a, b), true});
+  ENFILADE_ASSERT(added || sweep.pairCount > 0);
+  sweep.pairCount += added ? 1 : -1;
+}
+
 void addDynamicOverlap(SweepState& sweep, ProxyId a, ProxyId b) {
-  [[maybe_unused]] const bool isNewForA = insertOverlap(sweep.proxies[a].overlaps, {b, true});
-  [[maybe_unused]] const bool isNewForB = insertOverlap(sweep.proxies[b].overlaps, {a, true});
-  ENFILADE_ASSERT(isNewForA && isNewForB);
-  sweep.addedPairs.push_back({std::min(a, b), std::max(a, b), true});
-  ++sweep.pairCount;
+  if (!insertOverlap(sweep.proxies[a].overlaps, {b, true})) return;
+  changePartner(sweep, b, a, true);
+  recordDynamicChange(sweep, a, b, true);
 }
 
 void removeDynamicOverlap(SweepState& sweep, ProxyId a, ProxyId b) {
-  [[maybe_unused]] const bool existedForA = eraseOverlap(sweep.proxies[a].overlaps, {b, true});
-  [[maybe_unused]] const bool existedForB = eraseOverlap(sweep.proxies[b].overlaps, {a, true});
-  ENFILADE_ASSERT(existedForA && existedForB && sweep.pairCount > 0);
-  sweep.removedPairs.push_back({std::min(a, b), std::max(a, b), true});
-  --sweep.pairCount;
+  if (!eraseOverlap(sweep.proxies[a].overlaps, {b, true})) return;
+  changePartner(sweep, b, a, false);
+  recordDynamicChange(sweep, a, b, false);
 }
 
 }  // namespace enfilade::collision

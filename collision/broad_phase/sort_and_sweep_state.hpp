@@ -5,9 +5,11 @@
 #include <cstdint>
 #include <map>
 #include <set>
+#include <span>
 #include <utility>
 #include <vector>
 
+#include "collision/broad_phase/box_table.hpp"
 #include "collision/broad_phase/cell_grid.hpp"
 #include "collision/broad_phase/endpoint_lists.hpp"
 #include "collision/broad_phase/proxy_window.hpp"
@@ -47,6 +49,34 @@ struct alignas(64) DynamicProxy {
   SignedBounds velocity{};  ///< velocity of the maximum endpoints at that tick, metres per tick
 };
 
+/// The overlapping dynamic proxies of each proxy.
+struct PartnerLists {
+  std::vector<std::uint32_t> start;  ///< by proxy: its first partner; and the end of the last one
+  std::vector<ProxyId> partners;     ///< ascending for each proxy
+  std::span<const ProxyId> of(ProxyId id) const {
+    if (id + std::size_t{1} >= start.size()) return {};
+    return std::span(partners).subspan(start[id], start[id + 1] - start[id]);
+  }
+};
+
+/// State of batch updates (sort_and_sweep_batch.cpp).
+struct BatchState {
+  bool isActive = false;                ///< else the endpoint lists find the pairs
+  std::vector<ProxyId> moving;          ///< all proxies that do not rest
+  std::vector<std::uint8_t> isResting;  ///< by proxy: its box is that of restingTable
+  std::vector<std::uint8_t> hasMoved;   ///< by proxy: since the last review
+  BoxTable movingTable, restingTable;
+  std::vector<ProxyId> woken;  ///< resting proxies that have moved in this update
+  PartnerLists known;          ///< as found in the last update: without partners that both rest
+  PartnerLists next;           ///< scratch
+  std::vector<std::uint32_t> writeAt;   ///< scratch
+  std::vector<ProxyId> unsorted;        ///< scratch
+  std::vector<BoxTable::IdPair> found;  ///< scratch: each pair once
+  std::uint64_t reviewAt = 0;           ///< tick
+  std::array<double, 3> travel{};  ///< metres on each axis, of window endpoints, since the review
+  std::uint64_t movedSinceReview = 0;  ///< moved proxies, each once in an update
+};
+
 struct SweepState {
   SweepState(StaticGrid grid, std::size_t boxes)
       : staticGrid(std::move(grid)), staticIdCount(boxes), staticCount(boxes) {}
@@ -59,6 +89,9 @@ struct SweepState {
   std::size_t staticCount = 0;
 
   EndpointLists windowLists;  ///< of the proxy windows
+  BatchState batch;
+  std::array<double, 3> travel{};    ///< metres on each axis, of window endpoints in this update
+  std::uint64_t neighbourTests = 0;  ///< of the last update
   std::vector<DynamicProxy> proxies;
   // Separate arrays for the fields that neighbours read of a proxy.
   std::vector<SignedBounds> proxyMaxEndpoints;

@@ -173,7 +173,12 @@ void rebuildStaticGrid(SweepState& sweep) {
 void rebuildWindow(SweepState& sweep, ProxyId id) {
   DynamicProxy& proxy = sweep.proxies[id];
   ENFILADE_ASSERT(proxy.state == ProxyState::added || proxy.state == ProxyState::active);
+  const SignedBounds before = proxy.window.maxBounds;
   setWindowBounds(sweep, id);
+  if (proxy.state == ProxyState::active) {
+    for (std::size_t k = 0; k < 6; ++k)
+      sweep.travel[k % 3] += std::abs(proxy.window.maxBounds[k] - before[k]);
+  }
   sweep.rows.count = 0;
   sweep.staticGrid.gather(proxy.window.maxBounds, sweep.rows);
   for (const Row row : sweep.rows.all()) __builtin_prefetch(&sweep.staticGrid.minEndpoints(row));

@@ -70,12 +70,16 @@ endfunction()
 bench_methods(bench_broad_phases pairs broad_phase_methods.cpp
   approaches/brute_force.cpp approaches/bsp_tree.cpp approaches/hash_grid.cpp
   approaches/interval_tree.cpp approaches/loose_octree.cpp)
+target_sources(bench_broad_phases PRIVATE broad_phase_runs.cpp)
 bench_methods(bench_narrow_phases convex narrow_phase_methods.cpp our_narrow_phases.cpp)
 bench_methods(bench_mesh_queries mesh mesh_methods.cpp our_mesh_queries.cpp)
 bench_methods(bench_boxes boxes box_methods.cpp)
 
 enfilade_benchmark(collision_broad_phase
   SOURCES collision_broad_phase.cpp building_workload.cpp
+  LIBRARIES bench_broad_phases)
+enfilade_benchmark(collision_all_moving
+  SOURCES collision_all_moving.cpp moving_cubes.cpp
   LIBRARIES bench_broad_phases)
 set(accuracy ${PROJECT_SOURCE_DIR}/tests/accuracy)
 enfilade_benchmark(collision_narrow_phase
@@ -94,7 +98,7 @@ enfilade_benchmark(collision_time_to_contact
 enfilade_benchmark(collision_boxes
   SOURCES collision_boxes.cpp
   LIBRARIES bench_boxes gmpxx gmp)
-set(programs collision_boxes collision_broad_phase collision_narrow_phase collision_mesh collision_icollide
+set(programs collision_all_moving collision_boxes collision_broad_phase collision_narrow_phase collision_mesh collision_icollide
   collision_time_to_contact)
 set_target_properties(${programs} PROPERTIES EXCLUDE_FROM_ALL ON)
 add_custom_target(collision_benchmarks DEPENDS ${programs})

@@ -5,25 +5,15 @@
 //      ours alone, unchecked: for callgrind, with valgrind --tool=callgrind --collect-atstart=no
 //      --toggle-collect='*oursTick*'
 //
-// The workload is that of building_workload.hpp. Methods run in turns of some dozens of ticks on
-// the same boxes, so that a disturbance of the machine affects all of them. A tick is timed from
-// the new boxes to all reported pairs. Number and sum of mixed ids of its pairs are checked against
-// an independent method (PairTruth) every tick. A method stops when its time for a size is used up.
-//
-// The motion is run kRuns times with newly built methods. A tick counts with its minimum time, as
-// all runs do the same work and a busy machine only adds time. Methods with a long build time run
-// once.
-//
-// Bytes are the method's heap without the static boxes themselves, before movers are added: 48
-// bytes a box are subtracted if the method copied them.
-
-#include <malloc.h>
+// The workload is that of building_workload.hpp, the way of measuring that of broad_phase_runs.hpp.
+// The pairs of every tick are checked against an independent method (PairTruth).
 
 #include <cstdlib>
 #include <cstring>
 
 #include "collision/broad_phase/broad_phase_audit.hpp"
 #include "tests/benchmarks/broad_phase_method.hpp"
+#include "tests/benchmarks/broad_phase_runs.hpp"
 #include "tests/benchmarks/building_workload.hpp"
 #include "tests/benchmarks/measurement.hpp"
 
@@ -32,17 +22,12 @@ namespace {
 using namespace enfilade::benchmarks;
 namespace collision = enfilade::collision;
 
-constexpr int kTurns = 6;
-constexpr int kRuns = 3;
-constexpr double kLongToBuild = 0.5;  // seconds
-
 struct Effort {
   std::size_t mostObjects;
   int ticks;
-  double secondsAMethod;  ///< for ticks, per size; at least kMinTicks are always made
+  double secondsAMethod;  ///< for ticks, per size
   std::size_t slowShare;  ///< methods with an object limit are skipped above limit / slowShare
 };
-constexpr int kMinTicks = 4;
 
 /// Reference for the pairs of a tick: for each mover all static boxes within a metre of its
 /// position at the last gathering. Gathering scans a list sorted on x.
@@ -100,14 +85,8 @@ bool truthHolds(const Building& building, std::span<const Aabb> movers, const Pa
   return expected.sameAs(reported);
 }
 
-/// The boxes of all ticks, and their expected pairs.
-struct Motion {
-  std::vector<std::vector<Aabb>> boxes;
-  std::vector<PairTally> pairs;
-};
-
-Motion record(const Building& building, std::size_t movers, int ticks) {
-  Motion motion;
+RecordedBoxes record(const Building& building, std::size_t movers, int ticks) {
+  RecordedBoxes motion;
   BuildingMotion bodies(building, movers);
   PairTruth truth(building.still);
   for (int tick = 0; tick < ticks; ++tick) {
@@ -123,65 +102,6 @@ Motion record(const Building& building, std::size_t movers, int ticks) {
   return motion;
 }
 
-struct Run {
-  const BroadPhaseMethod* method = nullptr;
-  std::unique_ptr<BroadPhase> phase;
-  double buildSeconds = 0, bytesAnObject = 0, spent = 0;
-  std::vector<double> microseconds;  ///< by tick; 0 if not timed
-  std::size_t tick = 0, wrong = 0;
-};
-
-double heapBytes() {
-  const auto info = mallinfo2();
-  return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
-}
-
-Run build(const BroadPhaseMethod& method, const Building& building) {
-  Run run;
-  run.method = &method;
-  const double before = heapBytes();
-  const auto start = Clock::now();
-  run.phase = method.make(building.still);
-  run.buildSeconds = secondsSince(start);
-  const double bytes = heapBytes() - before + static_cast<double>(run.phase->hiddenBytes());
-  run.bytesAnObject = bytes / static_cast<double>(building.still.size());
-  if (!run.phase->readsGivenBoxes()) run.bytesAnObject -= sizeof(Aabb);
-  return run;
-}
-
-/// Runs some ticks of one method. The first tick finds the caches full of other methods' data (and
-/// the very first inserts the movers), so it is not timed.
-void turn(Run& run, const Motion& motion, const Effort& effort) {
-  const std::size_t until =
-      std::min(motion.boxes.size(), run.tick + motion.boxes.size() / kTurns + 1);
-  const std::size_t first = run.tick;
-  for (; run.tick < until; ++run.tick) {
-    if (run.tick > kMinTicks && run.spent > effort.secondsAMethod) return;
-    PairTally tally;
-    const auto start = Clock::now();
-    run.phase->tick(motion.boxes[run.tick], tally);
-    const double seconds = secondsSince(start);
-    run.spent += seconds;
-    run.microseconds.push_back(run.tick > first ? 1e6 * seconds : 0);
-    if (!tally.sameAs(motion.pairs[run.tick])) ++run.wrong;
-  }
-}
-
-/// Takes the minimum of two runs of a method, tick by tick.
-void takeLeast(Run& best, const Run& again) {
-  best.buildSeconds = std::min(best.buildSeconds, again.buildSeconds);
-  best.wrong = std::max(best.wrong, again.wrong);
-  const std::size_t both = std::min(best.microseconds.size(), again.microseconds.size());
-  for (std::size_t k = 0; k < both; ++k) {
-    best.microseconds[k] = std::min(best.microseconds[k], again.microseconds[k]);
-  }
-}
-
-const char* kindName(BroadPhaseMethod::Kind kind) {
-  if (kind == BroadPhaseMethod::Kind::ours) return "ours";
-  return kind == BroadPhaseMethod::Kind::approach ? "approach" : "peer";
-}
-
 nlohmann::json headOf(const BroadPhaseMethod& method, std::size_t objects, std::size_t movers) {
   return {{"bench", "broad"},
           {"method", method.name},
@@ -190,7 +110,7 @@ nlohmann::json headOf(const BroadPhaseMethod& method, std::size_t objects, std::
           {"movers", movers}};
 }
 
-void print(const Run& run, std::size_t objects, std::size_t movers, double pairs,
+void print(const BroadPhaseRun& run, std::size_t objects, std::size_t movers, double pairs,
            Results& results) {
   std::vector<double> timed = run.microseconds;
   std::erase(timed, 0.0);
@@ -222,41 +142,23 @@ void leaveOut(const BroadPhaseMethod& method, std::size_t objects, std::size_t m
   results.add(line);
 }
 
-void runAll(std::vector<Run>& runs, const Motion& motion, const Effort& effort) {
-  for (int k = 0; k < kTurns; ++k) {
-    for (Run& run : runs) turn(run, motion, effort);
-  }
-  for (Run& run : runs) run.phase.reset();
-}
-
 std::size_t measure(const Building& building, std::size_t objects, std::size_t movers,
                     const Effort& effort, const Arguments& arguments,
                     const std::vector<BroadPhaseMethod>& methods, Results& results) {
-  const Motion motion = record(building, movers, effort.ticks);
-  std::vector<Run> best;
+  const RecordedBoxes motion = record(building, movers, effort.ticks);
+  std::vector<const BroadPhaseMethod*> chosen;
   for (const BroadPhaseMethod& method : methods) {
     if (!arguments.wants(method.name)) continue;
     if (objects > method.mostObjects / effort.slowShare) {
       leaveOut(method, objects, movers, results);
     } else {
-      best.push_back(build(method, building));
+      chosen.push_back(&method);
     }
   }
-  runAll(best, motion, effort);
-  for (int k = 1; k < kRuns; ++k) {
-    std::vector<Run> again;
-    for (const Run& run : best) {
-      if (run.buildSeconds < kLongToBuild) again.push_back(build(*run.method, building));
-    }
-    runAll(again, motion, effort);
-    for (const Run& run : again) {
-      takeLeast(*std::find_if(best.begin(), best.end(),
-                              [&](const Run& b) { return b.method == run.method; }),
-                run);
-    }
-  }
+  const std::vector<BroadPhaseRun> best =
+      runMethods(chosen, building.still, motion, effort.secondsAMethod);
   std::size_t wrong = 0;
-  for (const Run& run : best) {
+  for (const BroadPhaseRun& run : best) {
     print(run, objects, movers, static_cast<double>(motion.pairs.back().count), results);
     if (run.method->kind != BroadPhaseMethod::Kind::peer) wrong += run.wrong;
   }

@@ -3,7 +3,7 @@
 
 report.py RESULTS_FOLDER REPORT_FOLDER [--quick]
 
-Reads broad.jsonl, narrow.jsonl, mesh.jsonl, time.jsonl and icollide.jsonl, as the programs write them.
+Reads broad.jsonl, moving.jsonl, narrow.jsonl, mesh.jsonl, time.jsonl and icollide.jsonl, as the programs write them.
 """
 
 import datetime
@@ -151,6 +151,49 @@ is not timed. A method stops when its time for a size is used up.
     if reasons:
         parts.append("Left out at the larger sizes: "
                      + "; ".join(f"{name} ({why})" for name, why in reasons.items()) + ".\n")
+    return "\n".join(parts)
+
+
+# ---- all moving -----------------------------------------------------------------------------------
+
+def moving_cell(row):
+    if row is None:
+        return "–"
+    cell = f"{short(row['median_ms'])} ({short(row['p99_ms'])})"
+    return cell if row["wrong"] == 0 else f"{cell} **{row['wrong']} wrong**"
+
+
+def moving_table(rows, motion, sizes):
+    of = [row for row in rows if row["motion"] == motion]
+    body = [[method] + [moving_cell(find(of, method=method, cubes=n)) for n in sizes]
+            for method in names(of)]
+    best = []
+    for n in sizes:
+        ours = find(of, kind="ours", cubes=n)
+        peers = [row["median_ms"] for row in of if row["kind"] == "peer" and row["cubes"] == n]
+        best.append(f"**{min(peers) / ours['median_ms']:.1f}×**" if ours and peers else "–")
+    pairs = [f"{find(of, kind='ours', cubes=n)['pairs']:,.0f}" for n in sizes]
+    return table([f"{motion}: ms a frame, median (99 %)"] + [f"{n:,} cubes" for n in sizes],
+                 body + [["best peer : ours"] + best, ["pairs in the last frame"] + pairs])
+
+
+def all_moving(rows):
+    if not rows:
+        return ""
+    sizes = sorted(set(row["cubes"] for row in rows))
+    frames = [row for row in rows if "ticks" in row]
+    wrong = f"{sum(r['wrong'] for r in frames)} of {sum(r['ticks'] for r in frames)}"
+    parts = ["## Broad phase, all moving\n", """\
+Equal cubes that all move and pass through each other, in frames of 1/30 s. Brownian: a tenth of the volume
+is filled, and each cube makes a random step of up to a fifth of its edge. Falling: a tower of cubes falls
+onto a floor and bounces. Turbulent: a dense heap swirls about its centre. One thread. A frame is timed and
+checked as above; the first one, which inserts all cubes, is not part of the median.
+"""]
+    for motion in dict.fromkeys(row["motion"] for row in rows):
+        parts.append(moving_table(rows, motion, sizes))
+    first = [f"{n:,} cubes: {short(max(r['first_ms'] for r in rows if r['kind'] == 'ours' and r['cubes'] == n))} ms"
+             for n in sizes]
+    parts.append(f"Wrong frames, all methods: {wrong}. First insertion by ours, slowest motion: {'; '.join(first)}.\n")
     return "\n".join(parts)
 
 
@@ -402,6 +445,7 @@ noisy (other load, shared clocks), so times vary by a factor of two: every table
 which the methods take turns, times are medians, and only ratios within a table are meaningful. Peers are Debian's packages; one that is not installed is missing here.
 """
     parts = [head, broad(read(results, "broad"), out),
+             all_moving(read(results, "moving")),
              narrow([row for row in rows if row["bench"] == "narrow"], out),
              families([row for row in rows if row["bench"] == "family"], out),
              mesh(read(results, "mesh")), time_to_contact(read(results, "time")),

@@ -29,10 +29,11 @@ class BulletPairs : public BroadPhase {
     Aabb world;
     for (const Aabb& box : still) world.include(box);
     world = collision::inflated(world, 10);
+    const std::size_t mostMovers = still.size() < 100 ? 100'000 : 2'000;  // or everything moves
     if (axisSweep) {
       broadphase_ = std::make_unique<bt32BitAxisSweep3>(
           bulletVector(world.min), bulletVector(world.max),
-          static_cast<unsigned>(still.size() + 2000), nullptr, true);
+          static_cast<unsigned>(still.size() + mostMovers), nullptr, true);
     } else {
       broadphase_ = std::make_unique<btDbvtBroadphase>();
     }

@@ -1,0 +1,94 @@
+// Benchmark of all broad phases where everything moves (moving_cubes.hpp): ours and the peers.
+//
+//   collision_all_moving [--quick] [--out FILE] [--only PART_OF_A_NAME]
+//
+// The way of measuring is that of broad_phase_runs.hpp. The expected pairs are those of a sweep of
+// the whole list along x, which shares no code with ours.
+
+#include "tests/benchmarks/approaches/mover_sweep.hpp"
+#include "tests/benchmarks/broad_phase_method.hpp"
+#include "tests/benchmarks/broad_phase_runs.hpp"
+#include "tests/benchmarks/measurement.hpp"
+#include "tests/benchmarks/moving_cubes.hpp"
+
+namespace {
+
+using namespace enfilade::benchmarks;
+
+struct Size {
+  std::size_t cubes;
+  int ticks;
+  double secondsAMethod;
+};
+constexpr Size kSizes[] = {{1000, 301, 1}, {8000, 121, 3}, {64000, 61, 12}};
+constexpr Size kQuickSizes[] = {{1000, 121, 0.3}, {8000, 31, 0.6}};
+
+RecordedBoxes record(CubeMotion motion, const Size& size) {
+  MovingCubes cubes(motion, size.cubes);
+  MoverSweep truth;
+  RecordedBoxes recorded;
+  for (int tick = 0; tick < size.ticks; ++tick) {
+    const std::span<const Aabb> boxes = cubes.next();
+    recorded.boxes.emplace_back(boxes.begin(), boxes.end());
+    truth.reportPairs(boxes, recorded.pairs.emplace_back());
+  }
+  return recorded;
+}
+
+std::vector<double> timedOf(const BroadPhaseRun& run) {
+  std::vector<double> timed = run.microseconds;
+  std::erase(timed, 0.0);
+  return timed;
+}
+
+std::size_t measure(CubeMotion motion, const Size& size, const Arguments& arguments,
+                    const std::vector<BroadPhaseMethod>& methods, Results& results) {
+  const RecordedBoxes recorded = record(motion, size);
+  // Two distant boxes, which some peers need to know the extent of the world.
+  const std::vector<Aabb> distant{{Vec3(-1e3, -1001, -1e3), Vec3(1e3, -1000, 1e3)},
+                                  {Vec3(-1e3, 1000, -1e3), Vec3(1e3, 1001, 1e3)}};
+  std::vector<const BroadPhaseMethod*> chosen;
+  for (const BroadPhaseMethod& method : methods) {
+    if (method.kind != BroadPhaseMethod::Kind::approach && arguments.wants(method.name))
+      chosen.push_back(&method);
+  }
+  std::size_t wrong = 0;
+  for (const BroadPhaseRun& run : runMethods(chosen, distant, recorded, size.secondsAMethod)) {
+    const std::vector<double> timed = timedOf(run);
+    const double median = quantile(timed, 0.5) / 1e3, p99 = quantile(timed, 0.99) / 1e3;
+    const double pairs = static_cast<double>(recorded.pairs.back().count);
+    std::printf("%-22s %-9s %6zu cubes | %9.3f ms (99 %% %9.3f, first %9.2f) | %zu of %zu wrong\n",
+                run.method->name.c_str(), nameOf(motion), size.cubes, median, p99,
+                1e3 * run.firstTick, run.wrong, run.tick);
+    std::fflush(stdout);
+    results.add({{"bench", "moving"},
+                 {"method", run.method->name},
+                 {"kind", kindName(run.method->kind)},
+                 {"motion", nameOf(motion)},
+                 {"cubes", size.cubes},
+                 {"median_ms", median},
+                 {"p99_ms", p99},
+                 {"first_ms", 1e3 * run.firstTick},
+                 {"ticks", run.tick},
+                 {"wrong", run.wrong},
+                 {"pairs", pairs}});
+    if (run.method->kind == BroadPhaseMethod::Kind::ours) wrong += run.wrong;
+  }
+  return wrong;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const Arguments arguments(argc, argv);
+  Results results(arguments);
+  const auto methods = broadPhaseMethods();
+  const std::span<const Size> sizes =
+      arguments.quick ? std::span<const Size>(kQuickSizes) : std::span<const Size>(kSizes);
+  std::size_t wrong = 0;
+  for (const Size& size : sizes) {
+    for (const CubeMotion motion : kCubeMotions)
+      wrong += measure(motion, size, arguments, methods, results);
+  }
+  return wrong == 0 ? 0 : 3;
+}

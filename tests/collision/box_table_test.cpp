@@ -1,0 +1,126 @@
+// Tests of the table of boxes that finds all overlapping pairs at once, against brute force.
+#include "collision/broad_phase/box_table.hpp"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "tests/collision/checked_sweep.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+using Id = BoxTable::Id;
+using IdPairs = std::vector<BoxTable::IdPair>;
+
+IdPairs sorted(IdPairs pairs) {
+  for (auto& [a, b] : pairs)
+    if (a > b) std::swap(a, b);
+  std::sort(pairs.begin(), pairs.end());
+  return pairs;
+}
+
+/// Compares all pairs of the table, and those of one more box, with brute force. Returns the number
+/// of pairs.
+std::size_t checkPairs(const std::vector<Aabb>& boxes, const Aabb& query) {
+  std::vector<SignedBounds> maxEndpoints;
+  for (const Aabb& box : boxes) maxEndpoints.push_back(toMaxEndpoints(box));
+  std::vector<Id> ids(boxes.size());
+  std::iota(ids.begin(), ids.end(), Id{0});
+  BoxTable table;
+  table.build(maxEndpoints, ids);
+  IdPairs found, expected, foundByQuery, expectedByQuery;
+  table.findPairs(found);
+  constexpr Id kQuery = 1u << 30;
+  table.findOverlaps(toMaxEndpoints(query), kQuery, foundByQuery);
+  for (Id a = 0; a < boxes.size(); ++a) {
+    for (Id b = a + 1; b < boxes.size(); ++b)
+      if (overlaps(boxes[a], boxes[b])) expected.emplace_back(a, b);
+    if (overlaps(boxes[a], query)) expectedByQuery.emplace_back(a, kQuery);
+  }
+  EXPECT_EQ(sorted(found), expected);
+  EXPECT_EQ(sorted(foundByQuery), expectedByQuery);
+  return expected.size();
+}
+
+TEST(BoxTable, FindsThePairsOfEqualBoxesInAnyDensity) {
+  Random random(1);
+  for (const double width : {0.5, 3.0, 10.0, 40.0, 4000.0}) {
+    std::vector<Aabb> boxes;
+    for (int k = 0; k < 300; ++k)
+      boxes.push_back(
+          boxAt(uniform3(random, Vec3::Zero(), Vec3::Constant(width)), Vec3::Constant(1)));
+    checkPairs(boxes, boxAt(Vec3::Constant(width / 3), Vec3(1, 2, 3)));
+  }
+}
+
+TEST(BoxTable, FindsThePairsOfBoxesOfAllSizesAndPlaces) {
+  Random random(2);
+  std::size_t pairs = 0;
+  for (int round = 0; round < 40; ++round) {
+    std::vector<Aabb> boxes;
+    const auto randomBox = [&] {
+      const double reach = std::exp2(randomInt(random, -2, 8));
+      const Vec3 size =
+          std::exp2(randomInt(random, -12, 8)) * uniform3(random, Vec3::Zero(), Vec3::Constant(1));
+      return boxAt(uniform3(random, Vec3::Constant(-reach), Vec3::Constant(reach)), size);
+    };
+    for (int k = 0; k < 200; ++k) boxes.push_back(randomBox());
+    pairs += checkPairs(boxes, randomBox());
+  }
+  EXPECT_GT(pairs, 10000u);
+}
+
+TEST(BoxTable, FindsThePairsOfFewLargeBoxesAmongManySmallOnes) {
+  Random random(3);
+  std::vector<Aabb> boxes;
+  for (int k = 0; k < 600; ++k)
+    boxes.push_back(boxAt(uniform3(random, Vec3::Zero(), Vec3::Constant(60)), Vec3::Constant(0.3)));
+  for (const double size : {20.0, 50.0, 1000.0})
+    boxes.push_back(boxAt(Vec3::Constant(-3), Vec3(size, 0.5 * size, size)));
+  EXPECT_GT(checkPairs(boxes, boxAt(Vec3::Constant(-1e9), Vec3::Constant(2e9))), 600u);
+}
+
+TEST(BoxTable, BoxesThatTouchOverlapAndThoseApartByOneRoundingDoNot) {
+  Random random(4);
+  for (const double centre : {0.0, 0.1, -7.3, 1e6 / 3, -1e12 / 7}) {
+    std::vector<Aabb> boxes;
+    for (int x = 0; x < 5; ++x)
+      for (int y = 0; y < 5; ++y)
+        for (int z = 0; z < 5; ++z) {
+          const Vec3 corner = Vec3::Constant(centre) + Vec3(x, y, z) * 0.7;
+          Aabb box{corner, corner + Vec3::Constant(0.7)};
+          for (int axis = 0; axis < 3; ++axis) {  // touch the next one exactly, or almost
+            const int chance = randomInt(random, 0, 2);
+            const double next = centre + (Vec3(x, y, z)[axis] + 1) * 0.7;
+            box.max[axis] = chance == 0 ? next : std::nextafter(next, chance == 1 ? -1e300 : 1e300);
+          }
+          boxes.push_back(box);
+        }
+    EXPECT_GT(checkPairs(boxes, boxes[62]), 100u);
+  }
+}
+
+TEST(BoxTable, AcceptsPointsHugeCoordinatesAndDistantClusters) {
+  Random random(5);
+  std::vector<Aabb> boxes;
+  for (const double centre : {-1e300, -1e15, 0.0, 5e-324, 1e9, 1.7e308})
+    for (int k = 0; k < 20; ++k) {
+      const Vec3 corner =
+          Vec3::Constant(centre) + uniform3(random, Vec3::Zero(), Vec3::Constant(2));
+      boxes.push_back(boxAt(corner, Vec3::Constant(k % 3 == 0 ? 0.0 : 1.0)));
+    }
+  boxes.push_back({Vec3::Constant(-1.7e308), Vec3::Constant(1.7e308)});
+  boxes.push_back({Vec3::Zero(), Vec3(5e-324, 0, 0)});
+  EXPECT_GT(checkPairs(boxes, boxAt(Vec3::Constant(1e9), Vec3::Zero())), 100u);
+}
+
+TEST(BoxTable, FindsNothingInAnEmptyTable) {
+  EXPECT_EQ(checkPairs({}, boxAt(Vec3::Zero(), Vec3::Ones())), 0u);
+  EXPECT_EQ(checkPairs({boxAt(Vec3::Zero(), Vec3::Ones())}, boxAt(Vec3::Ones(), Vec3::Ones())), 0u);
+}
+
+}  // namespace
+}  // namespace enfilade::collision

@@ -1,0 +1,160 @@
+// Tests of batch updates, which find all dynamic pairs from scratch because coherence is lost: the
+// same pairs and changes as by brute force, and a return to the endpoint lists.
+#include <gtest/gtest.h>
+
+#include "tests/collision/checked_sweep.hpp"
+
+namespace enfilade::collision {
+namespace {
+
+constexpr int kProxies = 160;
+
+class BatchedSweep : public ::testing::Test {
+ protected:
+  Aabb randomBox(double largest = 1) {
+    const Vec3 size = uniform3(random_, Vec3::Constant(0.05), Vec3::Constant(largest));
+    return boxAt(uniform3(random_, Vec3::Zero(), Vec3::Constant(9)), size);
+  }
+  void insertAll(double largest = 1) {
+    for (int k = 0; k < kProxies; ++k) ids_.push_back(checked_.insert(randomBox(largest)));
+  }
+  void shift(ProxyId id, double step) {
+    const Vec3 by = uniform3(random_, Vec3::Constant(-step), Vec3::Constant(step));
+    const Aabb box = checked_.dynamicBoxes()[id];
+    checked_.move(id, {box.min + by, box.max + by});
+  }
+  void updateAndCheck() {
+    ASSERT_NO_FATAL_FAILURE(checked_.updateAndCheck());
+    batched_ = checked_.sweep().counters().batched;
+  }
+
+  Random random_{7};
+  CheckedSweep checked_{makeFurnishedHall(random_, 60, Vec3::Constant(10))};
+  std::vector<ProxyId> ids_;
+  std::uint64_t batched_ = 0;  ///< of the last update
+};
+
+TEST_F(BatchedSweep, EqualsBruteForceWhileAllProxiesMoveFast) {
+  insertAll();
+  int batches = 0;
+  for (int tick = 0; tick < 150; ++tick) {
+    for (const ProxyId id : ids_) shift(id, 0.4);
+    updateAndCheck();
+    if (HasFatalFailure()) return;
+    batches += batched_ > 0 ? 1 : 0;
+  }
+  EXPECT_EQ(batches, 150);
+  EXPECT_GT(checked_.dynamicPairsAdded, 600u);
+}
+
+TEST_F(BatchedSweep, EqualsBruteForceWithSizesOfManyMagnitudes) {
+  insertAll(0.3);
+  for (int k = 0; k < 12; ++k) ids_.push_back(checked_.insert(randomBox(6)));
+  for (int tick = 0; tick < 60; ++tick) {
+    for (const ProxyId id : ids_) {
+      if (randomInt(random_, 0, 9) > 0) {
+        shift(id, 0.3);
+      } else {
+        checked_.move(id, randomBox(tick % 3 == 0 ? 5 : 0.2));
+      }
+    }
+    updateAndCheck();
+    if (HasFatalFailure()) return;
+    EXPECT_GT(batched_, 0u);
+  }
+}
+
+TEST_F(BatchedSweep, ProxiesThatRestAreLeftOutUntilTheyMove) {
+  insertAll();
+  const std::size_t movers = 100;
+  for (int tick = 0; tick < 200; ++tick) {
+    for (std::size_t k = 0; k < movers; ++k) shift(ids_[k], 0.4);
+    if (tick > 100 && tick % 7 == 0) {  // resting ones move a little, two at once, or jump
+      const auto rested = movers + static_cast<std::size_t>(randomInt(random_, 0, 58));
+      shift(ids_[rested], 0.2);
+      shift(ids_[rested + 1], tick % 3 == 0 ? 5 : 0.01);
+    }
+    updateAndCheck();
+    if (HasFatalFailure()) return;
+    if (tick == 100) {
+      EXPECT_EQ(batched_, movers);
+    }
+    if (tick == 106) {
+      EXPECT_EQ(batched_, movers + 2);
+    }
+  }
+}
+
+TEST_F(BatchedSweep, ProxiesComeAndGoWhileOthersRestOrMove) {
+  insertAll();
+  for (int tick = 0; tick < 250; ++tick) {
+    for (std::size_t k = 0; k < 90; ++k) shift(ids_[k], 0.4);
+    for (int change = 0; change < 2; ++change) {
+      const auto k = static_cast<std::size_t>(randomInt(random_, 0, kProxies - 1));
+      checked_.remove(ids_[k]);
+      if (change == 1) shift(ids_[k == 0 ? 1 : 0], 0.1);
+      ids_[k] = checked_.insert(randomBox());
+    }
+    if (tick % 20 == 0) checked_.insertStatic(randomBox());
+    updateAndCheck();
+    if (HasFatalFailure()) return;
+  }
+  EXPECT_GT(batched_, 0u);
+}
+
+TEST_F(BatchedSweep, ReturnsToTheListsWhenTheMotionIsSlowAndToBatchesWhenItIsFast) {
+  insertAll();
+  for (int round = 0; round < 2; ++round) {
+    for (int tick = 0; tick < 40; ++tick) {
+      for (const ProxyId id : ids_) shift(id, 0.4);
+      updateAndCheck();
+      if (HasFatalFailure()) return;
+    }
+    EXPECT_GT(batched_, 0u);
+    for (int tick = 0; tick < 140; ++tick) {
+      for (const ProxyId id : ids_) shift(id, 0.0005);
+      updateAndCheck();
+      if (HasFatalFailure()) return;
+    }
+    EXPECT_EQ(batched_, 0u);
+  }
+}
+
+TEST_F(BatchedSweep, FewProxiesAreNeverABatch) {
+  for (int k = 0; k < 40; ++k) ids_.push_back(checked_.insert(randomBox()));
+  for (int tick = 0; tick < 40; ++tick) {
+    for (const ProxyId id : ids_) shift(id, 0.8);
+    updateAndCheck();
+    EXPECT_EQ(batched_, 0u);
+  }
+}
+
+TEST_F(BatchedSweep, LeavesTheBatchWhenMostProxiesAreRemoved) {
+  insertAll();
+  for (int tick = 0; tick < 10; ++tick) {
+    for (const ProxyId id : ids_) shift(id, 0.4);
+    updateAndCheck();
+  }
+  EXPECT_GT(batched_, 0u);
+  while (ids_.size() > 20) {
+    checked_.remove(ids_.back());
+    ids_.pop_back();
+  }
+  for (int tick = 0; tick < 40; ++tick) {
+    for (const ProxyId id : ids_) shift(id, 0.4);
+    updateAndCheck();
+  }
+  EXPECT_EQ(batched_, 0u);
+}
+
+TEST_F(BatchedSweep, AnIdleBatchDoesNothing) {
+  insertAll();
+  updateAndCheck();
+  EXPECT_EQ(batched_, static_cast<std::uint64_t>(kProxies));
+  updateAndCheck();
+  EXPECT_EQ(batched_, 0u);
+  EXPECT_EQ(checked_.sweep().counters().aabbTests, 0u);
+}
+
+}  // namespace
+}  // namespace enfilade::collision
