@@ -70,6 +70,7 @@ constexpr std::array kCatalog{
     DiagnosticKind{"unreadable_texture", warning,
                    "not a readable PNG, JPEG or WebP; drawn without it"},
     DiagnosticKind{"vertex_colours_ignored", warning, "vertex colours are not drawn"},
+    DiagnosticKind{"skin_ignored", error, "its node has no size: it is not posed by its skin"},
     DiagnosticKind{"instance_attributes_ignored", note,
                    "attributes of instances that neither place nor shape them"},
     // of IFC

@@ -283,8 +283,7 @@ void drawMoments(std::vector<Moment>& moments, const WalkDifference& difference,
 }
 
 /// Reads the paths of a walk's first run, thinned out.
-std::vector<WalkedPath> readPaths(const RecordedWalk& walk, const std::string& suffix,
-                                  scene::EntityId idOffset) {
+std::vector<WalkedPath> readPaths(const RecordedWalk& walk, bool isEarlier) {
   std::map<std::string, WalkedPath> paths;
   protocol::RecordingReader reader(walk.file, walk.run);
   std::uint64_t last = 0;
@@ -297,8 +296,9 @@ std::vector<WalkedPath> readPaths(const RecordedWalk& walk, const std::string& s
       WalkedPath& path = paths[avatar.name()];
       const Vec3 feet = vectorFromProto(avatar.feet());
       if (path.footPositions.empty()) {
-        path.avatar = avatar.name() + suffix;
-        path.id = avatar.id() + idOffset;
+        path.avatar = avatar.name() + (isEarlier ? ", before" : ", after");
+        path.id = avatar.id();
+        path.isEarlier = isEarlier;
       }
       if (path.footPositions.empty() || (path.footPositions.back() - feet).norm() > kTrailStep)
         path.footPositions.push_back(feet);
@@ -314,8 +314,8 @@ void drawChangeMap(const WalkDifference& difference, const ComparedModels& model
   WalkTrace trace;
   trace.title = "regressions in " + difference.after.runs.front().start.scene().source();
   // Later paths are drawn over earlier ones and have the avatars' colours of the pictures.
-  trace.paths = readPaths(difference.before, ", before", 7);
-  for (WalkedPath& path : readPaths(difference.after, ", after", 0))
+  trace.paths = readPaths(difference.before, true);
+  for (WalkedPath& path : readPaths(difference.after, false))
     trace.paths.push_back(std::move(path));
   for (const WalkEventChange& change : difference.events) {
     if (!change.worse || change.run != 0) continue;

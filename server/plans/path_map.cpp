@@ -58,6 +58,14 @@ TextStyle makeStyle(double size, bool bold = false) {
   return style;
 }
 
+/// The colour of the path's avatar; half of it for an earlier walk.
+Colour colourOf(const WalkedPath& path) {
+  Colour colour = computeAvatarColour(path.id);
+  if (!path.isEarlier) return colour;
+  for (std::uint8_t& part : colour) part = static_cast<std::uint8_t>((part + 255) / 2);
+  return colour;
+}
+
 void drawDot(Canvas& canvas, Point at, double radius, Colour colour) {
   canvas.disc(at, radius + 1.5, kPlanPaper);
   canvas.disc(at, radius, colour);
@@ -97,7 +105,7 @@ class StoreyMarks {
   void drawPath(const WalkedPath& path) {
     std::vector<Point> line;
     const auto flush = [&] {
-      if (line.size() > 1) canvas_.polyline(line, 3, computeAvatarColour(path.id));
+      if (line.size() > 1) canvas_.polyline(line, 3, colourOf(path), path.isEarlier);
       line.clear();
     };
     for (const Vec3& feet : path.footPositions) {
@@ -109,8 +117,7 @@ class StoreyMarks {
       if (line.empty() || next.x != line.back().x || next.y != line.back().y) line.push_back(next);
     }
     flush();
-    if (startsHere(path))
-      drawDot(canvas_, at(path.footPositions.front()), 6, computeAvatarColour(path.id));
+    if (startsHere(path)) drawDot(canvas_, at(path.footPositions.front()), 6, colourOf(path));
   }
 
   bool startsHere(const WalkedPath& path) const {
@@ -120,7 +127,7 @@ class StoreyMarks {
   void drawName(const WalkedPath& path) {
     if (!startsHere(path)) return;
     TextStyle style = makeStyle(13, true);
-    style.colour = computeAvatarColour(path.id), style.halo = 2;
+    style.colour = colourOf(path), style.halo = 2;
     captions_.draw(canvas_, at(path.footPositions.front()), path.avatar, style);
   }
 
@@ -159,7 +166,7 @@ struct LegendEntry {
 std::vector<LegendEntry> makeLegend(const WalkTrace& trace) {
   std::vector<LegendEntry> entries;
   for (const WalkedPath& path : trace.paths)
-    entries.push_back({path.avatar, computeAvatarColour(path.id), false});
+    entries.push_back({path.avatar, colourOf(path), false});
   if (!trace.contacts.empty())
     entries.push_back({"contact begins (without floors)", kContact, false});
   if (!trace.blockedWalks.empty()) entries.push_back({"walk ends blocked", kBlocked, false});

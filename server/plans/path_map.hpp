@@ -15,6 +15,7 @@ struct WalkedPath {
   std::string avatar;
   std::vector<Vec3> footPositions;
   scene::EntityId id = 0;  ///< selects the avatar's colour
+  bool isEarlier = false;  ///< of the walk that another one is compared with: pale and dashed
 };
 struct MapContact {
   Vec3 point = Vec3::Zero();

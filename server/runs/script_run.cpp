@@ -36,6 +36,7 @@ struct ScriptTarget {
   std::function<std::vector<v1::ContactEvent>()> endContacts;
   v1::Scene scene;
   std::string renderer;
+  const scene::Scene* localScene = nullptr;  ///< for walls in maps; null: in another process
 };
 
 protocol::CaptureFormat makeCaptureFormat() {
@@ -134,7 +135,7 @@ ExitCode runAndReport(const protocol::Script& script, RunReport& report, bool st
   bar.clear();
   runSummary.metrics = target.metrics();
   runSummary.maxPairs = std::max(runSummary.maxPairs, runSummary.metrics.pairs());
-  report.writePictures(runSummary, {makePlanRenderer(target)});
+  report.writePictures(runSummary, {makePlanRenderer(target), target.localScene});
   report.writeContacts(target.endContacts());
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   runSummary.wallSeconds = elapsed.count();
@@ -239,7 +240,8 @@ ExitCode replay(const ReplayCommand& command) {
                             [&] { return driver.metrics(); },
                             [&] { return driver.endContacts(); },
                             toProto(*scene),
-                            renderer ? renderer->deviceName() : std::string()};
+                            renderer ? renderer->deviceName() : std::string(),
+                            scene.get()};
         const ExitCode code = runAndReport(script, report, command.strict, std::move(target));
         const bool recordingComplete = !world.recorder() || !world.recorder()->close();
         return recordingComplete ? code : ExitCode::runtimeError;

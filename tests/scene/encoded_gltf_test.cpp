@@ -222,6 +222,19 @@ TEST(GltfExtensions, WhatIsNotReadIsRefusedOrReported) {
   EXPECT_EQ(diagnosticText(model, "ignored_extension"), "ACME_bent_meshes");
 }
 
+TEST(GltfExtensions, UnlistedOnesAreReportedUnlessTheyChangeNoShape) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  file.json["nodes"][0]["extras"] = {{"extensions", {{"ACME_of_the_exporter", 1}}}};
+  file.json["nodes"][0]["extensions"] = {{"MOZ_hubs_components", {{"ACME_bent", 1}}}};
+  file.json["meshes"][0]["extensions"] = {{"OMI_physics_body", Json::object()}};
+  EXPECT_TRUE(importModel(folder.write("harmless.glb", file.glb())).diagnostics.empty());
+  file.json["nodes"][0]["extensions"]["KHR_node_visibility"] = {{"visible", false}};
+  const Model model = importModel(folder.write("hidden.glb", file.glb()));
+  EXPECT_EQ(countOf(model, "ignored_extension"), 1u);
+  EXPECT_EQ(diagnosticText(model, "ignored_extension"), "KHR_node_visibility");
+}
+
 TEST(GltfExtensions, OtherScenesAreReported) {
   const TemporaryFolder folder;
   GltfWriter file = tests::plainTerrace();
@@ -241,6 +254,9 @@ TEST(GltfExtensions, GltfOneIsRefusedInWords) {
   const std::string text = failureOf(folder.write("old.gltf", file.gltf("a.bin")));
   EXPECT_NE(text.find("glTF version 1.0 cannot be read; export it as glTF 2.0"), std::string::npos)
       << text;
+  file.json["asset"] = {{"version", "2.1"}, {"minVersion", "2.1"}};
+  const std::string newer = failureOf(folder.write("newer.glb", file.glb()));
+  EXPECT_NE(newer.find("needs a reader of glTF 2.1"), std::string::npos) << newer;
 }
 
 TEST(GltfSizes, ACountThatTheFileCannotJustifyIsRefused) {

@@ -137,6 +137,26 @@ TEST(IfcMetadata, AMapPositionIsReportedInMetres) {
   EXPECT_EQ(bare->scale, 1);
 }
 
+TEST(IfcMetadata, TheScaleOfAMapIsAFactorWhetherOrNotItConvertsUnits) {
+  IfcHouse house;  // in millimetres
+  const auto placeOf = [&](const std::string& scale, bool mapInMetres) {
+    house.more = "#600=IFCMAPCONVERSION(#20,#601,456789.,5428000.,110.,1.,0.," + scale + ");\n" +
+                 "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$," + (mapInMetres ? "#602" : "$") +
+                 ");\n#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
+    return factsOf(house).mapConversion.value();
+  };
+  // By the standard, Scale also converts from millimetres to metres; some write the factor alone.
+  EXPECT_NEAR(placeOf("0.001", true).scale, 1, 1e-12);
+  EXPECT_NEAR(placeOf("0.0009996", true).scale, 0.9996, 1e-12);
+  EXPECT_EQ(placeOf("0.9996", true).scale, 0.9996);
+  const IfcMapConversion bare = placeOf("0.001", false);  // then the map is in metres, too
+  EXPECT_NEAR(bare.scale, 1, 1e-12);
+  EXPECT_EQ(bare.east, 456789);
+  const IfcMapConversion own = placeOf("1.", false);
+  EXPECT_EQ(own.scale, 1);
+  EXPECT_NEAR(own.east, 456.789, 1e-9);
+}
+
 TEST(IfcMetadata, DrawingsAreNoBodies) {
   IfcHouse house;
   house.more =

@@ -225,6 +225,35 @@ TEST(ImportIfc, AMapThatIsMissingIsAnErrorOnRequest) {
   }
 }
 
+TEST(ImportIfc, ATechnicalCorrigendumOfAReleaseIsReadAsTheRelease) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  house.schema = "IFC4";
+  std::string text = house.text();
+  text.replace(text.find("'IFC4'"), 6, "'IFC4X3_TC1'");
+  const Model model = importModel(folder.write("house.ifc", text), by(IfcReader::webIfc));
+  EXPECT_EQ(model.reader, "web-ifc");
+  EXPECT_TRUE(objectOf(model, "IfcDoor").worldFromPlacement);
+}
+
+TEST(ImportIfc, AMapOfAnotherScaleIsRefusedOnRequest) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  house.more =
+      "#600=IFCMAPCONVERSION(#20,#601,456789.,5428000.,110.,1.,0.,40.);\n"
+      "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
+      "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
+  ImportOptions options;
+  options.georeference = true;
+  try {
+    importModel(folder.write("house.ifc", house.text()), options);
+    ADD_FAILURE() << "a map forty times as large was applied";
+  } catch (const ImportError& error) {
+    EXPECT_NE(std::string(error.what()).find("IfcMapConversion scales by 40"), std::string::npos)
+        << error.what();
+  }
+}
+
 TEST(ImportIfc, StoreysAndSpacesAreKept) {
   const TemporaryFolder folder;
   IfcHouse house;

@@ -185,6 +185,14 @@ INSTANTIATE_TEST_SUITE_P(
                                [](const BoxMesh& box) { return makeBinaryPly(box, true); }, true},
                       ScanFile{"PolygonsBeforeVertices", "a.ply", makePolygonPly},
                       ScanFile{"TextStl", "a.stl", makeTextStl},
+                      ScanFile{"TextStlInCapitals", "a.stl",
+                               [](const BoxMesh& box) {
+                                 std::string text = makeTextStl(box);
+                                 std::ranges::transform(text, text.begin(), [](char c) {
+                                   return static_cast<char>(std::toupper(c));
+                                 });
+                                 return text;
+                               }},
                       ScanFile{"BinaryStl", "a.STL", makeBinaryStl}),
     nameScan);
 

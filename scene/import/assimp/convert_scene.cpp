@@ -2,6 +2,7 @@
 
 #include <assimp/scene.h>
 
+#include <nlohmann/json.hpp>
 #include <set>
 #include <span>
 
@@ -12,6 +13,7 @@
 #include "scene/import/assimp/nodes.hpp"
 #include "scene/import/bodies/gltf_bodies.hpp"
 #include "scene/import/bodies/name_suffixes.hpp"
+#include "scene/import/gltf/gltf_metadata.hpp"
 #include "scene/import/gltf/gltf_nodes.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
@@ -30,16 +32,20 @@ Eigen::Matrix3d computeAssimpFromFile(const FileMetadata& metadata, ModelFormat 
 }
 
 /// Reports triangles that assimp dropped silently because their vertex indices are out of range.
-void reportMissingTriangles(const aiScene& scene, const FileMetadata& metadata,
+void reportMissingTriangles(const aiScene& scene, const ConvertInput& input,
                             std::vector<Diagnostic>& diagnostics) {
   std::size_t read = 0;
   for (const aiMesh* mesh : std::span(scene.mMeshes, scene.mNumMeshes)) {
     for (const aiFace& face : std::span(mesh->mFaces, mesh->mNumFaces))
       read += face.mNumIndices == 3 ? 1 : 0;
   }
-  if (metadata.triangles && read < *metadata.triangles)
+  if (!input.metadata.triangles || read >= *input.metadata.triangles) return;
+  // A mesh that the scene does not use may explain it; to know that takes a look at all nodes.
+  const std::size_t used =
+      countSceneTriangles(nlohmann::json::parse(input.gltfJson, nullptr, false));
+  if (read < used)
     addDiagnostic(diagnostics, "broken_triangle_dropped", "vertex indices out of range",
-                  *metadata.triangles - read);
+                  used - read);
 }
 
 }  // namespace
@@ -60,7 +66,7 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
 
   if (progress) progress("convert", 0);
   std::vector<Mesh> meshes = convertMeshes(scene, model.diagnostics);
-  reportMissingTriangles(scene, input.metadata, model.diagnostics);
+  reportMissingTriangles(scene, input, model.diagnostics);
   Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
   worldFromRoot.linear() = makeYUpRotation(model.upAxis) * model.metresPerUnit *
                            computeAssimpFromFile(input.metadata, input.format).inverse();

@@ -273,7 +273,8 @@ void GltfBuffers::applySparse(const Json& sparse, const std::string& name, GltfE
 }
 
 GltfElements GltfBuffers::readElements(std::size_t index, std::size_t width) {
-  static constexpr std::array<const char*, 5> kTypes{"", "SCALAR", "VEC2", "VEC3", "VEC4"};
+  static constexpr std::array<const char*, 17> kTypes{
+      "", "SCALAR", "VEC2", "VEC3", "VEC4", "", "", "", "", "", "", "", "", "", "", "", "MAT4"};
   const std::string name = "accessors[" + std::to_string(index) + "]";
   const Json& accessor = getEntry("accessors", index);
   GltfElements elements;

@@ -18,7 +18,13 @@ constexpr std::array<std::string_view, 7> kReadExtensions{
 
 /// Beginnings of names of extensions that change neither shapes nor places: appearance, metadata,
 /// animation, and alternatives to what the core of the file describes.
-constexpr std::array<std::string_view, 29> kHarmlessExtensions{"KHR_materials_",
+constexpr std::array<std::string_view, 35> kHarmlessExtensions{"MOZ_",
+                                                               "OMI_",
+                                                               "NV_materials_",
+                                                               "ASOBO_",
+                                                               "MPEG_media",
+                                                               "BLENDER_",
+                                                               "KHR_materials_",
                                                                "KHR_texture_",
                                                                "KHR_lights_",
                                                                "KHR_xmp",
@@ -56,28 +62,39 @@ bool isSupportedExtension(const std::string& extension) {
 }
 
 /// The unsupported names in a list of the file.
-std::vector<std::string> findUnsupported(const nlohmann::json& gltf, const char* list) {
-  std::vector<std::string> names;
+std::set<std::string> findUnsupported(const nlohmann::json& gltf, const char* list) {
+  std::set<std::string> names;
   const auto found = gltf.find(list);
   if (found == gltf.end() || !found->is_array()) return names;
   for (const nlohmann::json& name : *found) {
     if (name.is_string() && !isSupportedExtension(name.get<std::string>()))
-      names.push_back(name.get<std::string>());
+      names.insert(name.get<std::string>());
   }
   return names;
 }
 
 }  // namespace
 
-std::vector<Diagnostic> checkGltfExtensions(const nlohmann::json& gltf,
+void ExtensionNames::seeKey(int depth, const std::string& key) {
+  while (!open_.empty() && depth <= open_.back()) open_.pop_back();
+  if (extras_ && depth <= *extras_) extras_.reset();
+  if (extras_) return;
+  if (!open_.empty() && depth == open_.back() + 1) names_.insert(key);
+  if (key == "extensions") open_.push_back(depth);
+  if (key == "extras") extras_ = depth;
+}
+
+std::vector<Diagnostic> checkGltfExtensions(const nlohmann::json& gltf, const ExtensionNames& inUse,
                                             const std::filesystem::path& file) {
   for (const std::string& name : findUnsupported(gltf, "extensionsRequired")) {
     throw ImportError(file.string() + ": requires the glTF extension " + name +
                       ", which is not supported; export without it (open)");
   }
-  const std::vector<std::string> ignored = findUnsupported(gltf, "extensionsUsed");
+  std::set<std::string> ignored = findUnsupported(gltf, "extensionsUsed");
+  for (const std::string& name : inUse.names())
+    if (!isSupportedExtension(name)) ignored.insert(name);
   if (ignored.empty()) return {};
-  return {{"ignored_extension", ignored.size(), ignored.front()}};
+  return {{"ignored_extension", ignored.size(), *ignored.begin()}};
 }
 
 }  // namespace enfilade::scene

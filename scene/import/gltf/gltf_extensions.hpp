@@ -4,15 +4,32 @@
 
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
+/// Collects the names of the extensions that a file uses from the keys of its JSON: exporters
+/// forget to list them. Keys below "extras" are the exporter's own.
+class ExtensionNames {
+ public:
+  /// Call it for each key of the file in order; those of the file's own object have depth 1.
+  void seeKey(int depth, const std::string& key);
+  const std::set<std::string>& names() const { return names_; }
+
+ private:
+  std::vector<int> open_;      ///< depths of the keys "extensions" whose objects are being read
+  std::optional<int> extras_;  ///< depth of the key "extras" whose value is being read
+  std::set<std::string> names_;
+};
+
 /// Throws ImportError for a required extension that is neither read nor without effect on shapes.
-/// Returns a diagnostic `ignored_extension` for the optional ones.
-std::vector<Diagnostic> checkGltfExtensions(const nlohmann::json& gltf,
+/// Returns a diagnostic `ignored_extension` for the optional ones, listed or not.
+std::vector<Diagnostic> checkGltfExtensions(const nlohmann::json& gltf, const ExtensionNames& inUse,
                                             const std::filesystem::path& file);
 
 }  // namespace enfilade::scene

@@ -33,6 +33,12 @@ const nlohmann::json* findMember(const nlohmann::json* json, const char* key) {
   return found == json->end() ? nullptr : &*found;
 }
 
+const nlohmann::json& getArray(const nlohmann::json& json, const char* key) {
+  static const nlohmann::json kEmpty = nlohmann::json::array();
+  const nlohmann::json* found = findMember(&json, key);
+  return found != nullptr && found->is_array() ? *found : kEmpty;
+}
+
 std::optional<std::size_t> readIndexMember(const nlohmann::json* json, const char* key) {
   const nlohmann::json* value = findMember(json, key);
   if (value == nullptr || !value->is_number_unsigned()) return std::nullopt;

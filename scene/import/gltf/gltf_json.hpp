@@ -22,6 +22,8 @@ std::string readGltfJson(const std::filesystem::path& file, ModelFormat format);
 /// Returns the member of an object; null if the member is missing, or if `json` is null or no
 /// object.
 const nlohmann::json* findMember(const nlohmann::json* json, const char* key);
+/// Returns a member that is an array; an empty array in place of anything else.
+const nlohmann::json& getArray(const nlohmann::json& json, const char* key);
 /// Returns a member that is a number of an entry; nullopt for anything else.
 std::optional<std::size_t> readIndexMember(const nlohmann::json* json, const char* key);
 

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <optional>
+#include <set>
+#include <vector>
 
 #include "scene/import/gltf/gltf_json.hpp"
 
@@ -27,19 +29,45 @@ std::size_t countTriangles(const Json& primitive, const Json& accessors) {
   return mode == kStrip || mode == kFan ? std::max<std::size_t>(corners, 2) - 2 : 0;
 }
 
+std::size_t countTrianglesOfMesh(const Json& gltf, const Json& mesh) {
+  std::size_t triangles = 0;
+  for (const Json& primitive : getArray(mesh, "primitives"))
+    triangles += countTriangles(primitive, getArray(gltf, "accessors"));
+  return triangles;
+}
+
 }  // namespace
 
 std::size_t countGltfTriangles(const Json& gltf) {
-  const Json none = Json::array();
-  const auto getList = [&](const Json& object, const char* key) -> const Json& {
-    const Json* list = findMember(&object, key);
-    return list != nullptr && list->is_array() ? *list : none;
-  };
   std::size_t triangles = 0;
-  for (const Json& mesh : getList(gltf, "meshes")) {
-    for (const Json& primitive : getList(mesh, "primitives"))
-      triangles += countTriangles(primitive, getList(gltf, "accessors"));
+  for (const Json& mesh : getArray(gltf, "meshes")) triangles += countTrianglesOfMesh(gltf, mesh);
+  return triangles;
+}
+
+std::size_t countSceneTriangles(const Json& gltf) {
+  const Json &nodes = getArray(gltf, "nodes"), &meshes = getArray(gltf, "meshes"),
+             &scenes = getArray(gltf, "scenes");
+  std::set<std::size_t> reachedNodes, reachedMeshes;
+  std::vector<std::size_t> open;
+  const auto reach = [&](const Json& indices) {
+    for (const Json& index : indices) {
+      if (!index.is_number_unsigned() || index.get<std::size_t>() >= nodes.size()) continue;
+      if (reachedNodes.insert(index.get<std::size_t>()).second)
+        open.push_back(index.get<std::size_t>());
+    }
+  };
+  const std::size_t scene = readIndexMember(&gltf, "scene").value_or(0);
+  if (scene < scenes.size()) reach(getArray(scenes[scene], "nodes"));
+  while (!open.empty()) {
+    const Json& node = nodes[open.back()];
+    open.pop_back();
+    if (const auto mesh = readIndexMember(&node, "mesh"); mesh && *mesh < meshes.size())
+      reachedMeshes.insert(*mesh);
+    reach(getArray(node, "children"));
   }
+  std::size_t triangles = 0;
+  for (const std::size_t mesh : reachedMeshes)
+    triangles += countTrianglesOfMesh(gltf, meshes[mesh]);
   return triangles;
 }
 

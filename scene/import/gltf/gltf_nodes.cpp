@@ -30,24 +30,6 @@ std::optional<std::array<double, count>> readNumbers(const Json& node, const cha
   return numbers;
 }
 
-Eigen::Affine3d readTransform(const Json& node) {
-  Eigen::Affine3d result = Eigen::Affine3d::Identity();
-  if (const auto m = readNumbers<16>(node, "matrix")) {
-    for (int i = 0; i < 16; ++i) result.matrix()(i % 4, i / 4) = (*m)[static_cast<std::size_t>(i)];
-    result.makeAffine();
-    return result;
-  }
-  if (const auto t = readNumbers<3>(node, "translation")) {
-    result.translate(Vec3((*t)[0], (*t)[1], (*t)[2]));
-  }
-  if (const auto r = readNumbers<4>(node, "rotation")) {
-    const Eigen::Quaterniond rotation((*r)[3], (*r)[0], (*r)[1], (*r)[2]);
-    if (rotation.norm() > 0) result.rotate(rotation.normalized());
-  }
-  if (const auto s = readNumbers<3>(node, "scale")) result.scale(Vec3((*s)[0], (*s)[1], (*s)[2]));
-  return result;
-}
-
 bool isSameTransform(const Eigen::Affine3d& exact, const aiMatrix4x4& rounded) {
   Eigen::Matrix<double, 3, 4> other;
   other << rounded.a1, rounded.a2, rounded.a3, rounded.a4, rounded.b1, rounded.b2, rounded.b3,
@@ -70,7 +52,7 @@ class NodeMatcher {
     const auto i = index.get<std::size_t>();
     if (i >= nodes_.size() || !nodes_[i].is_object()) return;
     const Json& json = nodes_[i];
-    const Eigen::Affine3d exact = readTransform(json);
+    const Eigen::Affine3d exact = readNodeTransform(json);
     if (!isSameTransform(exact, node.mTransformation)) return;
     matchedNodes_.emplace(&node, GltfNode{exact, i});
     visitChildren(json.value("children", Json::array()), node, depth + 1);
@@ -89,6 +71,24 @@ class NodeMatcher {
 };
 
 }  // namespace
+
+Eigen::Affine3d readNodeTransform(const Json& node) {
+  Eigen::Affine3d result = Eigen::Affine3d::Identity();
+  if (const auto m = readNumbers<16>(node, "matrix")) {
+    for (int i = 0; i < 16; ++i) result.matrix()(i % 4, i / 4) = (*m)[static_cast<std::size_t>(i)];
+    result.makeAffine();
+    return result;
+  }
+  if (const auto t = readNumbers<3>(node, "translation")) {
+    result.translate(Vec3((*t)[0], (*t)[1], (*t)[2]));
+  }
+  if (const auto r = readNumbers<4>(node, "rotation")) {
+    const Eigen::Quaterniond rotation((*r)[3], (*r)[0], (*r)[1], (*r)[2]);
+    if (rotation.norm() > 0) result.rotate(rotation.normalized());
+  }
+  if (const auto s = readNumbers<3>(node, "scale")) result.scale(Vec3((*s)[0], (*s)[1], (*s)[2]));
+  return result;
+}
 
 GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson) {
   GltfNodes transforms;

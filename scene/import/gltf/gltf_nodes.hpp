@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <map>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 
@@ -22,6 +23,9 @@ struct GltfNode {
   std::size_t index;  ///< index into the file's list of nodes
 };
 using GltfNodes = std::map<const aiNode*, GltfNode>;
+
+/// The transform of a node of the file's JSON, in doubles.
+Eigen::Affine3d readNodeTransform(const nlohmann::json& node);
 
 /// Reads the nodes of a glTF file's JSON in doubles. Nodes without a matching assimp node are left
 /// out.

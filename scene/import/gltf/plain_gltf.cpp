@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <string_view>
 
@@ -12,6 +13,7 @@
 #include "scene/import/gltf/gltf_instances.hpp"
 #include "scene/import/gltf/gltf_json.hpp"
 #include "scene/import/gltf/gltf_metadata.hpp"
+#include "scene/import/gltf/gltf_rest_pose.hpp"
 #include "scene/import/gltf/plain_primitives.hpp"
 #include "scene/import/gltf/texture_mapping.hpp"
 
@@ -22,24 +24,28 @@ using Json = nlohmann::json;
 
 /// Texts in the JSON of a file that may need rewriting. Exporters sometimes forget to list an
 /// extension in extensionsUsed, so the whole text is searched.
-constexpr std::array<std::string_view, 9> kRewrittenTexts{"\"EXT_meshopt_compression\"",
-                                                          "\"KHR_meshopt_compression\"",
-                                                          "\"KHR_draco_mesh_compression\"",
-                                                          "\"EXT_mesh_gpu_instancing\"",
-                                                          "\"KHR_texture_basisu\"",
-                                                          "\"EXT_texture_webp\"",
-                                                          "\"KHR_texture_transform\"",
-                                                          "\"sparse\"",
-                                                          "\"EXT_texture_avif\""};
+constexpr std::array<std::string_view, 11> kRewrittenTexts{"\"skins\"",
+                                                           "\"targets\"",
+                                                           "\"EXT_meshopt_compression\"",
+                                                           "\"KHR_meshopt_compression\"",
+                                                           "\"KHR_draco_mesh_compression\"",
+                                                           "\"EXT_mesh_gpu_instancing\"",
+                                                           "\"KHR_texture_basisu\"",
+                                                           "\"EXT_texture_webp\"",
+                                                           "\"KHR_texture_transform\"",
+                                                           "\"sparse\"",
+                                                           "\"EXT_texture_avif\""};
 
 /// Parses only the sections needed here and skips the nodes, of which there may be a million.
 constexpr int kMaxJsonDepth = 512;
 
 /// Sets `tooDeep` if copies and dumps of the whole text would need much stack.
-Json parseMeshSections(const std::string& text, bool& tooDeep) {
+Json parseMeshSections(const std::string& text, bool& tooDeep, ExtensionNames& extensions) {
   const auto wanted = [&](int depth, Json::parse_event_t event, Json& value) {
     tooDeep = tooDeep || depth > kMaxJsonDepth;
-    if (event != Json::parse_event_t::key || depth != 1) return true;
+    if (event != Json::parse_event_t::key) return true;
+    extensions.seeKey(depth, value.get_ref<const std::string&>());
+    if (depth != 1) return true;
     return value == "asset" || value == "extensionsRequired" || value == "extensionsUsed" ||
            value == "meshes" || value == "accessors" || value == "buffers" || value == "scenes" ||
            value == "scene" || value == "materials";
@@ -47,17 +53,15 @@ Json parseMeshSections(const std::string& text, bool& tooDeep) {
   return Json::parse(text, wanted, false);
 }
 
-const Json& getArray(const Json& gltf, const char* key) {
-  static const Json kEmpty = Json::array();
-  const auto found = gltf.find(key);
-  return found != gltf.end() && found->is_array() ? *found : kEmpty;
-}
-
 /// glTF 1.0 has dictionaries where 2.0 has arrays.
 void requireVersion2(const Json& gltf, const std::filesystem::path& file) {
   const Json* version = findMember(findMember(&gltf, "asset"), "version");
   const bool isOld = version != nullptr && version->is_string() &&
                      !version->get_ref<const std::string&>().starts_with("2");
+  const Json* minimum = findMember(findMember(&gltf, "asset"), "minVersion");
+  if (minimum != nullptr && minimum->is_string() && *minimum != "2.0")
+    throw ImportError(file.string() + ": needs a reader of glTF " + minimum->get<std::string>() +
+                      "; export it as glTF 2.0 (open)");
   const Json* meshes = findMember(&gltf, "meshes");
   if (!isOld && (meshes == nullptr || !meshes->is_object())) return;
   throw ImportError(file.string() + ": glTF version " +
@@ -127,6 +131,7 @@ void rewriteMeshes(Json& gltf, GltfBuffers& buffers, GltfBinary& binary,
   PlainPrimitives primitives(original, buffers, binary, problems);
   const auto meshes = gltf.find("meshes");
   if (meshes == gltf.end() || !meshes->is_array()) return;
+  const std::map<std::size_t, RestPose> poses = separatePosedMeshes(gltf, buffers, problems);
   for (std::size_t m = 0; m < meshes->size(); ++m) {
     Json& mesh = (*meshes)[m];
     const std::string name = "meshes[" + std::to_string(m) + "]";
@@ -137,7 +142,11 @@ void rewriteMeshes(Json& gltf, GltfBuffers& buffers, GltfBinary& binary,
       Json& primitive = mesh["primitives"][p];
       const std::string place = name + ".primitives[" + std::to_string(p) + "]";
       if (!primitive.is_object()) buffers.fail(place + " is not an object");
-      primitives.rewrite(primitive, place);
+      if (const auto pose = poses.find(m); pose != poses.end()) {
+        primitives.rewritePosed(primitive, place, pose->second);
+      } else {
+        primitives.rewrite(primitive, place);
+      }
     }
   }
 }
@@ -155,7 +164,7 @@ void rewriteImages(Json& gltf, GltfBuffers& buffers, GltfBinary& binary) {
   }
 }
 
-/// Removes what refers to the old accessors. The import reads neither skins nor animations.
+/// Removes what refers to the old accessors: rest poses are applied, and animations are not read.
 void removeAnimation(Json& gltf) {
   for (const char* section : {"animations", "skins", "extensionsRequired"}) gltf.erase(section);
   const auto nodes = gltf.find("nodes");
@@ -211,13 +220,14 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
   PlainGltf plain;
   plain.json = readGltfJson(file, format);
   bool tooDeep = false;
-  Json sections = parseMeshSections(plain.json, tooDeep);
+  ExtensionNames extensions;
+  Json sections = parseMeshSections(plain.json, tooDeep, extensions);
   if (tooDeep)
     throw ImportError(file.string() + ": its JSON is nested deeper than " +
                       std::to_string(kMaxJsonDepth) + " levels; export it again (open)");
   if (!sections.is_object()) return plain;
   requireVersion2(sections, file);
-  plain.problems = checkGltfExtensions(sections, file);
+  plain.problems = checkGltfExtensions(sections, extensions, file);
   if (const std::size_t scenes = getArray(sections, "scenes").size(); scenes > 1)
     plain.problems.push_back({"other_scenes", scenes - 1,
                               "scene " +
@@ -225,7 +235,7 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
                                   " was read, which is the file's default"});
   if (needsRewriting(plain.json, sections)) {
     rewriteGltf(file, format, plain);
-    sections = parseMeshSections(plain.json, tooDeep);
+    sections = parseMeshSections(plain.json, tooDeep, extensions);
   }
   plain.triangles = countGltfTriangles(sections);
   return plain;

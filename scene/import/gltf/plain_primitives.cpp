@@ -71,14 +71,8 @@ std::size_t PlainPrimitives::writeAttribute(std::size_t accessor, std::size_t wi
   return written_[key] = writeFloats(buffers_.readFloats(accessor, width), width, mapping);
 }
 
-const PlainPrimitives::WrittenDraco& PlainPrimitives::writeDraco(const Json& extension,
-                                                                 const Json& attributes,
-                                                                 const Widths& widths,
-                                                                 const TextureMapping& mapping,
-                                                                 const std::string& name) {
-  const std::string key = extension.dump() + mapping.makeKey() + std::to_string(mapping.set);
-  const auto known = writtenDraco_.find(key);
-  if (known != writtenDraco_.end()) return known->second;
+DracoMesh PlainPrimitives::decodeDraco(const Json& extension, const Json& attributes,
+                                       const Widths& widths, const std::string& name) {
   DracoAttributes wanted;
   for (const auto& [attribute, width] : widths) {
     const auto id = readIndexMember(findMember(&extension, "attributes"), attribute.c_str());
@@ -92,15 +86,26 @@ const PlainPrimitives::WrittenDraco& PlainPrimitives::writeDraco(const Json& ext
       buffers_.getView(readIndexMember(&extension, "bufferView").value_or(kNoIndex));
   if (const std::string fault = decodeDracoMesh(bytes, wanted, mesh); !fault.empty())
     buffers_.fail(name + ": " + fault);
+  std::size_t floats = mesh.indices.size();
+  for (const auto& [attribute, values] : mesh.attributes) floats += values.size();
+  buffers_.spend(floats * sizeof(float) / kDracoBytesPerByte, 1, name);
+  return mesh;
+}
+
+const PlainPrimitives::WrittenDraco& PlainPrimitives::writeDraco(const Json& extension,
+                                                                 const Json& attributes,
+                                                                 const Widths& widths,
+                                                                 const TextureMapping& mapping,
+                                                                 const std::string& name) {
+  const std::string key = extension.dump() + mapping.makeKey() + std::to_string(mapping.set);
+  const auto known = writtenDraco_.find(key);
+  if (known != writtenDraco_.end()) return known->second;
+  DracoMesh mesh = decodeDraco(extension, attributes, widths, name);
   WrittenDraco& to = writtenDraco_[key];
   to.vertices = mesh.attributes.at("POSITION").size() / 3;
   to.indices = binary_.addIndices(mesh.indices);
-  std::size_t floats = mesh.indices.size();
-  for (auto& [attribute, values] : mesh.attributes) {
-    floats += values.size();
+  for (auto& [attribute, values] : mesh.attributes)
     to.attributes[attribute] = writeFloats(std::move(values), widths.at(attribute), mapping);
-  }
-  buffers_.spend(floats * sizeof(float) / kDracoBytesPerByte, 1, name);
   return to;
 }
 
@@ -156,6 +161,50 @@ void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
     plain[width == 2 ? "TEXCOORD_0" : attribute] = written[attribute];
   }
   if (draco == nullptr) rewriteIndices(primitive, countElements(*positions));
+  primitive["attributes"] = std::move(plain);
+  for (const char* member : {"targets", "extensions"}) primitive.erase(member);
+}
+
+/// The arrays of a primitive, decoded. A Draco mesh gives its indices to the primitive.
+PrimitiveArrays PlainPrimitives::readArrays(Json& primitive, const Json& attributes,
+                                            const Widths& widths, const std::string& name) {
+  PrimitiveArrays arrays;
+  const Json* draco = findMember(findMember(&primitive, "extensions"), kDraco);
+  if (draco != nullptr) {
+    DracoMesh mesh = decodeDraco(*draco, attributes, widths, name);
+    arrays = std::move(mesh.attributes);
+    primitive["indices"] = binary_.addIndices(mesh.indices);
+    primitive["mode"] = kTriangleMode;
+  }
+  for (const auto& [attribute, width] : widths) {
+    if (arrays.contains(attribute)) continue;
+    const auto accessor = readIndexMember(&attributes, attribute.c_str());
+    if (!accessor) buffers_.fail(name + ": its " + attribute + " is not an accessor");
+    arrays[attribute] = buffers_.readFloats(*accessor, width);
+  }
+  if (draco == nullptr) rewriteIndices(primitive, arrays.at("POSITION").size() / 3);
+  return arrays;
+}
+
+void PlainPrimitives::rewritePosed(Json& primitive, const std::string& name, const RestPose& pose) {
+  const Json attributes = primitive.value("attributes", Json::object());
+  if (!readIndexMember(&attributes, "POSITION")) buffers_.fail(name + ": has no positions");
+  const TextureMapping mapping =
+      readTextureMapping(gltf_, readIndexMember(&primitive, "material").value_or(kNoIndex));
+  const Widths kept = listAttributes(attributes, mapping);
+  Widths widths = kept;
+  if (!pose.nodeFromJoint.empty()) {
+    for (const auto& [attribute, accessor] : attributes.items())
+      if (attribute.starts_with("JOINTS_") || attribute.starts_with("WEIGHTS_"))
+        widths[attribute] = 4;
+  }
+  PrimitiveArrays arrays = readArrays(primitive, attributes, widths, name);
+  applyMorphTargets(pose, primitive.value("targets", Json::array()), buffers_, name, arrays);
+  if (!pose.nodeFromJoint.empty()) applySkin(pose, buffers_, name, arrays);
+  Json plain = Json::object();
+  for (const auto& [attribute, width] : kept)
+    plain[width == 2 ? "TEXCOORD_0" : attribute] =
+        writeFloats(std::move(arrays.at(attribute)), width, mapping);
   primitive["attributes"] = std::move(plain);
   for (const char* member : {"targets", "extensions"}) primitive.erase(member);
 }

@@ -10,6 +10,7 @@
 #include "scene/import/gltf/draco_mesh.hpp"
 #include "scene/import/gltf/gltf_binary.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
+#include "scene/import/gltf/gltf_rest_pose.hpp"
 #include "scene/import/gltf/texture_mapping.hpp"
 #include "scene/model/model.hpp"
 
@@ -25,6 +26,8 @@ class PlainPrimitives {
   /// Rewrites one primitive in place. It keeps its material, positions, normals and the texture
   /// coordinates that its material uses; `name` is for errors. Throws ImportError.
   void rewrite(nlohmann::json& primitive, const std::string& name);
+  /// As rewrite(), with the vertices in a rest pose.
+  void rewritePosed(nlohmann::json& primitive, const std::string& name, const RestPose& pose);
 
  private:
   /// A Draco mesh whose arrays were written.
@@ -35,6 +38,10 @@ class PlainPrimitives {
   using Widths = std::map<std::string, std::size_t>;
 
   Widths listAttributes(const nlohmann::json& attributes, const TextureMapping& mapping) const;
+  DracoMesh decodeDraco(const nlohmann::json& extension, const nlohmann::json& attributes,
+                        const Widths& widths, const std::string& name);
+  PrimitiveArrays readArrays(nlohmann::json& primitive, const nlohmann::json& attributes,
+                             const Widths& widths, const std::string& name);
   const WrittenDraco& writeDraco(const nlohmann::json& extension, const nlohmann::json& attributes,
                                  const Widths& widths, const TextureMapping& mapping,
                                  const std::string& name);

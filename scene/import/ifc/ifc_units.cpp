@@ -48,6 +48,14 @@ bool isLengthUnit(const StepStatement& unit) {
   return arguments.size() > 1 && parseStepEnum(arguments[1]) == "LENGTHUNIT";
 }
 
+/// From metres of the file to metres of the map. `mapUnits`: units of the file in one of the map.
+/// By the standard the file's scale also converts between the units. Many exporters write the pure
+/// factor (1, or the projection's) all the same, so the reading nearer to 1 is taken.
+double computeMapScale(double scale, double mapUnits) {
+  const double converted = scale * mapUnits;
+  return std::abs(std::log(converted)) < std::abs(std::log(scale)) ? converted : scale;
+}
+
 }  // namespace
 
 std::optional<double> readIfcMetresPerUnit(const StepFile& file, bool& siUnit) {
@@ -77,7 +85,9 @@ std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, doubl
       return parseStepNumber(arguments[index]).value_or(fallback);
     };
     IfcMapConversion conversion;
-    double unit = metresPerUnit;
+    const double scale = number(7, 1);
+    // Without a unit of its own the map has that of the file, unless the scale leads to metres.
+    double unit = computeMapScale(scale, 1 / metresPerUnit) == scale ? metresPerUnit : 1;
     const auto crs = arguments.size() > 1 ? parseStepReference(arguments[1]) : std::nullopt;
     if (const StepStatement* map = crs ? file.find(*crs) : nullptr) {
       const std::vector<std::string_view> crsArguments = splitStepArguments(map->arguments);
@@ -95,7 +105,7 @@ std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, doubl
       conversion.xAxisEast = xAxisEast / length;
       conversion.xAxisNorth = xAxisNorth / length;
     }
-    conversion.scale = number(7, 1);
+    conversion.scale = computeMapScale(scale, unit / metresPerUnit);
     const double maxCoordinate = std::max(
         {std::abs(conversion.east), std::abs(conversion.north), std::abs(conversion.height)});
     const bool isValid = unit > 0 && maxCoordinate <= kMaxCoordinate && conversion.scale > 0 &&

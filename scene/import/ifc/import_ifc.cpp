@@ -188,6 +188,16 @@ std::string formatMapConversion(const IfcMapConversion& conversion) {
   return (conversion.crs.empty() ? "unnamed map" : conversion.crs) + ": " + text;
 }
 
+/// A projection scales by less than a percent; coordinates of another size are not what was meant.
+void requireMapScale(const IfcMapConversion& conversion) {
+  if (conversion.scale >= 0.5 && conversion.scale <= 2) return;
+  std::ostringstream scale;
+  scale << conversion.scale;
+  throw ImportError("--georeference: its IfcMapConversion scales by " + scale.str() +
+                    "; leave the option out, or correct its Scale, which converts from the file's "
+                    "length unit to the map's (open)");
+}
+
 class IfcImport {
  public:
   IfcImport(const ImportRequest& request, const ImportProgress& progress)
@@ -245,6 +255,7 @@ class IfcImport {
       throw ImportError(request_.file +
                         ": --georeference: the file has no IfcMapConversion; leave "
                         "the option out, or export the file with its map (open)");
+    if (request_.options.georeference) requireMapScale(*metadata_.mapConversion);
     if (metadata_.mapConversion)
       addDiagnostic(diagnostics_, "map_place", formatMapConversion(*metadata_.mapConversion));
     for (const IfcProduct& product : metadata_.products) {

@@ -82,13 +82,19 @@ std::vector<ScanMesh> parseBinaryStl(std::string_view bytes, std::size_t count) 
   return meshes;
 }
 
+/// Keywords are written in small letters by the format, and in capitals by some programs.
+bool isKeyword(std::string_view word, std::string_view keyword) {
+  return std::ranges::equal(word, keyword, [](char a, char b) { return (a | 0x20) == b; });
+}
+
 /// Reads one facet after the word "facet"; words other than "vertex" are skipped.
 std::array<Vec3, 3> parseStlFacet(TextCursor& text, std::size_t index) {
   std::array<Vec3, 3> corners;
   std::size_t found = 0;
-  for (std::string_view word = text.readWord(); word != "endfacet"; word = text.readWord()) {
+  for (std::string_view word = text.readWord(); !isKeyword(word, "endfacet");
+       word = text.readWord()) {
     if (word.empty()) failStl("facet " + std::to_string(index) + " is cut off");
-    if (word != "vertex") continue;
+    if (!isKeyword(word, "vertex")) continue;
     if (found == 3) failStl("facet " + std::to_string(index) + " has more than three corners");
     for (int axis = 0; axis < 3; ++axis) corners[found][axis] = text.readNumber();
     if (text.failed())
@@ -104,12 +110,13 @@ std::vector<ScanMesh> parseTextStl(std::string_view bytes) {
   TextCursor text(bytes);
   std::size_t facets = 0;
   for (std::string_view word = text.readWord(); !word.empty(); word = text.readWord()) {
-    if (word != "solid") failStl("'" + std::string(word.substr(0, 40)) + "' where 'solid' belongs");
+    if (!isKeyword(word, "solid"))
+      failStl("'" + std::string(word.substr(0, 40)) + "' where 'solid' belongs");
     ScanMesh& mesh = meshes.emplace_back();
     mesh.name = text.readLine();
     StlWelder welder(mesh);
-    for (word = text.readWord(); word != "endsolid"; word = text.readWord()) {
-      if (word != "facet")
+    for (word = text.readWord(); !isKeyword(word, "endsolid"); word = text.readWord()) {
+      if (!isKeyword(word, "facet"))
         failStl(word.empty() ? "cut off after facet " + std::to_string(facets)
                              : "'" + std::string(word.substr(0, 40)) + "' where 'facet' belongs");
       welder.addTriangle(parseStlFacet(text, ++facets));
@@ -127,7 +134,7 @@ std::vector<ScanMesh> parseStl(std::string_view bytes) {
       bytes.size() >= kStlHeader + 4 && count <= (bytes.size() - kStlHeader - 4) / kStlFacet;
   const bool fits = holds && bytes.size() - kStlHeader - 4 == count * kStlFacet;
   if (fits) return parseBinaryStl(bytes, count);
-  if (bytes.starts_with("solid")) return parseTextStl(bytes);
+  if (isKeyword(bytes.substr(0, 5), "solid")) return parseTextStl(bytes);
   if (!holds)
     failStl("cut off: " + std::to_string(count) + " triangles announced, " +
             std::to_string(bytes.size()) + " bytes present");

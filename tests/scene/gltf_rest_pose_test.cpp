@@ -1,0 +1,208 @@
+// Skinned and morphed glTF meshes are imported in their rest pose: skins where the joints are,
+// morph targets by their default weights.
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <functional>
+
+#include "scene/import/import_model.hpp"
+#include "tests/scene/encoded_gltf.hpp"
+#include "tests/scene/import_outcome.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+using Eigen::Affine3d;
+using tests::GltfWriter;
+using tests::Json;
+using tests::TemporaryFolder;
+
+constexpr std::size_t kVertices = 64;  // of the terrace
+
+std::vector<Vec3> positionsOf(const Model& model, const Object& object) {
+  std::vector<Vec3> positions;
+  for (const std::uint32_t m : object.meshes)
+    for (std::uint32_t v = 0; v < model.meshes[m].positions.size(); ++v)
+      positions.push_back(computeWorldPosition(object, model.meshes[m], v));
+  return positions;
+}
+
+/// Expects the positions of the terrace's vertices after `move`, in any order.
+void expectMoved(const Model& model, const Object& object,
+                 const std::function<Vec3(const Vec3&, std::size_t)>& move) {
+  const std::vector<Vec3> read = positionsOf(model, object);
+  const tests::Terrace terrace;
+  ASSERT_EQ(terrace.positions.size(), kVertices);
+  for (std::size_t v = 0; v < kVertices; ++v) {
+    const auto& p = terrace.positions[v];
+    const Vec3 wanted = move(Vec3(p[0], p[1], p[2]), v);
+    double nearest = 1e300;
+    for (const Vec3& other : read) nearest = std::min(nearest, (other - wanted).norm());
+    EXPECT_LT(nearest, 1e-5) << "vertex " << v << ": " << wanted.transpose();
+  }
+}
+
+unsigned addMatrices(GltfWriter& file, const std::vector<Affine3d>& matrices) {
+  std::vector<float> numbers;
+  for (const Affine3d& m : matrices)
+    for (int i = 0; i < 16; ++i) numbers.push_back(static_cast<float>(m.matrix()(i % 4, i / 4)));
+  return file.addAccessor(static_cast<int>(file.addView(tests::toBytes(numbers))), 5126,
+                          matrices.size(), "MAT4");
+}
+
+/// Share of the second joint at a vertex: 0, 0.25 or 1.
+double secondShare(std::size_t vertex) {
+  return vertex % 3 == 0 ? 0 : vertex % 3 == 1 ? 0.25 : 1;
+}
+
+/// Binds the terrace to two joints: nodes 1 and 2, the second one a child of the first.
+void bindToJoints(GltfWriter& file, const std::vector<Affine3d>& inverseBinds) {
+  std::vector<std::uint8_t> joints;
+  std::vector<float> weights;
+  for (std::size_t v = 0; v < kVertices; ++v) {
+    joints.insert(joints.end(), {1, 0, 0, 0});
+    const auto second = static_cast<float>(secondShare(v));
+    weights.insert(weights.end(), {second, 1 - second, 0, 0});
+  }
+  Json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
+  attributes["JOINTS_0"] = file.addAccessor(static_cast<int>(file.addView(tests::toBytes(joints))),
+                                            5121, kVertices, "VEC4");
+  attributes["WEIGHTS_0"] = file.addAccessor(
+      static_cast<int>(file.addView(tests::toBytes(weights))), 5126, kVertices, "VEC4");
+  file.json["nodes"].push_back({{"name", "hip"}, {"translation", {0, 5, 0}}, {"children", {2}}});
+  file.json["nodes"].push_back(
+      {{"name", "knee"}, {"translation", {0, 0, 2}}, {"rotation", {0, 0, 0.6, 0.8}}});
+  file.json["scenes"][0]["nodes"] = {0, 1};
+  file.json["skins"] = Json::array({{{"joints", {1, 2}}}});
+  if (!inverseBinds.empty())
+    file.json["skins"][0]["inverseBindMatrices"] = addMatrices(file, inverseBinds);
+  file.json["nodes"][0]["skin"] = 0;
+  // glTF: the node's own transform does not move a skinned mesh.
+  file.json["nodes"][0]["translation"] = {100, 0, 0};
+  file.json["nodes"][0]["scale"] = {2, 2, 2};
+}
+
+Vec3 blend(const std::vector<Affine3d>& inverseBinds, const Vec3& p, std::size_t vertex) {
+  const Affine3d hip(Eigen::Translation3d(0, 5, 0));
+  const Affine3d knee = hip * Eigen::Translation3d(0, 0, 2) * Eigen::Quaterniond(0.8, 0, 0, 0.6);
+  const double second = secondShare(vertex);
+  return (1 - second) * (hip * inverseBinds[0] * p) + second * (knee * inverseBinds[1] * p);
+}
+
+TEST(GltfRestPose, ASkinPutsVerticesWhereTheJointsAre) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  const std::vector<Affine3d> inverseBinds{
+      Affine3d(Eigen::Translation3d(0, -1, 0)),
+      Eigen::Translation3d(0.5, 0, 0) * Affine3d(Eigen::Scaling(0.5))};
+  bindToJoints(file, inverseBinds);
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.objects[0].path.substr(model.objects[0].path.rfind('/') + 1), "terrace");
+  EXPECT_TRUE(model.diagnostics.empty());
+  expectMoved(model, model.objects[0],
+              [&](const Vec3& p, std::size_t v) { return blend(inverseBinds, p, v); });
+}
+
+TEST(GltfRestPose, WithoutInverseBindMatricesTheyAreIdentities) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  bindToJoints(file, {});
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const std::vector<Affine3d> identities(2, Affine3d::Identity());
+  expectMoved(model, model.objects.at(0),
+              [&](const Vec3& p, std::size_t v) { return blend(identities, p, v); });
+}
+
+TEST(GltfRestPose, AMeshThatOtherNodesUseUnskinnedStaysThere) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  bindToJoints(file, {});
+  file.json["nodes"].push_back({{"name", "plain"}, {"mesh", 0}});
+  file.json["scenes"][0]["nodes"].push_back(3);
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 2u);
+  expectMoved(model, model.objects[1], [](const Vec3& p, std::size_t) { return p; });
+  EXPECT_TRUE(model.diagnostics.empty());
+}
+
+TEST(GltfRestPose, InvalidSkinsAreErrorsInWords) {
+  const TemporaryFolder folder;
+  const auto textOf = [&](const std::function<void(GltfWriter&)>& damage) {
+    GltfWriter file = tests::plainTerrace();
+    bindToJoints(file, {Affine3d::Identity(), Affine3d::Identity()});
+    damage(file);
+    return failureOf(folder.write("a.glb", file.glb()));
+  };
+  const auto expect = [](const std::string& text, const char* part) {
+    EXPECT_NE(text.find(part), std::string::npos) << text;
+  };
+  expect(textOf([](GltfWriter& f) { f.json["skins"][0]["joints"] = {1}; }), "is not in its skin");
+  expect(textOf([](GltfWriter& f) {
+           f.json["skins"][0]["joints"] = {1, 99};
+         }),
+         "skins[0]: joint 1 is not a node");
+  expect(textOf([](GltfWriter& f) { f.json["skins"][0]["joints"] = Json::array(); }),
+         "skins[0]: has no joints");
+  expect(textOf([](GltfWriter& f) { f.json["nodes"][0]["skin"] = 7; }), "skins[7] does not exist");
+  expect(textOf([](GltfWriter& f) {
+           f.json["skins"][0]["joints"] = {1, 2, 1};
+         }),
+         "fewer inverse bind matrices than joints");
+  expect(textOf([](GltfWriter& f) {
+           f.json["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0");
+         }),
+         "joints and weights do not fit");
+}
+
+/// Adds two morph targets: one raises all vertices by 2 m, the other moves them along x.
+void addTargets(GltfWriter& file) {
+  const unsigned raised = file.addPoints(tests::Points(kVertices, {0, 2, 0}));
+  const unsigned moved = file.addPoints(tests::Points(kVertices, {4, 0, 0}));
+  file.json["meshes"][0]["primitives"][0]["targets"] = {{{"POSITION", raised}},
+                                                        {{"POSITION", moved}}};
+}
+
+TEST(GltfRestPose, MorphTargetsHaveTheWeightsOfTheMeshOrOfTheNode) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  addTargets(file);
+  const Model neutral = importModel(folder.write("neutral.glb", file.glb()));
+  expectMoved(neutral, neutral.objects.at(0), [](const Vec3& p, std::size_t) { return p; });
+  file.json["meshes"][0]["weights"] = {0.5, 0};
+  file.json["nodes"].push_back({{"name", "own"}, {"mesh", 0}, {"weights", {0, -0.25}}});
+  file.json["scenes"][0]["nodes"] = {0, 1};
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 2u);
+  expectMoved(model, model.objects[0],
+              [](const Vec3& p, std::size_t) { return Vec3(p + Vec3(0, 1, 0)); });
+  expectMoved(model, model.objects[1],
+              [](const Vec3& p, std::size_t) { return Vec3(p - Vec3(1, 0, 0)); });
+  EXPECT_TRUE(model.diagnostics.empty());
+}
+
+TEST(GltfRestPose, AMorphTargetOfAnotherLengthIsAnError) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  addTargets(file);
+  const unsigned single = file.addPoints({{1, 1, 1}});
+  file.json["meshes"][0]["primitives"][0]["targets"][1]["POSITION"] = single;
+  file.json["meshes"][0]["weights"] = {0, 1};
+  const std::string text = failureOf(folder.write("a.glb", file.glb()));
+  EXPECT_NE(text.find("morph target 1 has another number of vertices"), std::string::npos) << text;
+}
+
+TEST(GltfRestPose, AMeshThatNoNodeUsesIsNoBrokenTriangle) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  file.json["meshes"].push_back(Json(file.json["meshes"][0]));
+  const Model unused = importModel(folder.write("unused.glb", file.glb()));
+  EXPECT_TRUE(unused.diagnostics.empty());
+  file.json["nodes"].push_back({{"name", "stray"}, {"mesh", 1}});
+  const Model stray = importModel(folder.write("stray.glb", file.glb()));
+  EXPECT_TRUE(stray.diagnostics.empty());
+}
+
+}  // namespace
+}  // namespace enfilade::scene
