@@ -113,6 +113,7 @@ struct Canvas::State {
   double width = 0, height = 0;
   std::filesystem::path file;  ///< of a page
   std::string bytes;           ///< of a page
+  std::string textWithoutFont;
 
   State(cairo_surface_t* owned, double w, double h)
       : surface(owned), cairo(cairo_create(owned)), width(w), height(h) {
@@ -241,6 +242,8 @@ void Canvas::image(const Image& image, Point topLeft, double width, double heigh
 void Canvas::text(Point at, const std::string& text, const TextStyle& style, Align align) {
   if (!isFinite(at)) return;
   const Layout layout(state_->cairo, text, style);
+  if (state_->textWithoutFont.empty() && pango_layout_get_unknown_glyphs_count(layout.get()) > 0)
+    state_->textWithoutFont = text;
   const double width = layout.size().width;
   const double shift = align == Align::left ? 0 : align == Align::right ? width : width / 2;
   cairo_move_to(state_->cairo, at.x - shift, at.y);
@@ -252,6 +255,10 @@ void Canvas::text(Point at, const std::string& text, const TextStyle& style, Ali
   setColour(state_->cairo, style.colour);
   pango_cairo_show_layout(state_->cairo, layout.get());
   cairo_new_path(state_->cairo);
+}
+
+const std::string& Canvas::textWithoutFont() const {
+  return state_->textWithoutFont;
 }
 
 TextSize Canvas::measure(const std::string& text, const TextStyle& style) const {

@@ -66,6 +66,8 @@ class Canvas {
   /// (x, y) is the top of the text's line, at its left end, centre or right end. Invalid UTF-8 is
   /// shown with replacement characters.
   void text(Point at, const std::string& text, const TextStyle& style, Align align = Align::left);
+  /// The first drawn text with letters that no font of this machine has; empty: none.
+  const std::string& textWithoutFont() const;
   TextSize measure(const std::string& text, const TextStyle& style) const;
   /// The text, cut to `width` units with an ellipsis.
   std::string shorten(const std::string& text, const TextStyle& style, double width) const;

@@ -18,6 +18,9 @@ constexpr std::array kCatalog{
                    "a reader failed, and another one read the file; --ifc-reader chooses a reader"},
     DiagnosticKind{"guessed_up_axis", note,
                    "the file states no up axis: that of the largest level area; --up sets it"},
+    DiagnosticKind{
+        "unclear_up_axis", warning,
+        "the file states no up axis, and no level is clearly the largest: say it by --up"},
     DiagnosticKind{"ignored_extension", error,
                    "a glTF extension that is not read, so shapes may differ; export without it"},
     DiagnosticKind{"mended_text", note, "the text was repaired in memory; export the file again"},

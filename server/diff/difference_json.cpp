@@ -22,6 +22,8 @@ Json toJson(const WalkEvent& walkEvent) {
             {"point", toJson(walkEvent.point)},
             {"normal", toJson(walkEvent.normal)},
             {"distance", walkEvent.distance}};
+  if (!walkEvent.aGlobalId.empty()) json["a_global_id"] = walkEvent.aGlobalId;
+  if (!walkEvent.bGlobalId.empty()) json["b_global_id"] = walkEvent.bGlobalId;
   if (walkEvent.ended) json["ended"] = *walkEvent.ended;
   return json;
 }

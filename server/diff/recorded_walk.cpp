@@ -22,6 +22,8 @@ WalkEvent toWalkEvent(const Event& event) {
   walkEvent.point = vectorFromProto(event.point_b());
   walkEvent.normal = vectorFromProto(event.normal());
   walkEvent.distance = event.distance();
+  walkEvent.aGlobalId = event.a_global_id();
+  walkEvent.bGlobalId = event.b_global_id();
   return walkEvent;
 }
 

@@ -20,7 +20,8 @@ using collision::Vec3;
 
 /// An event of a walk: a contact that begins, a blocked move, or a trigger entered or left.
 struct WalkEvent {
-  std::string a, b;  ///< names in the recording
+  std::string a, b;                  ///< names in the recording
+  std::string aGlobalId, bGlobalId;  ///< of IFC; empty: none
   std::uint64_t tick = 0;
   double time = 0;              ///< seconds
   Vec3 point = Vec3::Zero();    ///< on b; scene frame, metres

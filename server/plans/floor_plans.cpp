@@ -172,6 +172,7 @@ void drawSheet(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
   const double below = view.topLeft.y + view.height();
   drawScaleBar(canvas, view, {view.topLeft.x, below + 34 * view.unit});
   drawTitle(canvas, view, scene, storey, scale);
+  reportMissingFont(canvas);
 }
 
 }  // namespace

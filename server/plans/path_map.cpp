@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "collision/assert.hpp"
+#include "server/plans/floor_plans.hpp"
 #include "server/plans/plan_drawing.hpp"
 
 namespace enfilade::server {
@@ -24,8 +25,9 @@ constexpr double kMinTickShare = 0.08;  // minimum share of ticks for a storey w
 constexpr std::size_t kMaxMapStoreys = 3;
 constexpr double kMapMargin = 4.0;                           // metres around the walked area
 constexpr double kMaxMapWidth = 1600, kMaxMapHeight = 1100;  // pixels of one plan
-constexpr double kBorder = 16, kLineHeight = 26;             // pixels
-constexpr double kMinSupportNormalY = 0.7;  // contacts with a larger y are floors and stairs
+constexpr double kMaxStoreyDistance = 0.6;        // metres between a walked floor and a storey's
+constexpr double kBorder = 48, kLineHeight = 26;  // pixels
+constexpr double kMinSupportNormalY = 0.7;        // contacts with a larger y are floors and stairs
 
 constexpr Colour kContact{214, 40, 40}, kBlocked{120, 0, 120}, kCamera{20, 20, 24};
 
@@ -197,11 +199,19 @@ void drawLegend(Canvas& canvas, const std::vector<LegendEntry>& entries, double 
   }
 }
 
-std::string formatHeading(const Storey& storey) {
+/// The storey of the file at this floor; null: none is near.
+const StoreyFloor* findStoreyAt(const std::vector<StoreyFloor>& storeys, double floor) {
+  const auto distanceOf = [&](const StoreyFloor& s) { return std::abs(s.height - floor); };
+  const auto nearest = std::ranges::min_element(storeys, {}, distanceOf);
+  return nearest != storeys.end() && distanceOf(*nearest) < kMaxStoreyDistance ? &*nearest
+                                                                               : nullptr;
+}
+
+std::string formatHeading(const Storey& storey, const StoreyFloor* named) {
   char text[64];
   std::snprintf(text, sizeof text, "floor at %.2f m, cut %.1f m above", storey.floor,
                 kPlanCutHeight);
-  return text;
+  return named != nullptr && !named->name.empty() ? named->name + ": " + text : text;
 }
 
 /// Gives the storeys their places, one below the other, and returns the height of all.
@@ -221,19 +231,27 @@ Image composeMap(const WalkTrace& trace, std::vector<Storey>& storeys, const sce
   const double legendTop = placeStoreys(storeys, kBorder + 2 * kLineHeight) + 2 * kLineHeight;
   const double height =
       legendTop + static_cast<double>(countLegendRows(legend, width)) * kLineHeight + kBorder;
+  const std::vector<StoreyFloor> namedStoreys =
+      scene ? findStoreys(*scene) : std::vector<StoreyFloor>();
   Canvas canvas(static_cast<int>(width), static_cast<int>(height), kPlanPaper);
   const TextStyle title = makeStyle(18, true), heading = makeStyle(14);
   canvas.text({kBorder, kBorder}, canvas.shorten(trace.title, title, width - 2 * kBorder), title);
   for (const Storey& storey : storeys) {
     const PlanView& view = storey.view;
-    canvas.text({kBorder, view.topLeft.y - kLineHeight + 4}, formatHeading(storey), heading);
+    const StoreyFloor* const named = findStoreyAt(namedStoreys, storey.floor);
+    canvas.text({kBorder, view.topLeft.y - kLineHeight + 4},
+                canvas.shorten(formatHeading(storey, named), heading, width - 2 * kBorder),
+                heading);
     drawPlanPicture(canvas, view, storey.picture);
+    drawGrid(canvas, view);
     if (scene) drawCut(canvas, view, *scene);
-    canvas.rectangle(view.topLeft, view.width(), view.height(), 1.5, kPlanInk);
+    if (named != nullptr && named->storey)
+      drawSpaceNames(canvas, view, scene->model(), *named->storey);
     StoreyMarks(canvas, storeys, storey).draw(trace);
   }
   drawScaleBar(canvas, storeys.front().view, {kBorder, legendTop - 1.6 * kLineHeight});
   drawLegend(canvas, legend, legendTop);
+  reportMissingFont(canvas);
   return canvas.toImage();
 }
 

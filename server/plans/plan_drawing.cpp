@@ -1,5 +1,7 @@
 #include "server/plans/plan_drawing.hpp"
 
+#include <spdlog/spdlog.h>
+
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -205,6 +207,14 @@ void drawGrid(Canvas& canvas, const PlanView& view) {
                 styleOf(metres), render::Align::right);
   });
   canvas.rectangle(view.topLeft, view.width(), view.height(), 1.5 * view.unit, kPlanInk);
+}
+
+void reportMissingFont(const Canvas& canvas) {
+  if (canvas.textWithoutFont().empty()) return;
+  spdlog::warn(
+      "a plan shows boxes in place of letters of '{}': no font has them here; install one, "
+      "e.g. fonts-noto-cjk",
+      canvas.textWithoutFont());
 }
 
 void drawScaleBar(Canvas& canvas, const PlanView& view, Point at) {

@@ -45,6 +45,9 @@ void drawGrid(render::Canvas& canvas, const PlanView& view);
 /// Draws a scale bar with its top left corner at `at`, and the axes right of it.
 void drawScaleBar(render::Canvas& canvas, const PlanView& view, render::Point at);
 
+/// Warns in the log if letters of a plan have no font here.
+void reportMissingFont(const render::Canvas& canvas);
+
 /// Places captions so that no two overlap.
 class CaptionPlacer {
  public:

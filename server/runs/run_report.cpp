@@ -79,6 +79,8 @@ Json walkToJson(const v1::Notice& notice) {
             {"outcome", toString(notice.kind())},
             {"position", toJson(notice.position())}};
   if (!notice.obstacle_name().empty()) walk["obstacle"] = notice.obstacle_name();
+  if (!notice.obstacle_global_id().empty())
+    walk["obstacle_global_id"] = notice.obstacle_global_id();
   if (!notice.text().empty()) walk["text"] = notice.text();
   return walk;
 }

@@ -43,6 +43,7 @@ const std::vector<std::string> kRooms{
     "scene/import/file",
     "scene/import/assembly",
     "scene/import/worker",
+    "scene/import/gltf/encoding",
     "scene/import/gltf",
     "scene/import/scan",
     "scene/import/bodies",

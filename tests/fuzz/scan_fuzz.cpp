@@ -36,7 +36,7 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
     require(error.what()[0] != '\0', "an error has a message");
   }
   for (const scene::ScanMesh& mesh : meshes) requireValidMesh(mesh);
-  const char up = scene::guessUpAxis(scene::computeLevelAreas(meshes));
+  const char up = scene::guessUpAxis(scene::computeLevelAreas(meshes)).axis;
   require(up >= 'x' && up <= 'z', "the up axis is an axis");
 }
 

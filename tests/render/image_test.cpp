@@ -190,6 +190,16 @@ TEST(Canvas, TextIsAlignedMeasuredAndShortened) {
   EXPECT_NEAR(right, 300, 3);
 }
 
+TEST(Canvas, NamesTheFirstTextWithoutAFont) {
+  Canvas canvas(200, 100, {255, 255, 255});
+  canvas.text({10, 10}, "Grüße, Ωμέγα", {});
+  EXPECT_EQ(canvas.textWithoutFont(), "");
+  const std::string privateUse = "\xf4\x8f\xbf\xbd";  // U+10FFFD: no font has it
+  canvas.text({10, 30}, "a" + privateUse, {});
+  canvas.text({10, 50}, privateUse, {});
+  EXPECT_EQ(canvas.textWithoutFont(), "a" + privateUse);
+}
+
 TEST(Canvas, PagesAreWrittenWhole) {
   const tests::TemporaryFolder folder;
   for (const auto& [name, start] :

@@ -206,11 +206,41 @@ TEST(ScanUpAxis, IsThatOfTheLargestLevelAreaAndCanBeSet) {
   EXPECT_EQ(importBox({8, 3, 6}).upAxis, 'y');
   EXPECT_EQ(importBox({3, 8, 6}).upAxis, 'x');
   EXPECT_EQ(importBox({5, 5, 5}).upAxis, 'z');
-  EXPECT_EQ(diagnosticText(importBox({8, 3, 6}), "guessed_up_axis"),
-            "y is up: surfaces across x, y, z have 36 96 48 square units; override it with --up");
+  EXPECT_EQ(
+      diagnosticText(importBox({8, 3, 6}), "guessed_up_axis"),
+      "y is up: the largest levels across x, y, z have 18 48 24 square units; --up sets another");
+  const Model cube = importBox({5, 5, 5});
+  EXPECT_EQ(countOf(cube, "unclear_up_axis"), 1u);
+  EXPECT_EQ(countOf(cube, "guessed_up_axis"), 0u);
   const Model set = importBox({8, 3, 6}, 'z');
   EXPECT_EQ(set.upAxis, 'z');
   EXPECT_EQ(countOf(set, "guessed_up_axis"), 0u);
+}
+
+/// A room of 6 x 5 x 2.7 m without a ceiling, with its floor across `up`.
+std::string makeOpenRoom(std::size_t up) {
+  std::string text =
+      "ply\nformat ascii 1.0\ncomment TextureFile room.png\nelement vertex 8\nproperty float x\n"
+      "property float y\nproperty float z\nelement face 5\nproperty list uchar int vertex_indices\n"
+      "end_header\n";
+  const std::array<double, 3> size{6, 5, 2.7};
+  for (int corner = 0; corner < 8; ++corner) {
+    std::array<double, 3> p{};
+    for (std::size_t k = 0; k < 3; ++k) p[(up + 1 + k) % 3] = (corner >> k & 1) * size[k];
+    for (const double x : p) text += std::to_string(x) + " ";
+    text += "\n";
+  }
+  return text + "4 0 1 3 2\n4 0 1 5 4\n4 2 3 7 6\n4 0 2 6 4\n4 1 3 7 5\n";
+}
+
+TEST(ScanUpAxis, IsThatOfTheFloorOfARoomWithoutACeiling) {
+  const TemporaryFolder folder;
+  for (std::size_t up = 0; up < 3; ++up) {
+    const Model model = importModel(folder.write("room.ply", makeOpenRoom(up)));
+    EXPECT_EQ(model.upAxis, "xyz"[up]);
+    EXPECT_EQ(countOf(model, "guessed_up_axis"), 1u);
+    EXPECT_EQ(diagnosticText(model, "missing_texture"), "room.png: textures of PLY are not read");
+  }
 }
 
 TEST(ScanPly, APointCloudIsRefusedInWords) {

@@ -174,6 +174,21 @@ TEST(WalkMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
   }
   EXPECT_GT(blue, 1000u);
   EXPECT_FALSE(drawMap(trace, {[](const auto&) { return std::optional<PlanPicture>(); }}));
+  // An earlier walk of the same avatar is paler, and no other avatar's.
+  const render::Colour own = computeAvatarColour(trace.paths[0].id);
+  const auto countPale = [&](const render::Image& image) {
+    std::size_t pale = 0;
+    for (std::size_t i = 0; i < image.rgb.size(); i += 3) {
+      bool isPale = true;
+      for (std::size_t k = 0; k < 3; ++k) isPale = isPale && image.rgb[i + k] == (own[k] + 255) / 2;
+      pale += isPale ? 1 : 0;
+    }
+    return pale;
+  };
+  EXPECT_EQ(countPale(*map), 0u);
+  trace.paths[0].isEarlier = true;
+  EXPECT_GT(countPale(drawMap(trace, {blank}).value()), 300u);
+  trace.paths[0].isEarlier = false;
   // The blank image lacks the room's walls; the map shows them dark.
   const auto inkOf = [](const render::Image& image) {
     std::size_t ink = 0;

@@ -8,7 +8,7 @@
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/path_names.hpp"
 #include "scene/import/file/import_options.hpp"
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {

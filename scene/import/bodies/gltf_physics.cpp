@@ -6,7 +6,7 @@
 #include <set>
 
 #include "scene/import/bodies/implicit_shapes.hpp"
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {

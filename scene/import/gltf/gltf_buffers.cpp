@@ -10,8 +10,8 @@
 
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/file/uri.hpp"
-#include "scene/import/gltf/gltf_json.hpp"
-#include "scene/import/gltf/meshopt_view.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
+#include "scene/import/gltf/encoding/meshopt_view.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -10,8 +10,8 @@
 
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/file/import_options.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
-#include "scene/import/gltf/gltf_json.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {

@@ -5,7 +5,7 @@
 #include <set>
 #include <vector>
 
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 
 namespace enfilade::scene {
 namespace {

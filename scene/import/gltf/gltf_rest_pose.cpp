@@ -4,7 +4,7 @@
 #include <cmath>
 #include <optional>
 
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/gltf_nodes.hpp"
 #include "scene/model/add_diagnostic.hpp"
 

@@ -7,11 +7,11 @@
 #include <string_view>
 
 #include "scene/import/file/import_options.hpp"
-#include "scene/import/gltf/gltf_binary.hpp"
+#include "scene/import/gltf/encoding/gltf_binary.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
 #include "scene/import/gltf/gltf_extensions.hpp"
 #include "scene/import/gltf/gltf_instances.hpp"
-#include "scene/import/gltf/gltf_json.hpp"
 #include "scene/import/gltf/gltf_metadata.hpp"
 #include "scene/import/gltf/gltf_rest_pose.hpp"
 #include "scene/import/gltf/plain_primitives.hpp"

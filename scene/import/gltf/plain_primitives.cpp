@@ -3,7 +3,7 @@
 #include <array>
 #include <numeric>
 
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {

@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
-#include "scene/import/gltf/draco_mesh.hpp"
-#include "scene/import/gltf/gltf_binary.hpp"
+#include "scene/import/gltf/encoding/draco_mesh.hpp"
+#include "scene/import/gltf/encoding/gltf_binary.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
 #include "scene/import/gltf/gltf_rest_pose.hpp"
 #include "scene/import/gltf/texture_mapping.hpp"

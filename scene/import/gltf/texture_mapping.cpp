@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 
 namespace enfilade::scene {
 namespace {

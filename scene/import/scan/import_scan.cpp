@@ -96,6 +96,9 @@ Material makeScanMaterial(const ScanMesh& scan, const std::string& name,
   Material material;
   material.name = name;
   material.doubleSided = true;
+  if (!scan.textureFile.empty())
+    addDiagnostic(diagnostics, "missing_texture",
+                  scan.textureFile + ": textures of PLY are not read");
   if (!scan.colour) return material;
   material.baseColour.head<3>() = scan.colour->unaryExpr(&srgbToLinear);
   addDiagnostic(diagnostics, "vertex_colours_ignored", name + ": drawn in their mean colour");
@@ -103,9 +106,9 @@ Material makeScanMaterial(const ScanMesh& scan, const std::string& name,
 }
 
 std::string describeLevelAreas(const LevelAreas& areas, char up) {
-  std::string text = std::string(1, up) + " is up: surfaces across x, y, z have";
+  std::string text = std::string(1, up) + " is up: the largest levels across x, y, z have";
   for (const double area : areas) text += " " + std::to_string(std::llround(area));
-  return text + " square units; override it with --up";
+  return text + " square units; --up sets another";
 }
 
 }  // namespace
@@ -122,9 +125,11 @@ Model importScan(const std::filesystem::path& file, ModelFormat format,
                   (format == ModelFormat::ply ? "PLY" : "STL") +
                       std::string(" has no unit: taken for metres"));
   const LevelAreas areas = computeLevelAreas(scans);
-  model.upAxis = options.up.value_or(guessUpAxis(areas));
+  const UpAxisGuess guess = guessUpAxis(areas);
+  model.upAxis = options.up.value_or(guess.axis);
   if (!options.up)
-    addDiagnostic(model.diagnostics, "guessed_up_axis", describeLevelAreas(areas, model.upAxis));
+    addDiagnostic(model.diagnostics, guess.isClear ? "guessed_up_axis" : "unclear_up_axis",
+                  describeLevelAreas(areas, model.upAxis));
   Eigen::Affine3d worldFromFile = Eigen::Affine3d::Identity();
   worldFromFile.linear() = makeYUpRotation(model.upAxis) * model.metresPerUnit;
 

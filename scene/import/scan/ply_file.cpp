@@ -101,6 +101,7 @@ class PlyReader {
     if (mesh_.positions.empty()) failPly("contains no vertices");
     addFaces();
     finishColour();
+    mesh_.textureFile = header_.textureFile;
     return std::move(mesh_);
   }
 

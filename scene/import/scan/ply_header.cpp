@@ -105,6 +105,8 @@ PlyHeader parsePlyHeader(std::string_view bytes) {
       header.elements.back().properties.push_back(parsePlyProperty(words));
       if (header.elements.back().properties.size() > kMaxPlyProperties)
         failHeader("an element has more than 1000 properties");
+    } else if (kind == "comment" && words.readWord() == "TextureFile") {
+      header.textureFile = words.readWord();
     } else if (kind == "end_header") {
       if (!hasFormat) failHeader("no format line");
       header.size = start.size() - lines.remaining();

@@ -34,7 +34,8 @@ struct PlyElement {
 struct PlyHeader {
   PlyEncoding encoding = PlyEncoding::ascii;
   std::vector<PlyElement> elements;
-  std::size_t size = 0;  ///< bytes, with the end of its last line
+  std::string textureFile;  ///< of a comment "TextureFile"; empty: none
+  std::size_t size = 0;     ///< bytes, with the end of its last line
 };
 
 /// Parses the header at the start of `bytes`. Throws ImportError without the file's name.

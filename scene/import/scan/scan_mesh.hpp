@@ -21,6 +21,7 @@ struct ScanMesh {
   std::vector<std::uint32_t> indices;    ///< three per triangle, each below positions.size()
   /// Mean of the colours of the vertices, sRGB 0..1; nullopt: the file has none.
   std::optional<Eigen::Vector3f> colour;
+  std::string textureFile;      ///< not read; empty: none
   std::size_t brokenFaces = 0;  ///< left out: an index out of range or a vertex not finite
 };
 

@@ -1,4 +1,4 @@
-#include "scene/import/gltf/gltf_binary.hpp"
+#include "scene/import/gltf/encoding/gltf_binary.hpp"
 
 #include <array>
 

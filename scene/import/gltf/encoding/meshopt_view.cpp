@@ -1,10 +1,10 @@
-#include "scene/import/gltf/meshopt_view.hpp"
+#include "scene/import/gltf/encoding/meshopt_view.hpp"
 
 #include <meshoptimizer.h>
 
 #include <array>
 
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,6 +1,6 @@
 // The header is read here first, because Draco allocates by its counts alone: Draco bit stream 2.2,
 // sections "Draco header", "Sequential" and "EdgeBreaker connectivity".
-#include "scene/import/gltf/draco_mesh.hpp"
+#include "scene/import/gltf/encoding/draco_mesh.hpp"
 
 #include <draco/compression/decode.h>
 #include <draco/core/varint_decoding.h>

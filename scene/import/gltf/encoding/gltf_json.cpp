@@ -1,4 +1,4 @@
-#include "scene/import/gltf/gltf_json.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 
 #include <array>
 #include <cstdint>
