@@ -188,7 +188,7 @@ void drawLegend(Canvas& canvas, const std::vector<LegendEntry>& entries, double 
   const std::size_t rows = countLegendRows(entries, canvas.width());
   const TextStyle style = makeStyle(14);
   for (std::size_t i = 0; i < entries.size(); ++i) {
-    const double x = 24 + static_cast<double>(i / rows) * kLegendColumn;
+    const double x = kBorder + 6 + static_cast<double>(i / rows) * kLegendColumn;
     const double y = top + static_cast<double>(i % rows) * kLineHeight;
     if (entries[i].wedge) {
       drawWedge(canvas, {x - 8, y + 9}, 1, 0);

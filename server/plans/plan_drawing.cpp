@@ -24,6 +24,7 @@ constexpr Colour kWall{52, 54, 62}, kFurniture{206, 210, 220}, kOutline{110, 114
 constexpr double kTextSize = 13;       // thin lines
 constexpr double kSpaceNameSize = 12;  // thin lines
 constexpr double kSpaceLineHeight = 1.25;
+constexpr double kMinNameScale = 0.65;  // of a name in a narrow room; a longer one is cut
 
 std::vector<Point> toPage(const PlanView& view, const std::vector<Vec3>& points) {
   std::vector<Point> page;
@@ -272,16 +273,22 @@ void drawSpaceNames(Canvas& canvas, const PlanView& view, const scene::Model& mo
   style.halo = 3 * view.unit, style.haloColour = kPlanPaper;
   for (const scene::Space& space : model.spaces) {
     if (space.storey != storey || space.box.empty()) continue;
-    const Point centre = view.at((space.box.min + space.box.max) / 2);
-    const double width = space.box.size().x() * view.unitsPerMetre;
+    const Vec3 low = space.box.min.cwiseMax(view.area.min),
+               high = space.box.max.cwiseMin(view.area.max);
+    if (low.x() >= high.x() || low.z() >= high.z()) continue;
+    const Point centre = view.at((low + high) / 2);
+    const double width = (high.x() - low.x()) * view.unitsPerMetre;
     std::vector<std::string> lines;
     for (const std::string* text : {&space.longName, &space.name})
       if (!text->empty() && (lines.empty() || lines[0] != *text)) lines.push_back(*text);
     const double height = style.size * kSpaceLineHeight;
     double top = centre.y - height * static_cast<double>(lines.size()) / 2;
     for (std::size_t i = 0; i < lines.size(); ++i, top += height) {
-      style.bold = i == 0;
-      canvas.text({centre.x, top}, canvas.shorten(lines[i], style, width), style,
+      TextStyle fitting = style;
+      fitting.bold = i == 0;
+      const double wanted = canvas.measure(lines[i], fitting).width;
+      if (wanted > width) fitting.size *= std::max(kMinNameScale, 0.99 * width / wanted);
+      canvas.text({centre.x, top}, canvas.shorten(lines[i], fitting, width), fitting,
                   render::Align::centre);
     }
   }
