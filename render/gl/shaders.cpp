@@ -88,7 +88,7 @@ layout(binding = 1) uniform sampler2D shadowMask;
 // most a quarter of a byte step. Framebuffer encoding takes software renderers three times as long,
 // because they read, decode, select and encode the existing colour.
 vec3 encoded(vec3 radiance) {
-  vec3 t = sqrt(clamp(radiance, 0.0, 9.0));  // larger values are white
+  vec3 t = sqrt(clamp(kExposure * radiance, 0.0, 9.0));  // larger values are white
   return t * (-0.101668 + t * (16.2093 + t * (251.839 + t * 13.5556))) /
          (1.0 + t * (2.352 + t * (240.678 + t * (-25.9677 + t * (127.038 + t * -15.3394)))));
 }

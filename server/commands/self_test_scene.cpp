@@ -17,22 +17,22 @@ constexpr int kMaxWrongIds = 4;                             // cells whose centr
 constexpr double kWallDistance = 4, kMaxDepthError = 1e-3;  // metres, of the back wall
 
 constexpr const char* kGolden =
-    "0afbdcc0aebccb0adbccb0acbbcb0acbbcb0abbacb0abbacb0aabacb0aabacb0abbacb0abbacb0acbbcb"
-    "0acbbcb0adbccb0aebccb0afbdcc0b5bdc30b5bdc30b6bdc40b6bdc40b6bec50b6bec50b6bec50b6bec5"
-    "0b6bec50b6bec50b6bec50b6bec50b6bdc40b6bdc40b5bdc30b5bdc32bcbab42bebcb52bfbeb72c1bfb9"
-    "2c2c0ba2c3c2bb2c4c2bc2c5c3bc2c5c3bc2c4c2bc2c3c2bb2c2c0ba2c1bfb92bfbeb72bebcb52bcbab4"
-    "2bdbbb52bfbdb62c0beb82c2c0ba2c3c2bb2c5c3bc2c5c4bd2c6c4be2c6c4be2c5c4bd2c5c3bc2c3c2bb"
-    "2c2c0ba2c0beb82bfbdb62bdbbb52bdbcb52bfbdb72c1bfb92c3c1ba2c4c2bc2c5c4bd2c6c5be2c7c5be"
-    "2c7c5be2c6c5be2c5c4bd2c4c2bc2c3c1ba2c1bfb92bfbdb72bdbcb52bebcb52c0beb72c1c0b92c3c1bb"
-    "2c5c3bc2c6c4bd2c7c5be2c8c6bf2bbc7b92a3c8ad2a3c7ac2a1c6ab2adc3af2c1c0b92c0beb72bebcb5"
-    "2bebcb52bfbeb72c1bfb93c776733ca5b593cb5c5a2bd8e892c7c5be2b4c7b528cc8a227ac0a127bbfa1"
-    "299c0aa2c1bfb92bfbeb72bebcb52bab8b22bcbab32bdbbb53c675723ca5b593ca5b592bb8c872c3c1ba"
-    "2b0c4b2284c49f45cb2a145eb3a5484b7aa2bdbbb52bcbab32bab8b219a908119a8f811998e803b96863"
-    "3c559573c659571a1736a19c9183191a087173b78d45bb1a045db2a4476a69619a908119a8f8119a9081"
-    "1a194821a294831a3958319f7b6e19f73681a174691a0907f1a597851a19b861939d83462859945e849f"
-    "478899319f92801a294831a194821a597851a698861a799871a698861a698861a799871a99b891a99b89"
-    "1a99b891a89a881a395841a294831a597851a799871a698861a597851a89a881a99b891aa9c891ab9c8a"
-    "1ab9d8b1ac9e8b1ac9e8c1ad9e8c1ad9e8c1ac9e8c1ac9e8b1ab9d8b1ab9c8a1aa9c891a99b891a89a88";
+    "0c7d4e10c6d3e00c5d3e00c4d2e00c3d2e00c3d1e00c2d1e00c2d1e00c2d1e00c2d1e00c3d1e00c3d2e0"
+    "0c4d2e00c5d3e00c6d3e00c7d4e10cdd4d90cdd4d90cdd4d90cdd4da0cdd4da0cdd4db0cdd5db0cdd5db"
+    "0cdd5db0cdd5db0cdd4db0cdd4da0cdd4da0cdd4d90cdd4d90cdd4d92d3d2cb2d5d3cd2d6d4ce2d7d6d0"
+    "2d9d7d12d9d8d22dad9d32dad9d32dad9d32dad9d32d9d8d22d9d7d12d7d6d02d6d4ce2d5d3cd2d3d2cb"
+    "2d4d2cc2d5d4ce2d7d5cf2d8d7d12d9d8d22dad9d32dbdad42dcdad42dcdad42dbdad42dad9d32d9d8d2"
+    "2d8d7d12d7d5cf2d5d4ce2d4d2cc2d4d3cc2d6d4ce2d7d6d02d9d7d12dad9d32dbdad42dcdad52dcdbd5"
+    "2dcdbd52dcdad52dbdad42dad9d32d9d7d12d7d6d02d6d4ce2d4d3cc2d4d3cd2d6d4ce2d8d6d02d9d7d2"
+    "2dad9d32dbdad42dcdad52dddbd62d0dccf2b7ddc42b7ddc32b5dcc12c2d9c62d8d6d02d6d4ce2d4d3cd"
+    "2d4d3cd2d6d4ce2d8d6d03dd8a873df6e6b3e06e6c2d4a29d2dddbd62c9ddcc29fdcb928dd4b828ed4b8"
+    "2add6c12d8d6d02d6d4ce2d4d3cd2d1d0c92d3d1cb2d4d3cd3dc89863df6d6b3df6e6c2d2a09c2d9d7d2"
+    "2c6dac9298d8b746ec6b8470c8bc498ccc22d4d3cd2d3d1cb2d1cfc91b1a6971b2a7981b2a7983d27d77"
+    "3dc6c693dc6c6a1b9897f1b5aa9a1a8b69e189cba546dc5b7470c7bb48cbdae1b2a7981b2a7981b1a697"
+    "1baac991bbac9a1bbad9a1bb95871b5887c1b7897d1b4a4931beaf9d1b9b39d1acb69c4779bb247199b6"
+    "48b9da61b9ab981bbac9a1baac991bdaf9c1beb09d1bfb19e1bfb19e1c0b29f1c0b29f1c1b3a01c2b3a0"
+    "1c2b3a01c1b3a01beb09d1bbad9b1bbad9b1bfb09d1beb09d1bdaf9c1c0b29f1c1b3a01c2b4a11c3b5a2"
+    "1c4b5a21c4b6a31c4b6a31c5b7a31c5b7a31c4b6a31c4b6a31c4b5a21c3b5a21c2b4a11c1b3a01c0b29f";
 
 scene::Mesh makeCube() {
   scene::Mesh mesh;
