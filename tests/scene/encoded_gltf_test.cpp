@@ -168,6 +168,24 @@ TEST(GltfUris, DataIsBase64OrPercentEncoded) {
 
 // ---- instances ----------------------------------------------------------------------------------
 
+TEST(GltfUris, AMissingOrShortBufferAndAMissingSceneAreNamed) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  const auto model = folder.write("a.gltf", file.gltf("a.bin"));
+  const std::string missing = failureOf(model);
+  EXPECT_NE(missing.find("its buffer 'a.bin' is missing; put it next to the model"),
+            std::string::npos)
+      << missing;
+  folder.write("a.bin", file.binary.substr(0, file.binary.size() / 2));
+  const std::string cut = failureOf(model);
+  EXPECT_NE(cut.find("extends beyond its buffer of"), std::string::npos) << cut;
+  folder.write("a.bin", file.binary);
+  EXPECT_EQ(importModel(model).objects.size(), 1u);
+  file.json.erase("scenes");
+  const std::string bare = failureOf(folder.write("b.gltf", file.gltf("a.bin")));
+  EXPECT_NE(bare.find("has no scene; export it with one"), std::string::npos) << bare;
+}
+
 TEST(GltfInstances, EachIsAnObjectWhetherTheExtensionIsRequiredOrNot) {
   const TemporaryFolder folder;
   GltfWriter nodes = tests::plainTerrace();

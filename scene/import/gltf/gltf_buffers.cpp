@@ -182,7 +182,8 @@ std::string GltfBuffers::readBuffer(std::size_t index) {
     loaded_ += bytes.size();
     return bytes;
   }
-  fail("its buffer '" + uri + "' is missing; put it next to the model, or");
+  throw ImportError(file_.string() + ": its buffer '" + uri +
+                    "' is missing; put it next to the model, or export the file again (open)");
 }
 
 const std::string& GltfBuffers::getBuffer(std::size_t index) {

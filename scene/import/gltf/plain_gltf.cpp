@@ -91,12 +91,15 @@ bool isPlainPrimitive(const Json& primitive, const Json& accessors) {
   });
 }
 
-/// assimp reads data URIs in Base64 only.
-bool isPlainBuffer(const Json& buffer) {
+/// assimp reads data URIs in Base64 only. It does not say well that a file is missing or cut off.
+bool isPlainBuffer(const Json& buffer, const std::filesystem::path& folder) {
   const Json* uri = findMember(&buffer, "uri");
   if (uri == nullptr || !uri->is_string()) return true;
   const auto& text = uri->get_ref<const std::string&>();
-  return !text.starts_with("data:") || text.substr(0, text.find(',')).ends_with(";base64");
+  if (text.starts_with("data:")) return text.substr(0, text.find(',')).ends_with(";base64");
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(folder / text, error);
+  return !error && size >= readIndexMember(&buffer, "byteLength").value_or(0);
 }
 
 /// The import takes the first set of texture coordinates from assimp.
@@ -106,12 +109,15 @@ bool usesFirstTexCoords(const Json& sections) {
   return true;
 }
 
-bool needsRewriting(const std::string& text, const Json& sections) {
+bool needsRewriting(const std::string& text, const Json& sections,
+                    const std::filesystem::path& folder) {
   if (std::any_of(kRewrittenTexts.begin(), kRewrittenTexts.end(),
                   [&](std::string_view mark) { return text.find(mark) != std::string::npos; }))
     return true;
   const Json& buffers = getArray(sections, "buffers");
-  if (!std::all_of(buffers.begin(), buffers.end(), isPlainBuffer)) return true;
+  if (!std::all_of(buffers.begin(), buffers.end(),
+                   [&](const Json& buffer) { return isPlainBuffer(buffer, folder); }))
+    return true;
   if (!usesFirstTexCoords(sections)) return true;
   const Json& accessors = getArray(sections, "accessors");
   for (const Json& mesh : getArray(sections, "meshes")) {
@@ -228,12 +234,14 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
   if (!sections.is_object()) return plain;
   requireVersion2(sections, file);
   plain.problems = checkGltfExtensions(sections, extensions, file);
+  if (getArray(sections, "scenes").empty())
+    throw ImportError(file.string() + ": has no scene; export it with one (open)");
   if (const std::size_t scenes = getArray(sections, "scenes").size(); scenes > 1)
     plain.problems.push_back({"other_scenes", scenes - 1,
                               "scene " +
                                   std::to_string(readIndexMember(&sections, "scene").value_or(0)) +
                                   " was read, which is the file's default"});
-  if (needsRewriting(plain.json, sections)) {
+  if (needsRewriting(plain.json, sections, file.parent_path())) {
     rewriteGltf(file, format, plain);
     sections = parseMeshSections(plain.json, tooDeep, extensions);
   }
