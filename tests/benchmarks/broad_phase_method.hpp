@@ -65,6 +65,7 @@ struct BroadPhaseMethod {
   std::string reason;
   /// `still` outlives the method.
   std::function<std::unique_ptr<BroadPhase>(std::span<const Aabb> still)> make;
+  std::size_t mostMovers = SIZE_MAX;  ///< the method is skipped above it
 };
 
 template <typename Method, typename... Arguments>

@@ -49,7 +49,8 @@ std::size_t measure(CubeMotion motion, const Size& size, const Arguments& argume
                                   {Vec3(-1e3, 1000, -1e3), Vec3(1e3, 1001, 1e3)}};
   std::vector<const BroadPhaseMethod*> chosen;
   for (const BroadPhaseMethod& method : methods) {
-    if (method.kind != BroadPhaseMethod::Kind::approach && arguments.wants(method.name))
+    if (method.kind != BroadPhaseMethod::Kind::approach && arguments.wants(method.name) &&
+        size.cubes <= method.mostMovers)
       chosen.push_back(&method);
   }
   std::size_t wrong = 0;

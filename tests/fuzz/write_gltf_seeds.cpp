@@ -20,7 +20,8 @@ int main(int argc, char** argv) {
       {"draco-sequential", tests::dracoTerrace(10, true)},
       {"sparse", tests::sparseTerrace(false)},
       {"strip", tests::stripTerrace()},
-      {"instances", tests::instancedTerrace(true)}};
+      {"instances", tests::instancedTerrace(true)},
+      {"posed", tests::posedTerrace()}};
   for (const auto& [name, file] : seeds)
     std::ofstream(std::filesystem::path(argv[1]) / name, std::ios::binary) << file.glb();
   const std::string uri = "data:application/octet-stream;base64,";

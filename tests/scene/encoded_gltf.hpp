@@ -326,4 +326,29 @@ inline GltfWriter instancedTerrace(bool required) {
   return file;
 }
 
+/// Skinned to two joints, without inverse bind matrices, and with a morph target that
+/// doubles it.
+inline GltfWriter posedTerrace() {
+  GltfWriter file = plainTerrace();
+  const std::size_t vertices = Terrace().positions.size();
+  std::vector<std::uint8_t> joints, weights;
+  for (std::size_t v = 0; v < vertices; ++v) {
+    joints.insert(joints.end(), {0, 1, 0, 0});
+    weights.insert(weights.end(), {64, 191, 0, 0});  // of 255
+  }
+  Json& primitive = file.json["meshes"][0]["primitives"][0];
+  const int jointView = static_cast<int>(file.addView(toBytes(joints)));
+  const int weightView = static_cast<int>(file.addView(toBytes(weights)));
+  primitive["attributes"]["JOINTS_0"] = file.addAccessor(jointView, 5121, vertices, "VEC4");
+  primitive["attributes"]["WEIGHTS_0"] = file.addAccessor(weightView, 5121, vertices, "VEC4", true);
+  primitive["targets"] = {{{"POSITION", primitive["attributes"]["POSITION"]}}};
+  file.json["meshes"][0]["weights"] = {1};
+  file.json["nodes"][0]["skin"] = 0;
+  file.json["nodes"].push_back({{"translation", {0, 1, 0}}, {"children", {2}}});
+  file.json["nodes"].push_back({{"rotation", {0, 0, 0.6, 0.8}}});
+  file.json["scenes"][0]["nodes"].push_back(1);
+  file.json["skins"] = Json::array({{{"joints", {1, 2}}}});
+  return file;
+}
+
 }  // namespace enfilade::tests

@@ -16,7 +16,7 @@ struct IfcMapConversion {
   double east = 0, north = 0, height = 0;  ///< of the file's origin, metres
   double xAxisEast = 1, xAxisNorth = 0;    ///< direction of the file's x axis, unit
   double rotation = 0;                     ///< its angle, from east to north, radians
-  double scale = 1;                        ///< from metres of the file to metres of the map; about 1
+  double scale = 1;  ///< from metres of the file to metres of the map; about 1
 };
 
 /// Metres per length unit of the project; nullopt: not stated. Sets `siUnit`.

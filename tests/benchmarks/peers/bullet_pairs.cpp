@@ -94,7 +94,7 @@ class BulletPairs : public BroadPhase {
 std::vector<BroadPhaseMethod> bulletBroadPhases() {
   return {{"Bullet Dbvt", BroadPhaseMethod::Kind::peer, SIZE_MAX, "", maker<BulletPairs>(false)},
           {"Bullet axis sweep", BroadPhaseMethod::Kind::peer, 10000, "minutes to build",
-           maker<BulletPairs>(true)}};
+           maker<BulletPairs>(true), 20000}};
 }
 
 }  // namespace enfilade::benchmarks
