@@ -27,8 +27,8 @@ using IdPair = BoxTable::IdPair;
 constexpr double kSwapCost = 12, kNeighbourTestCost = 6;
 constexpr double kBatchProxyCost = 90, kBatchPairCost = 15;
 // The present way is kept unless the other one is cheaper by this factor.
-constexpr double kHysteresis = 1.5;
-constexpr std::size_t kMinBatchProxies = 64;   // fewer proxies are never a batch
+constexpr double kEnterRatio = 1.5, kLeaveRatio = 1.15;
+constexpr std::size_t kMinBatchProxies = 256;  // fewer proxies are never a batch
 constexpr std::uint64_t kReviewInterval = 32;  // updates, in a batch
 constexpr std::uint64_t kCheckInterval = 8;    // updates, of the lists
 
@@ -41,9 +41,10 @@ std::size_t countLive(const SweepState& sweep) {
   return sweep.proxies.size() - sweep.freeIds.size() - sweep.removed.size();
 }
 
-/// Predicts the cost of the swaps when the endpoints of the windows travel this far on each axis.
-/// The density of the endpoints is that between the octiles of a sample: where most proxies are.
-double predictSwapCost(const SweepState& sweep, const std::array<double, 3>& travel) {
+/// Predicts the cost of the swaps when `windows` windows travel this far in sum on each axis. The
+/// density of the endpoints is that between the octiles of a sample: where most proxies are.
+double predictSwapCost(const SweepState& sweep, const std::array<double, 3>& travel,
+                       std::size_t windows) {
   constexpr std::size_t kSample = 64;
   constexpr double kShare = 0.75;  // of the proxies lies between the octiles
   std::array<ProxyId, kSample> ids;
@@ -61,7 +62,9 @@ double predictSwapCost(const SweepState& sweep, const std::array<double, 3>& tra
     std::sort(positions.begin(), positions.begin() + static_cast<std::ptrdiff_t>(count));
     const double width = positions[count * 7 / 8] - positions[count / 8];
     const double endpoints = 2 * kShare * static_cast<double>(countLive(sweep));
-    swaps += std::min(travel[axis] / std::max(width, 1e-9), 1e9) * endpoints;
+    // Both endpoints of a window pass at most all others: on a storey all have one height.
+    const double passed = 2 * static_cast<double>(windows);
+    swaps += (travel[axis] < passed * width ? travel[axis] / width : passed) * endpoints;
   }
   return kSwapCost * swaps;
 }
@@ -198,7 +201,7 @@ double predictListCost(SweepState& sweep, std::span<const ProxyId> live, std::si
   const double updates = static_cast<double>(kReviewInterval);
   const double movedShare = static_cast<double>(batch.movedSinceReview) /
                             (updates * static_cast<double>(std::max<std::size_t>(live.size(), 1)));
-  return predictSwapCost(sweep, batch.travel) / updates +
+  return predictSwapCost(sweep, batch.travel, batch.rebuiltSinceReview) / updates +
          kNeighbourTestCost * 2 * movedShare * static_cast<double>(neighbours);
 }
 
@@ -226,13 +229,13 @@ void reviewCost(SweepState& sweep) {
   }
   std::sort(live.begin(), live.end());
   ENFILADE_ASSERT(live.size() == countLive(sweep));
-  const double limit = predictBatchCost(batch.moving.size(), sweep.pairCount) / kHysteresis;
+  const double limit = predictBatchCost(batch.moving.size(), sweep.pairCount) / kLeaveRatio;
   const bool isSmall = live.size() < kMinBatchProxies;
   const bool leaves =
       isSmall || (predictListCost(sweep, live, 0) < limit &&
                   predictListCost(sweep, live, countNeighbours(sweep, live)) < limit);
   batch.travel.fill(0);
-  batch.movedSinceReview = 0;
+  batch.movedSinceReview = batch.rebuiltSinceReview = 0;
   if (!leaves) return;
   for (const ProxyId id : live)
     sweep.windowLists.setMaxEndpoints(id, sweep.proxies[id].window.maxBounds);
@@ -252,9 +255,9 @@ bool isBatchCheaper(const SweepState& sweep) {
   // Many windows at once may be a burst; otherwise a look from time to time suffices.
   const bool isBurst = 4 * sweep.rebuilt.size() >= live;
   if (!isBurst && sweep.tick % kCheckInterval != 0) return false;
-  const double listCost = predictSwapCost(sweep, sweep.travel) +
+  const double listCost = predictSwapCost(sweep, sweep.travel, sweep.rebuilt.size()) +
                           kNeighbourTestCost * static_cast<double>(sweep.neighbourTests);
-  return listCost > kHysteresis * predictBatchCost(live, sweep.pairCount);
+  return listCost > kEnterRatio * predictBatchCost(live, sweep.pairCount);
 }
 
 void enterBatch(SweepState& sweep) {
@@ -273,6 +276,7 @@ void updateBatch(SweepState& sweep) {
   BatchState& batch = sweep.batch;
   for (std::size_t axis = 0; axis < 3; ++axis) batch.travel[axis] += sweep.travel[axis];
   batch.movedSinceReview += sweep.moved.size();
+  batch.rebuiltSinceReview += sweep.rebuilt.size();
   if (!sweep.moved.empty() || !sweep.rebuilt.empty() || !sweep.removed.empty()) {
     updateMembers(sweep);
     findPairs(sweep);

@@ -74,7 +74,8 @@ struct BatchState {
   std::vector<BoxTable::IdPair> found;  ///< scratch: each pair once
   std::uint64_t reviewAt = 0;           ///< tick
   std::array<double, 3> travel{};  ///< metres on each axis, of window endpoints, since the review
-  std::uint64_t movedSinceReview = 0;  ///< moved proxies, each once in an update
+  std::uint64_t rebuiltSinceReview = 0;  ///< windows
+  std::uint64_t movedSinceReview = 0;    ///< moved proxies, each once in an update
 };
 
 struct SweepState {

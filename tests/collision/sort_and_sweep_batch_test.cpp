@@ -7,7 +7,7 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr int kProxies = 160;
+constexpr int kProxies = 300;
 
 class BatchedSweep : public ::testing::Test {
  protected:
@@ -70,7 +70,7 @@ TEST_F(BatchedSweep, ProxiesThatRestAreLeftOutUntilTheyMove) {
   for (int tick = 0; tick < 200; ++tick) {
     for (std::size_t k = 0; k < movers; ++k) shift(ids_[k], 0.4);
     if (tick > 100 && tick % 7 == 0) {  // resting ones move a little, two at once, or jump
-      const auto rested = movers + static_cast<std::size_t>(randomInt(random_, 0, 58));
+      const auto rested = movers + static_cast<std::size_t>(randomInt(random_, 0, 198));
       shift(ids_[rested], 0.2);
       shift(ids_[rested + 1], tick % 3 == 0 ? 5 : 0.01);
     }
