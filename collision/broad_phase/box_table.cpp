@@ -299,6 +299,7 @@ void BoxTable::visitNear(const Level& level, const SignedBounds& box, const Visi
         isAll ? 0
               : static_cast<std::size_t>(wrap(low, level.cells[axis], level.inverseCells[axis]));
   }
+  if (count[0] * count[1] >= level.content.count) return visit(boxesOf(level));  // few boxes
   const std::size_t endZ = std::min(first[2] + count[2], cells[2]),
                     wrappedZ = first[2] + count[2] - endZ;
   for (std::size_t i = 0, x = first[0]; i < count[0]; ++i, x = x + 1 == cells[0] ? 0 : x + 1) {

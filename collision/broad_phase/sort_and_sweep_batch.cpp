@@ -24,7 +24,7 @@ namespace {
 using IdPair = BoxTable::IdPair;
 
 // Estimated costs, nanoseconds.
-constexpr double kSwapCost = 12, kNeighbourTestCost = 6;
+constexpr double kSwapCost = 6, kNeighbourTestCost = 6;
 constexpr double kBatchProxyCost = 90, kBatchPairCost = 15;
 // The present way is kept unless the other one is cheaper by this factor.
 constexpr double kEnterRatio = 1.5, kLeaveRatio = 1.15;
