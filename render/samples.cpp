@@ -6,6 +6,7 @@
 
 #include "collision/assert.hpp"
 #include "render/camera_basis.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -48,9 +49,8 @@ const LinearTable& linearOfSrgb() {
   static const LinearTable table = [] {
     LinearTable values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
-      const double s = static_cast<double>(i) / 255;
-      const double linear = s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
-      values[i] = static_cast<std::uint32_t>(std::lround(kWhite * linear));
+      const float linear = scene::srgbToLinear(static_cast<float>(i) / 255);
+      values[i] = static_cast<std::uint32_t>(std::lround(kWhite * static_cast<double>(linear)));
     }
     return values;
   }();

@@ -82,30 +82,30 @@ def picture(out, name, words):
 
 # ---- broad phase ---------------------------------------------------------------------------------
 
-def broad_cell(row):
+def time_cell(row, unit):
     if row is None:
         return "–"
     if "left_out" in row:
         return "left out"
-    cell = f"{short(row['median_us'])} ({short(row['p99_us'])})"
+    cell = f"{short(row[f'median_{unit}'])} ({short(row[f'p99_{unit}'])})"
     return cell if row["wrong"] == 0 else f"{cell} **{row['wrong']} wrong**"
 
 
-def ahead(rows, objects, movers):
+def ahead(rows, unit, **cell):
     """The best peer's median divided by ours."""
-    ours = find(rows, kind="ours", objects=objects, movers=movers)
-    peers = [row["median_us"] for row in rows
-             if row["kind"] == "peer" and row["objects"] == objects and row["movers"] == movers
-             and "median_us" in row]
-    return f"**{min(peers) / ours['median_us']:.1f}×**" if ours and peers else "–"
+    median = f"median_{unit}"
+    ours = find(rows, kind="ours", **cell)
+    peers = [row[median] for row in rows if row["kind"] == "peer" and median in row
+             and all(row.get(key) == value for key, value in cell.items())]
+    return f"**{min(peers) / ours[median]:.1f}×**" if ours and peers else "–"
 
 
 def broad_table(rows, movers, sizes):
     body = []
     for method in names(rows):
-        cells = [broad_cell(find(rows, method=method, movers=movers, objects=n)) for n in sizes]
+        cells = [time_cell(find(rows, method=method, movers=movers, objects=n), "us") for n in sizes]
         body.append([method] + cells)
-    body.append(["best peer : ours"] + [ahead(rows, n, movers) for n in sizes])
+    body.append(["best peer : ours"] + [ahead(rows, "us", objects=n, movers=movers) for n in sizes])
     return table(["µs a tick, median (99 %)"] + [f"{n:,} objects" for n in sizes], body)
 
 
@@ -156,22 +156,11 @@ is not timed. A method stops when its time for a size is used up.
 
 # ---- all moving -----------------------------------------------------------------------------------
 
-def moving_cell(row):
-    if row is None:
-        return "–"
-    cell = f"{short(row['median_ms'])} ({short(row['p99_ms'])})"
-    return cell if row["wrong"] == 0 else f"{cell} **{row['wrong']} wrong**"
-
-
 def moving_table(rows, motion, sizes):
     of = [row for row in rows if row["motion"] == motion]
-    body = [[method] + [moving_cell(find(of, method=method, cubes=n)) for n in sizes]
+    body = [[method] + [time_cell(find(of, method=method, cubes=n), "ms") for n in sizes]
             for method in names(of)]
-    best = []
-    for n in sizes:
-        ours = find(of, kind="ours", cubes=n)
-        peers = [row["median_ms"] for row in of if row["kind"] == "peer" and row["cubes"] == n]
-        best.append(f"**{min(peers) / ours['median_ms']:.1f}×**" if ours and peers else "–")
+    best = [ahead(of, "ms", cubes=n) for n in sizes]
     pairs = [f"{find(of, kind='ours', cubes=n)['pairs']:,.0f}" for n in sizes]
     return table([f"{motion}: ms a frame, median (99 %)"] + [f"{n:,} cubes" for n in sizes],
                  body + [["best peer : ours"] + best, ["pairs in the last frame"] + pairs])

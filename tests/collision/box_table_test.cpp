@@ -103,6 +103,27 @@ TEST(BoxTable, BoxesThatTouchOverlapAndThoseApartByOneRoundingDoNot) {
   }
 }
 
+TEST(BoxTable, RoundingNeverPutsBoxesThatTouchTwoCellsApart) {
+  // Boxes as large as a cell, whose corners lie on both sides of the cells' borders: without slack
+  // in the cell size, the product with its inverse would be rounded down for one and up for the
+  // other.
+  Random random(6);
+  for (int round = 0; round < 3000; ++round) {
+    const double size = uniform(random, 0.01, 3);
+    const double far = round % 2 == 0 ? 0 : 0x1p38;  // cells away: corners are rounded, too
+    const double border = size * (far + randomInt(random, -40, 40));
+    std::vector<Aabb> boxes;
+    for (const double below : {border, std::nextafter(border, -1e300)}) {
+      for (const double above : {below + size, std::nextafter(below + size, 1e300)}) {
+        boxes.push_back({Vec3(below, 0, 0), Vec3(above, size, size)});
+        boxes.push_back({Vec3(above, 0, 0), Vec3(above + size, size, size)});
+      }
+    }
+    ASSERT_GT(checkPairs(boxes, boxes[0]), 4u);
+    if (HasFailure()) return;
+  }
+}
+
 TEST(BoxTable, AcceptsPointsHugeCoordinatesAndDistantClusters) {
   Random random(5);
   std::vector<Aabb> boxes;

@@ -226,7 +226,7 @@ TEST(ImportIfc, AMapThatIsMissingIsAnErrorOnRequest) {
 }
 
 TEST(ImportIfc, ATechnicalCorrigendumOfAReleaseIsReadAsTheRelease) {
-  if (!hasWebIfc()) GTEST_SKIP() << "web-ifc is not installed: ./dev installs it";
+  ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
   IfcHouse house;
   house.schema = "IFC4";

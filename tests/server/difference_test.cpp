@@ -1,10 +1,12 @@
 // Tests of matching the contacts of two walks, and of comparing two recordings.
 #include <gtest/gtest.h>
 
+#include <nlohmann/json.hpp>
 #include <random>
 
 #include "protocol/recording/recording.hpp"
 #include "server/diff/align_events.hpp"
+#include "server/diff/difference_json.hpp"
 #include "server/diff/walk_difference.hpp"
 #include "tests/support/temporary_folder.hpp"
 
@@ -229,6 +231,24 @@ TEST(ComparedWalks, TheOrderOfTwoDynamicBodiesIsNoDifference) {
   const auto before = Recorded("barrel_first", touch("barrel", "crate", 1)).go(20).close();
   const auto after = Recorded("crate_first", touch("crate", "barrel", -1)).go(20).close();
   EXPECT_TRUE(compareWalks(before, after, 1e-3).isEmpty());
+}
+
+TEST(ComparedWalks, HappeningsNameGlobalIds) {
+  const std::string id = "2O2Fr$t4X7Zf8NOew3FNtn";
+  v1::ContactEvent contact = touch("ann", "house/window", 1);
+  const auto before = Recorded("without", touch("ann", "house/wall", 1)).go(20).close();
+  contact.set_b_global_id(id);
+  const auto after = Recorded("with", contact).go(20).close();
+  const auto json = nlohmann::json::parse(formatDifferenceJson(compareWalks(before, after, 1e-3)));
+  std::size_t named = 0;
+  for (const auto& change : json.at("happenings")) {
+    const auto& walked = change.at("after");
+    if (!walked.is_object()) continue;
+    EXPECT_EQ(walked.at("b_global_id"), id);
+    EXPECT_FALSE(walked.contains("a_global_id"));
+    ++named;
+  }
+  EXPECT_EQ(named, 1u);
 }
 
 v1::ContactEvent near(double distance, v1::ContactEvent::Phase phase) {

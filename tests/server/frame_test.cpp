@@ -28,6 +28,12 @@ std::vector<T> valuesOf(const protocol::ReceivedFrame& frame, v1::Channel channe
   return values;
 }
 
+/// Spawns ann and lets her settle. Returns her id.
+std::uint32_t standAt(protocol::Client& ann, double x, double z) {
+  EXPECT_FALSE(ann.command(spawn("ann", x, 0.001, z)));
+  return ann.step(30, true).avatars(0).id();
+}
+
 v1::FrameRequest eyesOf(const std::string& avatar) {
   v1::FrameRequest request;
   request.mutable_eyes()->set_avatar(avatar);
@@ -71,8 +77,7 @@ TEST_F(Frames, AnAvatarSeesTheWallItFacesAtItsDistance) {
 
 TEST_F(Frames, AnotherAvatarIsSeenFromAboveUnderItsOwnId) {
   protocol::Client ann = client("ann");
-  ASSERT_FALSE(ann.command(spawn("ann", 1, 0.001, 1)));
-  const std::uint32_t id = ann.step(30, true).avatars(0).id();
+  const std::uint32_t id = standAt(ann, 1, 1);
   v1::FrameRequest request = eyesOf("ann");
   v1::FreeCamera& camera = *request.mutable_free();
   *camera.mutable_eye() = vec(1, 6, 1);
@@ -88,8 +93,7 @@ TEST_F(Frames, AnotherAvatarIsSeenFromAboveUnderItsOwnId) {
 
 TEST_F(Frames, AvatarsAreFiguresAndOnRequestTheirCollisionShapes) {
   protocol::Client ann = client("ann");
-  ASSERT_FALSE(ann.command(spawn("ann", 1, 0.001, 1)));
-  const std::uint32_t id = ann.step(30, true).avatars(0).id();
+  const std::uint32_t id = standAt(ann, 1, 1);
   v1::FrameRequest request = eyesOf("ann");
   v1::FreeCamera& camera = *request.mutable_free();
   *camera.mutable_eye() = vec(-1, 0.9, 1);

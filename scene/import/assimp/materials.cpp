@@ -9,9 +9,9 @@
 #include <map>
 
 #include "scene/import/file/decode_image.hpp"
-#include "scene/import/file/srgb.hpp"
 #include "scene/import/file/uri.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::scene {
 namespace {

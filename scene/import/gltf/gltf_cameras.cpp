@@ -39,12 +39,6 @@ struct Node {
   std::map<std::string, Channel> channels;  ///< by path: translation, rotation, scale
 };
 
-const Json& getList(const Json& object, const char* key) {
-  static const Json none = Json::array();
-  const Json* list = findMember(&object, key);
-  return list != nullptr && list->is_array() ? *list : none;
-}
-
 std::size_t getIndex(const Json& object, const char* key) {
   return readIndexMember(&object, key).value_or(kNoIndex);
 }
@@ -94,7 +88,7 @@ class GltfCameraReader {
 template <std::size_t count>
 bool GltfCameraReader::readArray(const Json& node, const char* key,
                                  std::array<double, count>& numbers) const {
-  const Json& list = getList(node, key);
+  const Json& list = getArray(node, key);
   if (list.empty()) return false;
   if (list.size() != count)
     fail(std::string(key) + " of a node does not have " + std::to_string(count) + " numbers");
@@ -123,13 +117,13 @@ void GltfCameraReader::readTransform(const Json& json, Node& node) const {
 }
 
 void GltfCameraReader::readNodes() {
-  const Json& list = getList(json_, "nodes");
+  const Json& list = getArray(json_, "nodes");
   nodes_.resize(list.size());
   for (std::size_t i = 0; i < list.size(); ++i) {
     nodes_[i].name = getString(list[i], "name");
     nodes_[i].camera = getIndex(list[i], "camera");
     readTransform(list[i], nodes_[i]);
-    for (const Json& child : getList(list[i], "children")) {
+    for (const Json& child : getArray(list[i], "children")) {
       if (child.is_number_unsigned() && child.get<std::size_t>() < nodes_.size())
         nodes_[child.get<std::size_t>()].parent = i;
     }
@@ -137,9 +131,9 @@ void GltfCameraReader::readNodes() {
 }
 
 void GltfCameraReader::readAnimations() {
-  for (const Json& animation : getList(json_, "animations")) {
-    for (const Json& channel : getList(animation, "channels"))
-      readChannel(channel, getList(animation, "samplers"));
+  for (const Json& animation : getArray(json_, "animations")) {
+    for (const Json& channel : getArray(animation, "channels"))
+      readChannel(channel, getArray(animation, "samplers"));
   }
 }
 
@@ -257,7 +251,7 @@ std::string GltfCameraReader::listCameraNames() const {
 }
 
 std::size_t GltfCameraReader::chooseCamera(const std::string& name) {
-  const Json& cameras = getList(json_, "cameras");
+  const Json& cameras = getArray(json_, "cameras");
   const auto matchesName = [&](const Node& node) {
     return node.name == name ||
            (node.camera < cameras.size() && getString(cameras[node.camera], "name") == name);
@@ -286,7 +280,7 @@ Eigen::Affine3d GltfCameraReader::computeFileFromNode(std::size_t node, double t
 }
 
 double GltfCameraReader::readFovY(std::size_t camera) const {
-  const Json& cameras = getList(json_, "cameras");
+  const Json& cameras = getArray(json_, "cameras");
   const Json none = Json::object();
   const Json& json =
       camera < cameras.size() && cameras[camera].is_object() ? cameras[camera] : none;

@@ -9,13 +9,13 @@
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/finish_model.hpp"
 #include "scene/import/assembly/path_names.hpp"
-#include "scene/import/file/srgb.hpp"
 #include "scene/import/ifc/elevators.hpp"
 #include "scene/import/ifc/ifc_file.hpp"
 #include "scene/import/ifc/ifc_readers.hpp"
 #include "scene/import/ifc/openings.hpp"
 #include "scene/import/ifc/spatial_structure.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -7,11 +7,11 @@
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/finish_model.hpp"
 #include "scene/import/assembly/path_names.hpp"
-#include "scene/import/file/srgb.hpp"
 #include "scene/import/scan/ply_file.hpp"
 #include "scene/import/scan/stl_file.hpp"
 #include "scene/import/scan/up_axis.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::scene {
 namespace {

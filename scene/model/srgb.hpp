@@ -1,4 +1,4 @@
-// Colours of files in sRGB.
+// Decodes sRGB colours.
 #pragma once
 
 #include <algorithm>
