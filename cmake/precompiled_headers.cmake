@@ -11,7 +11,7 @@ set(ENFILADE_PRECOMPILED_MESSAGES
   <google/protobuf/generated_enum_reflection.h> <google/protobuf/generated_message_reflection.h>
   <google/protobuf/generated_message_util.h> <google/protobuf/message.h>
   <google/protobuf/repeated_field.h> <google/protobuf/unknown_field_set.h>
-  <nlohmann/json.hpp>)
+  <nlohmann/json.hpp> <protocol/enfilade.pb.h> <protocol/recording.pb.h>)
 
 # enfilade_precompiled(NAME HEADERS... [LIBRARIES...]): a target that only compiles the headers.
 function(enfilade_precompiled name)
@@ -20,6 +20,11 @@ function(enfilade_precompiled name)
   file(CONFIGURE OUTPUT ${empty} CONTENT "")
   add_library(${name} OBJECT EXCLUDE_FROM_ALL ${empty})
   target_link_libraries(${name} PRIVATE Eigen3::Eigen ${P_LIBRARIES})
+  if(P_HEADERS MATCHES "\\.pb\\.h")
+    target_include_directories(${name} SYSTEM PRIVATE
+      $<TARGET_PROPERTY:enfilade_messages,INTERFACE_INCLUDE_DIRECTORIES>)
+    add_dependencies(${name} enfilade_message_headers)
+  endif()
   target_precompile_headers(${name} PRIVATE ${ENFILADE_PRECOMPILED_HEADERS} ${P_HEADERS})
 endfunction()
 
@@ -58,7 +63,7 @@ function(enfilade_precompile_headers root)
     target_compile_options(enfilade_precompiled_message_tests PRIVATE ${ENFILADE_UNHURRIED})
   endif()
   set(with_messages enfilade_server enfilade_protocol protocol_tests server_tests replay_tests
-                    difference_tests)
+                    difference_tests export_tests)
   set(unhurried "")
   if(ENFILADE_UNHURRIED)
     set(unhurried enfilade_import enfilade_server)  # compiled with the flags of tests

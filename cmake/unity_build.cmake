@@ -1,7 +1,8 @@
 # Compiles several sources of a room as one file, so that their common headers are parsed once.
 # Sources with compile options or definitions of their own stay separate. collision/ and
 # scene/physics/ do too: what the compiler inlines there, and so their speed, must not depend on
-# neighbouring files. Tests stay separate so that a new test may use any name.
+# neighbouring files. So do most tests, and a new one may use any name; those with messages take too
+# long.
 
 # enfilade_unity_build(TARGET SIZE): groups the sources of each folder of TARGET, at most SIZE in
 # one group. An edit of a source then compiles at most SIZE of them.

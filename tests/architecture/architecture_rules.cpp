@@ -118,7 +118,7 @@ const std::array<ThirdParty, 18> kThirdParties{{
     {"other Boost", "boost/(?!asio|beast|system).*", {}},
     {"protobuf", "google/protobuf/.*", {"protocol"}},
     {"nlohmann-json", "nlohmann/.*", {"scene", "render", "protocol", "server", "assets"}},
-    {"CLI11", "CLI/.*", {"server", "assets"}},
+    {"CLI11", "CLI/.*", {"server"}},
     {"spdlog", "(spdlog|fmt)/.*", {"server"}},
 }};
 

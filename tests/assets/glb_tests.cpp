@@ -7,6 +7,7 @@
 
 #include "assets/building.hpp"
 #include "assets/glb_writer.hpp"
+#include "assets/maker.hpp"
 
 namespace enfilade::assets {
 namespace {
@@ -26,10 +27,35 @@ std::uint32_t wordAt(const std::string& bytes, std::size_t offset) {
   return word;
 }
 
+int runMakerWith(std::vector<const char*> arguments, std::vector<MakerArguments>& made) {
+  arguments.insert(arguments.begin(), "maker");
+  return runMaker(static_cast<int>(arguments.size()), arguments.data(), "usage: maker",
+                  [&](const MakerArguments& parsed) {
+                    if (parsed.file == "full") throw std::runtime_error("disk full");
+                    made.push_back(parsed);
+                  });
+}
+
 std::uint64_t fnv1a(const std::string& bytes) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
   return hash;
+}
+
+TEST(Maker, ParsesFileNumberAndSeed) {
+  std::vector<MakerArguments> made;
+  EXPECT_EQ(runMakerWith({"a.glb"}, made), 0);
+  EXPECT_EQ(runMakerWith({"b.glb", "7000", "3"}, made), 0);
+  ASSERT_EQ(made.size(), 2u);
+  EXPECT_FALSE(made[0].number || made[0].seed);
+  EXPECT_EQ(made[1].file, "b.glb");
+  EXPECT_EQ(made[1].number, 7000u);
+  EXPECT_EQ(made[1].seed, 3u);
+  for (const std::vector<const char*>& bad : std::vector<std::vector<const char*>>{
+           {}, {"a", "many"}, {"a", "-1"}, {"a", "1.5"}, {"a", "1", ""}, {"a", "1", "2", "3"}})
+    EXPECT_EQ(runMakerWith(bad, made), 2) << ::testing::PrintToString(bad);
+  EXPECT_EQ(runMakerWith({"full"}, made), 1);
+  EXPECT_EQ(made.size(), 2u);
 }
 
 TEST(Glb, IsTheSameFromRunToRunAndFromCompilerToCompiler) {

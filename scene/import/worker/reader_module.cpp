@@ -18,13 +18,16 @@ std::filesystem::path findModule(const char* name, const char* variable, const c
 }
 
 void* openModule(const std::filesystem::path& module, const char* symbol) {
+  if (std::error_code error; !std::filesystem::is_regular_file(module, error))
+    throw ImportError("the reader " + module.string() +
+                      " is missing: build it (./dev build), or install it with the program");
   void* library = dlopen(module.c_str(), RTLD_NOW | RTLD_LOCAL);
   void* address = library ? dlsym(library, symbol) : nullptr;
   if (address) return address;
   const char* reason = dlerror();
   throw ImportError("the reader " + module.string() + " cannot be opened (" +
                     (reason ? reason : "?") +
-                    "): install it with the program, or raise the memory limit");
+                    "): install what it needs, or raise the memory limit");
 }
 
 }  // namespace enfilade::scene

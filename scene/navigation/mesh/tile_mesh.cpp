@@ -22,7 +22,7 @@ constexpr int kCellsPerTile = 192;
 constexpr double kMaxCell = 0.1, kMinCell = 0.02, kCellHeight = 0.05;  // metres
 constexpr int kCellsPerRadius = 6;
 constexpr double kMaxColumns = 1e8;  // of cells: a quarter of a square kilometre of 0.05 m cells
-constexpr double kRounding = 1e-6;   // of a number of cells
+constexpr double kCellRounding = 1e-6;  // of a number of cells
 constexpr float kMaxContourError = 1.0f;  // cells
 constexpr int kMinRegionCells = 8, kMergeRegionCells = 400;
 /// Meshes with more triangles are searched by their trees, not triangle by triangle.
@@ -48,10 +48,10 @@ struct CellSizes {
 CellSizes makeCellSizes(const WorldSettings& settings, const NavigationAgent& agent,
                         const TileGrid& grid, Clearance clearance) {
   const double height = agent.height / grid.cellHeight;
-  const double climb = settings.stepHeight / grid.cellHeight + kRounding;
+  const double climb = settings.stepHeight / grid.cellHeight + kCellRounding;
   const double radius = agent.radius / grid.cell;
   const auto floor = [](double value) { return static_cast<int>(std::floor(value)); };
-  const auto ceil = [](double value) { return static_cast<int>(std::ceil(value - kRounding)); };
+  const auto ceil = [](double value) { return static_cast<int>(std::ceil(value - kCellRounding)); };
   // Voxels of solids are larger than the solids by less than a cell on each side.
   if (clearance == Clearance::none) return {std::max(3, floor(climb) + 1), floor(climb) + 1, 0};
   if (clearance == Clearance::scarce)
