@@ -121,14 +121,6 @@ bool applyPairFlags(PhysicsWorld& world, const BodyPair& pair, std::uint8_t& fla
   return true;
 }
 
-void wakeJointedBodies(PhysicsWorld& world) {
-  for (const Joint& joint : world.joints) {
-    PhysicsBody &a = world.bodies[joint.a], &b = world.bodies[joint.b];
-    if (a.isAwake() && b.asleep) wakeBody(b);
-    if (b.isAwake() && a.asleep) wakeBody(a);
-  }
-}
-
 /// Prefetches the cache of a pair with a constraint. The caches are scattered in memory.
 void prefetchPair(const BodyPair& pair) {
   if (!pair.hasConstraint) return;
@@ -137,7 +129,6 @@ void prefetchPair(const BodyPair& pair) {
 }
 
 void findConstraints(PhysicsWorld& world, const PairStepSettings& step, StepScratch& scratch) {
-  wakeJointedBodies(world);
   std::vector<BodyPair>& pairs = world.pairs;
   scratch.pairFlags.assign(pairs.size(), 0);
   std::vector<std::uint8_t> isNew(pairs.size(), 1);
@@ -226,20 +217,6 @@ void findKinematicPenetrations(const PhysicsWorld& world, StepScratch& scratch) 
   }
 }
 
-void gatherJoints(const PhysicsWorld& world, StepScratch& scratch) {
-  for (std::uint32_t i = 0; i < world.joints.size(); ++i) {
-    const Joint& joint = world.joints[i];
-    const PhysicsBody &a = world.bodies[joint.a], &b = world.bodies[joint.b];
-    if (!isRelevantPair(a, b)) continue;
-    addBody(world, joint.a, scratch);
-    addBody(world, joint.b, scratch);
-    scratch.joints.push_back(joint);
-    scratch.joints.back().a = scratch.localIndices[joint.a];
-    scratch.joints.back().b = scratch.localIndices[joint.b];
-    scratch.jointIndices.push_back(i);
-  }
-}
-
 /// Metres by which the points of a constraint approach on the swept poses; < 0: they separate.
 double computeApproach(const ContactConstraint& constraint, const StepScratch& scratch) {
   const auto displacementOf = [&](std::uint32_t body, const Vec3& arm) -> Vec3 {
@@ -275,7 +252,6 @@ std::vector<std::uint8_t> findColdStarts(const PhysicsWorld& world, const StepSc
     if (isAwake(link.a) && isAwake(link.b)) islands.unite(link.a, link.b);
   };
   for (const ContactConstraint& constraint : scratch.constraints) uniteAwake(constraint);
-  for (const Joint& joint : scratch.joints) uniteAwake(joint);
   for (std::uint32_t i = 0; i < cold.size(); ++i)
     if (cold[i] != 0) cold[islands.find(i)] = 1;
   for (std::uint32_t i = 0; i < cold.size(); ++i) cold[i] = cold[islands.find(i)];
@@ -302,11 +278,6 @@ void storePairImpulses(PhysicsWorld& world, const StepScratch& scratch) {
           constraint.torsionImpulse = solved.torsionImpulse;
         }
       });
-  for (std::size_t k = 0; k < scratch.joints.size(); ++k) {
-    const Joint& joint = scratch.joints[k];
-    world.joints[scratch.jointIndices[k]].impulses =
-        isWarm(joint) ? joint.impulses : Joint{}.impulses;
-  }
 }
 
 // ---- after step 3 ------------------------------------------------------------------------------
@@ -354,9 +325,6 @@ DisjointSets findIslands(const PhysicsWorld& world, const StepScratch& scratch) 
     if (!world.bodies[pair.key.a].isAwake() || !world.bodies[pair.key.b].isAwake()) continue;
     if (scratch.isTouchingPair(i)) islands.unite(pair.key.a, pair.key.b);
   }
-  for (const Joint& joint : world.joints)
-    if (world.bodies[joint.a].isAwake() && world.bodies[joint.b].isAwake())
-      islands.unite(joint.a, joint.b);
   return islands;
 }
 
@@ -435,10 +403,9 @@ StepReport stepPhysics(PhysicsWorld& world, const StepSettings& settings) {
   findConstraints(world, makePairStepSettings(settings), scratch);
   gatherBodies(world, scratch);
   gatherConstraints(world, scratch);
-  gatherJoints(world, scratch);
   findKinematicPenetrations(world, scratch);
-  solveConstraints(scratch.motions, scratch.constraints, scratch.joints, scratch.kinematicBodies,
-                   settings.solver, *scratch.pool);
+  solveConstraints(scratch.motions, scratch.constraints, scratch.kinematicBodies, settings.solver,
+                   *scratch.pool);
   clampToProvenMotion(world, settings.solver.seconds, settings.solver.contactOffset, scratch);
   storePairImpulses(world, scratch);
   applyMotions(world, scratch);

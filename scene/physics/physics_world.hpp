@@ -5,14 +5,12 @@
 #include <vector>
 
 #include "scene/physics/body_pair.hpp"
-#include "scene/physics/joint.hpp"
 #include "scene/physics/solver.hpp"
 
 namespace enfilade::scene {
 
 struct PhysicsWorld {
   std::vector<PhysicsBody> bodies;
-  std::vector<Joint> joints;    ///< indices refer to `bodies`
   std::vector<BodyPair> pairs;  ///< ascending by key; set by setPairs()
 };
 

@@ -2,8 +2,8 @@
 // et al., "Small Steps in Physics Simulation", 2019)
 //  1. Apply gravity and the gyroscopic term.
 //  2. Warm start with the impulses of the last substep.
-//  3. Iterate over all contacts and joints. Friction comes before the normals, so that
-//     non-penetration takes precedence. Impulses are accumulated, and the sums are clamped.
+//  3. Iterate over all contacts. Friction comes before the normals, so that non-penetration takes
+//     precedence. Impulses are accumulated, and the sums are clamped.
 //  4. Correct positions by separate velocities that end with the substep (split impulses). They
 //     add no momentum. One set of velocities for both would pump energy into a stack, which then
 //     never rests.
@@ -44,7 +44,6 @@ constexpr double kMaxCorrectionSpeed = 1;
 /// Multiple of the velocity that gravity adds in one step: slower impacts do not bounce; otherwise
 /// resting bodies would hop.
 constexpr double kRestitutionThreshold = 4;
-constexpr double kJointBaumgarte = 0.2;  // fraction of a joint's error corrected per substep
 
 constexpr int kPositionIterations = 2;  // position iterations of step 4
 
@@ -107,11 +106,7 @@ template <Vec3 SolverBody::*velocity = &SolverBody::velocity,
   }
 }
 
-void warmStart(SolverContext& context, std::span<const Joint> joints, ThreadPool& pool) {
-  for (const SolverJointRow& row : context.jointRows) {
-    const Joint& joint = joints[row.row.joint];
-    row.jacobian.applyImpulse(context.bodies[joint.a], context.bodies[joint.b], row.impulse);
-  }
+void warmStart(SolverContext& context, ThreadPool& pool) {
   forEachConstraint(
       context, pool, [&](const ContactConstraintW& block) __attribute__((always_inline)) {
         if (block.idle) return;
@@ -241,50 +236,15 @@ void warmStart(SolverContext& context, std::span<const Joint> joints, ThreadPool
       m, block, context);
 }
 
-void solveJointPositions(SolverContext& context, std::span<const Joint> joints) {
-  for (SolverJointRow& row : context.jointRows) {
-    if (row.row.kind == JointRow::Kind::motor || (row.row.error >= 0 && row.row.minImpulse == 0))
-      continue;
-    const Joint& joint = joints[row.row.joint];
-    SolverBody &a = context.bodies[joint.a], &b = context.bodies[joint.b];
-    const double target = -kJointBaumgarte * row.row.error / context.seconds;
-    const double velocityError = target - row.jacobian.relativeCorrectionVelocity(a, b);
-    const double impulse =
-        std::max(row.row.minImpulse, row.correctionImpulse + row.effectiveMass * velocityError);
-    row.jacobian.applyCorrection(a, b, impulse - row.correctionImpulse);
-    row.correctionImpulse = impulse;
-  }
-}
-
-/// Solves step 4 for all joints and contacts.
-void solvePositions(SolverContext& context, std::span<const Joint> joints, ThreadPool& pool) {
+/// Solves step 4 for all contacts.
+void solvePositions(SolverContext& context, ThreadPool& pool) {
   for (SolverBody& solverBody : context.bodies)
     solverBody.correctionVelocity = solverBody.correctionAngularVelocity = Vec3::Zero();
-  for (SolverJointRow& row : context.jointRows) row.correctionImpulse = 0;
   for (int i = 0; i < kPositionIterations; ++i) {
-    solveJointPositions(context, joints);
     forEachConstraint(
         context, pool, [&](ContactConstraintW & block) __attribute__((always_inline)) {
           solveContactPositions(block, i == 0, context);
         });
-  }
-}
-
-double computeTargetSpeed(const JointRow& row, double seconds) {
-  if (row.kind == JointRow::Kind::motor) return row.motorSpeed;
-  return row.kind == JointRow::Kind::limit ? std::min(0.0, -row.error / seconds) : 0;
-}
-
-void solveJointVelocities(SolverContext& context, std::span<const Joint> joints) {
-  for (SolverJointRow& row : context.jointRows) {
-    const Joint& joint = joints[row.row.joint];
-    SolverBody &a = context.bodies[joint.a], &b = context.bodies[joint.b];
-    const double velocityError =
-        computeTargetSpeed(row.row, context.seconds) - row.jacobian.relativeVelocity(a, b);
-    const double impulse = std::clamp(row.impulse + row.effectiveMass * velocityError,
-                                      row.row.minImpulse, row.row.maxImpulse);
-    row.jacobian.applyImpulse(a, b, impulse - row.impulse);
-    row.impulse = impulse;
   }
 }
 
@@ -326,26 +286,18 @@ void applyForces(SolverContext& context, std::span<BodyMotion> motions, const Ve
   });
 }
 
-void storeJointImpulses(const SolverContext& context, std::span<Joint> joints) {
-  for (const SolverJointRow& row : context.jointRows)
-    joints[row.row.joint].impulses[row.row.slot] = row.impulse;
-}
-
-void substep(SolverContext& context, std::span<BodyMotion> motions, std::span<Joint> joints,
-             const SolverSettings& settings, ThreadPool& pool) {
+void substep(SolverContext& context, std::span<BodyMotion> motions, const SolverSettings& settings,
+             ThreadPool& pool) {
   applyForces(context, motions, settings.gravity, pool);
-  prepareJoints(motions, joints, context);
-  warmStart(context, joints, pool);
+  warmStart(context, pool);
   for (int i = 0; i < settings.iterations; ++i) {
-    solveJointVelocities(context, joints);
     forEachConstraint(
         context, pool, [&](ContactConstraintW & block) __attribute__((always_inline)) {
           solveContactVelocities(block, context);
         });
   }
-  solvePositions(context, joints, pool);
+  solvePositions(context, pool);
   integratePoses(context, motions, pool);
-  storeJointImpulses(context, joints);
 }
 
 // ---- the end of the step -----------------------------------------------------------------------
@@ -408,7 +360,7 @@ void storeImpulses(const SolverContext& context, std::span<BodyMotion> motions,
 }  // namespace
 
 void solveConstraints(std::span<BodyMotion> motions, std::span<ContactConstraint> constraints,
-                      std::span<Joint> joints, std::span<const KinematicBody> kinematicBodies,
+                      std::span<const KinematicBody> kinematicBodies,
                       const SolverSettings& settings, ThreadPool& pool) {
   ENFILADE_ASSERT(settings.seconds > 0 && settings.substeps >= 1);
   thread_local SolverContext threadContext;
@@ -423,7 +375,7 @@ void solveConstraints(std::span<BodyMotion> motions, std::span<ContactConstraint
       context.bodies[body.body].velocity = body.substepVelocities[i].velocity;
       context.bodies[body.body].angularVelocity = body.substepVelocities[i].angularVelocity;
     }
-    substep(context, motions, joints, settings, pool);
+    substep(context, motions, settings, pool);
   }
   applyRestitution(context, settings);
   storeImpulses(context, motions, constraints, pool);

@@ -1,5 +1,5 @@
-// Contact and joint solver: sequential impulses with substeps. Free functions on plain arrays; only
-// the impulses in constraints and joints persist. It uses only + - * / and sqrt, in an order that
+// Contact solver: sequential impulses with substeps. Free functions on plain arrays; only the
+// impulses in constraints persist. It uses only + - * / and sqrt, in an order that
 // the constraints alone determine.
 #pragma once
 
@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "scene/physics/contact_constraint.hpp"
-#include "scene/physics/joint.hpp"
 #include "scene/physics/physics_body.hpp"
 #include "scene/physics/thread_pool.hpp"
 
@@ -33,7 +32,7 @@ struct KinematicBody {
 /// Bodies of inverse mass 0 keep their velocity. Impulses are those of one substep. The result does
 /// not depend on the number of threads.
 void solveConstraints(std::span<BodyMotion> motions, std::span<ContactConstraint> constraints,
-                      std::span<Joint> joints, std::span<const KinematicBody> kinematicBodies,
+                      std::span<const KinematicBody> kinematicBodies,
                       const SolverSettings& settings, ThreadPool& pool);
 
 }  // namespace enfilade::scene

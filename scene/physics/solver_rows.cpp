@@ -223,20 +223,4 @@ void prepareConstraints(std::span<const BodyMotion> motions,
                    });
 }
 
-void prepareJoints(std::span<const BodyMotion> motions, std::span<const Joint> joints,
-                   SolverContext& context) {
-  std::vector<JointRow> rows;
-  for (std::uint32_t i = 0; i < joints.size(); ++i)
-    appendJointRows(joints[i], i, motions, context.seconds, rows);
-  context.jointRows.clear();
-  for (const JointRow& row : rows) {
-    const Joint& joint = joints[row.joint];
-    const SolverBody &a = context.bodies[joint.a], &b = context.bodies[joint.b];
-    const Jacobian jacobian(row.linear, row.angularA, row.angularB, a, b);
-    const double effectiveMass =
-        invertOrZero(computeResponse(jacobian, jacobian, a.inverseMass + b.inverseMass));
-    context.jointRows.push_back({row, jacobian, effectiveMass, joint.impulses[row.slot], 0});
-  }
-}
-
 }  // namespace enfilade::scene

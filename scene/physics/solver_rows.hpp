@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "scene/physics/contact_constraint.hpp"
-#include "scene/physics/joint.hpp"
 #include "scene/physics/simd.hpp"
 #include "scene/physics/thread_pool.hpp"
 
@@ -40,29 +39,6 @@ struct Jacobian {
   double relativeVelocity(const SolverBody& a, const SolverBody& b) const {
     return linear.dot(b.velocity - a.velocity) + angularB.dot(b.angularVelocity) -
            angularA.dot(a.angularVelocity);
-  }
-  void applyImpulse(SolverBody& a, SolverBody& b, double impulse) const {
-    if (a.isDynamic()) {
-      a.velocity -= (impulse * a.inverseMass) * linear;
-      a.angularVelocity -= impulse * responseA;
-    }
-    if (!b.isDynamic()) return;
-    b.velocity += (impulse * b.inverseMass) * linear;
-    b.angularVelocity += impulse * responseB;
-  }
-  /// The same for the correction velocities of step 4.
-  double relativeCorrectionVelocity(const SolverBody& a, const SolverBody& b) const {
-    return linear.dot(b.correctionVelocity - a.correctionVelocity) +
-           angularB.dot(b.correctionAngularVelocity) - angularA.dot(a.correctionAngularVelocity);
-  }
-  void applyCorrection(SolverBody& a, SolverBody& b, double impulse) const {
-    if (a.isDynamic()) {
-      a.correctionVelocity -= (impulse * a.inverseMass) * linear;
-      a.correctionAngularVelocity -= impulse * responseA;
-    }
-    if (!b.isDynamic()) return;
-    b.correctionVelocity += (impulse * b.inverseMass) * linear;
-    b.correctionAngularVelocity += impulse * responseB;
   }
 };
 
@@ -156,12 +132,6 @@ struct ContactConstraintW {
   }
 };
 
-struct SolverJointRow {
-  JointRow row;
-  Jacobian jacobian;
-  double effectiveMass, impulse, correctionImpulse;
-};
-
 /// Uninitialised memory that is written before it is read. It only grows.
 template <class T>
 class ScratchBuffer {
@@ -176,7 +146,7 @@ class ScratchBuffer {
   std::size_t size_ = 0;
 };
 
-/// State of one solve: joints in array order, then contacts by color. Each thread keeps it between
+/// State of one solve: contacts by color. Each thread keeps it between
 /// steps to reuse its memory.
 struct SolverContext {
   std::vector<SolverBody> bodies;             ///< one per body, and a dummy
@@ -184,8 +154,7 @@ struct SolverContext {
   /// end of each color in `constraints`; see graph_coloring.hpp
   std::vector<std::uint32_t> colorEnds;
   std::span<ContactConstraintPointW> points;  ///< in the order of their blocks
-  std::vector<SolverJointRow> jointRows;
-  double seconds = 0;  ///< of a substep
+  double seconds = 0;                         ///< of a substep
   double contactOffset = 0;
   bool useAvx = false;
 
@@ -197,9 +166,5 @@ struct SolverContext {
 void prepareConstraints(std::span<const BodyMotion> motions,
                         std::span<const ContactConstraint> constraints, SolverContext& context,
                         ThreadPool& pool);
-
-/// Builds the joint rows for the present poses, with the joints' impulses.
-void prepareJoints(std::span<const BodyMotion> motions, std::span<const Joint> joints,
-                   SolverContext& context);
 
 }  // namespace enfilade::scene

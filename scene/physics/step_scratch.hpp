@@ -36,9 +36,9 @@ struct StepScratch {
     pool = &newPool;
     report = {};
     for (std::vector<std::uint32_t>* list :
-         {&activePairs, &constrainedPairs, &bodyIndices, &jointIndices, &kinematicPenetrations})
+         {&activePairs, &constrainedPairs, &bodyIndices, &kinematicPenetrations})
       list->clear();
-    pairBodies.clear(), motions.clear(), kinematicBodies.clear(), joints.clear();
+    pairBodies.clear(), motions.clear(), kinematicBodies.clear();
   }
 
   ThreadPool* pool = nullptr;
@@ -59,8 +59,6 @@ struct StepScratch {
   std::vector<std::uint32_t> kinematicPenetrations;
   std::vector<std::uint8_t> released;  ///< of each of `motions`: see isReleased()
   std::vector<ContactConstraint> constraints;
-  std::vector<Joint> joints;
-  std::vector<std::uint32_t> jointIndices;
   std::vector<double>
       motionFractions;  ///< of each of `motions`: the fraction of its motion that is kept
   std::vector<std::uint8_t> hasOwnMotion;  ///< of each of `motions`

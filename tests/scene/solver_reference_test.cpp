@@ -445,7 +445,7 @@ void compareWithReference(bool byAvx) {
       for (const int threads : {1, 2}) {
         Heap fast = start;
         ThreadPool workers(threads);
-        solveConstraints(fast.bodies, fast.patches, {}, fast.driven(), step, workers);
+        solveConstraints(fast.bodies, fast.patches, fast.driven(), step, workers);
         EXPECT_EQ(difference(slow, fast), "") << threads << " threads";
         EXPECT_NE(difference(start, fast), "");
       }
@@ -474,7 +474,7 @@ TEST(SolverReference, APatchWithoutPointsDoesNothing) {
   }
   for (Heap* each : {&heap, &more}) {
     ThreadPool workers(2);
-    solveConstraints(each->bodies, each->patches, {}, each->driven(), step, workers);
+    solveConstraints(each->bodies, each->patches, each->driven(), step, workers);
   }
   EXPECT_EQ(difference(heap, more), "");
 }

@@ -112,8 +112,7 @@ void archiveDynamicBodies(A& a, MaybeConst<A, WorldData>& world) {
   auto& [physicsWorld, bodyIndices, physicsBodyByPart, entities, freeSlots, sceneBodyOf,
          physicsBodyOf, threadPool, threadPoolSize, maxThreads, activeBodies, partFronts,
          lastReport, avatarBodyPairs] = world.dynamicBodies;
-  auto& [physicsBodies, joints, pairs] = physicsWorld;
-  if (!joints.empty()) throw std::logic_error("checkpoints do not support physics joints");
+  auto& [physicsBodies, pairs] = physicsWorld;
   a(physicsBodyByPart, freeSlots);
   if constexpr (!A::kWrites) restorePhysicsBodies(a, world);
   for (const auto& [key, index] : physicsBodyByPart)
