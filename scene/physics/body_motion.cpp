@@ -76,12 +76,4 @@ Mat3 computeWorldInverseInertia(const BodyMotion& motion) {
   return rotation * motion.inverseInertia * rotation.transpose();
 }
 
-double computeKineticEnergy(const BodyMotion& motion) {
-  if (motion.inverseMass == 0) return 0;
-  const Vec3 angularVelocity =
-      motion.rotation.toRotationMatrix().transpose() * motion.angularVelocity;
-  return 0.5 * (motion.velocity.squaredNorm() / motion.inverseMass +
-                angularVelocity.dot(motion.inertia * angularVelocity));
-}
-
 }  // namespace enfilade::scene

@@ -38,7 +38,4 @@ void applyGyroscopicTorque(BodyMotion& motion, double seconds);
 /// Inverse inertia in world axes, 1/(kg m^2).
 Mat3 computeWorldInverseInertia(const BodyMotion& motion);
 
-/// Kinetic energy in joules; 0 for a body that impulses do not move.
-double computeKineticEnergy(const BodyMotion& motion);
-
 }  // namespace enfilade::scene

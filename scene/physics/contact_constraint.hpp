@@ -40,12 +40,4 @@ struct ContactConstraint {
   }
 };
 
-/// Sum over all points, motor impulses included, in N s.
-inline double computeNormalImpulse(const ContactConstraint& constraint) {
-  double sum = 0;
-  for (const ContactConstraintPoint& point : constraint.activePoints())
-    sum += point.impulse + point.motorImpulse;
-  return sum;
-}
-
 }  // namespace enfilade::scene

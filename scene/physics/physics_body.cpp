@@ -20,15 +20,6 @@ Vec3 computeFaceNormal(const collision::Hull& hull, const std::vector<std::uint3
   return normal.normalized();
 }
 
-/// Adds the parts and updates the bounding radius.
-void addParts(std::span<const collision::Hull* const> hulls, PhysicsBody& body) {
-  for (const collision::Hull* hull : hulls) {
-    body.parts.push_back(makeConvexPart(*hull));
-    for (const Vec3& v : hull->vertices)
-      body.radius = std::max(body.radius, (v - body.centreInFrame).norm() * kRadiusRoundUpFactor);
-  }
-}
-
 }  // namespace
 
 ConvexPart makeConvexPart(const collision::Hull& hull) {
@@ -54,29 +45,6 @@ collision::InterpolatedMotion makeStationaryMotion(const PhysicsBody& body) {
   motion.fromMatrix = motion.toMatrix = body.rotation;
   motion.fromPosition = motion.toPosition = body.position;
   return motion;
-}
-
-PhysicsBody makeDynamicBody(std::span<const collision::Hull* const> hulls, double density,
-                            const collision::Pose& worldFromFrame) {
-  std::vector<MassProperties> masses;
-  for (const collision::Hull* hull : hulls) masses.push_back(computeHullMass(*hull, density));
-  const MassProperties whole = combineMassProperties(masses);
-  PhysicsBody body;
-  body.motion = makeDynamicMotion(whole, worldFromFrame);
-  body.centreInFrame = whole.centre;
-  addParts(hulls, body);
-  updateTransform(body);
-  return body;
-}
-
-PhysicsBody makeKinematicBody(std::span<const collision::Hull* const> hulls,
-                              const collision::Pose& worldFromFrame) {
-  PhysicsBody body;
-  body.motion.rotation = worldFromFrame.rotation;
-  body.motion.centre = worldFromFrame.translation;
-  addParts(hulls, body);
-  updateTransform(body);
-  return body;
 }
 
 PhysicsBody makeStaticBody(const CollisionGeometry& parts) {

@@ -106,12 +106,6 @@ inline collision::PlacedConvex placePart(const PhysicsBody& body, std::uint32_t 
   return {p.vertices, body.position, &body.rotation, p.hull};
 }
 
-/// Makes a dynamic body of convex parts (hulls in one frame; uniform `density` in kg/m^3).
-PhysicsBody makeDynamicBody(std::span<const collision::Hull* const> hulls, double density,
-                            const collision::Pose& worldFromFrame);
-/// Makes a kinematic or static body of hulls; its centre is the frame's origin.
-PhysicsBody makeKinematicBody(std::span<const collision::Hull* const> hulls,
-                              const collision::Pose& worldFromFrame);
 /// Makes a static body of hulls and triangles about the parts' origin, in the part order of
 /// CollisionGeometry. `parts` must outlive it.
 PhysicsBody makeStaticBody(const CollisionGeometry& parts);

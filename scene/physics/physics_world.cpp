@@ -32,9 +32,6 @@ PairStepSettings makePairStepSettings(const StepSettings& settings) {
 bool isRelevantPair(const SpeedBound& a, const SpeedBound& b) {
   return a.isAwake || b.isAwake || (a.isActuated && b.isDynamic) || (b.isActuated && a.isDynamic);
 }
-bool isRelevantPair(const PhysicsBody& a, const PhysicsBody& b) {
-  return isRelevantPair(computeSpeedBound(a, Vec3::Zero()), computeSpeedBound(b, Vec3::Zero()));
-}
 
 void wakeBody(PhysicsBody& body) {
   body.asleep = false;

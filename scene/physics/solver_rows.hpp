@@ -146,8 +146,7 @@ class ScratchBuffer {
   std::size_t size_ = 0;
 };
 
-/// State of one solve: contacts by color. Each thread keeps it between
-/// steps to reuse its memory.
+/// State of one solve: contacts by color. Each thread keeps it between steps to reuse its memory.
 struct SolverContext {
   std::vector<SolverBody> bodies;             ///< one per body, and a dummy
   std::span<ContactConstraintW> constraints;  ///< by color

@@ -36,6 +36,47 @@ inline Quat turnBy(const Vec3& axis, double half) {
   return q;
 }
 
+inline void addParts(std::span<const collision::Hull* const> hulls, PhysicsBody& body) {
+  for (const collision::Hull* hull : hulls) {
+    body.parts.push_back(makeConvexPart(*hull));
+    for (const Vec3& v : hull->vertices)  // the factor exceeds the rounding error
+      body.radius = std::max(body.radius, (v - body.centreInFrame).norm() * (1 + 0x1p-48));
+  }
+  updateTransform(body);
+}
+
+/// Makes a dynamic body of convex parts (hulls in one frame; uniform `density` in kg/m^3).
+inline PhysicsBody makeDynamicBody(std::span<const collision::Hull* const> hulls, double density,
+                                   const collision::Pose& worldFromFrame) {
+  std::vector<MassProperties> masses;
+  for (const collision::Hull* hull : hulls) masses.push_back(computeHullMass(*hull, density));
+  const MassProperties whole = combineMassProperties(masses);
+  PhysicsBody body;
+  body.motion = makeDynamicMotion(whole, worldFromFrame);
+  body.centreInFrame = whole.centre;
+  addParts(hulls, body);
+  return body;
+}
+
+/// Makes a kinematic or static body of hulls; its centre is the frame's origin.
+inline PhysicsBody makeKinematicBody(std::span<const collision::Hull* const> hulls,
+                                     const collision::Pose& worldFromFrame) {
+  PhysicsBody body;
+  body.motion.rotation = worldFromFrame.rotation;
+  body.motion.centre = worldFromFrame.translation;
+  addParts(hulls, body);
+  return body;
+}
+
+/// Kinetic energy in joules; 0 for a body that impulses do not move.
+inline double computeKineticEnergy(const BodyMotion& motion) {
+  if (motion.inverseMass == 0) return 0;
+  const Vec3 angularVelocity =
+      motion.rotation.toRotationMatrix().transpose() * motion.angularVelocity;
+  return 0.5 * (motion.velocity.squaredNorm() / motion.inverseMass +
+                angularVelocity.dot(motion.inertia * angularVelocity));
+}
+
 struct RigidScene {
   std::deque<collision::Hull> hulls;
   PhysicsWorld dynamics;

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "collision/narrow_phase/penetration_depth.hpp"
+#include "tests/scene/physics_scene.hpp"
 
 namespace enfilade::testing {
 namespace {
