@@ -82,14 +82,6 @@ void appendCommand(DrawList& list, const DrawItem& item, AlphaMode alphaMode,
   ++batch.commandCount;
 }
 
-/// For each object, its body, or kNoBody.
-std::vector<std::uint32_t> mapObjectsToBodies(const scene::Model& model) {
-  std::vector<std::uint32_t> bodies(model.objects.size(), kNoBody);
-  for (std::uint32_t b = 0; b < model.bodies.size(); ++b)
-    for (const std::uint32_t object : model.bodies[b].objects) bodies[object] = b;
-  return bodies;
-}
-
 }  // namespace
 
 std::vector<BodyPlacement> computeBodyPlacements(const scene::Scene& scene,
@@ -126,12 +118,14 @@ std::vector<DrawItem> buildDrawItems(const scene::Model& model) {
   meshBoxes.reserve(model.meshes.size());
   for (const scene::Mesh& mesh : model.meshes) meshBoxes.push_back(computeMeshAabb(mesh));
 
-  const std::vector<std::uint32_t> bodyOfObject = mapObjectsToBodies(model);
+  const std::vector<const scene::BodySpec*> bodyOfObject = mapObjectsToBodies(model);
   std::vector<DrawItem> items;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const scene::Object& object = model.objects[o];
-    const std::uint32_t body = bodyOfObject[o];
-    if (body != kNoBody && isTrigger(model.bodies[body].kind)) continue;
+    if (bodyOfObject[o] && isTrigger(bodyOfObject[o]->kind)) continue;
+    const auto body = bodyOfObject[o]
+                          ? static_cast<std::uint32_t>(bodyOfObject[o] - model.bodies.data())
+                          : kNoBody;
     if (object.usage == scene::Object::Usage::collisionOnly) continue;
     for (const std::uint32_t m : object.meshes) {
       if (model.meshes[m].indices.empty()) continue;

@@ -12,7 +12,6 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr double kRadiansPerDegree = 0.017453292519943295;
 // 33 bits each: their products with up to 2^31 quarter turns are exact.
 constexpr std::array<double, 3> kHalfPi{0x1.921fb544p+0, 0x1.0b4611a6p-34, 0x1.3198a2ep-69};
 

@@ -14,6 +14,7 @@ struct SineCosine {
 /// |degrees| up to 1e4.
 SineCosine<double> computeSineCosineOfDegrees(double degrees);
 
+inline constexpr double kRadiansPerDegree = 0.017453292519943295;
 inline constexpr double kMaxAngle = 1e6;  ///< radians
 /// 0 <= radians <= kMaxAngle. The error is below 8 units of rounding of LongReal.
 SineCosine<LongReal> computeSineCosine(LongReal radians);

@@ -10,6 +10,7 @@
 #include "collision/assert.hpp"
 #include "render/image/atomic_file.hpp"
 #include "render/image/encode.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -34,21 +35,6 @@ PixelSpan computeCoveredSpan(int target, int targetSize, int sourceSize) {
   };
   const int first = edge(target);
   return {first, std::max(edge(target + 1), first + 1)};
-}
-
-std::array<float, 256> makeSrgbToLinearTable() {
-  std::array<float, 256> table{};
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    const double s = static_cast<double>(i) / 255;
-    table[i] = static_cast<float>(s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4));
-  }
-  return table;
-}
-
-std::uint8_t linearToSrgb(float linear) {
-  const double l = linear;
-  const double s = l <= 0.0031308 ? 12.92 * l : 1.055 * std::pow(l, 1 / 2.4) - 0.055;
-  return static_cast<std::uint8_t>(std::lround(std::clamp(s, 0.0, 1.0) * 255));
 }
 
 }  // namespace
@@ -88,7 +74,6 @@ void writePng(const std::filesystem::path& file, const Image& image) {
 
 Image resizeImage(const Image& image, int width, int height) {
   ENFILADE_ASSERT(width >= 1 && height >= 1 && image.rgb.size() == 3 * pixelCount(image));
-  static const std::array<float, 256> linear = makeSrgbToLinearTable();
   Image result{width, height, {}};
   result.rgb.reserve(3 * pixelCount(result));
   for (int y = 0; y < height; ++y) {
@@ -101,12 +86,12 @@ Image resizeImage(const Image& image, int width, int height) {
           const std::size_t at =
               3 * (static_cast<std::size_t>(v) * static_cast<std::size_t>(image.width) +
                    static_cast<std::size_t>(u));
-          for (std::size_t c = 0; c < 3; ++c) sum[c] += linear[image.rgb[at + c]];
+          for (std::size_t c = 0; c < 3; ++c) sum[c] += scene::srgbByteToLinear(image.rgb[at + c]);
         }
       }
       const auto count =
           static_cast<float>((rows.last - rows.first) * (columns.last - columns.first));
-      for (const float s : sum) result.rgb.push_back(linearToSrgb(s / count));
+      for (const float s : sum) result.rgb.push_back(scene::linearToSrgbByte(s / count));
     }
   }
   return result;

@@ -4,36 +4,25 @@
 #include <cmath>
 
 #include "collision/assert.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::render {
 namespace {
 
 constexpr std::uint8_t kWhite[4] = {255, 255, 255, 255};
 
-std::array<float, 256> makeDecodeTable() {
-  std::array<float, 256> table{};
-  for (std::size_t i = 0; i < table.size(); ++i) {
-    const double c = static_cast<double>(i) / 255;
-    table[i] = static_cast<float>(c <= 0.04045 ? c / 12.92 : std::pow((c + 0.055) / 1.055, 2.4));
-  }
-  return table;
-}
-
 /// sRGB bytes of evenly spaced linear values; the error is at most one byte step.
 constexpr std::size_t kEncodedSteps = 1 << 14;
 std::vector<std::uint8_t> makeEncodeTable() {
   std::vector<std::uint8_t> table(kEncodedSteps + 1);
-  for (std::size_t i = 0; i <= kEncodedSteps; ++i) {
-    const double c = static_cast<double>(i) / kEncodedSteps;
-    const double s = c <= 0.0031308 ? 12.92 * c : 1.055 * std::pow(c, 1 / 2.4) - 0.055;
-    table[i] = static_cast<std::uint8_t>(std::lround(255 * s));
-  }
+  for (std::size_t i = 0; i <= kEncodedSteps; ++i)
+    table[i] = scene::linearToSrgbByte(static_cast<double>(i) / kEncodedSteps);
   return table;
 }
 
 Texel decodeTexel(const std::uint8_t* rgba) {
-  return {srgbToLinear(rgba[0]), srgbToLinear(rgba[1]), srgbToLinear(rgba[2]),
-          static_cast<float>(rgba[3]) / 255.0f};
+  return {scene::srgbByteToLinear(rgba[0]), scene::srgbByteToLinear(rgba[1]),
+          scene::srgbByteToLinear(rgba[2]), static_cast<float>(rgba[3]) / 255.0f};
 }
 
 Texel lerpTexel(const Texel& a, const Texel& b, float t) {
@@ -58,11 +47,6 @@ Neighbours findNeighbours(float u, std::uint32_t size) {
 }
 
 }  // namespace
-
-float srgbToLinear(std::uint8_t value) {
-  static const std::array<float, 256> kTable = makeDecodeTable();
-  return kTable[value];
-}
 
 std::uint8_t linearToSrgb(float value) {
   static const std::vector<std::uint8_t> kTable = makeEncodeTable();

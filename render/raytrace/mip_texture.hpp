@@ -53,8 +53,7 @@ class MipTextures {
   std::unique_ptr<Slot[]> slots_;
 };
 
-/// 0..1 to 0..1.
-float srgbToLinear(std::uint8_t value);
+/// Encodes 0..1 by a table; the error is at most one step of the byte.
 std::uint8_t linearToSrgb(float value);
 
 }  // namespace enfilade::render

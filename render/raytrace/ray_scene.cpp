@@ -49,8 +49,6 @@ RayScene::RayScene(std::shared_ptr<const scene::Scene> scene, bool robust,
   if (!scene_->bounds().empty()) origin_ = scene_->bounds().centre().array().round().matrix();
   items_ = buildDrawItems(model);
   for (const scene::Mesh& mesh : model.meshes) materials_.push_back(makeMaterialData(model, mesh));
-  for (const DrawItem& item : items_)
-    hasMaskTextures_ |= item.alphaMode == AlphaMode::mask && item.texture >= 0;
   for (std::size_t i = 0; i < items_.size(); ++i)
     if (items_[i].body != kNoBody) bodyItems_.push_back(i);
   chooseInstancing();
@@ -154,30 +152,24 @@ void RayScene::buildAvatarTree() {
   avatarTree_ = {true, buildTree(std::move(batches))};
 }
 
-std::vector<const RayTree*> RayScene::opaqueTrees(scene::EntityId hiddenEntity) {
+std::vector<const RayTree*> RayScene::itemTrees(bool isTransparent) {
   std::vector<const RayTree*> trees;
   for (const bool isDynamic : {false, true}) {
     if (isDynamic && bodyItems_.empty()) continue;
-    LazyTree& lazyTree = (isDynamic ? bodyStates_.front().trees : staticTrees_)[0];
-    if (!lazyTree.built) lazyTree = {true, buildTree(collectBatches(isDynamic, false))};
+    LazyTree& lazyTree = (isDynamic ? bodyStates_.front().trees : staticTrees_)[isTransparent];
+    if (!lazyTree.built) lazyTree = {true, buildTree(collectBatches(isDynamic, isTransparent))};
     if (lazyTree.tree) trees.push_back(&*lazyTree.tree);
   }
+  return trees;
+}
+
+std::vector<const RayTree*> RayScene::opaqueTrees(scene::EntityId hiddenEntity) {
+  std::vector<const RayTree*> trees = itemTrees(false);
   const bool anyVisible = std::ranges::any_of(
       currentAvatars_, [&](const scene::AvatarSnapshot& one) { return one.id != hiddenEntity; });
   if (!anyVisible) return trees;
   if (!avatarTree_.built) buildAvatarTree();
   if (avatarTree_.tree) trees.push_back(&*avatarTree_.tree);
-  return trees;
-}
-
-std::vector<const RayTree*> RayScene::transparentTrees() {
-  std::vector<const RayTree*> trees;
-  for (const bool isDynamic : {false, true}) {
-    if (isDynamic && bodyItems_.empty()) continue;
-    LazyTree& lazyTree = (isDynamic ? bodyStates_.front().trees : staticTrees_)[1];
-    if (!lazyTree.built) lazyTree = {true, buildTree(collectBatches(isDynamic, true))};
-    if (lazyTree.tree) trees.push_back(&*lazyTree.tree);
-  }
   return trees;
 }
 

@@ -23,15 +23,14 @@ class RayScene {
   /// Non-empty trees, built on the first call. Pointers are valid until the next update(). An
   /// avatar that is hidden may still be in them.
   std::vector<const RayTree*> opaqueTrees(scene::EntityId hiddenEntity = 0);
-  std::vector<const RayTree*> transparentTrees();
+  std::vector<const RayTree*> transparentTrees() { return itemTrees(true); }
 
   /// Origin of the trees, world, metres. Rays must be relative to it, to reduce float rounding.
   const Vec3& origin() const { return origin_; }
   const scene::Model& model() const { return scene_->model(); }
-  /// Whether any surface has an alpha-tested texture.
-  bool hasMaskTextures() const { return hasMaskTextures_; }
 
  private:
+  std::vector<const RayTree*> itemTrees(bool isTransparent);
   /// The batches of dynamic or static, transparent or opaque items.
   std::vector<TriangleBatch> collectBatches(bool isDynamic, bool transparent) const;
   std::optional<RayTree> buildTree(std::vector<TriangleBatch> batches);  ///< nullopt: no batches
@@ -47,7 +46,6 @@ class RayScene {
   std::vector<DrawItem> items_;
   std::vector<MaterialData> materials_;  ///< one per mesh
   std::vector<bool> instanced_;          ///< one per item
-  bool hasMaskTextures_ = false;
 
   std::vector<scene::AvatarSnapshot> currentAvatars_;
   AvatarForm avatarForm_ = AvatarForm::figure;

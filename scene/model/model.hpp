@@ -130,6 +130,14 @@ struct Model {
   std::vector<std::string> dependencies;
 };
 
+/// Returns for each object the body that contains it, or null.
+inline std::vector<const BodySpec*> mapObjectsToBodies(const Model& model) {
+  std::vector<const BodySpec*> bodies(model.objects.size());
+  for (const BodySpec& body : model.bodies)
+    for (const std::uint32_t object : body.objects) bodies[object] = &body;
+  return bodies;
+}
+
 /// World position of a vertex. Always use this expression, so that all results agree to the last
 /// bit.
 inline Vec3 computeWorldPosition(const Object& object, const Mesh& mesh, std::uint32_t vertex) {

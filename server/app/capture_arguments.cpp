@@ -3,13 +3,13 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "server/base/parse_number.hpp"
 
 namespace enfilade::server {
 namespace {
 
-constexpr double kRadiansPerDegree = 0.017453292519943295;  // per degree
-constexpr int kMaxPixels = 4096;                            // pixels, limit of render::Camera
+constexpr int kMaxPixels = 4096;  // pixels, limit of render::Camera
 constexpr std::uint32_t kMaxShards = 100'000;
 constexpr double kTumStepsPerMetre = 5000;      // per metre, as in the TUM RGB-D benchmark
 constexpr double kDefaultStepsPerMetre = 1000;  // per metre
@@ -309,7 +309,8 @@ PictureOptions makePictureOptions(const CaptureArguments& read) {
     options.width = size->width;
     options.height = size->height;
   }
-  if (!read.fov.empty()) options.fovY = *parseNumber<double>(read.fov) * kRadiansPerDegree;
+  if (!read.fov.empty())
+    options.fovY = *parseNumber<double>(read.fov) * collision::kRadiansPerDegree;
   if (!read.intrinsics.empty()) options.pinhole = parsePinhole(read.intrinsics);
   options.near = *parseNumber<double>(read.near);
   options.far = *parseNumber<double>(read.far);

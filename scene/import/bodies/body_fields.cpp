@@ -2,10 +2,12 @@
 
 #include <algorithm>
 
+#include "collision/motion/sine_cosine.hpp"
+
 namespace enfilade::scene {
 namespace {
 
-constexpr double kRadiansPerDegree = 0.017453292519943295;
+using collision::kRadiansPerDegree;
 
 void allowKeys(const JsonCursor& cursor, std::vector<const char*> keys,
                const std::vector<const char*>& more) {

@@ -8,14 +8,6 @@
 namespace enfilade::scene {
 namespace {
 
-/// Returns for each object the body that contains it, or null.
-std::vector<const BodySpec*> mapObjectsToBodies(const Model& model) {
-  std::vector<const BodySpec*> bodies(model.objects.size());
-  for (const BodySpec& body : model.bodies)
-    for (const std::uint32_t object : body.objects) bodies[object] = &body;
-  return bodies;
-}
-
 /// A file may describe a body twice in the same way.
 bool isSameBody(const BodySpec& a, const BodySpec& b) {
   const bool sameAnchor = a.kind != BodyKind::hinged || a.anchor.isApprox(b.anchor, 1e-6);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "scene/model/rotation.hpp"
 #include "scene/world/avatars/rigid_step.hpp"
 #include "scene/world/avatars/spawn.hpp"
@@ -11,7 +12,6 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 constexpr double kMinProgressFraction = 1e-6;  // of a tick's turn: minimum that counts as progress
 
 /// The facing of a direction, degrees in -180..180; 0 if it is vertical. By bisection, because
@@ -43,7 +43,7 @@ double turnParts(const WorldSettings& settings, Avatar& avatar, double angle, Qu
   step.movedParts = findTurnedParts(avatar);
   step.isRotation = true;
   step.pivot = avatar.footPosition;
-  step.delta = angle * kRadiansPerDegree;
+  step.delta = angle * collision::kRadiansPerDegree;
   step.maxDisplacement = std::abs(step.delta) * computeTurnRadius(avatar);
   const RigidStepHit hit = castRigidStep(settings, avatar, step, count);
   avatar.turn.blockedBy = hit.entity;
@@ -83,7 +83,7 @@ double computeMaxTurnDisplacement(const WorldSettings& settings, const Avatar& a
   if (avatar.turn.left == 0) return 0;
   const double angle =
       std::min(std::abs(avatar.turn.left), avatar.turn.rate * settings.tickDuration);
-  return angle * kRadiansPerDegree * computeTurnRadius(avatar);
+  return angle * collision::kRadiansPerDegree * computeTurnRadius(avatar);
 }
 
 void turnAvatar(const WorldSettings& settings, Avatar& avatar, QueryCount& count) {

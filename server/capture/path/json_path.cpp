@@ -2,8 +2,10 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <set>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "protocol/json_depth.hpp"
 
 namespace enfilade::server {
@@ -11,9 +13,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kRotationTolerance = 1e-3;                 // tolerance of a rotation's entries
-constexpr double kRadiansPerDegree = 0.017453292519943295;  // per degree
-constexpr double kPi = 3.141592653589793;
+constexpr double kRotationTolerance = 1e-3;  // tolerance of a rotation's entries
 constexpr std::size_t kMaxQuoteLength = 60;
 
 /// The position of a value in the file, for example "path.json: frames[3].eye".
@@ -144,7 +144,7 @@ CameraPose parsePose(const Json& entry, const JsonCursor& cursor, CameraAxes axe
     const double degrees = parseNumber(entry["fov"], cursor.member("fov"));
     if (!(degrees > 0 && degrees < 180))
       cursor.member("fov").fail("must lie between 0 and 180 degrees");
-    pose.fovY = degrees * kRadiansPerDegree;
+    pose.fovY = degrees * collision::kRadiansPerDegree;
   }
   return pose;
 }
@@ -153,7 +153,7 @@ CameraPose parsePose(const Json& entry, const JsonCursor& cursor, CameraAxes axe
 std::optional<double> parseFieldOfView(const Json& file, const JsonCursor& cursor) {
   if (!file.contains("camera_angle_x")) return std::nullopt;
   const double radians = parseNumber(file["camera_angle_x"], cursor.member("camera_angle_x"));
-  if (!(radians > 0 && radians < kPi))
+  if (!(radians > 0 && radians < std::numbers::pi))
     cursor.member("camera_angle_x").fail("must lie between 0 and pi radians");
   return radians;
 }

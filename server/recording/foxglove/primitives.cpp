@@ -17,17 +17,12 @@ foxglove::Point3 toPoint(const scene::Vec3& v) {
   return point;
 }
 
-/// Converts a linear colour component (materials) to sRGB (viewers).
-float encodeSrgb(float linear) {
-  return linear <= 0.0031308f ? 12.92f * linear : 1.055f * std::pow(linear, 1 / 2.4f) - 0.055f;
-}
-
 foxglove::Color materialColour(const scene::Material& material) {
   const Eigen::Vector4f& base = material.baseColour;
+  const auto encode = [](float linear) { return static_cast<float>(scene::linearToSrgb(linear)); };
   const bool isTransparent = material.alpha == scene::Material::Alpha::blend;
-  return server::makeColour(
-      Eigen::Vector3f(encodeSrgb(base[0]), encodeSrgb(base[1]), encodeSrgb(base[2])),
-      isTransparent ? static_cast<double>(base[3]) : 1.0);
+  return server::makeColour(Eigen::Vector3f(encode(base[0]), encode(base[1]), encode(base[2])),
+                            isTransparent ? static_cast<double>(base[3]) : 1.0);
 }
 
 /// Appends an object's mesh, relative to `origin`.
