@@ -12,7 +12,7 @@ struct DepthNoise {
 };
 
 /// Replaces depths in metres (NaN: none) by those of a structured-light camera: the model of Choi,
-/// Zhou and Koltun 2015 ("Robust Reconstruction of Indoor Scenes") without their table of one
+/// Choi et al. 2015 ("Robust Reconstruction of Indoor Scenes") without their table of one
 /// device's distortion. Each pixel takes the depth of a neighbour, and its disparity gets noise and
 /// is rounded to an eighth; depths from 10 m on are lost. The result depends on seed, `frame` and
 /// pixel alone.

@@ -11,7 +11,7 @@
 
 namespace enfilade::scene {
 
-/// What ends the only ways to a goal.
+/// What blocks every path to a goal.
 struct Obstruction {
   EntityId entity = 0;           ///< that the walker hit; 0: the floor ends
   Vec3 position = Vec3::Zero();  ///< of the walker's feet there, scene frame, metres

@@ -13,7 +13,7 @@ namespace enfilade::server {
 std::variant<v1::NavigationQuery, v1::Error> makePathQuery(const scene::World& world,
                                                            const v1::Command& command);
 
-/// What a Go becomes: its doors open, and the avatar waits for them and walks.
+/// The orders that carry out a Go: its doors open, and the avatar waits for them and walks.
 struct GoOrders {
   std::vector<v1::BodyCommand> doors;
   std::vector<v1::Command> orders;

@@ -101,7 +101,7 @@ struct ThirdParty {
   Names folders;        ///< where it may be used
 };
 
-const std::array<ThirdParty, 18> kThirdParties{{
+const std::array<ThirdParty, 22> kThirdParties{{
     {"GMP", "gmp.*", {"collision"}},
     {"assimp", "assimp/.*", {"scene"}},
     {"ifcplusplus", "(ifcpp|carve)/.*", {"scene"}},
@@ -110,6 +110,10 @@ const std::array<ThirdParty, 18> kThirdParties{{
     {"EGL and OpenGL", "(epoxy|EGL|GL|GLES.*)/.*", {"render"}},
     {"libpng", "png.*", {"scene", "render"}},
     {"libjpeg", "(jpeglib|turbojpeg).*", {"scene", "render"}},
+    {"WebP", "webp/.*", {"scene"}},
+    {"Draco", "draco/.*", {"scene"}},
+    {"meshoptimizer", "meshoptimizer.*", {"scene"}},
+    {"Cairo and Pango", "(cairo.*|pango/.*)", {"render"}},
     {"minizip", "minizip/.*", {"scene"}},
     {"xxHash", "xxh.*", {"scene"}},
     {"zlib", "zlib.*", {"protocol", "server"}},
@@ -311,6 +315,28 @@ Faults thirdPartiesOutOfPlace(const Sources& sources) {
                            folderOf(path) + "/");
       }
     }
+  }
+  return faults;
+}
+
+Faults roomsWithoutDescription(const Sources& sources) {
+  const auto page = sources.find("ARCHITECTURE.md");
+  const std::string text = page == sources.end() ? "" : page->second;
+  const auto headingNames = [&](const std::string& room) {
+    static const std::regex heading("^## .*");
+    bool named = false;
+    forEachLine(text, [&](int, const std::string& line) {
+      named |= std::regex_match(line, heading) && (line + " ").find(" " + room + " ") != line.npos;
+    });
+    return named;
+  };
+  Faults faults;
+  for (const std::string& room : kRooms) {
+    bool described = headingNames(room);
+    for (auto slash = room.find('/'); slash != room.npos; slash = room.find('/', slash + 1))
+      described |= text.find("`" + room.substr(slash + 1) + "/`") != text.npos;
+    described |= text.find("`" + room + "/`") != text.npos;
+    if (!described) faults.push_back(room + "/ is not in ARCHITECTURE.md; describe it there");
   }
   return faults;
 }

@@ -30,6 +30,9 @@ Faults thirdPartiesInPublicHeaders(const Sources& sources);
 /// A third party is used only in the folders it was chosen for.
 Faults thirdPartiesOutOfPlace(const Sources& sources);
 
+/// Rooms that ARCHITECTURE.md names neither in a heading nor as `room/`.
+Faults roomsWithoutDescription(const Sources& sources);
+
 Faults headersWithoutPragmaOnce(const Sources& sources);
 /// A schema (.proto) may be twice as long: it is read as one document.
 Faults longFiles(const Sources& sources, int maxLines);

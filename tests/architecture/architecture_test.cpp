@@ -41,6 +41,11 @@ TEST(Architecture, EachThirdPartyStaysInItsFolders) {
   EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
+TEST(Architecture, EveryRoomIsDescribed) {
+  const Faults faults = roomsWithoutDescription(repository());
+  EXPECT_TRUE(faults.empty()) << listed(faults);
+}
+
 TEST(Architecture, EveryHeaderIsIncludedOnce) {
   EXPECT_EQ(headersWithoutPragmaOnce(repository()), Faults{});
 }
@@ -117,6 +122,17 @@ TEST(ArchitectureRules, ANewRoomMustBeListed) {
                         {"scene/attic/box.cpp", "#include \"scene/model/model.hpp\"\n"}};
   EXPECT_EQ(includeDirections(sources),
             Faults{"scene/attic/box.cpp:1: scene/attic/ is not a known room; add it to kRooms"});
+}
+
+TEST(ArchitectureRules, ARoomWithoutDescriptionIsAFault) {
+  Sources sources{{"ARCHITECTURE.md", repository().at("ARCHITECTURE.md")}};
+  EXPECT_TRUE(roomsWithoutDescription(sources).empty());
+  std::string& text = sources["ARCHITECTURE.md"];
+  const std::string row = "`server/navigation/`";
+  text.replace(text.find(row), row.size(), "`paths`");
+  const Faults faults = roomsWithoutDescription(sources);
+  ASSERT_EQ(faults.size(), 1U) << listed(faults);
+  EXPECT_NE(faults[0].find("server/navigation/"), std::string::npos);
 }
 
 TEST(ArchitectureRules, ADiagnosticWithoutMeaningIsAFault) {

@@ -98,7 +98,7 @@ std::array<Vec3, 3> parseStlFacet(TextCursor& text, std::size_t index) {
     if (found == 3) failStl("facet " + std::to_string(index) + " has more than three corners");
     for (int axis = 0; axis < 3; ++axis) corners[found][axis] = text.readNumber();
     if (text.failed())
-      failStl("facet " + std::to_string(index) + " has a corner that is no number");
+      failStl("facet " + std::to_string(index) + " has a corner that is not a number");
     ++found;
   }
   if (found != 3) failStl("facet " + std::to_string(index) + " has fewer than three corners");

@@ -1,4 +1,4 @@
-// The size of who walks, for navigation: the upright prism of an avatar without parts and links.
+// The size of a walker, for navigation: the upright prism of an avatar without parts and links.
 #pragma once
 
 namespace enfilade::scene {
