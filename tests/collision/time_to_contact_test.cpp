@@ -129,7 +129,7 @@ TEST(NextCheck, WaitsForTheContactOrForTheLeastTimeAndSaysWhetherThatIsProved) {
 const std::vector<Vec3> kCube{{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
                               {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
 
-TEST(CannotTouchBefore, IsProvedUpToTheContactAndNotBeyond) {
+TEST(SeparatedUntil, IsProvedUpToTheContactAndNotBeyond) {
   MovingBody a{{kCube}, {{1, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
   MovingBody b{{kCube, {5, 0, 0}}, {}};
   for (const double t : {1.0, 2.0, 2.9999999, 3 - 1e-11}) {
@@ -186,7 +186,7 @@ PreciseMatrix computePreciseRotation(const Vec3& angularVelocity, double time) {
   return sum;
 }
 
-TEST(ContinuousPose, ATurnIsWithinItsBoundOfTheMatrixExponential) {
+TEST(MovingPose, ATurnIsWithinItsBoundOfTheMatrixExponential) {
   Random random(13);
   double worst = 0;
   for (int i = 0; i < 300; ++i) {
@@ -207,7 +207,7 @@ TEST(ContinuousPose, ATurnIsWithinItsBoundOfTheMatrixExponential) {
   EXPECT_GT(worst, 0.2);
 }
 
-TEST(ContinuousPose, QuarterTurnsMoveAxesOntoAxes) {
+TEST(MovingPose, QuarterTurnsMoveAxesOntoAxes) {
   const double quarter = 1.5707963267948966;
   for (int k = 0; k < 9; ++k) {
     const Mat3 turn = integrateRotation(Mat3::Identity(), {0, 0, quarter}, k);
@@ -218,11 +218,11 @@ TEST(ContinuousPose, QuarterTurnsMoveAxesOntoAxes) {
   }
 }
 
-TEST(ContinuousPose, AMillionRadiansAreTooMany) {
+TEST(MovingPose, AMillionRadiansAreTooMany) {
   EXPECT_EQ(computeRotationError(Mat3::Identity(), {2e6, 0, 0}, 1, 1), kInfinity);
 }
 
-TEST(ContinuousPose, DisplacementIsExactWithinItsErrorBound) {
+TEST(MovingPose, DisplacementIsExactWithinItsErrorBound) {
   Random random(14);
   int exact = 0;
   for (int i = 0; i < 2000; ++i) {

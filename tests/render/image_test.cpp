@@ -55,7 +55,7 @@ TEST(Png, BrokenBytesAndWrongSizesAreErrors) {
   EXPECT_THROW(encodePng(wrong), std::runtime_error);
 }
 
-TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingElse) {
+TEST(AtomicFile, ReplacesAFileAndLeavesNothingElse) {
   const tests::TemporaryFolder folder;
   const fs::path file = folder.path() / "a.bin";
   writeFileAtomically(file, "first", 5);
@@ -65,7 +65,7 @@ TEST(WriteFileWhole, ReplacesAFileAndLeavesNothingElse) {
   EXPECT_EQ(entriesIn(folder), 1);
 }
 
-TEST(WriteFileWhole, APipeIsWrittenAndALinkFollowed) {
+TEST(AtomicFile, APipeIsWrittenAndALinkFollowed) {
   const tests::TemporaryFolder folder;
   const fs::path pipe = folder.path() / "pipe", link = folder.path() / "link";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
@@ -89,7 +89,7 @@ TEST(WriteFileWhole, APipeIsWrittenAndALinkFollowed) {
   EXPECT_THROW(writeFileAtomically(folder.path() / "circle", "x", 1), std::runtime_error);
 }
 
-TEST(WriteFileWhole, AFailureNamesTheFileAndLeavesNoPart) {
+TEST(AtomicFile, AFailureNamesTheFileAndLeavesNoPart) {
   const tests::TemporaryFolder folder;
   const fs::path taken = folder.path() / "taken";
   fs::create_directories(taken / "inside");
@@ -218,7 +218,7 @@ TEST(Canvas, PagesAreWrittenWhole) {
   EXPECT_THROW(nowhere.finish(), std::runtime_error);
 }
 
-TEST(ScaledGap, TheMeanIsComputedInLinearLight) {
+TEST(ResizeImage, TheMeanIsComputedInLinearLight) {
   Image image = plain(2, 1);
   image.rgb = {0, 0, 0, 255, 255, 255};
   const Image one = resizeImage(image, 1, 1);

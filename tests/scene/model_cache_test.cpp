@@ -22,7 +22,7 @@ using tests::BoxMesh;
 using tests::TemporaryFolder;
 
 /// A glTF file with its buffer and an image next to it, and a cache in its own folder.
-class ModelCacheTest : public ::testing::Test {
+class CachedModel : public ::testing::Test {
  protected:
   void SetUp() override {
     const BoxMesh box({1, 2, 3});
@@ -56,7 +56,7 @@ void overwrite(const fs::path& file, const std::string& content) {
   std::ofstream(file, std::ios::binary) << content;
 }
 
-TEST_F(ModelCacheTest, TheSecondLoadIsTheSameModelWithoutAnImport) {
+TEST_F(CachedModel, TheSecondLoadIsTheSameModelWithoutAnImport) {
   const LoadedModel first = load(), second = load();
   EXPECT_FALSE(first.fromCache);
   EXPECT_TRUE(second.fromCache);
@@ -67,7 +67,7 @@ TEST_F(ModelCacheTest, TheSecondLoadIsTheSameModelWithoutAnImport) {
   EXPECT_FALSE(loadModel(file_, {}, std::nullopt).fromCache);
 }
 
-TEST_F(ModelCacheTest, AFileOfTheSameContentElsewhereIsTheSame) {
+TEST_F(CachedModel, AFileOfTheSameContentElsewhereIsTheSame) {
   load();
   fs::create_directories(folder_.path() / "moved");
   for (const char* name : {"box.gltf", "box.bin"})
@@ -78,7 +78,7 @@ TEST_F(ModelCacheTest, AFileOfTheSameContentElsewhereIsTheSame) {
   EXPECT_EQ(moved.model.source, file_.string());
 }
 
-TEST_F(ModelCacheTest, AChangeOfTheFileOrOfTheOptionsIsAnotherEntry) {
+TEST_F(CachedModel, AChangeOfTheFileOrOfTheOptionsIsAnotherEntry) {
   load();
   ImportOptions inches;
   inches.metresPerUnit = 0.0254;
@@ -96,7 +96,7 @@ TEST_F(ModelCacheTest, AChangeOfTheFileOrOfTheOptionsIsAnotherEntry) {
   EXPECT_EQ(renamed.model.objects[0].path, "cox");
 }
 
-TEST_F(ModelCacheTest, AChangeOfADependencyIsNoticed) {
+TEST_F(CachedModel, AChangeOfADependencyIsNoticed) {
   load();
   overwrite(folder_.path() / "box.bin", BoxMesh({4, 2, 3}).bytes());
   const LoadedModel changed = load();
@@ -105,7 +105,7 @@ TEST_F(ModelCacheTest, AChangeOfADependencyIsNoticed) {
   EXPECT_TRUE(load().fromCache);
 }
 
-TEST_F(ModelCacheTest, TheLibraryThatReadItIsAmongTheFilesThatMatter) {
+TEST_F(CachedModel, TheLibraryThatReadItIsAmongTheFilesThatMatter) {
   const Model model = load().model;
   EXPECT_TRUE(
       std::any_of(model.dependencies.begin(), model.dependencies.end(), [](const auto& file) {
@@ -113,7 +113,7 @@ TEST_F(ModelCacheTest, TheLibraryThatReadItIsAmongTheFilesThatMatter) {
       }));
 }
 
-TEST_F(ModelCacheTest, APictureThatWasMissingAndCameIsSeen) {
+TEST_F(CachedModel, APictureThatWasMissingAndCameIsSeen) {
   file_ =
       folder_.write("box.obj", "mtllib box.mtl\nusemtl wall\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   folder_.write("box.mtl", "newmtl wall\nKd 0.5 0.5 0.5\nmap_Kd brick.png\n");
@@ -126,7 +126,7 @@ TEST_F(ModelCacheTest, APictureThatWasMissingAndCameIsSeen) {
   EXPECT_TRUE(load().fromCache);
 }
 
-TEST_F(ModelCacheTest, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
+TEST_F(CachedModel, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
   const std::vector<std::byte> expected = serialiseModel(load().model);
   const fs::path entry = entries().at(0);
   const std::string whole = contentOf(entry);
@@ -149,7 +149,7 @@ TEST_F(ModelCacheTest, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
   }
 }
 
-TEST_F(ModelCacheTest, AnEntryUnderAWrongNameIsNotUsed) {
+TEST_F(CachedModel, AnEntryUnderAWrongNameIsNotUsed) {
   load();
   const fs::path entry = entries().at(0);
   const std::string box = contentOf(entry);
@@ -159,7 +159,7 @@ TEST_F(ModelCacheTest, AnEntryUnderAWrongNameIsNotUsed) {
   EXPECT_FALSE(load().fromCache);
 }
 
-TEST_F(ModelCacheTest, TheLeastRecentlyReadEntryIsEvictedFirst) {
+TEST_F(CachedModel, TheLeastRecentlyReadEntryIsEvictedFirst) {
   load();
   const std::uintmax_t bytes = fs::file_size(entries().at(0));
   cache_->maxBytes = 3 * bytes + bytes / 2;
@@ -188,7 +188,7 @@ TEST_F(ModelCacheTest, TheLeastRecentlyReadEntryIsEvictedFirst) {
   EXPECT_NE(large.notes[0].find("exceed the cache limit"), std::string::npos);
 }
 
-TEST_F(ModelCacheTest, WithoutAFolderToWriteToItWorksAndSaysSo) {
+TEST_F(CachedModel, WithoutAFolderToWriteToItWorksAndSaysSo) {
   cache_->folder = file_ / "below a file";
   const LoadedModel loaded = load();
   EXPECT_EQ(loaded.model.objects.size(), 1u);
@@ -198,7 +198,7 @@ TEST_F(ModelCacheTest, WithoutAFolderToWriteToItWorksAndSaysSo) {
   EXPECT_EQ(load().notes.size(), 1u);
 }
 
-TEST_F(ModelCacheTest, AFailedImportIsAnErrorWithoutAnEntry) {
+TEST_F(CachedModel, AFailedImportIsAnErrorWithoutAnEntry) {
   file_ = folder_.write("broken.gltf", "{");
   EXPECT_THROW(load(), ImportError);
   EXPECT_THROW(loadModel(folder_.path() / "none.gltf", {}, cache_), ImportError);
@@ -224,7 +224,7 @@ TEST(ModelCacheFolder, FollowsTheEnvironment) {
   setenv("HOME", home.c_str(), 1);
 }
 
-TEST(ShareMeshes, EqualMeshesAreStoredOnceAndUnusedOnesGo) {
+TEST(DeduplicateMeshes, EqualMeshesAreStoredOnceAndUnusedOnesGo) {
   Model model = testing::boxModel({{"a", {0, 0, 0}, {1, 1, 1}},
                                    {"b", {0, 0, 0}, {1, 1, 1}},
                                    {"c", {0, 0, 0}, {1, 1, 2}},
@@ -241,7 +241,7 @@ TEST(ShareMeshes, EqualMeshesAreStoredOnceAndUnusedOnesGo) {
   EXPECT_EQ(model.meshes[model.objects[2].meshes[0]].positions[7].z(), 2);
 }
 
-TEST(ShareMeshes, TheSceneStaysTheSame) {
+TEST(DeduplicateMeshes, TheSceneStaysTheSame) {
   Model model = testing::boxModel(
       {{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {0, 0, 0}, {1, 1, 1}}, {"c", {0, 0, 0}, {2, 1, 1}}});
   const std::uint64_t hash = Scene(model).hash();

@@ -19,7 +19,7 @@ std::string contentOf(const std::filesystem::path& file) {
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
-TEST(ReaderVersion, ALibraryIsIdentifiedByItsBuildIdAlone) {
+TEST(ToolchainVersion, ALibraryIsIdentifiedByItsBuildIdAlone) {
   const TemporaryFolder folder;
   const std::string bytes = contentOf(assimpModulePath());
   const auto copy = folder.write("copy.so", bytes + "and more behind it");
@@ -30,7 +30,7 @@ TEST(ReaderVersion, ALibraryIsIdentifiedByItsBuildIdAlone) {
   EXPECT_NE(computeFileVersion(copy), computeFileVersion("/proc/self/exe"));
 }
 
-TEST(ReaderVersion, OtherFilesAreIdentifiedByTheirContent) {
+TEST(ToolchainVersion, OtherFilesAreIdentifiedByTheirContent) {
   const TemporaryFolder folder;
   const std::string library = contentOf(assimpModulePath());
   // Truncated in the header, in the program header table, before the notes; and a header followed

@@ -47,27 +47,27 @@ double costOf(const IndexPairs& pairs, const std::vector<WalkEvent>& before,
   return cost;
 }
 
-TEST(MatchedHappenings, TheSameListIsItsOwnMatch) {
+TEST(AlignEvents, TheSameListIsItsOwnMatch) {
   const std::vector<WalkEvent> list{at(0, 1), at(5, 2), at(0, 3), at(0, 4)};
   EXPECT_EQ(alignEvents(list, list), (IndexPairs{{0, 0}, {1, 1}, {2, 2}, {3, 3}}));
 }
 
-TEST(MatchedHappenings, ANewEventInTheMiddleMovesNoOther) {
+TEST(AlignEvents, ANewEventInTheMiddleMovesNoOther) {
   const std::vector<WalkEvent> before{at(0, 1), at(6, 3), at(12, 5)};
   const std::vector<WalkEvent> after{at(0, 1), at(3, 2), at(6, 3), at(12, 5)};
   EXPECT_EQ(alignEvents(before, after), (IndexPairs{{0, 0}, {1, 2}, {2, 3}}));
 }
 
-TEST(MatchedHappenings, ALaterTimeAtTheSamePlaceIsTheSame) {
+TEST(AlignEvents, ALaterTimeAtTheSamePlaceIsTheSame) {
   EXPECT_EQ(alignEvents({at(1, 10)}, {at(1, 40)}), (IndexPairs{{0, 0}}));
 }
 
-TEST(MatchedHappenings, AnotherPlaceIsAnother) {
+TEST(AlignEvents, AnotherPlaceIsAnother) {
   EXPECT_EQ(alignEvents({at(0, 10)}, {at(kMaxMatchDistance, 10)}), IndexPairs{});
   EXPECT_EQ(alignEvents({at(0, 10)}, {at(0.99 * kMaxMatchDistance, 10)}), (IndexPairs{{0, 0}}));
 }
 
-TEST(MatchedHappenings, NoMatchingIsCheaper) {
+TEST(AlignEvents, NoMatchingIsCheaper) {
   std::mt19937 random(7);
   std::uniform_real_distribution<double> place(0, 6);
   std::uniform_int_distribution<int> length(0, 5);
@@ -88,7 +88,7 @@ TEST(MatchedHappenings, NoMatchingIsCheaper) {
   EXPECT_LT(paired, possible);
 }
 
-TEST(MatchedHappenings, LongListsAreCutIntoPieces) {
+TEST(AlignEvents, LongListsAreCutIntoPieces) {
   std::vector<WalkEvent> before, after;
   for (int i = 0; i < 4500; ++i) {
     before.push_back(at(i % 7, i));

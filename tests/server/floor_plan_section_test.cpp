@@ -38,7 +38,7 @@ double lengthOf(const ObjectSection& section) {
   return length;
 }
 
-TEST(PlanCut, ClosedSolidsGiveOneLoopAndSingleFacesOneLine) {
+TEST(FloorPlanSection, ClosedSolidsGiveOneLoopAndSingleFacesOneLine) {
   const scene::Scene scene(columnAndSheet());
   const auto both = cutStatic(scene, 1.2);
   ASSERT_EQ(both.size(), 2u);
@@ -55,7 +55,7 @@ TEST(PlanCut, ClosedSolidsGiveOneLoopAndSingleFacesOneLine) {
   EXPECT_TRUE(cutStatic(scene, -0.5).empty());
 }
 
-TEST(PlanCut, BodiesAreNotStaticAndAreCutAlone) {
+TEST(FloorPlanSection, BodiesAreNotStaticAndAreCutAlone) {
   scene::Model model = columnAndSheet();
   scene::BodySpec door;
   door.name = "door";
@@ -68,7 +68,7 @@ TEST(PlanCut, BodiesAreNotStaticAndAreCutAlone) {
   EXPECT_NEAR(lengthOf(cutObject(model, 1, 1.2)), 4, 1e-6);
 }
 
-TEST(PlanCut, TwoOutlinesOfOneObjectAreTwoLoops) {
+TEST(FloorPlanSection, TwoOutlinesOfOneObjectAreTwoLoops) {
   scene::Model model = columnAndSheet();
   for (std::size_t i = 0; i < 8; ++i)
     model.meshes[0].positions.push_back(model.meshes[0].positions[i] + Eigen::Vector3f(3, 0, 0));

@@ -4,7 +4,7 @@
 namespace enfilade::server::testing {
 namespace {
 
-class FrameWatches : public ServedRoom {
+class FrameSubscriptions : public ServedRoom {
  protected:
   void SetUp() override {
     serve();
@@ -35,7 +35,7 @@ class FrameWatches : public ServedRoom {
   }
 };
 
-TEST_F(FrameWatches, OneComesAtOnceAndThenOneATick) {
+TEST_F(FrameSubscriptions, OneComesAtOnceAndThenOneATick) {
   protocol::Client ann = client("ann");
   ann.request(watching(3, 0));
   const auto first = nextFrame(ann);
@@ -46,7 +46,7 @@ TEST_F(FrameWatches, OneComesAtOnceAndThenOneATick) {
   EXPECT_EQ(nextFrame(ann).value().tick(), 1u);
 }
 
-TEST_F(FrameWatches, OmittedFramesAreCounted) {
+TEST_F(FrameSubscriptions, OmittedFramesAreCounted) {
   protocol::Client ann = client("ann");
   ann.request(watching(1, 0));
   ann.step(500);
@@ -65,7 +65,7 @@ TEST_F(FrameWatches, OmittedFramesAreCounted) {
   EXPECT_LT(counted, 503u);
 }
 
-TEST_F(FrameWatches, ARateIsOfSimulatedTime) {
+TEST_F(FrameSubscriptions, ARateIsOfSimulatedTime) {
   protocol::Client ann = client("ann");
   ann.request(watching(1, 2));
   EXPECT_EQ(nextFrame(ann).value().tick(), 0u);
@@ -78,7 +78,7 @@ TEST_F(FrameWatches, ARateIsOfSimulatedTime) {
   EXPECT_FALSE(nextFrame(ann, 50)) << "and no others";
 }
 
-TEST_F(FrameWatches, AnAvatarMayComeLaterAndAWatchEnds) {
+TEST_F(FrameSubscriptions, AnAvatarMayComeLaterAndAWatchEnds) {
   protocol::Client ann = client("ann");
   v1::ClientMessage eyes = watching(1, 0);
   eyes.mutable_watch_frames()->mutable_frame()->mutable_eyes()->set_avatar("ann");
@@ -95,7 +95,7 @@ TEST_F(FrameWatches, AnAvatarMayComeLaterAndAWatchEnds) {
   EXPECT_FALSE(nextFrame(ann, 50));
 }
 
-TEST_F(FrameWatches, InvalidWatchesAreRefused) {
+TEST_F(FrameSubscriptions, InvalidWatchesAreRefused) {
   protocol::Client ann = client("ann");
   EXPECT_EQ(codeOf(ann, watching(0, 0)), v1::ERROR_BAD_MESSAGE);
   EXPECT_EQ(codeOf(ann, watching(17, 0)), v1::ERROR_BAD_MESSAGE);

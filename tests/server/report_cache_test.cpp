@@ -13,7 +13,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-class ReportCacheTest : public ::testing::Test {
+class ReportCache : public ::testing::Test {
  protected:
   std::vector<fs::path> kept() const {
     std::vector<fs::path> files;
@@ -31,7 +31,7 @@ class ReportCacheTest : public ::testing::Test {
   std::optional<scene::ModelCache> cache_{{folder_.path() / "cache"}};
 };
 
-TEST_F(ReportCacheTest, EqualsTheComputedReport) {
+TEST_F(ReportCache, EqualsTheComputedReport) {
   const scene::Scene scene(modelWithProblem());
   const std::string worked = serializeReport(scene::makeSceneReport(scene));
   EXPECT_EQ(serializeReport(loadOrMakeReport(scene, std::nullopt)), worked);
@@ -44,7 +44,7 @@ TEST_F(ReportCacheTest, EqualsTheComputedReport) {
   EXPECT_EQ(again.diagnostics.at(0).example, modelWithProblem().diagnostics[0].example);
 }
 
-TEST_F(ReportCacheTest, IsNotUsedForAnotherSceneOrOtherDiagnostics) {
+TEST_F(ReportCache, IsNotUsedForAnotherSceneOrOtherDiagnostics) {
   loadOrMakeReport(scene::Scene(modelWithProblem()), cache_);
   scene::Model other = modelWithProblem();
   other.diagnostics[0].count = 4;
@@ -54,7 +54,7 @@ TEST_F(ReportCacheTest, IsNotUsedForAnotherSceneOrOtherDiagnostics) {
   EXPECT_EQ(kept().size(), 3u);
 }
 
-TEST_F(ReportCacheTest, ADamagedTextIsRecomputed) {
+TEST_F(ReportCache, ADamagedTextIsRecomputed) {
   const scene::Scene scene(modelWithProblem());
   const std::string worked = serializeReport(loadOrMakeReport(scene, cache_));
   const fs::path file = kept().at(0);
@@ -70,7 +70,7 @@ TEST_F(ReportCacheTest, ADamagedTextIsRecomputed) {
   }
 }
 
-TEST_F(ReportCacheTest, AnInvalidTextIsNoReport) {
+TEST_F(ReportCache, AnInvalidTextIsNoReport) {
   for (const char* text : {"", "{}", "[1]", "{\"objects\":-1}", "null"})
     EXPECT_FALSE(parseReport(text)) << text;
   EXPECT_TRUE(parseReport(serializeReport({})));

@@ -19,7 +19,7 @@
 namespace enfilade::server::testing {
 namespace {
 
-class ServedWorlds : public ServedRoom {
+class HostedWorlds : public ServedRoom {
  protected:
   protocol::Client clientIn(const std::string& world, const std::string& name = "ann") {
     return client(name, "", world);
@@ -86,7 +86,7 @@ v1::Bye lastWordsTo(protocol::Client& client) {
   return {};
 }
 
-TEST_F(ServedWorlds, TheSameCommandsGiveTheSameBitsWhateverHappensInOtherWorlds) {
+TEST_F(HostedWorlds, TheSameCommandsGiveTheSameBitsWhateverHappensInOtherWorlds) {
   serve();
   protocol::Client main = client("main");
   create(main, "calm");
@@ -105,7 +105,7 @@ TEST_F(ServedWorlds, TheSameCommandsGiveTheSameBitsWhateverHappensInOtherWorlds)
   EXPECT_EQ(crowd.metrics().avatars(), kCrowd + 0u);
 }
 
-TEST_F(ServedWorlds, EachIsListedWithItsOwnTicksAndClients) {
+TEST_F(HostedWorlds, EachIsListedWithItsOwnTicksAndClients) {
   serve();
   protocol::Client main = client("main");
   EXPECT_EQ(main.welcome().world(), "main");
@@ -128,7 +128,7 @@ TEST_F(ServedWorlds, EachIsListedWithItsOwnTicksAndClients) {
   EXPECT_TRUE(worlds[1].clock().has_driver());
 }
 
-TEST_F(ServedWorlds, NamesAreValidated) {
+TEST_F(HostedWorlds, NamesAreValidated) {
   ServerLimits limits;
   limits.worlds = 3;
   serve(limits);
@@ -148,7 +148,7 @@ TEST_F(ServedWorlds, NamesAreValidated) {
   EXPECT_EQ(codeOf([&] { clientIn("d"); }), v1::ERROR_UNKNOWN_WORLD);
 }
 
-TEST_F(ServedWorlds, OnlyAnAdminMakesAndDropsThem) {
+TEST_F(HostedWorlds, OnlyAnAdminMakesAndDropsThem) {
   Access access;
   access.tokens = {{Role::drive, "driver-0123456789"}, {Role::admin, "admin-0123456789"}};
   serve({}, smallRoom(), access);
@@ -162,7 +162,7 @@ TEST_F(ServedWorlds, OnlyAnAdminMakesAndDropsThem) {
   drop(admin, "b");
 }
 
-TEST_F(ServedWorlds, ClientsOfADroppedWorldAreNotifiedAndTheirContactsEnd) {
+TEST_F(HostedWorlds, ClientsOfADroppedWorldAreNotifiedAndTheirContactsEnd) {
   serve();
   protocol::Client main = client("main");
   create(main, "b");
@@ -188,7 +188,7 @@ TEST_F(ServedWorlds, ClientsOfADroppedWorldAreNotifiedAndTheirContactsEnd) {
   EXPECT_EQ(create(main, "b").tick(), 0u) << "the name is free";
 }
 
-TEST_F(ServedWorlds, OneIsDroppedUnderAWaitingStep) {
+TEST_F(HostedWorlds, OneIsDroppedUnderAWaitingStep) {
   serve();
   protocol::Client main = client("main");
   create(main, "b");
@@ -205,7 +205,7 @@ TEST_F(ServedWorlds, OneIsDroppedUnderAWaitingStep) {
   EXPECT_EQ(stepping.get(), v1::ERROR_WORLD_DROPPED);
 }
 
-TEST_F(ServedWorlds, OneIsDroppedWhileItsPicturesAreDrawn) {
+TEST_F(HostedWorlds, OneIsDroppedWhileItsPicturesAreDrawn) {
   serve();
   ENFILADE_NEED_PICTURES(*server_);
   protocol::Client main = client("main");
@@ -242,7 +242,7 @@ TEST_F(ServedWorlds, OneIsDroppedWhileItsPicturesAreDrawn) {
   }
 }
 
-TEST_F(ServedWorlds, AClientThatDropsItsOwnWorldGetsTheReplyFirst) {
+TEST_F(HostedWorlds, AClientThatDropsItsOwnWorldGetsTheReplyFirst) {
   serve();
   protocol::Client main = client("main");
   create(main, "b");
@@ -252,7 +252,7 @@ TEST_F(ServedWorlds, AClientThatDropsItsOwnWorldGetsTheReplyFirst) {
   EXPECT_EQ(list(main).size(), 1u);
 }
 
-TEST_F(ServedWorlds, ADropWhenEmptyWorldEndsWithItsLastClient) {
+TEST_F(HostedWorlds, ADropWhenEmptyWorldEndsWithItsLastClient) {
   serve();
   protocol::Client main = client("main");
   EXPECT_TRUE(create(main, "b", "", true).drop_when_empty());
@@ -269,7 +269,7 @@ TEST_F(ServedWorlds, ADropWhenEmptyWorldEndsWithItsLastClient) {
   EXPECT_TRUE(becomesTrue([&] { return list(main).size() == 1; }));
 }
 
-TEST_F(ServedWorlds, AnUnusedWorldIsDroppedAfterAWhile) {
+TEST_F(HostedWorlds, AnUnusedWorldIsDroppedAfterAWhile) {
   ServerLimits limits;
   limits.emptyWorldTimeout = std::chrono::milliseconds(300);
   serve(limits);
@@ -283,7 +283,7 @@ TEST_F(ServedWorlds, AnUnusedWorldIsDroppedAfterAWhile) {
   for (const v1::World& world : list(main)) EXPECT_NE(world.name(), "forgotten");
 }
 
-TEST_F(ServedWorlds, AClientThatDisconnectsWhileUnreadIsNoticed) {
+TEST_F(HostedWorlds, AClientThatDisconnectsWhileUnreadIsNoticed) {
   ServerLimits limits;
   limits.pendingRequests = 4;
   limits.ticksPerStep = 1'000'000'000;  // days
@@ -326,7 +326,7 @@ std::shared_ptr<const scene::Scene> hall(std::size_t posts) {
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-TEST_F(ServedWorlds, ScenesThatAServerBeginsWithHaveAWorldEach) {
+TEST_F(HostedWorlds, ScenesThatAServerBeginsWithHaveAWorldEach) {
   ServerOptions options;
   options.additionalScenes = {hall(4), hall(5), smallRoom()};
   server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
@@ -343,7 +343,7 @@ TEST_F(ServedWorlds, ScenesThatAServerBeginsWithHaveAWorldEach) {
   EXPECT_EQ(create(inHall, "own").scene(), "hall") << "its own where none is named";
 }
 
-TEST_F(ServedWorlds, MetricsAndHealthCoverAllOfThem) {
+TEST_F(HostedWorlds, MetricsAndHealthCoverAllOfThem) {
   serve();
   protocol::Client main = client("main");
   create(main, "b");
