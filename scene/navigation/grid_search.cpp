@@ -13,7 +13,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kStoreyHeight = 1;   // metres: places of a cell closer than this are one place
+constexpr double kLayerHeight = 1;   // metres: places of a cell closer than this are one place
 constexpr double kSameHeight = 0.05;  // metres: of feet that come to the same place on two ways
 
 struct Cell {
@@ -37,7 +37,7 @@ struct Grid {
 
   Vec3 centre(int x, int z) const { return origin + Vec3(x * spacing, 0, z * spacing); }
   Cell cellOf(const Vec3& feet, int x, int z) const {
-    return {x, z, static_cast<int>(std::lround((feet.y() - origin.y()) / kStoreyHeight))};
+    return {x, z, static_cast<int>(std::lround((feet.y() - origin.y()) / kLayerHeight))};
   }
 };
 

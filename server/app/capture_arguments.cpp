@@ -217,7 +217,9 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
                   "normals, range, class, thing")
       ->capture_default_str()
       ->check(CLI::Validator(validateChannels, "LIST"));
-  verb.add_option("--rgb", into.rgb)->capture_default_str()->check(CLI::IsMember({"png", "jpeg"}));
+  verb.add_option("--rgb", into.rgb, "File format of rgb")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"png", "jpeg"}));
   verb.add_option("--quality", into.quality, "JPEG quality")
       ->capture_default_str()
       ->check(makeWholeRangeValidator(1, 100, "1..100"));

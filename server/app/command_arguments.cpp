@@ -320,8 +320,7 @@ void addExportOptions(CLI::App& verb, CommandArguments& into) {
   addRun(verb, into, "1");
   verb.add_option("--max-size", into.maxMegabytes,
                   "Size of the --html file; above it, textures are left out first, then pictures")
-      ->type_name("MB")
-      ->check(CLI::Range(1.0, 2000.0))
+      ->check(CLI::Range(1.0, 2000.0).description("MB"))
       ->capture_default_str();
   verb.footer(
       "Uses:\n"
@@ -364,6 +363,8 @@ void addDoctorOptions(CLI::App& verb, CommandArguments& into) {
 
 void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
   addModel(inspect, into.model);
+  inspect.get_option("SCENE")->description(
+      "Model file (glTF, GLB, OBJ, COLLADA, FBX, IFC, PLY or STL) or recording (MCAP)");
   setGroup(inspect, "Options");
   inspect.add_flag("--json", into.json, "Print one JSON object");
   inspect.add_flag("--objects", into.objects,
@@ -386,10 +387,10 @@ void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
       ->check(CLI::IsMember({"png", "svg", "pdf"}))
       ->capture_default_str();
   inspect.add_option("--plan-scale", into.planScale, "Scale of svg and pdf plans: 1:N")
-      ->check(CLI::Range(1.0, 100000.0))
+      ->check(CLI::Range(1.0, 100000.0).description("N"))
       ->capture_default_str();
   inspect.footer(
-      "SCENE may be a RECORDING: --json and --strict apply.\n"
+      "Of the options, --json and --strict apply to a recording.\n"
       "Notes never fail --strict; the kinds of problems are listed by every report.\n"
       "Example: enfilade inspect house.ifc --plan out/plans --strict");
 }
@@ -403,16 +404,13 @@ void addRouteOptions(CLI::App& verb, CommandArguments& into) {
   verb.add_option("FROM", into.route.from, std::string("Start") + kPlaces)->required();
   verb.add_option("TO", into.route.to, std::string("Goal") + kPlaces)->required();
   verb.add_option("--radius", into.route.agent.radius, "Radius of the walker")
-      ->type_name("METRES")
-      ->check(CLI::Range(0.05, 5.0))
+      ->check(CLI::Range(0.05, 5.0).description("METRES"))
       ->capture_default_str();
   verb.add_option("--height", into.route.agent.height, "Height of the walker")
-      ->type_name("METRES")
-      ->check(CLI::Range(0.2, 10.0))
+      ->check(CLI::Range(0.2, 10.0).description("METRES"))
       ->capture_default_str();
-  verb.add_option("--speed", into.route.agent.speed, "Speed of the walk, in m/s")
-      ->type_name("SPEED")
-      ->check(CLI::Range(0.1, 20.0))
+  verb.add_option("--speed", into.route.agent.speed, "Speed of the walk")
+      ->check(CLI::Range(0.1, 20.0).description("M/S"))
       ->capture_default_str();
   verb.add_flag("--doors-as-they-are", into.route.doorsAsTheyAre,
                 "Doors that move stay as in the file. Default: they are open");

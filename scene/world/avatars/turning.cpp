@@ -12,7 +12,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kMinProgressFraction = 1e-6;  // of a tick's turn: minimum that counts as progress
+constexpr double kMinTurnFraction = 1e-6;  // of a tick's turn: minimum that counts as progress
 
 /// The facing of a direction, degrees in -180..180; 0 if it is vertical. By bisection, because
 /// libm's arc tangent differs between processors.
@@ -95,7 +95,7 @@ void turnAvatar(const WorldSettings& settings, Avatar& avatar, QueryCount& count
   turn.heading =
       turnsShape(avatar) ? avatar.facing : std::remainder(turn.heading + fraction * angle, 360);
   setViewFacing(avatar, turn.heading);
-  turn.timeoutLeft = fraction > kMinProgressFraction ? settings.stuckTimeout
+  turn.timeoutLeft = fraction > kMinTurnFraction ? settings.stuckTimeout
                                                      : turn.timeoutLeft - settings.tickDuration;
 }
 
