@@ -7,7 +7,7 @@
 # enfilade_unity_build(TARGET SIZE): groups the sources of each folder of TARGET, at most SIZE in
 # one group. An edit of a source then compiles at most SIZE of them.
 function(enfilade_unity_build target size)
-  if(NOT ENFILADE_UNITY)
+  if(NOT ENFILADE_UNITY STREQUAL "ON" AND NOT target IN_LIST ENFILADE_UNITY)
     return()
   endif()
   get_target_property(sources ${target} SOURCES)
