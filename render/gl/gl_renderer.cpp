@@ -253,6 +253,7 @@ VisibleSet GlRenderer::State::predictVisible(const FrameJob& job, const CachedVi
       visibleSet.items.push_back(item);
   }
   const std::vector<AvatarMeshes::Item>& avatarItems = dynamicInstances.avatars().items;
+  ENFILADE_ASSERT(std::ranges::is_sorted(cached.items) && std::ranges::is_sorted(cached.avatars));
   for (std::uint32_t i = 0; i < avatarItems.size(); ++i) {
     if (avatarItems[i].id == job.options.hiddenEntity) continue;
     if (!std::binary_search(cached.avatars.begin(), cached.avatars.end(), avatarItems[i].id))
@@ -330,6 +331,7 @@ void GlRenderer::State::updateCache(const FrameJob& job, const VisibleSet& drawn
       continue;
     kept.push_back(item);
   }
+  ENFILADE_ASSERT(std::ranges::is_sorted(drawn.items) && std::ranges::is_sorted(drawn.avatarItems));
   for (const std::uint32_t item : cached.items) {
     if (std::binary_search(drawn.items.begin(), drawn.items.end(), item)) continue;
     if ((item + frameNumber) % kForgetCulledPeriod != 0) kept.push_back(item);

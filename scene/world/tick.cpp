@@ -5,6 +5,7 @@
 #include <tuple>
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "scene/world/audit.hpp"
 #include "scene/world/avatars/avatar_motion.hpp"
 #include "scene/world/avatars/avatar_state.hpp"
@@ -130,6 +131,31 @@ bool isWorldIdle(const WorldData& world) {
   return true;
 }
 
+/// Whether all lists of the world have the order that their declarations promise.
+[[maybe_unused]] bool areListsAscending(const WorldData& world) {
+  const auto ascends = [](const auto& list, auto key) {
+    return std::adjacent_find(list.begin(), list.end(), [&](const auto& a, const auto& b) {
+             return !(key(a) < key(b));
+           }) == list.end();
+  };
+  const auto itself = [](const auto& one) { return one; };
+  const auto name = [](const auto& one) -> const std::string& { return one.name; };
+  const auto other = [](const Contact& one) { return one.other; };
+  const auto part = [](const Obstacle& one) { return std::pair(one.entity, one.part); };
+  const auto entity = [](const DenseObject& one) { return one.entity; };
+  for (const Avatar& avatar : world.avatars)
+    if (!ascends(avatar.contacts, other) || !ascends(avatar.obstacles.list, part) ||
+        !ascends(avatar.obstacles.dense, entity))
+      return false;
+  for (const Body& body : world.bodies)
+    if (!ascends(body.occupants, itself)) return false;
+  return ascends(world.avatars, name) && ascends(world.queues, name) &&
+         ascends(world.bodyContacts, [](const auto& one) { return one.first; }) &&
+         ascends(world.kinematicBodies, itself) && ascends(world.triggers, itself) &&
+         ascends(world.movingBodies, itself) && ascends(world.dynamicBodies.activeBodies, itself) &&
+         ascends(world.dynamicBodies.avatarBodyPairs, itself);
+}
+
 }  // namespace
 
 std::shared_ptr<const Snapshot> makeSnapshot(const WorldData& world) {
@@ -174,6 +200,7 @@ TickReport runTick(WorldData& world) {
   updateTriggers(world, report, count);
   updateWalkProgress(world, report, count);
   stopwatch.recordStage(Stage::narrow);
+  ENFILADE_ASSERT(areListsAscending(world));
   hashState(world);
   stopwatch.recordStage(Stage::hash);
   world.snapshot = makeSnapshot(world);

@@ -1,7 +1,9 @@
 #include "server/capture/frame_times.hpp"
 
+#include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "scene/world/world.hpp"
 #include "server/base/signal_handling.hpp"
 
@@ -35,6 +37,8 @@ void SnapshotStore::keep(const std::shared_ptr<const scene::Snapshot>& snapshot,
 
 void assignSnapshots(const std::shared_ptr<const scene::Scene>& scene, bool freezeScene,
                      const Shard& shard, std::vector<CaptureFrame>& captureFrames) {
+  ENFILADE_ASSERT(!captureFrames.empty() &&
+                  std::ranges::is_sorted(captureFrames, {}, &CaptureFrame::time));
   scene::World world(scene);
   const double tickSeconds = world.settings().tickDuration, begin = captureFrames.front().time;
   const bool moves = !freezeScene && !scene->model().bodies.empty();

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "protocol/mcap/records.hpp"
 
 namespace enfilade::server {
@@ -67,6 +68,8 @@ std::size_t findFirstAfter(const std::vector<WalkEvent>& list, double time) {
 }  // namespace
 
 IndexPairs alignEvents(const std::vector<WalkEvent>& before, const std::vector<WalkEvent>& after) {
+  ENFILADE_ASSERT(std::ranges::is_sorted(before, {}, &WalkEvent::time) &&
+                  std::ranges::is_sorted(after, {}, &WalkEvent::time));
   IndexPairs pairs;
   Range b{0, 0}, a{0, 0};
   while (b.first < before.size() || a.first < after.size()) {
@@ -88,6 +91,7 @@ IndexPairs alignEvents(const std::vector<WalkEvent>& before, const std::vector<W
     b.first = b.last;
     a.first = a.last;
   }
+  ENFILADE_ASSERT(std::ranges::is_sorted(pairs));
   return pairs;
 }
 

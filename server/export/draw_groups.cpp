@@ -6,6 +6,8 @@
 #include <tuple>
 #include <utility>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -165,8 +167,11 @@ DrawGroups makeDrawGroups(const scene::Model& model) {
     for (const std::uint32_t object : model.bodies[i].objects) isMerged[object] = false;
   }
   groups.instanced = chooseInstanceGroups(model, findCandidates(model, isMerged));
-  for (const InstanceGroup& group : groups.instanced)
+  for (const InstanceGroup& group : groups.instanced) {
+    ENFILADE_ASSERT(!group.meshes.empty() && group.transforms.size() == group.objects.size() &&
+                    std::ranges::is_sorted(group.objects));
     for (const std::uint32_t object : group.objects) isMerged[object] = false;
+  }
   groups.batches = makeBatches(model, isMerged);
   return groups;
 }

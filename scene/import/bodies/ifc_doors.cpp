@@ -6,6 +6,7 @@
 #include <set>
 #include <string_view>
 
+#include "collision/assert.hpp"
 #include "scene/import/bodies/door_leaf.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
@@ -32,6 +33,7 @@ struct DoorMotion {
 DoorMotion guessMotion(const DoorPieces& pieces) {
   DoorMotion motion{{}, true};
   const bool two = pieces.leaves.size() == 2;
+  ENFILADE_ASSERT(!two || pieces.leaves[0].panel.min.x() <= pieces.leaves[1].panel.min.x());
   for (std::size_t i = 0; i < pieces.leaves.size(); ++i) {
     const int latch = pieces.leaves[i].latch;
     const int hingeSide = latch == 0 ? -1 : -latch;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
@@ -123,6 +124,7 @@ class ElevatorFinder {
     if (cabin.empty()) return;
     if (cabin.size().y() > kMaxCabinHeight)
       return reportStatic(elevator, "it is taller than a cabin, so its moving part is unknown");
+    ENFILADE_ASSERT(std::is_sorted(heights_.begin(), heights_.end()));
     const auto floor = std::find_if(heights_.begin(), heights_.end(), [&](double height) {
       return std::abs(height - cabin.min.y()) <= kMaxFloorOffset;
     });

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -164,6 +166,7 @@ void CollisionGeometry::query(const Aabb& box, std::vector<std::uint32_t>& parts
   parts.erase(std::remove_if(parts.begin() + hullsEnd, parts.end(),
                              [&](std::uint32_t part) { return !overlaps(this->box(part), box); }),
               parts.end());
+  ENFILADE_ASSERT(std::is_sorted(parts.begin() + begin, parts.end()));
 }
 
 std::size_t CollisionGeometry::bytes() const {

@@ -4,6 +4,7 @@
 #include <span>
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
 
@@ -245,6 +246,7 @@ void collectPairs(WorldData& world, ThreadPool* threadPool) {
   std::ranges::sort(collector.keys);
   PairKeys keys(found.pairs.size() + collector.keys.size());
   std::ranges::merge(found.pairs, collector.keys, keys.begin());
+  ENFILADE_ASSERT(std::ranges::adjacent_find(keys) == keys.end());  // each pair once
   setPairs(world.dynamicBodies.physicsWorld, keys, threadPool);
 }
 

@@ -1,7 +1,9 @@
 #include "scene/world/bodies/passengers.hpp"
 
+#include <algorithm>
 #include <set>
 
+#include "collision/assert.hpp"
 #include "collision/narrow_phase/contact_manifold.hpp"
 
 namespace enfilade::scene {
@@ -41,6 +43,7 @@ double computeSupportNormalY(const WorldData& world, const Contact& contact, con
 
 std::vector<CarriedBody> findCarriedBodies(const WorldData& world, const Body& body,
                                            const SupportGraph& supportGraph) {
+  ENFILADE_ASSERT(std::ranges::is_sorted(supportGraph));
   std::vector<CarriedBody> carriedBodies;
   std::vector<EntityId> pending{body.id};
   std::set<EntityId> visited{body.id};

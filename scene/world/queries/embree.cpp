@@ -82,6 +82,7 @@ void attachTriangles(const TriangleBuffers& buffers, RTCSceneTy* scene, unsigned
 EmbreeScene buildTriangleTree(RTCDeviceTy* device, const EmbreeSceneOptions& options,
                               std::span<const Eigen::Vector3f> positions,
                               std::span<const std::uint32_t> corners, EmbreeFilter filter) {
+  ENFILADE_ASSERT(!corners.empty() && corners.size() % 3 == 0);
   const std::size_t triangles = corners.size() / 3;
   const TriangleBuffers buffers = makeTriangleBuffers(device, positions.size(), triangles);
   std::copy(positions.begin(), positions.end(), buffers.positions);

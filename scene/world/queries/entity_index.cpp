@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -82,7 +84,8 @@ const std::uint32_t* EntityIndex::findBodyOfObject(EntityId id) const {
 }
 
 const AvatarSnapshot* findAvatarSnapshot(const SceneAt& sceneAt, EntityId id) {
-  const auto& avatars = sceneAt.snapshot.avatars;  // ascending
+  const auto& avatars = sceneAt.snapshot.avatars;
+  ENFILADE_ASSERT(std::ranges::is_sorted(avatars, {}, &AvatarSnapshot::id));
   const auto at =
       std::lower_bound(avatars.begin(), avatars.end(), id,
                        [](const AvatarSnapshot& one, EntityId i) { return one.id < i; });

@@ -114,7 +114,8 @@ Aabb HorizonState::boxOf(EntityId entity) const {
     return placeBox(avatar->shape->box, avatar->footPosition);
   if (const BodySnapshot* body = findBodySnapshot(sceneAt(), entity))
     return bodies_[body->index].box;
-  const auto& objects = scene_->solidObjects();  // ascending
+  const auto& objects = scene_->solidObjects();
+  ENFILADE_ASSERT(std::ranges::is_sorted(objects));
   const auto at = std::lower_bound(objects.begin(), objects.end(), entity - 1);
   ENFILADE_ASSERT(at != objects.end() && *at == entity - 1);
   return scene_->staticBoxes()[static_cast<std::size_t>(at - objects.begin())];
