@@ -29,11 +29,11 @@ struct BuildingOptions {
 
 /// Makes a two-storey gallery along an enfilade of rooms on the X axis (z = 0); see
 /// assets/landmarks.hpp. Throws std::invalid_argument for a district of fewer than
-/// kSmallestDistrict objects.
+/// kMinDistrictObjects objects.
 scene::Model makeBuilding(const BuildingOptions& options = {},
                           std::vector<MovingPart>* movingParts = nullptr);
 
-inline constexpr std::size_t kSmallestDistrict = 5000;
+inline constexpr std::size_t kMinDistrictObjects = 5000;
 
 /// Makes the gallery and varied town houses on streets: exactly `objects` objects, with shared
 /// meshes.

@@ -56,7 +56,7 @@ bool place(District& d, const Prototype& prototype, const std::string& path,
 }
 
 void addLampPost(Sketch& sketch) {
-  Shape s;
+  PaintedMesh s;
   addTurned(s, Vec3::Zero(), {{0.12, 0}, {0.12, 0.1}, {0.05, 0.2}, {0.04, 4.0}}, 12,
             Paint::darkIron);
   addBall(s, {0, 4.15, 0}, {0.2, 0.2, 0.2}, 12, Paint::lampGlow);
@@ -143,8 +143,8 @@ void fillUp(District& d, const Vec3& middle) {
 }  // namespace
 
 scene::Model makeDistrict(std::size_t objects, std::uint64_t seed) {
-  if (objects < kSmallestDistrict)
-    throw std::invalid_argument("a district has at least " + std::to_string(kSmallestDistrict) +
+  if (objects < kMinDistrictObjects)
+    throw std::invalid_argument("a district has at least " + std::to_string(kMinDistrictObjects) +
                                 " objects, not " + std::to_string(objects) +
                                 "; omit the number for the gallery alone");
   District d = prepared(objects, seed);

@@ -8,11 +8,11 @@ namespace enfilade::assets {
 void placeBench(Sketch& sketch, const std::string& path, const Spot& spot, double width,
                 Paint cloth) {
   const Eigen::Affine3d place = turned(spot.quarters, spot.at);
-  Shape seat;
+  PaintedMesh seat;
   addBox(seat, {-0.24, 0.36, -width / 2}, {0.24, 0.4, width / 2}, Paint::oakDark);
   addBox(seat, {-0.23, 0.395, -width / 2 + 0.01}, {0.23, 0.46, width / 2 - 0.01}, cloth);
   sketch.place(path + "/seat", seat, place);
-  Shape leg;
+  PaintedMesh leg;
   addTurned(leg, Vec3::Zero(), {{0.018, 0}, {0.025, 0.3}, {0.035, 0.362}}, 8, Paint::oakDark);
   int number = 0;
   for (const double x : {-0.18, 0.18})
@@ -21,9 +21,9 @@ void placeBench(Sketch& sketch, const std::string& path, const Spot& spot, doubl
 }
 
 void placePlinth(Sketch& sketch, const std::string& path, const Spot& spot, double height,
-                 const Shape& exhibit) {
+                 const PaintedMesh& exhibit) {
   const Eigen::Affine3d place = turned(spot.quarters, spot.at);
-  Shape plinth;
+  PaintedMesh plinth;
   addBox(plinth, {-0.27, 0, -0.27}, {0.27, 0.08, 0.27}, Paint::plaster);
   addBox(plinth, {-0.24, 0.078, -0.24}, {0.24, height - 0.04, 0.24}, Paint::plaster);
   addBox(plinth, {-0.26, height - 0.042, -0.26}, {0.26, height, 0.26}, Paint::plaster);
@@ -35,19 +35,19 @@ void placeDisplayCase(Sketch& sketch, const std::string& path, const Spot& spot,
                       Random& random) {
   const Eigen::Affine3d place = turned(spot.quarters, spot.at);
   const double x = 0.3, z = width / 2;
-  Shape base;
+  PaintedMesh base;
   addBox(base, {-x, 0, -z}, {x, 0.06, z}, Paint::blackMetal);
   addBox(base, {-x + 0.02, 0.055, -z + 0.02}, {x - 0.02, 0.78, z - 0.02}, Paint::mahogany);
   addBox(base, {-x, 0.775, -z}, {x, 0.82, z}, Paint::brass);
   addBox(base, {-x + 0.02, 0.815, -z + 0.02}, {x - 0.02, 0.83, z - 0.02}, Paint::fabricCream);
   sketch.place(path + "/base", base, place);
-  Shape glass;
+  PaintedMesh glass;
   addBox(glass, {-x + 0.008, 0.821, -z + 0.008}, {x - 0.008, 1.25, z - 0.008}, Paint::caseGlass);
   sketch.place(path + "/glass", glass, place);
   constexpr Paint kGlaze[] = {Paint::cobalt, Paint::celadon, Paint::clay, Paint::bronze};
   const int pieces = std::max(2, static_cast<int>(width / 0.4));
   for (int i = 0; i < pieces; ++i) {
-    Shape piece;
+    PaintedMesh piece;
     const int kind = random.below(4);
     Eigen::Affine3d small = moved({0, 0.829, -z + width * (i + 0.5) / pieces});
     small.linear() *= 0.55;
@@ -61,8 +61,8 @@ namespace {
 constexpr Paint kSpines[] = {Paint::bookRed,   Paint::bookBlue,  Paint::bookGreen, Paint::bookBrown,
                              Paint::bookOchre, Paint::bookBlack, Paint::bookCream, Paint::bookTeal};
 
-Shape bookShape(double depth, double height, double thickness, Paint spine) {
-  Shape s;
+PaintedMesh bookShape(double depth, double height, double thickness, Paint spine) {
+  PaintedMesh s;
   addBox(s, {0, 0, 0}, {depth, height, thickness},
          {Paint::paper, spine, Paint::paper, Paint::paper, spine, spine});
   return s;
@@ -92,7 +92,7 @@ void placeBookcase(Sketch& sketch, const std::string& path, const Spot& spot, do
                    double height, Random& random) {
   const Eigen::Affine3d place = turned(spot.quarters, spot.at);
   const double z = width / 2, board = 0.03, depth = 0.32;
-  Shape carcass;
+  PaintedMesh carcass;
   addBox(carcass, {0.002, 0, -z}, {0.02, height, z}, Paint::mahogany);
   addBox(carcass, {0.018, 0, -z}, {depth, height, -z + board}, Paint::mahogany);
   addBox(carcass, {0.018, 0, z - board}, {depth, height, z}, Paint::mahogany);
@@ -105,7 +105,7 @@ void placeBookcase(Sketch& sketch, const std::string& path, const Spot& spot, do
   for (int i = 0; i < shelves; ++i) {
     const double y = 0.1 + pitch * i;
     const std::string shelf = path + "/shelf" + std::to_string(i + 1);
-    Shape boardShape;
+    PaintedMesh boardShape;
     addBox(boardShape, {0.019, -board, -z + board - 0.001}, {depth - 0.01, 0, z - board + 0.001},
            Paint::mahogany);
     sketch.place(shelf + "/board", boardShape, place * moved({0, y + board, 0}));
@@ -117,11 +117,11 @@ void placeBookcase(Sketch& sketch, const std::string& path, const Spot& spot, do
 void placeCafeTable(Sketch& sketch, const std::string& path, const Spot& spot, int chairs) {
   const Eigen::Affine3d place = turned(spot.quarters, spot.at);
   sketch.place(path + "/table", roundTableShape(0.42, Paint::marbleWhite), place);
-  Shape cup;
+  PaintedMesh cup;
   addTurned(cup, Vec3::Zero(), {{0.03, 0}, {0.075, 0.008}, {0.078, 0.016}}, 12, Paint::plaster);
   addTurned(cup, {0, 0.012, 0}, {{0.022, 0}, {0.038, 0.03}, {0.04, 0.07}}, 12, Paint::plaster);
-  Shape flower = vaseShape(1, Paint::celadon);
-  for (Shape::Part& part : flower.parts)
+  PaintedMesh flower = vaseShape(1, Paint::celadon);
+  for (PaintedMesh::Part& part : flower.parts)
     for (Vec3& p : part.positions) p *= 0.35;
   sketch.place(path + "/vase", flower, place * moved({0, 0.7455, 0}));
   for (int i = 0; i < chairs; ++i) {

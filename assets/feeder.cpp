@@ -30,14 +30,14 @@ double innerOf(std::size_t parts) {
   return 0.5 * kSpacing * across;
 }
 
-Shape turnedPart(double radius, double halfHeight, double top, int sides, Paint paint) {
-  Shape shape;
+PaintedMesh turnedPart(double radius, double halfHeight, double top, int sides, Paint paint) {
+  PaintedMesh shape;
   addTurned(shape, Vec3::Zero(), {{radius, -halfHeight}, {top * radius, halfHeight}}, sides, paint);
   return shape;
 }
 
-std::array<Shape, 5> kindsOfParts() {
-  std::array<Shape, 5> kinds;
+std::array<PaintedMesh, 5> kindsOfParts() {
+  std::array<PaintedMesh, 5> kinds;
   addBox(kinds[0], Vec3(-0.010, -0.005, -0.007), Vec3(0.010, 0.005, 0.007), Paint::steel);
   kinds[1] = turnedPart(0.009, 0.004, 1, 6, Paint::brass);
   addPrism(kinds[2], {{-0.009, -0.005}, {0.009, -0.005}, {0, 0.010}},
@@ -72,7 +72,7 @@ void placeTray(Sketch& sketch, double in) {
 
 void placeParts(Sketch& sketch, const FeederOptions& options, double in) {
   Random random(options.seed);
-  const std::array<Shape, 5> kinds = kindsOfParts();
+  const std::array<PaintedMesh, 5> kinds = kindsOfParts();
   const auto across = static_cast<std::size_t>(std::lround(2 * in / kSpacing));
   for (std::size_t i = 0; i < options.parts; ++i) {
     const std::size_t row = i % across, column = i / across % across, layer = i / across / across;

@@ -46,7 +46,7 @@ void hangLamps(Sketch& sketch, int i) {
     sketch.place(path + (z < 0 ? "pendant_north" : "pendant_south"),
                  pendantShape(0.75, Paint::brass), moved({middle, kCeiling, z}));
   int number = 0;
-  const Shape spot = spotShape();
+  const PaintedMesh spot = spotShape();
   for (const double z : {-1.95, 1.95}) {
     sketch.place(numbered(path + "spot", ++number), spot,
                  turned(2, {roomWest(i) + 1.0, kCeiling, z}));
@@ -71,7 +71,7 @@ void placeCorners(Sketch& sketch, int i, Random& random) {
 
 /// Rows of chairs before a grand piano.
 void placeMusic(Sketch& sketch, const std::string& path, double middle) {
-  Shape piano;
+  PaintedMesh piano;
   addPrism(piano,
            {{-0.75, -0.7},
             {0.75, -0.7},
@@ -168,12 +168,12 @@ void furnishEnfilade(Sketch& sketch, Random& random) {
 void furnishHall(Sketch& sketch, Random& random) {
   const std::string path = "building/hall/";
   const double middle = 0.5 * (kVoidWest + kVoidEast);
-  Shape base;
+  PaintedMesh base;
   addBox(base, {-1.1, 0, -1.1}, {1.1, 0.12, 1.1}, Paint::plinthStone);
   addBox(base, {-0.5, 0.118, -0.5}, {0.5, 1.0, 0.5}, Paint::marbleWhite);
   addBox(base, {-0.56, 0.995, -0.56}, {0.56, 1.08, 0.56}, Paint::marbleWhite);
   sketch.place(path + "statue/base", base, moved({53.5, 0, 0.8}));
-  Shape figure;
+  PaintedMesh figure;
   append(figure, sculptureShape(4, Paint::bronze), turned(2) * Eigen::Scaling(1.25));
   sketch.place(path + "statue/figure", figure, moved({53.5, 1.078, 0.8}));
   int number = 0;
@@ -181,11 +181,11 @@ void furnishHall(Sketch& sketch, Random& random) {
     for (const double z : {-1.5, 1.5})
       sketch.place(numbered(path + "statue/stanchion", ++number), stanchionShape(),
                    moved({53.5 + x, 0, 0.8 + z}));
-  Shape desk;
+  PaintedMesh desk;
   addBox(desk, {-0.35, 0, -1.3}, {0.3, 1.0, 1.3}, Paint::oakDark);
   addBox(desk, {-0.4, 0.998, -1.35}, {0.42, 1.05, 1.35}, Paint::marbleGrey);
   sketch.place(path + "desk/counter", desk, turned(1, {47.5, 0, 5.0}));
-  Shape screen;
+  PaintedMesh screen;
   addBox(screen, {-0.02, 0.1, -0.25}, {0.02, 0.42, 0.25}, Paint::blackMetal);
   addBox(screen, {-0.08, 0, -0.1}, {0.08, 0.02, 0.1}, Paint::blackMetal);
   addBox(screen, {-0.015, 0.01, -0.03}, {0.015, 0.12, 0.03}, Paint::blackMetal);
@@ -206,7 +206,7 @@ void furnishHall(Sketch& sketch, Random& random) {
       sketch.place(numbered(path + "gallery_lamp", ++number), pendantShape(0.5, Paint::lampShade),
                    moved({kHallWest + 2.5 + 4.3 * i, kUpper - kSlab, z}));
   for (int i = 0; i < 3; ++i) {
-    Shape ring;
+    PaintedMesh ring;
     addRod(ring, {0, 0, 0}, {0, 3.0, 0}, 0.012, 8, Paint::blackMetal);
     addTorus(ring, Vec3::Zero(), 0.8, 0.03, 24, 8, Paint::brass);
     addTorus(ring, {0, -0.05, 0}, 0.8, 0.028, 24, 8, Paint::lampGlow);
@@ -258,7 +258,7 @@ void furnishUpperFloor(Sketch& sketch, Random& random) {
   int number = 0;
   for (double x = 19; x < 35; x += 3.4) {  // the studio's easels
     const std::string path = "building/upper/studio/easel" + std::to_string(++number);
-    Shape stand;
+    PaintedMesh stand;
     addRod(stand, {0.2, 0, -0.3}, {0, 1.8, 0}, 0.02, 8, Paint::birch);
     addRod(stand, {0.2, 0, 0.3}, {0, 1.8, 0.02}, 0.02, 8, Paint::birch);
     addRod(stand, {-0.5, 0, 0}, {0, 1.7, 0.01}, 0.02, 8, Paint::birch);

@@ -3,7 +3,7 @@
 namespace enfilade::assets {
 namespace {
 
-void addLegs(Shape& s, double halfX, double halfZ, double height, double thick, Paint paint) {
+void addLegs(PaintedMesh& s, double halfX, double halfZ, double height, double thick, Paint paint) {
   for (const double x : {-halfX, halfX})
     for (const double z : {-halfZ, halfZ})
       addBox(s, {x - thick, 0, z - thick}, {x + thick, height, z + thick}, paint);
@@ -11,8 +11,8 @@ void addLegs(Shape& s, double halfX, double halfZ, double height, double thick, 
 
 }  // namespace
 
-Shape chairShape(Paint wood, Paint seat) {
-  Shape s;
+PaintedMesh chairShape(Paint wood, Paint seat) {
+  PaintedMesh s;
   addLegs(s, 0.19, 0.19, 0.43, 0.018, wood);
   addBox(s, {-0.215, 0.425, -0.215}, {0.215, 0.45, 0.215}, wood);
   addBox(s, {-0.19, 0.445, -0.2}, {0.205, 0.48, 0.2}, seat);
@@ -23,8 +23,8 @@ Shape chairShape(Paint wood, Paint seat) {
   return s;
 }
 
-Shape stoolShape() {
-  Shape s;
+PaintedMesh stoolShape() {
+  PaintedMesh s;
   addCylinder(s, {0, 0, 0}, 0.2, 0.02, 16, Paint::blackMetal);
   addCylinder(s, {0, 0.018, 0}, 0.025, 0.69, 8, Paint::chrome);
   addTorus(s, {0, 0.28, 0}, 0.15, 0.01, 16, 8, Paint::chrome);
@@ -33,12 +33,12 @@ Shape stoolShape() {
   return s;
 }
 
-Shape armchairShape(Paint cloth) {
+PaintedMesh armchairShape(Paint cloth) {
   return sofaShape(cloth, 0.85);
 }
 
-Shape sofaShape(Paint cloth, double width) {
-  Shape s;
+PaintedMesh sofaShape(Paint cloth, double width) {
+  PaintedMesh s;
   const double h = width / 2;
   addLegs(s, 0.34, h - 0.08, 0.11, 0.025, Paint::mahogany);
   addBox(s, {-0.42, 0.1, -h}, {0.4, 0.3, h}, cloth);
@@ -57,8 +57,8 @@ Shape sofaShape(Paint cloth, double width) {
   return s;
 }
 
-Shape tableShape(double depth, double width, Paint wood) {
-  Shape s;
+PaintedMesh tableShape(double depth, double width, Paint wood) {
+  PaintedMesh s;
   addBox(s, {-depth / 2, 0.71, -width / 2}, {depth / 2, 0.75, width / 2}, wood);
   addBox(s, {-depth / 2 + 0.06, 0.62, -width / 2 + 0.06},
          {depth / 2 - 0.06, 0.715, width / 2 - 0.06}, wood);
@@ -66,8 +66,8 @@ Shape tableShape(double depth, double width, Paint wood) {
   return s;
 }
 
-Shape roundTableShape(double radius, Paint wood) {
-  Shape s;
+PaintedMesh roundTableShape(double radius, Paint wood) {
+  PaintedMesh s;
   addTurned(s, {0, 0.71, 0}, {{radius - 0.02, 0}, {radius, 0.015}, {radius, 0.035}}, 24, wood);
   addTurned(s, {0, 0, 0},
             {{0.26, 0}, {0.26, 0.03}, {0.06, 0.07}, {0.04, 0.3}, {0.05, 0.6}, {0.14, 0.715}}, 12,
@@ -75,13 +75,13 @@ Shape roundTableShape(double radius, Paint wood) {
   return s;
 }
 
-Shape vaseShape(int kind, Paint glaze) {
+PaintedMesh vaseShape(int kind, Paint glaze) {
   static const std::vector<std::vector<Ring>> kOutlines{
       {{0.09, 0}, {0.15, 0.08}, {0.19, 0.2}, {0.16, 0.34}, {0.08, 0.42}, {0.07, 0.48}, {0.1, 0.52}},
       {{0.12, 0}, {0.16, 0.12}, {0.13, 0.3}, {0.06, 0.42}, {0.05, 0.58}, {0.08, 0.64}},
       {{0.08, 0}, {0.07, 0.04}, {0.16, 0.14}, {0.2, 0.26}, {0.2, 0.3}, {0.18, 0.31}},
       {{0.1, 0}, {0.11, 0.2}, {0.17, 0.34}, {0.17, 0.42}, {0.06, 0.5}, {0.09, 0.54}}};
-  Shape s;
+  PaintedMesh s;
   addTurned(s, Vec3::Zero(), kOutlines[static_cast<std::size_t>(kind) % kOutlines.size()], 24,
             glaze);
   return s;
@@ -90,11 +90,11 @@ Shape vaseShape(int kind, Paint glaze) {
 namespace {
 
 /// A column of slabs, each rotated a little further than the one below.
-void addTwistedColumn(Shape& s, Paint stone) {
+void addTwistedColumn(PaintedMesh& s, Paint stone) {
   constexpr int kSlabs = 16;
   Eigen::Affine3d turn = Eigen::Affine3d::Identity();
   for (int i = 0; i < kSlabs; ++i) {
-    Shape slab;
+    PaintedMesh slab;
     const double half = 0.17 - 0.005 * i, y = 0.07 * i;
     addBox(slab, {-half, y - 0.002, -half * 0.6}, {half, y + 0.07, half * 0.6}, stone);
     append(s, slab, turn);
@@ -102,7 +102,7 @@ void addTwistedColumn(Shape& s, Paint stone) {
   }
 }
 
-void addBust(Shape& s, Paint stone) {
+void addBust(PaintedMesh& s, Paint stone) {
   addTurned(s, Vec3::Zero(),
             {{0.11, 0},
              {0.11, 0.05},
@@ -119,7 +119,7 @@ void addBust(Shape& s, Paint stone) {
   addBall(s, {-0.02, 0.66, 0}, {0.12, 0.11, 0.105}, 12, stone);
 }
 
-void addFigure(Shape& s, Paint stone) {
+void addFigure(PaintedMesh& s, Paint stone) {
   addTurned(s, Vec3::Zero(),
             {{0.22, 0},
              {0.22, 0.04},
@@ -139,8 +139,8 @@ void addFigure(Shape& s, Paint stone) {
   addRod(s, {-0.04, 1.62, -0.26}, {0.08, 1.86, -0.14}, 0.036, 12, stone);
 }
 
-void addRings(Shape& s, Paint stone) {
-  Shape ring;
+void addRings(PaintedMesh& s, Paint stone) {
+  PaintedMesh ring;
   addTorus(ring, Vec3::Zero(), 0.26, 0.045, 24, 12, stone);
   Eigen::Affine3d upright = Eigen::Affine3d::Identity();
   upright.linear() << 1, 0, 0, 0, 0, -1, 0, 1, 0;
@@ -154,8 +154,8 @@ void addRings(Shape& s, Paint stone) {
 
 }  // namespace
 
-Shape sculptureShape(int kind, Paint stone) {
-  Shape s;
+PaintedMesh sculptureShape(int kind, Paint stone) {
+  PaintedMesh s;
   switch (kind % 5) {
     case 0:
       addBust(s, stone);
@@ -177,8 +177,8 @@ Shape sculptureShape(int kind, Paint stone) {
   return s;
 }
 
-Shape pottedPlantShape(Random& random) {
-  Shape s;
+PaintedMesh pottedPlantShape(Random& random) {
+  PaintedMesh s;
   addTurned(s, Vec3::Zero(), {{0.15, 0}, {0.2, 0.34}, {0.22, 0.35}, {0.22, 0.4}}, 16, Paint::clay);
   addCylinder(s, {0, 0.4, 0}, 0.19, 0.006, 16, Paint::soil);
   constexpr Paint kLeaves[] = {Paint::leaf, Paint::leafDark, Paint::leafLight};
@@ -208,8 +208,8 @@ Shape pottedPlantShape(Random& random) {
   return s;
 }
 
-Shape globeShape() {
-  Shape s;
+PaintedMesh globeShape() {
+  PaintedMesh s;
   addTurned(s, Vec3::Zero(), {{0.22, 0}, {0.22, 0.03}, {0.05, 0.06}, {0.035, 0.5}, {0.07, 0.55}},
             16, Paint::mahogany);
   addBall(s, {0, 0.82, 0}, {0.26, 0.26, 0.26}, 24, Paint::paintBlue);
@@ -218,16 +218,16 @@ Shape globeShape() {
   return s;
 }
 
-Shape floorLampShape() {
-  Shape s;
+PaintedMesh floorLampShape() {
+  PaintedMesh s;
   addCylinder(s, Vec3::Zero(), 0.15, 0.025, 16, Paint::brass);
   addCylinder(s, {0, 0.02, 0}, 0.012, 1.4, 8, Paint::brass);
   addTurned(s, {0, 1.35, 0}, {{0.22, 0}, {0.15, 0.3}}, 16, Paint::lampShade);
   return s;
 }
 
-Shape tableLampShape() {
-  Shape s;
+PaintedMesh tableLampShape() {
+  PaintedMesh s;
   addTurned(s, Vec3::Zero(), {{0.08, 0}, {0.08, 0.015}, {0.02, 0.04}, {0.015, 0.26}}, 12,
             Paint::brass);
   addTurned(s, {0, 0.25, 0}, {{0.15, 0}, {0.09, 0.14}}, 16, Paint::leatherGreen);
@@ -235,8 +235,8 @@ Shape tableLampShape() {
   return s;
 }
 
-Shape pendantShape(double cord, Paint shade) {
-  Shape s;
+PaintedMesh pendantShape(double cord, Paint shade) {
+  PaintedMesh s;
   addCylinder(s, {0, -0.03, 0}, 0.06, 0.03, 12, Paint::brass);
   addCylinder(s, {0, -cord, 0}, 0.006, cord, 8, Paint::blackMetal);
   addTurned(s, {0, -cord - 0.3, 0}, {{0.26, 0}, {0.25, 0.06}, {0.16, 0.22}, {0.05, 0.31}}, 24,
@@ -245,10 +245,10 @@ Shape pendantShape(double cord, Paint shade) {
   return s;
 }
 
-Shape spotShape() {
-  Shape s;
+PaintedMesh spotShape() {
+  PaintedMesh s;
   addCylinder(s, {0, -0.09, 0}, 0.012, 0.09, 8, Paint::blackMetal);
-  Shape head;
+  PaintedMesh head;
   addTurned(head, {0, -0.17, 0}, {{0.05, 0}, {0.05, 0.13}, {0.03, 0.16}}, 12, Paint::blackMetal);
   addCylinder(head, {0, -0.174, 0}, 0.042, 0.012, 12, Paint::spotGlow);
   Eigen::Affine3d tilt = Eigen::Affine3d::Identity();
@@ -258,8 +258,8 @@ Shape spotShape() {
   return s;
 }
 
-Shape radiatorShape(double width) {
-  Shape s;
+PaintedMesh radiatorShape(double width) {
+  PaintedMesh s;
   const int ribs = static_cast<int>(width / 0.09);
   for (int i = 0; i < ribs; ++i) {
     const double z = -width / 2 + 0.09 * i;
@@ -270,8 +270,8 @@ Shape radiatorShape(double width) {
   return s;
 }
 
-Shape stanchionShape() {
-  Shape s;
+PaintedMesh stanchionShape() {
+  PaintedMesh s;
   addTurned(s, Vec3::Zero(),
             {{0.15, 0},
              {0.15, 0.015},
@@ -285,9 +285,9 @@ Shape stanchionShape() {
   return s;
 }
 
-Shape rugShape(double sizeX, double sizeZ, Paint ground, Paint border) {
+PaintedMesh rugShape(double sizeX, double sizeZ, Paint ground, Paint border) {
   const double x = sizeX / 2, z = sizeZ / 2;
-  Shape s;
+  PaintedMesh s;
   addBox(s, {-x, -0.002, -z}, {x, 0.006, z}, border);
   addBox(s, {-x + 0.15, 0, -z + 0.15}, {x - 0.15, 0.008, z - 0.15}, ground);
   addBox(s, {-x + 0.3, 0, -z + 0.3}, {x - 0.3, 0.0095, z - 0.3}, border);

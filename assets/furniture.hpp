@@ -15,24 +15,24 @@ struct Spot {
   int quarters = 0;
 };
 
-Shape chairShape(Paint wood, Paint seat);
-Shape stoolShape();
-Shape armchairShape(Paint cloth);
-Shape sofaShape(Paint cloth, double width);
-Shape tableShape(double depth, double width, Paint wood);
-Shape roundTableShape(double radius, Paint wood);
-Shape vaseShape(int kind, Paint glaze);
-Shape sculptureShape(int kind, Paint stone);
-Shape pottedPlantShape(Random& random);
-Shape globeShape();
-Shape floorLampShape();
-Shape tableLampShape();
-Shape pendantShape(double cord, Paint shade);
-Shape spotShape();
-Shape radiatorShape(double width);
-Shape stanchionShape();
+PaintedMesh chairShape(Paint wood, Paint seat);
+PaintedMesh stoolShape();
+PaintedMesh armchairShape(Paint cloth);
+PaintedMesh sofaShape(Paint cloth, double width);
+PaintedMesh tableShape(double depth, double width, Paint wood);
+PaintedMesh roundTableShape(double radius, Paint wood);
+PaintedMesh vaseShape(int kind, Paint glaze);
+PaintedMesh sculptureShape(int kind, Paint stone);
+PaintedMesh pottedPlantShape(Random& random);
+PaintedMesh globeShape();
+PaintedMesh floorLampShape();
+PaintedMesh tableLampShape();
+PaintedMesh pendantShape(double cord, Paint shade);
+PaintedMesh spotShape();
+PaintedMesh radiatorShape(double width);
+PaintedMesh stanchionShape();
 /// A rug flat on the floor; `low`, `high` are its corners in x and z.
-Shape rugShape(double sizeX, double sizeZ, Paint ground, Paint border);
+PaintedMesh rugShape(double sizeX, double sizeZ, Paint ground, Paint border);
 
 /// An upholstered bench whose legs are separate objects.
 void placeBench(Sketch& sketch, const std::string& path, const Spot& spot, double width,
@@ -42,7 +42,7 @@ void placeDisplayCase(Sketch& sketch, const std::string& path, const Spot& spot,
                       Random& random);
 /// A plinth with a sculpture or a vase on it.
 void placePlinth(Sketch& sketch, const std::string& path, const Spot& spot, double height,
-                 const Shape& exhibit);
+                 const PaintedMesh& exhibit);
 /// A bookcase whose boards and books are separate objects; its back is at x = 0.
 void placeBookcase(Sketch& sketch, const std::string& path, const Spot& spot, double width,
                    double height, Random& random);

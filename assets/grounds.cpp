@@ -10,7 +10,7 @@ void addRoofs(Sketch& sketch) {
   const double y = kEaves - 0.01, ridge = 11.0, over = 0.55;
   const double x0 = -kOuter - over, x1 = roomEast(5), z0 = kNorth - kOuter - over,
                z1 = kSouth + kOuter + over, zm = 0.5 * (z0 + z1);
-  Shape roof;
+  PaintedMesh roof;
   const Vec3 a{x0, y, z0}, b{x0, y, z1}, c{x1, y, z1}, d{x1, y, z0};
   const Vec3 p{x0 + 5.5, ridge, zm}, q{x1, ridge, zm};
   addQuad(roof, b, c, q, p, Paint::slateRoof);
@@ -78,7 +78,7 @@ void addEntrance(Sketch& sketch) {
   sketch.box(path + "landing", {-1.6, kGround - 0.1, -1.8}, {-kOuter + 0.003, 0, 1.8},
              Paint::plinthStone);
   for (const double z : {-1.5, 1.5}) {
-    Shape pillar;
+    PaintedMesh pillar;
     addTurned(pillar, Vec3::Zero(),
               {{0.2, 0}, {0.2, 0.12}, {0.15, 0.16}, {0.13, 2.85}, {0.2, 2.95}, {0.2, 3.05}}, 16,
               Paint::facadeTrim);
@@ -116,7 +116,7 @@ void addHedges(Sketch& sketch, Random& random) {
     }
   for (int i = 0; i < 12; ++i) {
     const double x = 2.5 + 3.3 * i;
-    Shape bush;
+    PaintedMesh bush;
     const double r = random.between(0.4, 0.55);
     addBall(bush, {0, r * 0.8, 0}, {r, r, r}, 12, i % 3 ? Paint::leafDark : Paint::leafLight);
     sketch.place(numbered("grounds/bush", i + 1), bush, moved({x, kGround, 4.6}));
@@ -126,7 +126,7 @@ void addHedges(Sketch& sketch, Random& random) {
 }  // namespace
 
 void addTree(Sketch& sketch, const std::string& path, const Vec3& foot, Random& random) {
-  Shape trunk, crown;
+  PaintedMesh trunk, crown;
   const double height = random.between(2.2, 3.2), spread = random.between(1.3, 2.0);
   addTurned(trunk, Vec3::Zero(), {{0.28, -0.1}, {0.17, 0.3}, {0.13, height}, {0.05, height + 1.2}},
             12, Paint::bark);

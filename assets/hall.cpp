@@ -102,9 +102,9 @@ void addEdgeBands(Sketch& sketch) {
   band("east_b", {Along::z, kStairHigh, kVoidHalf, kVoidEast, -1});
 }
 
-Shape columnShape(double height, double radius) {
+PaintedMesh columnShape(double height, double radius) {
   const double r = radius;
-  Shape s;
+  PaintedMesh s;
   addBox(s, {-1.45 * r, 0, -1.45 * r}, {1.45 * r, 0.12, 1.45 * r}, Paint::plinthStone);
   addTurned(s, {0, 0.118, 0},
             {{1.35 * r, 0},
@@ -131,8 +131,8 @@ void addColumns(Sketch& sketch) {
     for (const double z : {-z1, z1}) feet.push_back({x0 + (x1 - x0) * i / 3, 0, z});
   for (const double x : {x0, x1})
     for (const double z : {-z1 / 3, z1 / 3}) feet.push_back({x, 0, z});
-  const Shape lower = columnShape(kUpper - kSlab, 0.2);
-  const Shape upper = columnShape(kHallCeiling - kUpper, 0.16);
+  const PaintedMesh lower = columnShape(kUpper - kSlab, 0.2);
+  const PaintedMesh upper = columnShape(kHallCeiling - kUpper, 0.16);
   int number = 0;
   for (const Vec3& foot : feet) {
     sketch.place(numbered("building/hall/columns/lower", ++number), lower, moved(foot));
@@ -165,7 +165,7 @@ void addSkylight(Sketch& sketch) {
     const double x = west + (east - west) * i / kBays;
     for (const double side : {-1.0, 1.0}) {
       const std::string name = side < 0 ? "rafter_north" : "rafter_south";
-      Shape rafter;
+      PaintedMesh rafter;
       addSlopedBar(rafter, {0, 0, 0}, {0, ridge - curb, -side * (half + 0.1)}, 0.06, 0.14,
                    Paint::facadeTrim);
       sketch.place(numbered(lantern + name, i + 1), rafter,
@@ -177,7 +177,7 @@ void addSkylight(Sketch& sketch) {
   for (int i = 0; i < kBays; ++i) {
     const double x = west + (east - west) * (i + 0.5) / kBays;
     for (const double side : {-1.0, 1.0}) {
-      Shape pane;
+      PaintedMesh pane;
       addSlopedBar(pane, {0, 0, 0}, {0, ridge - curb, -side * (half + 0.08)},
                    (east - west) / kBays - 0.05, 0.012, Paint::glass);
       sketch.place(numbered(lantern + (side < 0 ? "pane_north" : "pane_south"), i + 1), pane,
@@ -185,7 +185,7 @@ void addSkylight(Sketch& sketch) {
     }
   }
   for (const double x : {west - 0.07, east + 0.07}) {
-    Shape gable;
+    PaintedMesh gable;
     addPrism(gable, {{-half, 0}, {half, 0}, {0, ridge - curb}},
              {{-0.006, 0, 0}, {0, 0, -1}, {0, 1, 0}, {1, 0, 0}}, 0.012, Paint::glass);
     sketch.place(lantern + (x < 0.5 * (west + east) ? "gable_west" : "gable_east"), gable,

@@ -124,7 +124,7 @@ void furnish(Sketch& sketch, const Plan& p, int storey, Random& random) {
 
 void addRoof(Sketch& sketch, const Plan& p) {
   const double x = p.halfX + kWallThick, z = p.halfZ + kWallThick + 0.4, y = kStorey * p.storeys;
-  Shape roof;
+  PaintedMesh roof;
   addPrism(roof, {{-z, -0.01}, {z, -0.01}, {0, z * 0.6}},
            {{-x, y, 0}, {0, 0, -1}, {0, 1, 0}, {1, 0, 0}}, 2 * x, p.roof);
   sketch.place("roof", roof, moved(Vec3::Zero()));

@@ -9,7 +9,7 @@ namespace {
 
 /// The picture's plane: origin in the centre, x to the right and y up as seen by a viewer.
 struct Easel {
-  Shape& shape;
+  PaintedMesh& shape;
   double halfWidth, halfHeight;
   double depth = 0.021;  ///< of the next layer, from the wall
 
@@ -167,9 +167,9 @@ void paintSomething(Easel& e, Random& random) {
   }
 }
 
-Shape frameShape(double w, double h, Paint paint) {
+PaintedMesh frameShape(double w, double h, Paint paint) {
   const double bar = 0.075, out = 0.055;
-  Shape s;
+  PaintedMesh s;
   addBox(s, {-0.003, -h, -w}, {out, -h + bar, w}, paint);
   addBox(s, {-0.003, h - bar, -w}, {out, h, w}, paint);
   // A millimetre shallower: boxes with a shared edge would not be separate closed solids.
@@ -187,7 +187,7 @@ void placePicture(Sketch& sketch, const std::string& path, const Spot& spot, dou
   constexpr Paint kFrames[] = {Paint::gilt, Paint::gilt, Paint::mahogany, Paint::blackMetal};
   const double w = width / 2, h = height / 2;
   sketch.place(path + "/frame", frameShape(w + 0.07, h + 0.07, kFrames[random.below(4)]), place);
-  Shape canvas;
+  PaintedMesh canvas;
   addBox(canvas, {-0.002, -h - 0.004, -w - 0.004}, {0.02, h + 0.004, w + 0.004}, Paint::canvas);
   Easel easel{canvas, w, h};
   paintSomething(easel, random);

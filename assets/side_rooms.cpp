@@ -6,12 +6,12 @@ namespace {
 
 using namespace plan;
 
-Shape coatShape(Paint cloth) {
-  Shape s;
+PaintedMesh coatShape(Paint cloth) {
+  PaintedMesh s;
   addRod(s, {0, 0, 0}, {0, -0.07, 0}, 0.004, 6, Paint::chrome);
   addTurned(s, {0, -1.1, 0}, {{0.2, 0}, {0.2, 0.1}, {0.17, 0.75}, {0.19, 0.95}, {0.06, 1.05}}, 8,
             cloth);
-  for (Shape::Part& part : s.parts)
+  for (PaintedMesh::Part& part : s.parts)
     for (Vec3& p : part.positions) p.z() *= 0.45;
   return s;
 }
@@ -24,7 +24,7 @@ void furnishCloakroom(Sketch& sketch, Random& random) {
   for (int rack = 0; rack < 2; ++rack) {
     const std::string name = path + "rack" + std::to_string(rack + 1);
     const double z = rack ? -6.9 : -5.4;
-    Shape rail;
+    PaintedMesh rail;
     addRod(rail, {-1.5, 1.6, 0}, {1.5, 1.6, 0}, 0.018, 8, Paint::chrome);
     for (const double x : {-1.45, 1.45}) {
       addRod(rail, {x, 0.02, 0}, {x, 1.62, 0}, 0.02, 8, Paint::chrome);
@@ -38,7 +38,7 @@ void furnishCloakroom(Sketch& sketch, Random& random) {
                    turned(1, {2.45 + 0.25 * i, 1.585, z}));
     }
   }
-  Shape locker;
+  PaintedMesh locker;
   addBox(locker, {0.002, 0, -0.2}, {0.45, 1.8, 0.2}, Paint::fabricBlue);
   addBox(locker, {0.445, 0.06, -0.185}, {0.46, 1.76, 0.185}, Paint::paintSky);
   addBox(locker, {0.458, 0.95, 0.11}, {0.475, 1.05, 0.14}, Paint::chrome);
@@ -50,17 +50,17 @@ void furnishCloakroom(Sketch& sketch, Random& random) {
 
 void furnishCafe(Sketch& sketch, Random& random) {
   const std::string path = "building/ground/cafe/";
-  Shape counter;
+  PaintedMesh counter;
   addBox(counter, {-0.3, 0, -1.6}, {0.28, 1.02, 1.6}, Paint::walnut);
   addBox(counter, {-0.34, 1.018, -1.66}, {0.4, 1.07, 1.66}, Paint::marbleWhite);
   addRod(counter, {0.36, 0.2, -1.55}, {0.36, 0.2, 1.55}, 0.02, 8, Paint::brass);
   sketch.place(path + "counter", counter, moved({8.0, 0, -6.4}));
-  Shape machine;
+  PaintedMesh machine;
   addBox(machine, {-0.22, 0, -0.35}, {0.2, 0.42, 0.35}, Paint::chrome);
   addBox(machine, {0.19, 0.28, -0.3}, {0.26, 0.36, 0.3}, Paint::blackMetal);
   addBox(machine, {-0.24, 0.415, -0.37}, {0.22, 0.44, 0.37}, Paint::brass);
   sketch.place(path + "coffee_machine", machine, moved({8.0, 1.07, -7.3}));
-  Shape cakes;
+  PaintedMesh cakes;
   addBox(cakes, {-0.2, 0, -0.5}, {0.2, 0.35, 0.5}, Paint::caseGlass);
   for (int i = 0; i < 4; ++i)
     addTurned(cakes, {0, 0.02, -0.36 + 0.24 * i}, {{0.09, 0}, {0.09, 0.07}, {0.04, 0.11}}, 12,
@@ -72,7 +72,7 @@ void furnishCafe(Sketch& sketch, Random& random) {
     sketch.box(numbered(path + "bar_shelf", shelf + 1), {6.298, y - 0.03, -7.9}, {6.52, y, -5.0},
                Paint::walnutDark);
     for (int i = 0; i < 14; ++i) {
-      Shape item;
+      PaintedMesh item;
       addTurned(item, Vec3::Zero(),
                 {{0.035, 0}, {0.036, 0.17}, {0.012, 0.22}, {0.012, 0.28}, {0.016, 0.3}}, 12,
                 kBottles[random.below(4)]);
@@ -139,14 +139,14 @@ void furnishLibrary(Sketch& sketch, Random& random) {
         sketch.place(table + "/chair" + std::to_string(++chair),
                      chairShape(Paint::mahogany, Paint::leatherGreen),
                      turned(side, {x + dx, 0, -6.6 + (side == 1 ? 0.75 : -0.75)}));
-    Shape open;  // an open book
+    PaintedMesh open;  // an open book
     addBox(open, {-0.14, 0, -0.19}, {0.14, 0.012, 0.19}, Paint::bookRed);
     addBox(open, {-0.13, 0.011, -0.18}, {0.13, 0.03, 0.18}, Paint::paper);
     sketch.place(table + "/open_book", open, moved({x + 0.5, 0.749, -6.4}));
     sketch.place(numbered(path + "pendant", number), pendantShape(0.9, Paint::leatherGreen),
                  moved({x, kCeiling, -6.6}));
   }
-  Shape ladder;
+  PaintedMesh ladder;
   for (const double z : {-0.22, 0.22})
     addRod(ladder, {0.55, 0, z}, {0.02, 2.5, z}, 0.022, 8, Paint::oakDark);
   for (int i = 1; i < 8; ++i) {
@@ -163,7 +163,7 @@ void furnishLobby(Sketch& sketch, Random& random) {
   placeBench(sketch, path + "bench1", {{39.0, 0, -3.7}, 1}, 1.6, Paint::leather);
   sketch.place(path + "plant", pottedPlantShape(random), moved({41.8, 0, -3.8}));
   sketch.place(path + "pendant", pendantShape(0.6, Paint::lampShade), moved({40.5, kCeiling, -5}));
-  Shape board;
+  PaintedMesh board;
   addBox(board, {-0.002, -0.5, -0.4}, {0.03, 0.5, 0.4}, Paint::blackMetal);
   for (int i = 0; i < 6; ++i)
     addBox(board, {0.028, 0.3 - 0.13 * i, -0.32}, {0.033, 0.36 - 0.13 * i, 0.1 + 0.03 * (i % 3)},

@@ -22,7 +22,7 @@ Sketch::Sketch() {
   model_.materials = paletteMaterials();
 }
 
-std::uint32_t Sketch::meshIndex(const Shape::Part& part, const std::string& name) {
+std::uint32_t Sketch::meshIndex(const PaintedMesh::Part& part, const std::string& name) {
   scene::Mesh mesh;
   for (const Vec3& p : part.positions) mesh.positions.push_back(p.cast<float>());
   for (const Vec3& n : part.normals) mesh.normals.push_back(n.cast<float>());
@@ -41,20 +41,20 @@ std::uint32_t Sketch::meshIndex(const Shape::Part& part, const std::string& name
   return entry->second;
 }
 
-void Sketch::place(const std::string& path, const Shape& shape,
+void Sketch::place(const std::string& path, const PaintedMesh& shape,
                    const Eigen::Affine3d& worldFromShape) {
   if (!paths_.insert(path).second) throw std::logic_error("assets: two objects named " + path);
   scene::Object object;
   object.path = path;
   object.worldFromMesh = worldFromShape;
-  for (const Shape::Part& part : shape.parts) object.meshes.push_back(meshIndex(part, path));
+  for (const PaintedMesh::Part& part : shape.parts) object.meshes.push_back(meshIndex(part, path));
   model_.objects.push_back(std::move(object));
 }
 
 void Sketch::box(const std::string& path, const Vec3& low, const Vec3& high,
                  const BoxPaints& paints) {
   const Vec3 half = (0.5 * (high - low)).unaryExpr([](double v) { return roundToMicrometre(v); });
-  Shape shape;
+  PaintedMesh shape;
   addBox(shape, -half, half, paints);
   place(path, shape, moved(0.5 * (low + high)));
 }

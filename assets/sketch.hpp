@@ -6,7 +6,7 @@
 #include <string>
 
 #include "assets/building.hpp"
-#include "assets/shape.hpp"
+#include "assets/painted_mesh.hpp"
 
 namespace enfilade::assets {
 
@@ -15,7 +15,8 @@ class Sketch {
   Sketch();
 
   /// Throws std::logic_error if the path is in use, which is a programming error.
-  void place(const std::string& path, const Shape& shape, const Eigen::Affine3d& worldFromShape);
+  void place(const std::string& path, const PaintedMesh& shape,
+             const Eigen::Affine3d& worldFromShape);
   /// The mesh is centred, so that equal boxes share it.
   void box(const std::string& path, const Vec3& low, const Vec3& high, const BoxPaints& paints);
   void box(const std::string& path, const Vec3& low, const Vec3& high, Paint paint);
@@ -27,7 +28,7 @@ class Sketch {
   std::vector<MovingPart>& movingParts() { return movingParts_; }
 
  private:
-  std::uint32_t meshIndex(const Shape::Part& part, const std::string& name);
+  std::uint32_t meshIndex(const PaintedMesh::Part& part, const std::string& name);
 
   scene::Model model_;
   std::vector<MovingPart> movingParts_;

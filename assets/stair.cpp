@@ -50,7 +50,7 @@ void addStringersAndHandrails(Sketch& sketch) {
       const std::string hand = side < 0 ? "left" : "right";
       const auto bar = [&](const std::string& name, double up, double width, double height,
                            Paint paint) {
-        Shape shape;
+        PaintedMesh shape;
         const Vec3 run{f.to.x() - f.from.x(), f.to.y() - f.from.y(), 0};
         addSlopedBar(shape, {-0.01, 0, 0}, run + Vec3{0.01, 0, 0}, width, height, paint);
         sketch.place("building/hall/stair/" + name + "_" + hand + std::to_string(number), shape,
@@ -62,8 +62,8 @@ void addStringersAndHandrails(Sketch& sketch) {
   }
 }
 
-Shape balusterShape(double height) {
-  Shape s;
+PaintedMesh balusterShape(double height) {
+  PaintedMesh s;
   addTurned(s, Vec3::Zero(),
             {{0.018, 0},
              {0.018, 0.05},
@@ -76,8 +76,8 @@ Shape balusterShape(double height) {
   return s;
 }
 
-Shape newelShape(double height) {
-  Shape s;
+PaintedMesh newelShape(double height) {
+  PaintedMesh s;
   addBox(s, {-0.06, 0, -0.06}, {0.06, height, 0.06}, Paint::mahogany);
   addBox(s, {-0.075, height - 0.03, -0.075}, {0.075, height, 0.075}, Paint::mahogany);
   addBall(s, {0, height + 0.06, 0}, {0.07, 0.07, 0.07}, 12, Paint::brass);
@@ -86,7 +86,7 @@ Shape newelShape(double height) {
 
 /// Adds balusters on the stringers, two a tread.
 void addStairBalusters(Sketch& sketch) {
-  const Shape baluster = balusterShape(kRailHeight - 0.04);
+  const PaintedMesh baluster = balusterShape(kRailHeight - 0.04);
   int number = 0;
   for (const Flight& f : flights()) {
     const double run = f.to.x() - f.from.x();
@@ -118,7 +118,7 @@ void addRailing(Sketch& sketch, const std::string& path, Wall::Along along, doub
           {to, y + 1.08, across + 0.035}, Paint::mahogany);
   wallBox(sketch, path + "/bottom_rail", along, {from, y + 0.08, across - 0.02},
           {to, y + 0.11, across + 0.02}, Paint::darkIron);
-  const Shape baluster = balusterShape(0.935);
+  const PaintedMesh baluster = balusterShape(0.935);
   const int count = static_cast<int>((to - from) / 0.14);
   for (int i = 0; i < count; ++i) {
     const double a = from + (to - from) * (i + 0.5) / count;
@@ -189,7 +189,7 @@ void addLift(Sketch& sketch) {
   }
   const double x0 = kLiftWest + t + 0.06, x1 = kLiftEast - t - 0.06;
   const double z0 = kLiftNorth + 0.06, z1 = kLiftSouth - t - 0.05, d = 0.03;
-  Shape cabin;
+  PaintedMesh cabin;
   const Vec3 at{mid, 0, 0.5 * (z0 + z1)};
   const double hx = (x1 - x0) / 2, hz = (z1 - z0) / 2;
   addBox(cabin, {-hx, -0.02, -hz}, {hx, 0.001, hz}, Paint::slateTile);
@@ -204,7 +204,7 @@ void addLift(Sketch& sketch) {
   sketch.moves(MovingPart::Kind::slide, {0, 1, 0}, 0, kUpper);
   // A static roof: only the space above the cabin at its upper stop.
   const double roof = kUpper + 2.4;
-  Shape cable;
+  PaintedMesh cable;
   addRod(cable, {0, 0, 0}, {0, top - roof - 0.045, 0}, 0.012, 8, Paint::darkIron);
   sketch.place(path + "cable", cable, moved({mid, roof, at.z()}));
 }

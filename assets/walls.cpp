@@ -38,20 +38,20 @@ void addMoulding(Sketch& sketch, const std::string& path, const Face& f, std::ve
   const Vec3 out = wallPoint(f.along, 0, 0, f.inward), up{0, 1, 0};
   const Vec3 w = out.cross(up);
   const double start = w.dot(wallPoint(f.along, 1, 0, 0)) > 0 ? f.from - kInto : f.to + kInto;
-  Shape shape;
+  PaintedMesh shape;
   addPrism(shape, profile, {Vec3::Zero(), out, up, w}, length, paint);
   sketch.place(path, shape, moved(wallPoint(f.along, start, y, f.face)));
 }
 
 /// Wavy cloth on a rod, `width` wide along +X, a closed solid.
-Shape curtainShape(double width, double height, Paint paint) {
+PaintedMesh curtainShape(double width, double height, Paint paint) {
   constexpr int kFolds = 7;
   std::vector<Vec2> outline;
   for (int i = 0; i <= 2 * kFolds; ++i)
     outline.push_back({width * i / (2 * kFolds), i % 2 ? 0.05 : 0.0});
   for (int i = 2 * kFolds; i >= 0; --i)
     outline.push_back({width * i / (2 * kFolds), i % 2 ? 0.065 : 0.015});
-  Shape shape;
+  PaintedMesh shape;
   addPrism(shape, outline, {Vec3::Zero(), {1, 0, 0}, {0, 0, -1}, {0, 1, 0}}, height, paint);
   return shape;
 }
@@ -62,11 +62,11 @@ void addCurtains(Sketch& sketch, const std::string& path, const Wall& wall, cons
   const double across = face + style.inward * 0.10;
   const double top = hole.top + 0.12, bottom = hole.bottom - 0.35, width = 0.34;
   const Vec3 reach = wallPoint(wall.along, 0.28, 0, 0);
-  Shape rod;
+  PaintedMesh rod;
   addRod(rod, wallPoint(wall.along, hole.from, top, across) - reach,
          wallPoint(wall.along, hole.to, top, across) + reach, 0.014, 8, Paint::brass);
   sketch.place(path + "/curtain_rod", rod, Eigen::Affine3d::Identity());
-  const Shape cloth = curtainShape(width, top - bottom, style.curtain);
+  const PaintedMesh cloth = curtainShape(width, top - bottom, style.curtain);
   const int quarters = wall.along == Wall::Along::x ? 0 : 3;
   sketch.place(path + "/curtain_left", cloth,
                turned(quarters, wallPoint(wall.along, hole.from - 0.26, bottom, across)));
@@ -189,7 +189,7 @@ void addThreshold(Sketch& sketch, const std::string& path, const Wall& w, const 
 void addLeaf(Sketch& sketch, const std::string& path, const Leaf& leaf) {
   constexpr double kHalf = 0.02;
   const double w = leaf.width, h = leaf.height, y0 = 0.008;
-  Shape s;
+  PaintedMesh s;
   if (leaf.glazed) {
     const double stile = 0.10;
     addBox(s, {0.004, y0, -kHalf}, {stile, h, kHalf}, Paint::doorWood);

@@ -407,7 +407,7 @@ void addFloor(Sketch& sketch, const std::string& path, const Vec3& low, const Ve
       cellTones.push_back(tones[static_cast<std::size_t>(pick)]);
     }
   const Vec3 half = 0.5 * (high - low);
-  Shape shape;
+  PaintedMesh shape;
   addTiledSlab(shape, -half, half, nx, nz, tones[0], cellTones);
   sketch.place(path, shape, moved(0.5 * (low + high)));
 }

@@ -15,7 +15,7 @@ namespace enfilade::collision {
 namespace {
 
 constexpr double kSlack = 128 * kRoundoff;
-constexpr std::size_t kFewVertices = 8;  // as a triangle or a box: scanned
+constexpr std::size_t kMaxScannedVertices = 8;  // as a triangle or a box: scanned
 
 double sumOfMagnitudes(const Vec3& p) {
   return std::abs(p.x()) + std::abs(p.y()) + std::abs(p.z());
@@ -46,8 +46,8 @@ double findHeight(const PlacedConvex& b, const Vec3& n) {
 
 /// Bodies of many vertices are tested by their boxes alone.
 bool isAbove(const PlacedConvex& b, const Aabb& boxOfB, const Vec3& normal, double height) {
-  return findBoxHeight(boxOfB, normal) > height ||
-         (b.vertices.size() <= kFewVertices && !b.rotation && findHeight(b, normal) > height);
+  return findBoxHeight(boxOfB, normal) > height || (b.vertices.size() <= kMaxScannedVertices &&
+                                                    !b.rotation && findHeight(b, normal) > height);
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include "scene/world/audit.hpp"
 #include "scene/world/avatars/avatar_motion.hpp"
 #include "scene/world/avatars/avatar_state.hpp"
-#include "scene/world/avatars/orders.hpp"
+#include "scene/world/avatars/order_execution.hpp"
 #include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/dynamic_bodies.hpp"
 #include "scene/world/bodies/kinematic_drive.hpp"

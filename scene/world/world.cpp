@@ -1,7 +1,7 @@
 #include "scene/world/world.hpp"
 
 #include "scene/model/hasher.hpp"
-#include "scene/world/avatars/orders.hpp"
+#include "scene/world/avatars/order_execution.hpp"
 #include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/dynamic_bodies.hpp"
 #include "scene/world/bodies/kinematic_drive.hpp"

@@ -15,7 +15,7 @@
 #include "server/diff/diff.hpp"
 #include "server/diff/resimulate.hpp"
 #include "server/inspection/inspect.hpp"
-#include "server/runs/script_run.hpp"
+#include "server/runs/reported_run.hpp"
 
 namespace enfilade::server {
 

@@ -38,7 +38,7 @@ using protocol::mcap::RecordingError;
 constexpr double kMegabyte = 1e6;  // bytes
 
 /// One run of a recording as a server would send it.
-struct RecordedRun {
+struct ExportedRun {
   v1::RecordingStart start;
   std::uint64_t firstTick = 0, lastTick = 0;
   std::size_t contacts = 0;
@@ -62,7 +62,7 @@ v1::State reduceState(const v1::State& state) {
   return reduced;
 }
 
-void addItem(const protocol::RecordedItem& item, RecordedRun& run) {
+void addItem(const protocol::RecordedItem& item, ExportedRun& run) {
   v1::ServerMessage message;
   if (const auto* start = std::get_if<v1::RecordingStart>(&item)) {
     run.start = *start;
@@ -79,9 +79,9 @@ void addItem(const protocol::RecordedItem& item, RecordedRun& run) {
   }
 }
 
-RecordedRun readRun(const ExportReplayCommand& command) {
+ExportedRun readRun(const ExportReplayCommand& command) {
   protocol::RecordingReader reader(command.recording, command.run);
-  RecordedRun run;
+  ExportedRun run;
   bool found = false;
   while (const auto item = reader.next()) {
     found = true;
@@ -94,7 +94,7 @@ RecordedRun readRun(const ExportReplayCommand& command) {
   return run;
 }
 
-v1::ServerMessage makeWelcome(const RecordedRun& run, const scene::Scene& scene,
+v1::ServerMessage makeWelcome(const ExportedRun& run, const scene::Scene& scene,
                               const std::string& file) {
   const auto settings = settingsFromProto(run.start.lengths());
   if (!settings) throw RecordingError(file + ": the recorded settings are not valid");
@@ -249,7 +249,7 @@ class ReplayExport {
 
   const ExportReplayCommand& command_;
   const ReplayPage page_;
-  const RecordedRun run_;
+  const ExportedRun run_;
   std::shared_ptr<const scene::Scene> scene_;
   Bytes messages_, sceneBytes_;  ///< compressed
   Json pictures_;

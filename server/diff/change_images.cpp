@@ -85,7 +85,7 @@ Moment makeMoment(const ClearanceChange& change) {
 
 /// Makes the moment at the end of an order, at the height of a table.
 Moment makeMoment(const OrderChange& change) {
-  const OrderEnd& current = change.after ? *change.after : *change.before;
+  const FinishedOrder& current = change.after ? *change.after : *change.before;
   return {current.avatar,     current.obstacle,
           formatLine(change), current.position + Vec3(0, 0.8, 0),
           Vec3::Zero(),       current.tick,

@@ -35,7 +35,7 @@ Json toJson(const Nearest& nearest) {
           {"point", toJson(nearest.point)}};
 }
 
-Json toJson(const OrderEnd& end) {
+Json toJson(const FinishedOrder& end) {
   Json json{{"outcome", toString(end.kind)},
             {"tick", end.tick},
             {"time", end.time},
@@ -114,7 +114,7 @@ Json toJson(const WalkEventChange& change) {
 }
 
 Json toJson(const OrderChange& change) {
-  const OrderEnd& end = change.after ? *change.after : *change.before;
+  const FinishedOrder& end = change.after ? *change.after : *change.before;
   Json json{{"avatar", end.avatar},
             {"tag", end.tag},
             {"before", optionalJson(change.before)},

@@ -44,7 +44,7 @@ const char* describeModel(ModelSide model) {
   return model == ModelSide::before ? "; removed from this model" : "";
 }
 
-std::string formatOutcome(const OrderEnd& end) {
+std::string formatOutcome(const FinishedOrder& end) {
   switch (end.kind) {
     case v1::Notice::KIND_SPAWNED:
       return "entered at " + formatTime(end.time);
@@ -152,7 +152,7 @@ std::string formatLine(const WalkEventChange& change) {
 }
 
 std::string formatLine(const OrderChange& change) {
-  const OrderEnd& current = change.after ? *change.after : *change.before;
+  const FinishedOrder& current = change.after ? *change.after : *change.before;
   std::string line = current.avatar;
   if (current.tag != 0)
     line += ", order " + std::to_string(current.tag);  // for scripts: the line number

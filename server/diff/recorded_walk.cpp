@@ -151,7 +151,7 @@ class RunCollector {
 
   void addNotice(const v1::Notice& notice, double time) {
     if (!endsOrder(notice)) return;
-    OrderEnd end;
+    FinishedOrder end;
     end.kind = notice.kind();
     end.avatar = notice.avatar();
     end.tag = notice.tag();

@@ -45,7 +45,7 @@ struct PairRecord {
 };
 
 /// The end of an order, or an avatar that left.
-struct OrderEnd {
+struct FinishedOrder {
   v1::Notice::Kind kind = v1::Notice::KIND_UNSPECIFIED;
   std::string avatar;
   std::uint64_t tag = 0;
@@ -67,7 +67,7 @@ struct RecordedRun {
   std::uint64_t ticks = 0, hash = 0;
   double time = 0;                                                  ///< seconds, at the end
   std::map<std::pair<std::string, std::string>, PairRecord> pairs;  ///< by the names of a and b
-  std::vector<OrderEnd> orders;
+  std::vector<FinishedOrder> orders;
   std::map<std::string, AvatarRecord> avatars;
 };
 

@@ -18,8 +18,8 @@
 #include "server/diff/difference_text.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/runs/in_process_driver.hpp"
+#include "server/runs/reported_run.hpp"
 #include "server/runs/run_report.hpp"
-#include "server/runs/script_run.hpp"
 
 namespace enfilade::server {
 namespace {

@@ -224,14 +224,14 @@ class RunComparison {
     into_.clearances.push_back(std::move(change));
   }
 
-  static std::map<OrderKey, const OrderEnd*> indexOrders(const RecordedRun& run) {
-    std::map<OrderKey, const OrderEnd*> orders;
-    for (const OrderEnd& end : run.orders)
+  static std::map<OrderKey, const FinishedOrder*> indexOrders(const RecordedRun& run) {
+    std::map<OrderKey, const FinishedOrder*> orders;
+    for (const FinishedOrder& end : run.orders)
       orders[{end.avatar, end.tag, end.kind == v1::Notice::KIND_LEFT, end.repeat}] = &end;
     return orders;
   }
 
-  static bool hasSucceeded(const OrderEnd& end) {
+  static bool hasSucceeded(const FinishedOrder& end) {
     return end.kind != v1::Notice::KIND_BLOCKED && end.kind != v1::Notice::KIND_REFUSED &&
            !(end.kind == v1::Notice::KIND_LEFT && !end.text.empty());
   }
@@ -246,7 +246,7 @@ class RunComparison {
       if (!before.contains(key)) compareOrder(nullptr, now);
   }
 
-  void compareOrder(const OrderEnd* old, const OrderEnd* now) {
+  void compareOrder(const FinishedOrder* old, const FinishedOrder* now) {
     if (old && now && old->kind == now->kind && old->tick == now->tick && old->text == now->text)
       return;
     OrderChange change;

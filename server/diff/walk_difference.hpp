@@ -36,7 +36,7 @@ struct WalkEventChange {
 
 /// An order with another outcome or end time.
 struct OrderChange {
-  std::optional<OrderEnd> before, after;  ///< at least one
+  std::optional<FinishedOrder> before, after;  ///< at least one
   std::size_t run = 0;
   bool worse = false;
   std::string picture;  ///< picture file, or empty

@@ -219,7 +219,7 @@ TEST(Building, HangsItsDoorsOnTheirHinges) {
 }
 
 TEST(District, HasTheRequestedNumberOfObjectsAndSharesMeshes) {
-  for (const std::size_t wanted : {kSmallestDistrict, std::size_t{10000}, std::size_t{100000}}) {
+  for (const std::size_t wanted : {kMinDistrictObjects, std::size_t{10000}, std::size_t{100000}}) {
     const Model model = makeDistrict(wanted, 7);
     EXPECT_EQ(model.objects.size(), wanted);
     EXPECT_LT(model.meshes.size(), 12000u);

@@ -70,7 +70,7 @@ int main(int argc, char** argv) {
     std::fprintf(stderr, "frame_soak: unknown renderer %s; use gl or rays\n", argv[1]);
     return 2;
   }
-  const scene::Model model = assets::makeDistrict(assets::kSmallestDistrict, 1);
+  const scene::Model model = assets::makeDistrict(assets::kMinDistrictObjects, 1);
   const int each = (pictures + reloads - 1) / reloads;
   std::vector<double> resident, allocated;
   for (int i = 0; i < reloads; ++i) {

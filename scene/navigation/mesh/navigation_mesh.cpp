@@ -18,8 +18,8 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr int kReferenceBits = 22;         // of a tile and a polygon, in a 32-bit dtPolyRef
-constexpr std::size_t kFewPolygons = 256;  // a query with more is repeated
+constexpr int kReferenceBits = 22;               // of a tile and a polygon, in a 32-bit dtPolyRef
+constexpr std::size_t kFirstPolygonCount = 256;  // a query with more is repeated
 constexpr int kMaxCorners = 4096;
 
 using Float3 = std::array<float, 3>;
@@ -156,7 +156,7 @@ double NavigationMesh::area() const {
 std::vector<std::uint32_t> NavigationMesh::findPolygons(const Vec3& point,
                                                         const Vec3& extent) const {
   const Float3 centre = toFloats(point), half = toFloats(extent);
-  thread_local std::vector<dtPolyRef> found(kFewPolygons);
+  thread_local std::vector<dtPolyRef> found(kFirstPolygonCount);
   int count = 0;
   for (;;) {
     detour_->query.queryPolygons(centre.data(), half.data(), &detour_->filter, found.data(), &count,

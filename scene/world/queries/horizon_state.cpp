@@ -109,7 +109,7 @@ std::uint64_t HorizonState::lastMotion(EntityId entity) const {
   return body ? bodies_[body->index].lastMotion : 0;
 }
 
-Aabb HorizonState::boxOf(EntityId entity) const {
+Aabb HorizonState::computeBox(EntityId entity) const {
   if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt(), entity))
     return placeBox(avatar->shape->box, avatar->footPosition);
   if (const BodySnapshot* body = findBodySnapshot(sceneAt(), entity))
@@ -150,7 +150,7 @@ double HorizonState::computeTime(double gap, double growth, double speed) const 
 }
 
 double HorizonState::boxTime(EntityId a, EntityId b, double speed) const {
-  return boxTime(boxOf(a), boxOf(b), growthOf(a) + growthOf(b), speed);
+  return boxTime(computeBox(a), computeBox(b), growthOf(a) + growthOf(b), speed);
 }
 
 double HorizonState::boxTime(const Aabb& own, const Aabb& other, double growth,

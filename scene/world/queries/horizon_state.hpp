@@ -36,7 +36,7 @@ class HorizonState {
   /// Last tick in which any kinematic body moved.
   std::uint64_t lastKinematicMotion() const { return kinematicMotion_; }
 
-  Aabb boxOf(EntityId entity) const;
+  Aabb computeBox(EntityId entity) const;
   /// Maximum speed of the entity during the next `seconds`, under any command; infinity for dynamic
   /// bodies.
   double speedWithin(EntityId entity, double seconds) const;

@@ -1,4 +1,4 @@
-#include "assets/shape.hpp"
+#include "assets/painted_mesh.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,14 +7,14 @@
 namespace enfilade::assets {
 namespace {
 
-Shape::Part& partOf(Shape& shape, Paint paint) {
-  for (Shape::Part& part : shape.parts)
+PaintedMesh::Part& partOf(PaintedMesh& shape, Paint paint) {
+  for (PaintedMesh::Part& part : shape.parts)
     if (part.paint == paint) return part;
   shape.parts.push_back({paint, {}, {}, {}});
   return shape.parts.back();
 }
 
-std::uint32_t addVertex(Shape::Part& part, const Vec3& position, const Vec3& normal) {
+std::uint32_t addVertex(PaintedMesh::Part& part, const Vec3& position, const Vec3& normal) {
   part.positions.push_back(position);
   part.normals.push_back(normal);
   return static_cast<std::uint32_t>(part.positions.size() - 1);
@@ -72,8 +72,8 @@ Vec2 jointNormal(const Vec2& own, const Vec2& neighbour) {
   return sum / std::sqrt(sum.x() * sum.x() + sum.y() * sum.y());
 }
 
-void addBand(Shape::Part& part, const Vec3& base, const std::vector<Vec2>& circle, const Ring& low,
-             const Ring& high, const Vec2& lowNormal, const Vec2& highNormal) {
+void addBand(PaintedMesh::Part& part, const Vec3& base, const std::vector<Vec2>& circle,
+             const Ring& low, const Ring& high, const Vec2& lowNormal, const Vec2& highNormal) {
   const auto n = static_cast<std::uint32_t>(circle.size());
   const auto first = static_cast<std::uint32_t>(part.positions.size());
   for (const Vec2& c : circle) {
@@ -90,10 +90,10 @@ void addBand(Shape::Part& part, const Vec3& base, const std::vector<Vec2>& circl
   }
 }
 
-void addDisc(Shape& shape, const Vec3& base, const std::vector<Vec2>& circle, const Ring& ring,
-             bool facesUp, Paint paint) {
+void addDisc(PaintedMesh& shape, const Vec3& base, const std::vector<Vec2>& circle,
+             const Ring& ring, bool facesUp, Paint paint) {
   if (ring.radius <= 0) return;
-  Shape::Part& part = partOf(shape, paint);
+  PaintedMesh::Part& part = partOf(shape, paint);
   const auto first = static_cast<std::uint32_t>(part.positions.size());
   const Vec3 normal{0, facesUp ? 1.0 : -1.0, 0};
   for (const Vec2& c : circle)
@@ -146,8 +146,8 @@ std::vector<Vec2> unitCircle(int sides) {
   return corners;
 }
 
-void addTriangle(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, Paint paint) {
-  Shape::Part& part = partOf(shape, paint);
+void addTriangle(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, Paint paint) {
+  PaintedMesh::Part& part = partOf(shape, paint);
   Vec3 n = (b - a).cross(c - a);
   n /= std::sqrt(n.x() * n.x() + n.y() * n.y() + n.z() * n.z());
   const std::uint32_t ia = addVertex(part, a, n);
@@ -156,9 +156,9 @@ void addTriangle(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, Pain
   part.indices.insert(part.indices.end(), {ia, ib, ic});
 }
 
-void addQuad(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d,
+void addQuad(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d,
              Paint paint) {
-  Shape::Part& part = partOf(shape, paint);
+  PaintedMesh::Part& part = partOf(shape, paint);
   Vec3 n = (c - a).cross(d - b);
   n /= std::sqrt(n.x() * n.x() + n.y() * n.y() + n.z() * n.z());
   const std::uint32_t first = addVertex(part, a, n);
@@ -169,7 +169,7 @@ void addQuad(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Ve
                       {first, first + 1, first + 2, first, first + 2, first + 3});
 }
 
-void addBox(Shape& shape, const Vec3& l, const Vec3& h, const BoxPaints& p) {
+void addBox(PaintedMesh& shape, const Vec3& l, const Vec3& h, const BoxPaints& p) {
   const auto corner = [&](int i) {
     return Vec3{i & 1 ? h.x() : l.x(), i & 2 ? h.y() : l.y(), i & 4 ? h.z() : l.z()};
   };
@@ -181,12 +181,12 @@ void addBox(Shape& shape, const Vec3& l, const Vec3& h, const BoxPaints& p) {
   addQuad(shape, corner(4), corner(5), corner(7), corner(6), p.plusZ);
 }
 
-void addBox(Shape& shape, const Vec3& low, const Vec3& high, Paint paint) {
+void addBox(PaintedMesh& shape, const Vec3& low, const Vec3& high, Paint paint) {
   addBox(shape, low, high, allFaces(paint));
 }
 
-void addTiledSlab(Shape& shape, const Vec3& l, const Vec3& h, int cellsX, int cellsZ, Paint side,
-                  const std::vector<Paint>& cellTones) {
+void addTiledSlab(PaintedMesh& shape, const Vec3& l, const Vec3& h, int cellsX, int cellsZ,
+                  Paint side, const std::vector<Paint>& cellTones) {
   const auto x = [&](int i) { return i == cellsX ? h.x() : l.x() + (h.x() - l.x()) * i / cellsX; };
   const auto z = [&](int k) { return k == cellsZ ? h.z() : l.z() + (h.z() - l.z()) * k / cellsZ; };
   const double y0 = l.y(), y1 = h.y();
@@ -208,22 +208,22 @@ void addTiledSlab(Shape& shape, const Vec3& l, const Vec3& h, int cellsX, int ce
   }
 }
 
-void addPolygon(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
+void addPolygon(PaintedMesh& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
                 Paint paint) {
-  Shape::Part& part = partOf(shape, paint);
+  PaintedMesh::Part& part = partOf(shape, paint);
   const auto first = static_cast<std::uint32_t>(part.positions.size());
   for (const Vec2& p : profile) addVertex(part, at(frame, p, 0), frame.w);
   for (std::uint32_t i : triangulated(profile)) part.indices.push_back(first + i);
 }
 
-void addPrism(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& f, double length,
-              Paint paint) {
+void addPrism(PaintedMesh& shape, const std::vector<Vec2>& profile, const SweepFrame& f,
+              double length, Paint paint) {
   const std::size_t n = profile.size();
   for (std::size_t i = 0; i < n; ++i) {
     const Vec2 &a = profile[i], &b = profile[(i + 1) % n];
     addQuad(shape, at(f, a, 0), at(f, b, 0), at(f, b, length), at(f, a, length), paint);
   }
-  Shape::Part& part = partOf(shape, paint);
+  PaintedMesh::Part& part = partOf(shape, paint);
   const std::vector<std::uint32_t> triangles = triangulated(profile);
   for (const bool top : {false, true}) {
     const auto first = static_cast<std::uint32_t>(part.positions.size());
@@ -236,7 +236,7 @@ void addPrism(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& 
   }
 }
 
-void addTurned(Shape& shape, const Vec3& base, const std::vector<Ring>& outline, int sides,
+void addTurned(PaintedMesh& shape, const Vec3& base, const std::vector<Ring>& outline, int sides,
                Paint paint) {
   const std::vector<Vec2> circle = unitCircle(sides);
   std::vector<Vec2> normals;
@@ -251,12 +251,13 @@ void addTurned(Shape& shape, const Vec3& base, const std::vector<Ring>& outline,
   addDisc(shape, base, circle, outline.back(), true, paint);
 }
 
-void addCylinder(Shape& shape, const Vec3& base, double radius, double height, int sides,
+void addCylinder(PaintedMesh& shape, const Vec3& base, double radius, double height, int sides,
                  Paint paint) {
   addTurned(shape, base, {{radius, 0}, {radius, height}}, sides, paint);
 }
 
-void addRod(Shape& shape, const Vec3& a, const Vec3& b, double radius, int sides, Paint paint) {
+void addRod(PaintedMesh& shape, const Vec3& a, const Vec3& b, double radius, int sides,
+            Paint paint) {
   const Vec3 along = b - a;
   const double length = std::sqrt(along.dot(along));
   const Vec3 y = along / length;
@@ -266,12 +267,12 @@ void addRod(Shape& shape, const Vec3& a, const Vec3& b, double radius, int sides
   Eigen::Affine3d frame = Eigen::Affine3d::Identity();
   frame.linear() << y.cross(z), y, z;
   frame.translation() = a;
-  Shape rod;
+  PaintedMesh rod;
   addCylinder(rod, Vec3::Zero(), radius, length, sides, paint);
   append(shape, rod, frame);
 }
 
-void addBall(Shape& shape, const Vec3& centre, const Vec3& radii, int sides, Paint paint) {
+void addBall(PaintedMesh& shape, const Vec3& centre, const Vec3& radii, int sides, Paint paint) {
   const std::vector<Vec2> circle = unitCircle(2 * (sides / 2));
   std::vector<Ring> outline;  // the right half of the circle, from the lowest point up
   const int half = sides / 2, quarter = sides / 4;
@@ -279,7 +280,7 @@ void addBall(Shape& shape, const Vec3& centre, const Vec3& radii, int sides, Pai
     const Vec2& c = circle[static_cast<std::size_t>((i + sides - quarter) % sides)];
     outline.push_back({i == 0 || i == half ? 0.0 : c.x(), c.y()});
   }
-  Shape ball;
+  PaintedMesh ball;
   addTurned(ball, Vec3::Zero(), outline, sides, paint);
   Eigen::Affine3d stretch = Eigen::Affine3d::Identity();
   stretch.linear() = radii.asDiagonal();
@@ -287,8 +288,8 @@ void addBall(Shape& shape, const Vec3& centre, const Vec3& radii, int sides, Pai
   append(shape, ball, stretch);
 }
 
-void addTorus(Shape& shape, const Vec3& centre, double ringRadius, double tubeRadius, int sides,
-              int tubeSides, Paint paint) {
+void addTorus(PaintedMesh& shape, const Vec3& centre, double ringRadius, double tubeRadius,
+              int sides, int tubeSides, Paint paint) {
   const std::vector<Vec2> tube = unitCircle(tubeSides), circle = unitCircle(sides);
   for (std::size_t i = 0; i < tube.size(); ++i) {
     const Vec2 &a = tube[i], &b = tube[(i + 1) % tube.size()];
@@ -298,7 +299,7 @@ void addTorus(Shape& shape, const Vec3& centre, double ringRadius, double tubeRa
   }
 }
 
-void addSlopedBar(Shape& shape, const Vec3& a, const Vec3& b, double width, double height,
+void addSlopedBar(PaintedMesh& shape, const Vec3& a, const Vec3& b, double width, double height,
                   Paint paint) {
   const bool alongX = a.z() == b.z();
   const double run = alongX ? b.x() - a.x() : b.z() - a.z();
@@ -310,10 +311,10 @@ void addSlopedBar(Shape& shape, const Vec3& a, const Vec3& b, double width, doub
   addPrism(shape, profile, {a - 0.5 * width * w, u, Vec3{0, 1, 0}, w}, width, paint);
 }
 
-void append(Shape& shape, const Shape& other, const Eigen::Affine3d& shapeFromOther) {
+void append(PaintedMesh& shape, const PaintedMesh& other, const Eigen::Affine3d& shapeFromOther) {
   const Eigen::Matrix3d normalMatrix = shapeFromOther.linear().inverse().transpose();
-  for (const Shape::Part& from : other.parts) {
-    Shape::Part& to = partOf(shape, from.paint);
+  for (const PaintedMesh::Part& from : other.parts) {
+    PaintedMesh::Part& to = partOf(shape, from.paint);
     const auto first = static_cast<std::uint32_t>(to.positions.size());
     for (std::size_t i = 0; i < from.positions.size(); ++i) {
       const Vec3 n = normalMatrix * from.normals[i];

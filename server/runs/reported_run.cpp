@@ -1,4 +1,4 @@
-#include "server/runs/script_run.hpp"
+#include "server/runs/reported_run.hpp"
 
 #include <spdlog/spdlog.h>
 

@@ -15,7 +15,7 @@ using collision::Vec3;
 using Vec2 = Eigen::Vector2d;
 
 /// Triangles grouped by paint, with one normal a vertex.
-struct Shape {
+struct PaintedMesh {
   struct Part {
     Paint paint;
     std::vector<Vec3> positions;
@@ -53,36 +53,38 @@ Eigen::Affine3d turnedByHalfTangent(double tangent, const Vec3& by = Vec3::Zero(
 /// or 6 times a power of two.
 std::vector<Vec2> unitCircle(int sides);
 
-void addTriangle(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, Paint paint);
-void addQuad(Shape& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d, Paint paint);
+void addTriangle(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, Paint paint);
+void addQuad(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d,
+             Paint paint);
 
-void addBox(Shape& shape, const Vec3& low, const Vec3& high, const BoxPaints& paints);
-void addBox(Shape& shape, const Vec3& low, const Vec3& high, Paint paint);
+void addBox(PaintedMesh& shape, const Vec3& low, const Vec3& high, const BoxPaints& paints);
+void addBox(PaintedMesh& shape, const Vec3& low, const Vec3& high, Paint paint);
 /// A box whose top is a grid of cells; `tone` gives the paint of a cell.
-void addTiledSlab(Shape& shape, const Vec3& low, const Vec3& high, int cellsX, int cellsZ,
+void addTiledSlab(PaintedMesh& shape, const Vec3& low, const Vec3& high, int cellsX, int cellsZ,
                   Paint side, const std::vector<Paint>& cellTones);
 /// A simple polygon in (u, v), counter-clockwise, swept along w.
-void addPrism(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
+void addPrism(PaintedMesh& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
               double length, Paint paint);
 /// The face of a simple polygon alone, seen from +w.
-void addPolygon(Shape& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
+void addPolygon(PaintedMesh& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
                 Paint paint);
 /// Revolves an outline from bottom to top about the vertical through `base`. Closed at both ends.
-void addTurned(Shape& shape, const Vec3& base, const std::vector<Ring>& outline, int sides,
+void addTurned(PaintedMesh& shape, const Vec3& base, const std::vector<Ring>& outline, int sides,
                Paint paint);
-void addCylinder(Shape& shape, const Vec3& base, double radius, double height, int sides,
+void addCylinder(PaintedMesh& shape, const Vec3& base, double radius, double height, int sides,
                  Paint paint);
 /// A round rod from a to b.
-void addRod(Shape& shape, const Vec3& a, const Vec3& b, double radius, int sides, Paint paint);
-void addBall(Shape& shape, const Vec3& centre, const Vec3& radii, int sides, Paint paint);
+void addRod(PaintedMesh& shape, const Vec3& a, const Vec3& b, double radius, int sides,
+            Paint paint);
+void addBall(PaintedMesh& shape, const Vec3& centre, const Vec3& radii, int sides, Paint paint);
 /// A torus about the vertical.
-void addTorus(Shape& shape, const Vec3& centre, double ringRadius, double tubeRadius, int sides,
-              int tubeSides, Paint paint);
+void addTorus(PaintedMesh& shape, const Vec3& centre, double ringRadius, double tubeRadius,
+              int sides, int tubeSides, Paint paint);
 /// A straight bar of constant section with vertical ends. a, b are the centres of its ends, which
 /// differ along one horizontal axis and in height (handrails, stringers).
-void addSlopedBar(Shape& shape, const Vec3& a, const Vec3& b, double width, double height,
+void addSlopedBar(PaintedMesh& shape, const Vec3& a, const Vec3& b, double width, double height,
                   Paint paint);
 
-void append(Shape& shape, const Shape& other, const Eigen::Affine3d& shapeFromOther);
+void append(PaintedMesh& shape, const PaintedMesh& other, const Eigen::Affine3d& shapeFromOther);
 
 }  // namespace enfilade::assets

@@ -1,7 +1,7 @@
 // The avatars' order queues. Commands are enqueued; the front order of each queue runs until it is
 // done. An order that takes no time ends in the tick in which it starts, and the next one starts. A
 // Capture holds the avatar for its tick, so that the image shows the requested position.
-#include "scene/world/avatars/orders.hpp"
+#include "scene/world/avatars/order_execution.hpp"
 
 #include <algorithm>
 #include <cmath>
