@@ -50,7 +50,7 @@ bool hasHorizonSubscriber(const HostedWorld& hosted) {
   });
 }
 
-v1::ContactHorizon toProto(const Horizon& horizon, std::size_t approaches) {
+v1::ContactHorizon makeHorizonMessage(const Horizon& horizon, std::size_t approaches) {
   v1::ContactHorizon message;
   message.set_avatar(horizon.avatar);
   for (std::size_t i = 0; i < std::min(approaches, horizon.approaches.size()); ++i) {
@@ -118,7 +118,7 @@ void addHorizons(Client& client, const scene::ContactHorizons& horizons, v1::Tic
   const auto add = [&](const Horizon& horizon) {
     const auto [sent, isNew] = client.sentHorizons.try_emplace(horizon.avatar);
     if (!isNew && horizon.changedTick != horizons.tick()) return;
-    v1::ContactHorizon message = toProto(horizon, approaches);
+    v1::ContactHorizon message = makeHorizonMessage(horizon, approaches);
     std::string bytes = message.SerializeAsString();
     if (bytes == sent->second) return;
     sent->second = std::move(bytes);

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <map>
 
+#include "scene/model/srgb.hpp"
+
 namespace enfilade::server {
 namespace {
 
