@@ -15,6 +15,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 
 #include "collision/assert.hpp"
@@ -315,6 +316,26 @@ void forEachSupportCandidate(const BoundedConvex& convex, const Vec3& direction,
     }
   }
   for (std::size_t k = 0; k < count; ++k) visit(reached[k]);
+}
+
+/// Vertices of a hull up to which a scan of all is cheaper than a search along its edges; at most
+/// the bits of a word.
+inline constexpr std::size_t kMaxScannedVertices = 48;
+
+/// As forEachSupportCandidate(), in any order and possibly with more vertices: for a maximum of
+/// values, not for a vertex, which ties would make depend on the order.
+template <class Visit>
+void forEachSupportValue(const BoundedConvex& convex, const Vec3& direction, double slack,
+                         const SupportVertex& support, Visit visit) {
+  const std::span<const Vec3> vertices = convex.shape->vertices;
+  if (support.unique || vertices.size() > kMaxScannedVertices)
+    return forEachSupportCandidate(convex, direction, slack, support, visit);
+  // Without branches: a body that rests on a face of many corners has them all as candidates.
+  const double threshold = support.projection - slack;
+  std::uint64_t above = 0;
+  for (std::uint32_t i = 0; i < vertices.size(); ++i)
+    above |= static_cast<std::uint64_t>(!(dot(direction, vertices[i]) < threshold)) << i;
+  for (; above != 0; above &= above - 1) visit(static_cast<std::uint32_t>(std::countr_zero(above)));
 }
 
 /// Twice the error bound of a projection in doubles. With u = 2^-53, the direction is off by 4u

@@ -58,7 +58,7 @@ struct TranslationCast {
     if (!(length > 0)) return false;
     const double closing = std::max(0.0, displacement.dot(cache.axis) / length);
     const double rounding = 0x1p-49 * displacement.norm();  // product, sums, length, quotient < 10u
-    return computeSeparationLowerBound(a, b, cache) > distance + closing + rounding;
+    return isSeparationProved(a, b, distance + closing + rounding, cache);
   }
 
   Advancement advanceTo(const TargetDistance& target, double from, ShapeCastResult& result) {

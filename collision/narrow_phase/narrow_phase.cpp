@@ -174,11 +174,10 @@ double computeSupportExcess(const BodyPoint& point, const BoundedConvex& convex,
   };
   const LongReal pointProjection = project(point.inBodyFrame(*convex.shape));
   LongReal maxProjection = pointProjection;
-  forEachSupportCandidate(convex, convex.bodyFromWorld<double>(direction),
-                          computeSupportSlack(convex, length), support, [&](std::uint32_t i) {
-                            maxProjection =
-                                std::max(maxProjection, project(convex.shape->vertices[i]));
-                          });
+  forEachSupportValue(convex, convex.bodyFromWorld<double>(direction),
+                      computeSupportSlack(convex, length), support, [&](std::uint32_t i) {
+                        maxProjection = std::max(maxProjection, project(convex.shape->vertices[i]));
+                      });
   return static_cast<double>(maxProjection - pointProjection);
 }
 
@@ -348,6 +347,42 @@ SeparationResult computeSeparationExactly(const MinkowskiDifference& difference,
   return result;
 }
 
+/// Vertices at which a hill climb along the cached axis starts.
+VertexPair getSupportHint(const PlacedConvex& a, const PlacedConvex& b, const FeatureCache& cache) {
+  return isUsable(cache, a, b) ? cache.pairs[0] : VertexPair{};
+}
+
+/// Upper bound, up to rounding, on the projection of the vertices in doubles. `support`: of a hill
+/// climb along `direction`, which is in the world's frame.
+double computeMaxProjection(const BoundedConvex& convex, const Vec3& direction, double length,
+                            const SupportVertex& support) {
+  const Vec3 local = convex.bodyFromWorld<double>(direction);
+  double max = support.projection;
+  forEachSupportValue(
+      convex, local, computeSupportSlack(convex, length), support,
+      [&](std::uint32_t i) { max = std::max(max, dot(local, convex.shape->vertices[i])); });
+  return max;
+}
+
+/// Whether the bodies' distance along `axis` exceeds `distance`, as far as doubles tell. The value
+/// of a support pair is off by less than 40u length reach (computeSupportValue); 48 leave room for
+/// the bound in extended precision, which is closer.
+std::optional<bool> isFartherAlong(const MinkowskiDifference& difference, const Vec3& axis,
+                                   double distance, VertexPair hint) {
+  const double length = computeNorm(axis) * kMaxUnitLength;
+  if (!fitsDoubleRange(difference) || !(length > 1e-100 && length < 1e100)) return std::nullopt;
+  const SupportPair supports = hillClimbPair(difference, axis, length, hint);
+  const double value = computeSupportValue(difference, axis, length, supports).value;
+  const double rounding = 48 * kRoundoff * length * (difference.reach + std::abs(distance));
+  if (value + rounding < distance * length) return false;
+  const double lowest =
+      value -
+      (computeMaxProjection(difference.a, axis, length, supports.a) - supports.a.projection) -
+      (computeMaxProjection(difference.b, -axis, length, supports.b) - supports.b.projection);
+  if (lowest - rounding > distance * length) return true;
+  return std::nullopt;
+}
+
 /// Runs GJK in Real from the cached features and classifies its result.
 template <class Real>
 GjkOutcome runGjk(const MinkowskiDifference& difference, double limit, FeatureCache& cache,
@@ -395,12 +430,19 @@ SeparationResult computeSeparation(const PlacedConvex& a, const PlacedConvex& b,
 double computeSeparationLowerBound(const PlacedConvex& a, const PlacedConvex& b,
                                    const FeatureCache& cache) {
   if (!(cache.axis.squaredNorm() > 0)) return -std::numeric_limits<double>::infinity();
-  VertexPair hint = isUsable(cache, a, b) ? cache.pairs[0] : VertexPair{};
+  VertexPair hint = getSupportHint(a, b, cache);
   const LongVec3 axis = cache.axis.cast<LongReal>();
   const LongReal length = axis.norm();
   const LongReal lowerBound =
       findCertifiedSupport(MinkowskiDifference(a, b), axis, length, hint).lowerBound / length;
   return static_cast<double>(lowerBound - std::abs(lowerBound) * 2 * kRoundoff);
+}
+
+bool isSeparationProved(const PlacedConvex& a, const PlacedConvex& b, double distance,
+                        const FeatureCache& cache) {
+  const std::optional<bool> isFarther =
+      isFartherAlong(MinkowskiDifference(a, b), cache.axis, distance, getSupportHint(a, b, cache));
+  return isFarther ? *isFarther : computeSeparationLowerBound(a, b, cache) > distance;
 }
 
 }  // namespace enfilade::collision

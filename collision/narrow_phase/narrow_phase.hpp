@@ -51,4 +51,8 @@ std::optional<SeparationResult> computeSeparationWithin(const PlacedConvex& a,
 double computeSeparationLowerBound(const PlacedConvex& a, const PlacedConvex& b,
                                    const FeatureCache& cache);
 
+/// Returns computeSeparationLowerBound() > distance (metres). Cheaper: doubles decide most cases.
+bool isSeparationProved(const PlacedConvex& a, const PlacedConvex& b, double distance,
+                        const FeatureCache& cache);
+
 }  // namespace enfilade::collision

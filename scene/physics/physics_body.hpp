@@ -37,9 +37,11 @@ struct PhysicsBody {
   std::vector<ConvexPart> parts;
   /// Of a static body: its triangles are parts too, numbered after `parts`.
   const collision::TriangleTree* mesh = nullptr;
-  double radius = 0;      ///< metres about the centre of mass: bound of all vertices
-  bool asleep = false;    ///< a dynamic body that stays at rest until it is woken
-  double sleepTimer = 0;  ///< seconds below the sleep velocity
+  double radius = 0;               ///< metres about the centre of mass: bound of all vertices
+  bool asleep = false;             ///< a dynamic body that stays at rest until it is woken
+  double sleepTimer = 0;           ///< seconds near the rest pose
+  Vec3 restCentre = Vec3::Zero();  ///< where the timer began
+  collision::Quat restRotation = collision::Quat::Identity();
   /// Motor of an avatar that pushes. The avatar counts as static and accelerates bodies in its way
   /// to this velocity, with up to `maxPushForce` newtons. 0: no motor.
   Vec3 targetVelocity = Vec3::Zero();

@@ -325,42 +325,73 @@ DisjointSets findIslands(const PhysicsWorld& world, const StepScratch& scratch) 
   return islands;
 }
 
+bool preventsSleep(const PhysicsBody& body) {
+  const bool isMoving = body.maxPointSpeed() + body.maxVelocityDeviation() > 0;
+  return body.preventsSleep || (body.isKinematic() && isMoving);
+}
+
+/// Metres: bound of the displacement of any point from the rest pose. A rotation by an angle moves
+/// a point by at most 2 sin(angle / 2) radius; the sine is the length of the quaternion's vector.
+double computeDisplacementFromRest(const PhysicsBody& body) {
+  const Vec3 turned = (body.motion.rotation * body.restRotation.conjugate()).vec();
+  return (body.motion.centre - body.restCentre).norm() + 2 * turned.norm() * body.radius;
+}
+
+/// Bodies that touch a moving kinematic body, or an avatar that pushes.
 std::vector<std::uint8_t> findBodiesKeptAwake(const PhysicsWorld& world,
                                               const StepScratch& scratch) {
   std::vector<std::uint8_t> keptAwake(world.bodies.size(), 0);
   for (const std::uint32_t i : scratch.constrainedPairs) {
     const BodyPair& pair = world.pairs[i];
-    const bool a = world.bodies[pair.key.a].preventsSleep,
-               b = world.bodies[pair.key.b].preventsSleep;
+    const bool a = preventsSleep(world.bodies[pair.key.a]),
+               b = preventsSleep(world.bodies[pair.key.b]);
     if ((!a && !b) || !scratch.isTouchingPair(i)) continue;
     keptAwake[a ? pair.key.b : pair.key.a] = 1;
   }
   return keptAwake;
 }
 
+/// Displacement decides, not velocity: a body that every pass stops is at rest, and so is one that
+/// its neighbours jostle in its place.
+void updateSleepTimer(PhysicsBody& body, const StepSettings& settings) {
+  const double maxDisplacement = settings.sleep.sleepVelocity * settings.sleep.timeToSleep;
+  if (computeDisplacementFromRest(body) <= maxDisplacement) {
+    body.sleepTimer += settings.solver.seconds;
+    return;
+  }
+  body.restCentre = body.motion.centre;
+  body.restRotation = body.motion.rotation;
+  body.sleepTimer = 0;
+}
+
+/// An island sleeps when all its bodies are at rest. Those that are at rest for half that time lose
+/// their velocity at each step, which ends their jostling; otherwise few bodies would keep a whole
+/// heap awake.
 void updateSleep(PhysicsWorld& world, const StepSettings& settings, StepScratch& scratch) {
   DisjointSets islands = findIslands(world, scratch);
   const std::vector<std::uint8_t> keptAwake = findBodiesKeptAwake(world, scratch);
   std::vector<double> sleepTimers(world.bodies.size(), settings.sleep.timeToSleep);
+  std::vector<std::uint8_t> driven(world.bodies.size(), 0);  // by the island's representative
   for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
     PhysicsBody& body = world.bodies[i];
     if (!body.isAwake()) continue;
-    ENFILADE_ASSERT(scratch.localIndices[i] != kNoIndex);
-    // Displacement decides, not velocity: a body that every pass stops is at rest, too.
-    const double displacement =
-        computeMaxDisplacement(scratch.sweptMotions[scratch.localIndices[i]]);
-    const bool isResting =
-        displacement < settings.sleep.sleepVelocity * settings.solver.seconds && !keptAwake[i];
-    body.sleepTimer = isResting ? body.sleepTimer + settings.solver.seconds : 0;
-    double& minTimer = sleepTimers[islands.find(i)];
-    minTimer = std::min(minTimer, body.sleepTimer);
-    if (islands.find(i) == i) ++scratch.report.islands;
+    const std::uint32_t island = islands.find(i);
+    updateSleepTimer(body, settings);
+    sleepTimers[island] = std::min(sleepTimers[island], body.sleepTimer);
+    if (keptAwake[i] != 0) driven[island] = 1;
+    if (island == i) ++scratch.report.islands;
   }
   for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
     PhysicsBody& body = world.bodies[i];
-    if (!body.isAwake() || sleepTimers[islands.find(i)] < settings.sleep.timeToSleep) continue;
-    body.asleep = true;
-    body.motion.velocity = body.motion.angularVelocity = Vec3::Zero();
+    if (!body.isAwake()) continue;
+    const std::uint32_t island = islands.find(i);
+    if (driven[island] != 0) {
+      body.sleepTimer = 0;
+      continue;
+    }
+    body.asleep = sleepTimers[island] >= settings.sleep.timeToSleep;
+    if (body.asleep || body.sleepTimer >= settings.sleep.timeToSleep / 2)
+      body.motion.velocity = body.motion.angularVelocity = Vec3::Zero();
   }
 }
 

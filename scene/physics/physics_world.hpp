@@ -16,7 +16,7 @@ struct PhysicsWorld {
 
 /// Sleep thresholds.
 struct SleepSettings {
-  double sleepVelocity = 0.01;  ///< m/s: bound of the speed of a resting body
+  double sleepVelocity = 0.01;  ///< m/s: bound of the mean speed of a resting body
   double timeToSleep = 0.5;     ///< seconds at rest before a body sleeps
 };
 

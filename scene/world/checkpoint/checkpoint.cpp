@@ -104,14 +104,12 @@ void archivePhysicsBody(A& a, MaybeConst<A, WorldData>& world, EntityId entity, 
 }
 
 /// Members that are not written follow from the scene and the written ones: `bodyIndices`,
-/// `entities`, `sceneBodyOf`, `physicsBodyOf`. The thread pool and `partFronts` are not part of
-/// the state. `activeBodies` are found before use, and `lastReport` is reported only in the tick
+/// `entities`, `sceneBodyOf`, `physicsBodyOf`. `partFronts` are not part of the state. `activeBodies` are found before use, and `lastReport` is reported only in the tick
 /// that produced it.
 template <class A>
 void archiveDynamicBodies(A& a, MaybeConst<A, WorldData>& world) {
   auto& [physicsWorld, bodyIndices, physicsBodyByPart, entities, freeSlots, sceneBodyOf,
-         physicsBodyOf, threadPool, threadPoolSize, maxThreads, activeBodies, partFronts,
-         lastReport, avatarBodyPairs] = world.dynamicBodies;
+         physicsBodyOf, activeBodies, partFronts, lastReport, avatarBodyPairs] = world.dynamicBodies;
   auto& [physicsBodies, pairs] = physicsWorld;
   a(physicsBodyByPart, freeSlots);
   if constexpr (!A::kWrites) restorePhysicsBodies(a, world);
@@ -177,13 +175,13 @@ void archiveBodies(Reader& a, std::vector<Body>& bodies) {
 /// Not written: `scene` and `settings` create the world that is read into, with
 /// `bodyIndexById`, `kinematicBodies`, `triggers` and `bodyIndexByProxy`. `excludedPairCache` and
 /// `movingBodies` are computed before use. `avatarByProxy` and `snapshot` follow from the rest;
-/// `auditCursor` is not part of the state.
+/// `auditCursor` and `threads` are not part of the state.
 template <class A>
 void archiveWorld(A& a, MaybeConst<A, WorldData>& world) {
   auto& [scene, settings, tick, hash, pendingCommands, queuedOrderCount, queues, avatars,
          avatarNames, avatarIndices, pendingBodyCommands, bodies, bodyIndexById, bodyContacts,
          excludedPairCache, kinematicBodies, triggers, movingBodies, dynamicBodies, broadPhase,
-         avatarByProxy, bodyIndexByProxy, snapshot, auditCursor] = world;
+         avatarByProxy, bodyIndexByProxy, snapshot, auditCursor, threads] = world;
   a(tick, hash, queuedOrderCount, avatarNames, queues, pendingCommands, pendingBodyCommands);
   archiveBodies(a, bodies);
   a(avatars, bodyContacts);

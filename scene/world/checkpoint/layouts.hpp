@@ -110,8 +110,8 @@ template <>
 struct Layout<WalkProgress> {
   template <class A>
   static void archive(A& a, MaybeConst<A, WalkProgress>& walk) {
-    auto& [waypointIndex, minDistance, timeoutLeft] = walk;
-    a(waypointIndex, minDistance, timeoutLeft);
+    auto& [waypointIndex, minDistance, timeoutLeft, yields, flowTick] = walk;
+    a(waypointIndex, minDistance, timeoutLeft, yields, flowTick);
   }
 };
 
@@ -197,7 +197,7 @@ struct Layout<Avatar> {
            turn, viewHeld, teleports, driveVelocity, desiredVelocity, walk, waitTimeLeft,
            stalledInAirTime, lastDisplacement, requestedDisplacement, idle, dirty, blockedBy,
            pairsChanged, blockingHit, blockedReported, proxy, motionBounds, cachedBounds, obstacles,
-           narrowQueries, partsLookedAt, hasBodyObstacles, contacts] = avatar;
+           work, hasBodyObstacles, contacts] = avatar;
     a(name, spawnOrder, spawnHeight, height, radius, facing);
     if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // `shape`, `baseParts`
     a(chain);
@@ -335,11 +335,12 @@ template <>
 struct Layout<PhysicsBody> {
   template <class A>
   static void archive(A& a, MaybeConst<A, PhysicsBody>& body) {
-    auto& [hull, motion, centreInFrame, parts, mesh, radius, asleep, sleepTimer, targetVelocity,
-           maxPushForce, maxStepDisplacement, substepVelocities, pushSpeedBound, preventsSleep,
-           rotation, position, accumulatedMotion, teleportedDistance] = body;
+    auto& [hull, motion, centreInFrame, parts, mesh, radius, asleep, sleepTimer, restCentre,
+           restRotation, targetVelocity, maxPushForce, maxStepDisplacement, substepVelocities,
+           pushSpeedBound, preventsSleep, rotation, position, accumulatedMotion,
+           teleportedDistance] = body;
     bool isFree = body.isDynamic();  // false for a body that left the world
-    a(motion, isFree, asleep, sleepTimer, targetVelocity, maxPushForce);
+    a(motion, isFree, asleep, sleepTimer, restCentre, restRotation, targetVelocity, maxPushForce);
     if constexpr (!A::kWrites)
       if (!isFree) motion.inverseMass = 0;
     archiveExtended(a, maxStepDisplacement);
