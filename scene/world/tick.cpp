@@ -7,6 +7,7 @@
 
 #include "collision/assert.hpp"
 #include "scene/world/audit.hpp"
+#include "scene/world/avatars/avatar_islands.hpp"
 #include "scene/world/avatars/avatar_motion.hpp"
 #include "scene/world/avatars/avatar_state.hpp"
 #include "scene/world/avatars/order_execution.hpp"
@@ -21,6 +22,8 @@
 
 namespace enfilade::scene {
 namespace {
+
+constexpr std::size_t kIslandsPerTask = 8;
 
 /// Records the wall time of consecutive stages in the report.
 class Stopwatch {
@@ -67,21 +70,32 @@ void updateBroadPhase(WorldData& world) {
       avatar.pairsChanged = true;
 }
 
-void moveAvatars(WorldData& world, QueryCount& count) {
-  for (Avatar& avatar : world.avatars) {
-    avatar.narrowQueries = avatar.partsLookedAt = 0;
-    avatar.blockedBy = 0;
-    for (ChainLink& link : avatar.chain.links) link.blockedBy = 0;
-    avatar.requestedDisplacement = Vec3::Zero();
-    avatar.idle = avatar.grounded && avatar.lastDisplacement.isZero(0) &&
-                  avatar.desiredVelocity.isZero(0) && !avatar.dirty && avatar.chain.speed == 0 &&
-                  avatar.turn.left == 0 && !avatar.pairsChanged &&
-                  areNeighboursStationary(world, avatar);
-    if (avatar.idle) continue;
-    collectObstacles(world, avatar);
-    const AvatarWorkCounter counter(avatar, count);
-    moveAvatar(world, avatar, count);
-  }
+void prepareAvatar(WorldData& world, Avatar& avatar) {
+  avatar.work = {};
+  avatar.blockedBy = 0;
+  for (ChainLink& link : avatar.chain.links) link.blockedBy = 0;
+  avatar.requestedDisplacement = Vec3::Zero();
+  avatar.idle = avatar.grounded && avatar.lastDisplacement.isZero(0) &&
+                avatar.desiredVelocity.isZero(0) && !avatar.dirty && avatar.chain.speed == 0 &&
+                avatar.turn.left == 0 && !avatar.pairsChanged &&
+                areNeighboursStationary(world, avatar);
+  if (!avatar.idle) prepareBodyObstacles(world, avatar);
+}
+
+/// Avatars that may meet move one after the other, by name; islands of them in parallel.
+void moveAvatars(WorldData& world) {
+  for (Avatar& avatar : world.avatars) prepareAvatar(world, avatar);
+  const AvatarIslands islands(world);
+  ThreadPool* threadPool = acquireThreadPool(world.threads, islands.size(), kMinParallelAvatars);
+  parallelForOrSerial(threadPool, islands.size(), kIslandsPerTask,
+                      [&](std::size_t from, std::size_t to) {
+                        for (std::size_t i = from; i < to; ++i)
+                          for (const std::uint32_t member : islands.members(i)) {
+                            Avatar& avatar = world.avatars[member];
+                            collectObstacles(world, avatar);
+                            moveAvatar(world, avatar, avatar.work);
+                          }
+                      });
 }
 
 void hashState(WorldData& world) {
@@ -108,11 +122,17 @@ void reportBoxWork(WorldData& world, TickReport& report) {
     report.verticesLookedAt += std::exchange(avatar.chain.verticesLookedAt, 0);
 }
 
-void reportAvatarWork(const WorldData& world, TickReport& report) {
+void reportQueries(const WorldData& world, QueryCount count, TickReport& report) {
   AvatarWork& costliest = report.costliestAvatar;
-  for (const Avatar& avatar : world.avatars)
-    if (avatar.narrowQueries > costliest.narrowQueries)
-      costliest = {avatar.id, avatar.narrowQueries, avatar.partsLookedAt, avatar.footPosition};
+  for (const Avatar& avatar : world.avatars) {
+    count.add(avatar.work);
+    if (avatar.work.narrow > costliest.narrowQueries)
+      costliest = {avatar.id, avatar.work.narrow, avatar.work.partsLookedAt, avatar.footPosition};
+  }
+  report.narrowQueries = count.narrow;
+  report.rationalQueries = count.rational;
+  report.iterationLimitedCasts = count.bounded;
+  report.partsLookedAt = count.partsLookedAt;
 }
 
 /// True if the avatar is falling, or driven by a client.
@@ -164,10 +184,12 @@ std::shared_ptr<const Snapshot> makeSnapshot(const WorldData& world) {
   snapshot->tick = world.tick;
   snapshot->time = static_cast<double>(world.tick) * world.settings.tickDuration;
   snapshot->stateHash = world.hash;
-  for (const Avatar& avatar : world.avatars)
-    snapshot->avatars.push_back(makeAvatarSnapshot(avatar));
-  std::sort(snapshot->avatars.begin(), snapshot->avatars.end(),
-            [](const AvatarSnapshot& a, const AvatarSnapshot& b) { return a.id < b.id; });
+  std::vector<const Avatar*> byId;
+  byId.reserve(world.avatars.size());
+  for (const Avatar& avatar : world.avatars) byId.push_back(&avatar);
+  std::ranges::sort(byId, {}, &Avatar::id);
+  snapshot->avatars.reserve(byId.size());
+  for (const Avatar* avatar : byId) snapshot->avatars.push_back(makeAvatarSnapshot(*avatar));
   return snapshot;
 }
 
@@ -191,11 +213,11 @@ TickReport runTick(WorldData& world) {
   }
   moveKinematicBodies(world, report, count);
   stopwatch.recordStage(Stage::bodies);
-  moveAvatars(world, count);
+  moveAvatars(world);
   stopwatch.recordStage(Stage::avatars);
   stepDynamicBodies(world, report, count);
   stopwatch.recordStage(Stage::solver);
-  detectAvatarContacts(world, report, count);
+  detectAvatarContacts(world, report);
   detectBodyContacts(world, report, count);
   updateTriggers(world, report, count);
   updateWalkProgress(world, report, count);
@@ -214,11 +236,7 @@ TickReport runTick(WorldData& world) {
                    [](const Notice& x, const Notice& y) { return x.avatar < y.avatar; });
   report.snapshot = world.snapshot;
   report.pairs = static_cast<std::uint32_t>(world.broadPhase.pairCount());
-  report.narrowQueries = count.narrow;
-  report.rationalQueries = count.rational;
-  report.iterationLimitedCasts = count.bounded;
-  report.partsLookedAt = count.partsLookedAt;
-  reportAvatarWork(world, report);
+  reportQueries(world, count, report);
   reportBoxWork(world, report);
   report.idle = isWorldIdle(world);
   return report;

@@ -110,8 +110,8 @@ TickReport tickWorld(World& world) {
   return runTick(world.data());
 }
 
-void setSolverThreadCount(World& world, int threads) {
-  world.data().dynamicBodies.maxThreads = threads;
+void setThreadCount(World& world, int threads) {
+  world.data().threads.maxThreads = threads;
 }
 
 void setAuditInterval(World& world, std::uint32_t everyTicks) {

@@ -46,9 +46,9 @@ std::optional<std::string> submitBodyCommand(World& world, BodyCommand command);
 /// Advances the world by WorldSettings::tickDuration.
 TickReport tickWorld(World& world);
 
-/// Maximum number of solver threads, >= 1, at most the number of processors; 0 (default): two.
-/// Results do not depend on it.
-void setSolverThreadCount(World& world, int threads);
+/// Number of threads of a tick, 1 to 64; 0 (default): two, or one on a single processor. They are
+/// used where many avatars or bodies move. Results do not depend on it.
+void setThreadCount(World& world, int threads);
 
 /// Audits every `everyTicks`-th tick from now on; 0 (default): never. An audit compares the pairs
 /// of the broad phase with brute force: proxies * (objects + proxies) box tests of about 5 ns. It

@@ -133,7 +133,7 @@ bool checkScene(const FeederPlan& plan, int ticks) {
   scene::Model model = assets::makeFeeder({plan.parts.size(), 1});
   scene::applySidecar(model, assets::feederSidecar(), "feeder.walk.json");
   scene::World world(std::make_shared<const scene::Scene>(std::move(model)));
-  scene::setSolverThreadCount(world, kThreads);
+  scene::setThreadCount(world, kThreads);
   const auto isInside = [&](const scene::BodySnapshot& body) {
     const testing::Vec3& at = body.pose.translation;
     return std::abs(at.x()) < plan.inner && std::abs(at.z()) < plan.inner && at.y() > 0.8;

@@ -1,13 +1,13 @@
 // Benchmark of a tick with walking avatars in a real or the bundled scene, by stage, in
 // microseconds.
 //
-//   tick_bench [SCENE [AVATARS [TICKS]]]
+//   tick_bench [SCENE [AVATARS [TICKS [THREADS]]]]
 //
 // SCENE is a file, district:N for a generated district of N objects, or scan:N, office:N,
 // plant_room:N or terrain:N for a generated scene of some N triangles (dense_scenes.hpp). Avatars
 // walk at 1.5 m/s towards seeded places and change direction every two seconds, like visitors of a
-// building. Contacts are computed each tick. The maximum penetration is printed with the times, so
-// that no speed is bought with an error.
+// building. THREADS: at most, of a tick (default: two). Contacts are computed each tick. The
+// maximum penetration is printed with the times, so that no speed is bought with an error.
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -76,14 +76,15 @@ std::shared_ptr<const scene::Scene> load(const std::filesystem::path& file) {
 void measure(const std::string& title, scene::World& world, int ticks,
              const std::function<void(int tick)>& before) {
   std::array<std::vector<double>, scene::kStageCount> stages;
-  std::vector<double> whole, processor;
+  std::vector<double> whole, processor, allProcessors;
   double worst = 0;
   std::uint64_t queries = 0, rationals = 0, pairs = 0, bounded = 0;
   for (int i = 0; i < ticks; ++i) {
     before(i);
-    const double start = processorTime();
+    const double start = processorTime(), startOfAll = processorTimeOfAllThreads();
     const scene::TickReport report = tickWorld(world);
     processor.push_back(processorTime() - start);
+    allProcessors.push_back(processorTimeOfAllThreads() - startOfAll);
     double sum = 0;
     for (std::size_t s = 0; s < scene::kStageCount; ++s) {
       stages[s].push_back(report.stageSeconds[s]);
@@ -101,7 +102,8 @@ void measure(const std::string& title, scene::World& world, int ticks,
   std::printf("| stage    | median us |    p99 us |    max us |\n|---|---|---|---|\n");
   for (std::size_t s = 0; s < scene::kStageCount; ++s) row(scene::kStageNames[s], stages[s]);
   row("tick", whole);
-  row("on a CPU", processor);
+  row("main CPU", processor);
+  row("all CPUs", allProcessors);
   std::printf(
       "a tick: %.1f pairs, %.1f narrow queries, %.3f of them rational; "
       "%llu sweeps bounded; worst penetration %g m; state hash %016llx\n",
@@ -110,9 +112,10 @@ void measure(const std::string& title, scene::World& world, int ticks,
       static_cast<unsigned long long>(world.snapshot()->stateHash));
 }
 
-void bench(const std::filesystem::path& file, int avatars, int ticks) {
+void bench(const std::filesystem::path& file, int avatars, int ticks, int threads) {
   const auto still = load(file);
   scene::World world(still);
+  setThreadCount(world, threads);
   std::mt19937_64 random(1);
   spawnAvatars(world, static_cast<std::size_t>(avatars), random);
   measure(file.string(), world, ticks, [&](int i) {
@@ -156,10 +159,11 @@ int main(int argc, char** argv) {
   if (const auto code = scene::runImportWorker(argc, argv)) return *code;
   const int avatars = argc > 2 ? std::atoi(argv[2]) : 10;
   const int ticks = argc > 3 ? std::atoi(argv[3]) : 3000;
+  const int threads = argc > 4 ? std::atoi(argv[4]) : 0;
   if (argc > 1) {
-    bench(argv[1], avatars, ticks);
+    bench(argv[1], avatars, ticks, threads);
   } else {
-    for (const auto& scene : defaultScenes(argv[0])) bench(scene, avatars, ticks);
+    for (const auto& scene : defaultScenes(argv[0])) bench(scene, avatars, ticks, threads);
     benchCrowd(600);
   }
 }

@@ -42,11 +42,18 @@ inline void turnAll(scene::World& world, double speed, std::mt19937_64& random) 
   }
 }
 
+inline double readClock(clockid_t clock) {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
 /// CPU time of this thread, seconds; other load does not count.
 inline double processorTime() {
-  timespec now{};
-  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &now);
-  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+  return readClock(CLOCK_THREAD_CPUTIME_ID);
+}
+/// The same of all threads of the process.
+inline double processorTimeOfAllThreads() {
+  return readClock(CLOCK_PROCESS_CPUTIME_ID);
 }
 
 }  // namespace enfilade::benchmarks

@@ -257,7 +257,7 @@ void tray(int threads, const char* name) {
   }
   b.model.bodies.push_back(plate);
   World world(std::make_shared<const Scene>(b.model));
-  setSolverThreadCount(world, threads);
+  setThreadCount(world, threads);
   ticks(world, 90);
   print(name, world);
 }

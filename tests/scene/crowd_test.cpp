@@ -1,5 +1,6 @@
 // Tests of avatars that block one another: none jitters, none penetrates another, none leaves the
 // corridor.
+#include <map>
 #include <random>
 
 #include "tests/scene/world_fixture.hpp"
@@ -93,6 +94,51 @@ TEST(Crowd, AvatarDrivenIntoTooNarrowGapStands) {
       ASSERT_EQ(run.feet("ann"), feet) << gap << ", tick " << tick;
     }
   }
+}
+
+/// Two hundred avatars leave a hall by one door of 1.2 m; who is blocked is sent again after a
+/// while, as a client would.
+TEST(Crowd, TwoHundredAvatarsLeaveByOneDoorAndNobodyIsStuckForEver) {
+  WorldFixture run({{"floor", {-20, -0.2, -12}, {40, 0, 12}},
+                    {"left", {0, 0, -12}, {0.2, 3, -0.6}},
+                    {"right", {0, 0, 0.6}, {0.2, 3, 12}}});
+  for (int i = 0; i < 200; ++i)
+    run.order("a" + std::to_string(i), Spawn{{-1.5 - 0.8 * (i / 20), 0, -8 + 0.8 * (i % 20)}});
+  run.step();
+  ASSERT_EQ(run.count(Notice::Kind::spawned), 200);
+  const auto send = [&](const std::string& name, int i) {
+    Walk walk;
+    walk.waypoints = {{-0.4, 0, 0}, {2, 0, 0}, {12, 0, -9 + 1.2 * (i % 16)}};
+    walk.speed = 1.3;
+    if (run.feet(name).x() > 0.2) walk.waypoints.erase(walk.waypoints.begin());
+    run.order(name, walk);
+  };
+  for (int i = 0; i < 200; ++i) send("a" + std::to_string(i), i);
+  std::set<std::string> arrived;
+  std::size_t seen = run.notices.size();
+  int tick = 0;
+  int reversals = 0;
+  std::map<EntityId, Vec3> last;
+  for (; tick < 60 * 200 && arrived.size() < 200; ++tick) {
+    run.step();
+    for (const AvatarSnapshot& a : run.world.snapshot()->avatars) {
+      const Vec3 step = a.move.actualDisplacement;
+      if (step.norm() < 1e-4) continue;
+      Vec3& before = last.try_emplace(a.id, step).first->second;
+      if (step.dot(before) < 0) ++reversals;
+      before = step;
+    }
+    for (; seen < run.notices.size(); ++seen) {
+      const Notice notice = run.notices[seen];
+      if (notice.kind == Notice::Kind::arrived && arrived.insert(notice.avatar).second)
+        run.order(notice.avatar, Leave{});
+      if (notice.kind == Notice::Kind::blocked)
+        send(notice.avatar, std::stoi(notice.avatar.substr(1)));
+    }
+  }
+  EXPECT_EQ(arrived.size(), 200u);
+  EXPECT_EQ(run.worstPenetration, 0);
+  EXPECT_LT(reversals, 200 * 12) << "steps back and forth, of all in " << tick << " ticks";
 }
 
 /// All avatars press towards one end, each also a little sideways, until they stop.

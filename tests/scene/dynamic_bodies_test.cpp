@@ -649,7 +649,7 @@ TEST(DynamicBodies, EventsDoNotDependOnTheNumberOfThreads) {
   };
   const auto run = [&](int threads) {
     BodyFixture t(loose(boxes));
-    setSolverThreadCount(t.world, threads);
+    setThreadCount(t.world, threads);
     Run result;
     for (int i = 0; i < 90; ++i)
       for (const ContactEvent& e : tickWorld(t.world).contacts)

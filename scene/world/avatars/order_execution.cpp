@@ -13,6 +13,7 @@
 #include "scene/world/avatars/spawn.hpp"
 #include "scene/world/avatars/turning.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
+#include "scene/world/avatars/yielding.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
 #include "scene/world/contacts/contacts.hpp"
 
@@ -86,17 +87,18 @@ OrderStatus executeOrder(const Spawn& spawn, OrderContext& context) {
   return OrderStatus::doneThisTick;
 }
 
-void startWaypoint(Avatar& avatar, const Walk& walk, const WorldSettings& settings) {
+void startWaypoint(const WorldData& world, const Walk& walk, Avatar& avatar) {
   avatar.walk.minDistance =
       computeRemainingDistance(avatar, walk.waypoints[avatar.walk.waypointIndex]);
-  avatar.walk.timeoutLeft = settings.stuckTimeout;
+  avatar.walk.timeoutLeft = world.settings.stuckTimeout;
+  avatar.walk.flowTick = world.tick;
 }
 
 OrderStatus executeOrder(const Walk& walk, OrderContext& context) {
   Avatar& avatar = *context.findAvatar();
   avatar.driveVelocity = Vec3::Zero();
   avatar.viewHeld = false;
-  if (avatar.walk.minDistance < 0) startWaypoint(avatar, walk, context.world.settings);
+  if (avatar.walk.minDistance < 0) startWaypoint(context.world, walk, avatar);
   return OrderStatus::running;
 }
 
@@ -280,10 +282,13 @@ void updateWalk(const Walk& walk, OrderContext& context) {
   Avatar& avatar = *context.findAvatar();
   const Vec3& goal = walk.waypoints[avatar.walk.waypointIndex];
   const double distance = computeRemainingDistance(avatar, goal);
-  if (distance <= kArrivalDistance &&
+  const bool isLast = avatar.walk.waypointIndex + 1 == walk.waypoints.size();
+  const double arrivalDistance =
+      isLast ? kArrivalDistance : computePassingDistance(context.world, avatar);
+  if (distance <= arrivalDistance &&
       std::abs(goal.y() - avatar.footPosition.y()) <= kArrivalHeight) {
-    if (++avatar.walk.waypointIndex < walk.waypoints.size())
-      return startWaypoint(avatar, walk, context.world.settings);
+    ++avatar.walk.waypointIndex;
+    if (!isLast) return startWaypoint(context.world, walk, avatar);
     return endWalk(context, Notice::Kind::arrived);
   }
   const double maxWalkDistance = walk.speed * context.world.settings.stuckTimeout;
@@ -292,6 +297,7 @@ void updateWalk(const Walk& walk, OrderContext& context) {
     avatar.walk.timeoutLeft = context.world.settings.stuckTimeout;
     return;
   }
+  if (isQueueing(context.world, avatar)) return;
   avatar.walk.timeoutLeft -= context.world.settings.tickDuration;
   if (avatar.walk.timeoutLeft > kTimeTolerance) return;
   emitBlocked(context.world, avatar, context.report, context.count);
@@ -357,6 +363,7 @@ void runOrders(WorldData& world, TickReport& report, QueryCount& count) {
     if (const double speed = avatar->desiredVelocity.norm(); speed > 0 && !avatar->viewHeld)
       avatar->viewDirection = avatar->desiredVelocity / speed;
   }
+  yieldToWalkersAhead(world);
   std::erase_if(world.queues,
                 [](const OrderQueue& queue) { return queue.orders.empty() && queue.avatar == 0; });
   if (world.queuedOrderCount == 0) return;

@@ -96,7 +96,7 @@ void turnAvatar(const WorldSettings& settings, Avatar& avatar, QueryCount& count
       turnsShape(avatar) ? avatar.facing : std::remainder(turn.heading + fraction * angle, 360);
   setViewFacing(avatar, turn.heading);
   turn.timeoutLeft = fraction > kMinTurnFraction ? settings.stuckTimeout
-                                                     : turn.timeoutLeft - settings.tickDuration;
+                                                 : turn.timeoutLeft - settings.tickDuration;
 }
 
 void setViewFacing(Avatar& avatar, double degrees) {

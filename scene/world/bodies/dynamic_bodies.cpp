@@ -218,7 +218,8 @@ void stepDynamicBodies(WorldData& world, TickReport& report, QueryCount& count) 
       wakeTouchingBodies(world, avatar);
   dynamicBodies.activeBodies = collectActiveBodies(world);
   if (dynamicBodies.activeBodies.empty()) return;
-  ThreadPool* threadPool = acquireThreadPool(dynamicBodies);
+  ThreadPool* threadPool =
+      acquireThreadPool(world.threads, dynamicBodies.activeBodies.size(), kMinParallelBodies);
   collectPairs(world, threadPool);
   startKinematicMotion(world);
   StepSettings stepSettings = makeStepSettings(world.settings);

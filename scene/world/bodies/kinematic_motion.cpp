@@ -56,6 +56,7 @@ Vec3 computePushDisplacement(const Vec3& normal, double distance) {
 /// that rise with the body do not obstruct upward motion.
 void pushAvatar(WorldData& world, Avatar& avatar, Vec3 displacement,
                 const std::vector<CarriedBody>& carriedBodies, QueryCount& count) {
+  prepareBodyObstacles(world, avatar);
   collectObstacles(world, avatar);
   if (displacement.y() > 0)
     for (Obstacle& obstacle : avatar.obstacles.list)

@@ -141,7 +141,8 @@ PartContact queryPair(BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b
 std::vector<PartContact> queryCloseParts(WorldData& world, const ContactDistances& distances,
                                          QueryCount& count) {
   DynamicBodies& dynamicBodies = world.dynamicBodies;
-  ThreadPool* pool = acquireThreadPool(dynamicBodies);
+  ThreadPool* pool =
+      acquireThreadPool(world.threads, dynamicBodies.activeBodies.size(), kMinParallelBodies);
   const std::vector<BodySummary> summaries = summarizeBodies(world);
   const std::vector<std::uint32_t> selected = selectPairsToQuery(world, distances, summaries, pool);
   std::vector<PartContact> found(selected.size());

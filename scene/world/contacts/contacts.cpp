@@ -19,6 +19,8 @@ namespace {
 using collision::SeparationResult;
 using collision::Verdict;
 
+constexpr std::size_t kAvatarsPerTask = 8;
+
 /// The search for what is close to one part of an avatar.
 struct CloseSearch {
   const collision::PlacedConvex part;
@@ -258,8 +260,10 @@ void addYieldedBodies(const WorldData& world, Avatar& avatar, std::vector<Contac
         at->second, [&] { return computeTouchWith(world, avatar, at->second, count); }, now);
 }
 
-void updateAvatarContacts(WorldData& world, Avatar& avatar, TickReport& report, QueryCount& count) {
-  const AvatarWorkCounter counter(avatar, count);
+/// Changes the avatar alone, so that avatars are updated in parallel.
+void updateAvatarContacts(const WorldData& world, Avatar& avatar,
+                          std::vector<ContactEvent>& events) {
+  QueryCount& count = avatar.work;
   refreshDynamicObstacles(world, avatar);
   std::vector<Contact> now = findNearby(avatar, computeContactDistances(world.settings), count);
   // The avatar with the smaller id reports a pair of avatars.
@@ -267,8 +271,8 @@ void updateAvatarContacts(WorldData& world, Avatar& avatar, TickReport& report, 
     return c.other >= world.firstAvatarId() && c.other < avatar.id;
   });
   addYieldedBodies(world, avatar, now, count);
-  emitContactBegins(world, avatar, now, report.contacts);
-  emitContactEnds(world, avatar, now, report.contacts, count);
+  emitContactBegins(world, avatar, now, events);
+  emitContactEnds(world, avatar, now, events, count);
   avatar.contacts = std::move(now);
 }
 
@@ -336,12 +340,21 @@ void emitContactEnd(const WorldData& world, EntityId a, const Contact& before, c
   events.push_back(makeNearMissEvent(world, a, last, ContactEvent::Phase::end));
 }
 
-void detectAvatarContacts(WorldData& world, TickReport& report, QueryCount& count) {
-  for (Avatar& avatar : world.avatars) {
-    // A dynamic body next to the avatar may have been woken after the avatar was found idle.
-    if (!avatar.idle || !areNeighboursStationary(world, avatar))
-      updateAvatarContacts(world, avatar, report, count);
-    for (const Contact& contact : avatar.contacts) {
+void detectAvatarContacts(WorldData& world, TickReport& report) {
+  std::vector<std::vector<ContactEvent>> events(world.avatars.size());
+  parallelForOrSerial(acquireThreadPool(world.threads, world.avatars.size(), kMinParallelAvatars),
+                      world.avatars.size(), kAvatarsPerTask, [&](std::size_t from, std::size_t to) {
+                        for (std::size_t i = from; i < to; ++i) {
+                          Avatar& avatar = world.avatars[i];
+                          // A dynamic body next to the avatar may have been woken after the avatar
+                          // was found idle.
+                          if (!avatar.idle || !areNeighboursStationary(world, avatar))
+                            updateAvatarContacts(world, avatar, events[i]);
+                        }
+                      });
+  for (std::size_t i = 0; i < world.avatars.size(); ++i) {
+    std::ranges::move(events[i], std::back_inserter(report.contacts));
+    for (const Contact& contact : world.avatars[i].contacts) {
       if (contact.touching) ++report.activeContacts;
       report.maxPenetration = std::max(report.maxPenetration, contact.penetration);
     }

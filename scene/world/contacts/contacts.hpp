@@ -29,26 +29,8 @@ void emitContactEnd(const WorldData& world, EntityId a, const Contact& before, c
                     const std::function<collision::SeparationResult()>& separationAtEnd,
                     std::vector<ContactEvent>& events);
 
-/// Adds the work until its end to the avatar's.
-class AvatarWorkCounter {
- public:
-  AvatarWorkCounter(Avatar& avatar, const QueryCount& count)
-      : avatar_(avatar), count_(count), before_(count) {}
-  ~AvatarWorkCounter() {
-    avatar_.narrowQueries += count_.narrow - before_.narrow;
-    avatar_.partsLookedAt += count_.partsLookedAt - before_.partsLookedAt;
-  }
-  AvatarWorkCounter(const AvatarWorkCounter&) = delete;
-  AvatarWorkCounter& operator=(const AvatarWorkCounter&) = delete;
-
- private:
-  Avatar& avatar_;
-  const QueryCount& count_;
-  const QueryCount before_;
-};
-
 /// Updates the contacts of avatars, and reports those that began or ended.
-void detectAvatarContacts(WorldData& world, TickReport& report, QueryCount& count);
+void detectAvatarContacts(WorldData& world, TickReport& report);
 /// Reports a blocked avatar: the entity that blocked it last, and the current separation.
 void emitBlocked(const WorldData& world, Avatar& avatar, TickReport& report, QueryCount& count);
 

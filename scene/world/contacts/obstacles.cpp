@@ -8,6 +8,7 @@ namespace enfilade::scene {
 namespace {
 
 constexpr double kPrefetchDistance = 3, kPrefetchSeconds = 1;  // metres, seconds
+constexpr std::size_t kMaxScannedDenseObjects = 4096;          // above, the broad phase finds them
 constexpr double kCollectMargin =
     0.15;  // metres: obstacles are collected for several ticks at once
 
@@ -91,6 +92,25 @@ void collectBodyObstacles(const WorldData& world, std::uint32_t body, const Aabb
     updateObstaclePose(world, obstacle);
     if (overlaps(obstacle.box, bounds)) obstacles.push_back(obstacle);
   }
+}
+
+/// Calls each(index into Scene::solidObjects()) for every dense object that overlaps `box`.
+template <class Each>
+void forEachDenseIndex(const WorldData& world, const Aabb& box, const Each& each) {
+  const Scene& scene = *world.scene;
+  const std::vector<std::uint32_t>& dense = scene.denseIndices();
+  if (dense.size() <= kMaxScannedDenseObjects) {
+    for (const std::uint32_t i : dense)
+      if (overlaps(box, scene.staticBoxes()[i])) each(i);
+    return;
+  }
+  for (const collision::StaticId i : world.broadPhase.overlapStatic(box))
+    if (std::ranges::binary_search(dense, i)) each(i);
+}
+
+/// True if the obstacles of earlier ticks suffice.
+bool hasAllObstacles(const Avatar& avatar) {
+  return !avatar.pairsChanged && contains(avatar.cachedBounds, avatar.motionBounds);
 }
 
 /// The cast of one part of an avatar's shape. Each hit shortens the rest of the motion.
@@ -271,14 +291,23 @@ void prefetchSurroundings(const WorldData& world) {
     const double distance =
         kPrefetchDistance + 2 * kPrefetchSeconds * avatar.desiredVelocity.norm();
     const Aabb around = inflated(avatar.motionBounds, distance);
-    for (const std::uint32_t i : scene.denseIndices())
-      if (overlaps(around, scene.staticBoxes()[i])) objects.push_back(scene.solidObjects()[i]);
+    forEachDenseIndex(world, around,
+                      [&](std::uint32_t i) { objects.push_back(scene.solidObjects()[i]); });
   }
   if (!objects.empty()) scene.prefetchCollisionGeometry(objects);
 }
 
-void collectObstacles(WorldData& world, Avatar& avatar) {
-  const bool complete = !avatar.pairsChanged && contains(avatar.cachedBounds, avatar.motionBounds);
+void prepareBodyObstacles(WorldData& world, const Avatar& avatar) {
+  if (hasAllObstacles(avatar)) return;
+  const auto overlapping = world.broadPhase.overlapsOf(avatar.proxy);
+  for (std::size_t i = overlapping.size();
+       i-- > 0 && overlapping[i].isDynamic;)  // dynamic proxies come last
+    if (const std::uint32_t body = world.findBodyByProxy(overlapping[i].id); body != kNoBody)
+      makePartBoxes(world.bodies[body]);
+}
+
+void collectObstacles(const WorldData& world, Avatar& avatar) {
+  const bool complete = hasAllObstacles(avatar);
   avatar.pairsChanged = false;
   if (complete) return refreshDynamicObstacles(world, avatar);
   ObstacleSet& obstacles = avatar.obstacles;
@@ -291,7 +320,6 @@ void collectObstacles(WorldData& world, Avatar& avatar) {
       collectStaticObstacles(*world.scene, world.scene->solidObjects()[overlap.id],
                              avatar.cachedBounds, obstacles);
     } else if (const std::uint32_t body = world.findBodyByProxy(overlap.id); body != kNoBody) {
-      makePartBoxes(world.bodies[body]);
       appendBodyParts(world, body, obstacles.list);
       avatar.hasBodyObstacles = true;
     } else {

@@ -47,8 +47,13 @@ Aabb computeAvatarFootBounds(const WorldSettings& settings, const Avatar& avatar
 /// about once a second, and at those that spawned.
 void prefetchSurroundings(const WorldData& world);
 
+/// Makes the boxes of parts of bodies that the next collectObstacles() of the avatar needs. It
+/// changes the bodies, so avatars are prepared one by one.
+void prepareBodyObstacles(WorldData& world, const Avatar& avatar);
+
 /// Collects the obstacles inside the avatar's motion bounds, unless the cached ones suffice.
-void collectObstacles(WorldData& world, Avatar& avatar);
+/// Changes the avatar alone.
+void collectObstacles(const WorldData& world, Avatar& avatar);
 
 /// All obstacles that overlap `box`, without the avatar `except`.
 ObstacleSet collectObstaclesInBox(const WorldData& world, const Aabb& box, EntityId except);

@@ -12,6 +12,7 @@
 #include "scene/world/data/contact.hpp"
 #include "scene/world/data/obstacle.hpp"
 #include "scene/world/data/orders.hpp"
+#include "scene/world/data/query_count.hpp"
 
 namespace enfilade::scene {
 
@@ -20,6 +21,10 @@ struct WalkProgress {
   std::size_t waypointIndex = 0;  ///< index of the current way point
   double minDistance = -1;        ///< metres, horizontal or, if flying, in space; -1: none yet
   double timeoutLeft = 0;         ///< seconds
+  bool yields = false;            ///< to a walker ahead of it (avatars/yielding.hpp)
+  /// The tick in which the first of its queue was free. It passes from one to the next each tick,
+  /// so it ages where a queue has no free first one.
+  std::uint64_t flowTick = 0;
 };
 
 /// A turn under way, in degrees.
@@ -75,8 +80,8 @@ struct Avatar {
   Aabb motionBounds;  ///< bounds of its motion in this tick, scene frame, metres
   Aabb cachedBounds;  ///< region in which `obstacles` are complete
   ObstacleSet obstacles;
-  std::uint32_t narrowQueries = 0, partsLookedAt = 0;  ///< in this tick; for its report
-  bool hasBodyObstacles = false;                       ///< `obstacles` contain parts of bodies
+  QueryCount work;                ///< of its motion and contacts in this tick
+  bool hasBodyObstacles = false;  ///< `obstacles` contain parts of bodies
   std::vector<Contact> contacts;  ///< ascending `other`; part of the state, not a cache
 };
 

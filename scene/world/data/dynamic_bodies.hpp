@@ -3,13 +3,11 @@
 #pragma once
 
 #include <map>
-#include <memory>
 #include <utility>
 #include <vector>
 
 #include "collision/compound/overlapping_parts.hpp"
 #include "scene/physics/physics_world.hpp"
-#include "scene/physics/thread_pool.hpp"
 #include "scene/world/data/body.hpp"
 #include "scene/world/data/snapshot.hpp"
 
@@ -31,9 +29,6 @@ struct DynamicBodies {
   std::vector<std::uint32_t> freeSlots;      ///< physics bodies of avatars that left, for reuse
   std::vector<std::uint32_t> sceneBodyOf;    ///< by physics body: index into WorldData::bodies
   std::vector<std::uint32_t> physicsBodyOf;  ///< by WorldData::bodies; kNoBody: not met yet
-  std::unique_ptr<ThreadPool> threadPool;    ///< once there are many bodies; not part of the state
-  int threadPoolSize = 0;                    ///< threads of `threadPool`
-  int maxThreads = 0;                        ///< 0: kDefaultThreads; at most the processors
   std::vector<std::uint32_t> activeBodies;   ///< awake or possibly woken in this tick, ascending
   /// By physics body of a rigid body. Not part of the state: only the cost of candidate pairs
   /// depends on it.
@@ -43,8 +38,5 @@ struct DynamicBodies {
   /// separated at its end; ascending.
   std::vector<std::pair<EntityId, EntityId>> avatarBodyPairs;
 };
-
-/// The thread pool for this tick; null if too few bodies are active to be worth it.
-ThreadPool* acquireThreadPool(DynamicBodies& dynamicBodies);
 
 }  // namespace enfilade::scene

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "collision/motion/shape_cast.hpp"
+#include "scene/world/data/query_count.hpp"
 #include "scene/world/data/snapshot.hpp"
 
 namespace enfilade::scene {
@@ -31,20 +31,6 @@ struct TickAudit {
   std::uint64_t pairs = 0;             ///< found for them by brute force
   std::vector<AuditFinding> findings;  ///< ascending entity; empty: the tick passed
   double seconds = 0;                  ///< wall time of the audit; not part of any stage
-};
-
-/// Narrow-phase work, for the tick's counters.
-struct QueryCount {
-  std::uint32_t narrow = 0;
-  std::uint32_t rational = 0;
-  std::uint32_t bounded = 0;        ///< casts that stopped at their iteration limit
-  std::uint32_t partsLookedAt = 0;  ///< triangles and hulls of dense objects
-
-  void add(const collision::ShapeCastResult& cast) {
-    narrow += cast.queries;
-    rational += cast.exactQueries;
-    bounded += cast.iterationLimitReached ? 1 : 0;
-  }
 };
 
 /// The work of one avatar in a tick.

@@ -17,6 +17,7 @@
 #include "scene/world/data/scene.hpp"
 #include "scene/world/data/snapshot.hpp"
 #include "scene/world/data/world_settings.hpp"
+#include "scene/world/data/world_threads.hpp"
 
 namespace enfilade::scene {
 
@@ -64,6 +65,7 @@ struct WorldData {
   std::vector<std::uint32_t> bodyIndexByProxy;  ///< kNoBody: no body; up to the last body's proxy
   std::shared_ptr<const Snapshot> snapshot;
   AuditCursor auditCursor;  ///< not part of the state: no result depends on it
+  WorldThreads threads;
 
   EntityId firstAvatarId() const {
     return static_cast<EntityId>(scene->model().objects.size()) + 1;
