@@ -157,6 +157,13 @@ void readWalk(const json& line, v1::Walk* walk) {
     }
   }
   if (line.contains("speed")) walk->set_speed(readSpeed(line));
+  if (!line.contains("opens")) return;
+  const json& opens = line["opens"];
+  if (!opens.is_array()) refuse("opens", "must be a list of doors, not " + excerpt(opens));
+  for (const json& door : opens) {
+    if (!door.is_string()) refuse("opens", "must list names of doors, not " + excerpt(door));
+    walk->add_opens(door.get<std::string>());
+  }
 }
 
 void readGo(const json& line, v1::Go* go) {
@@ -168,6 +175,9 @@ void readGo(const json& line, v1::Go* go) {
     readPoint(to, "to", go->mutable_to()->mutable_point());
   }
   if (line.contains("speed")) go->set_speed(readSpeed(line));
+  if (line.contains("drop"))
+    go->set_max_drop(parseNumberInRange(line["drop"], "drop", "a number of metres", 0, 10));
+  if (line.contains("lifts")) go->set_lifts(parseFlag(line["lifts"], "lifts"));
   if (!line.contains("doors")) return;
   if (line["doors"] == "open")
     go->set_doors(v1::NavigationQuery::DOORS_OPEN);
@@ -253,8 +263,8 @@ struct Verb {
 const std::vector<Verb>& verbs() {
   static const std::vector<Verb> all{
       {"spawn", {"at", "facing", "radius", "height", "flying", "parts", "links", "self_contact"}},
-      {"walk", {"to", "along", "speed"}},
-      {"go", {"to", "speed", "doors"}},
+      {"walk", {"to", "along", "speed", "opens"}},
+      {"go", {"to", "speed", "doors", "drop", "lifts"}},
       {"look", {"at"}},
       {"wait", {"for"}},
       {"capture", {"as"}},

@@ -123,6 +123,18 @@ std::pair<double, double> getJointLimits(const BodySpec& spec) {
   return {spec.low, spec.high};
 }
 
+double findOpenLimit(const BodySpec& spec) {
+  const auto [low, high] = getJointLimits(spec);
+  return high - spec.closedPosition >= spec.closedPosition - low ? high : low;
+}
+
+double computeMotionSeconds(const BodySpec& spec, double distance) {
+  if (distance == 0) return 0;
+  // Accelerated and decelerated motion takes no longer than that of both phases one after another.
+  return std::abs(distance) / spec.speed +
+         (spec.acceleration > 0 ? spec.speed / spec.acceleration : 0);
+}
+
 double computeMaxPointSpeed(const BodySpec& spec, double radius) {
   if (getTraits(spec.kind).rotates) return radius;
   if (!getTraits(spec.kind).takesKeys) return 1;

@@ -149,6 +149,13 @@ inline bool isLoopingPath(const BodySpec& body) {
 /// Limits of a kinematic body's joint position: low, high.
 std::pair<double, double> getJointLimits(const BodySpec& spec);
 
+/// Doors: the limit that is farther from BodySpec::closedPosition.
+double findOpenLimit(const BodySpec& spec);
+
+/// Seconds, upper bound, of an unobstructed motion of the joint position by `distance` at its own
+/// speed.
+double computeMotionSeconds(const BodySpec& spec, double distance);
+
 /// Maximum speed of any point, m/s, of a kinematic body at a joint velocity of 1 per second.
 /// `radius`: of its shape, metres.
 double computeMaxPointSpeed(const BodySpec& spec, double radius);

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "scene/navigation/ghost.hpp"
+#include "scene/world/data/body.hpp"
 #include "scene/world/world.hpp"
 
 namespace enfilade::scene {
@@ -20,14 +21,6 @@ std::shared_ptr<const AvatarShape> makeSweptShape(const AvatarShape& prism, cons
     }
   auto hull = std::make_shared<const collision::Hull>(collision::buildHull(points));
   return makeAvatarShape({makeAvatarPart(std::move(hull), Vec3::Zero(), Mat3::Identity())});
-}
-
-double computeSecondsToOpen(const BodySpec& door, double position) {
-  const double open =
-      door.high - door.closedPosition >= door.closedPosition - door.low ? door.high : door.low;
-  const double rest = std::abs(open - position);
-  // Accelerated and decelerated motion takes no longer than that of both phases one after another.
-  return rest / door.speed + (door.acceleration > 0 ? door.speed / door.acceleration : 0);
 }
 
 }  // namespace
@@ -61,12 +54,30 @@ std::shared_ptr<const Snapshot> makeSnapshotWithOpenDoors(std::shared_ptr<const 
   return world.snapshot();
 }
 
+namespace {
+
+/// The snapshot with all doors closed.
+Snapshot closeDoors(const Scene& scene, Snapshot snapshot) {
+  auto bodies = std::make_shared<std::vector<BodySnapshot>>(*snapshot.bodies);
+  for (BodySnapshot& body : *bodies) {
+    const BodySpec& spec = scene.model().bodies[body.index];
+    if (!getTraits(spec.kind).isDoor) continue;
+    body.jointPosition = spec.closedPosition;
+    body.pose = computeBodyPose(spec, computeJointPose(spec, spec.closedPosition));
+  }
+  snapshot.bodies = std::move(bodies);
+  return snapshot;
+}
+
+}  // namespace
+
 std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings& settings,
                                         const Snapshot& snapshot, const NavigationAgent& agent,
                                         const std::vector<Vec3>& points) {
   std::vector<DoorOnPath> doors;
   const std::vector<BodySpec>& bodies = index.scene().model().bodies;
   if (!hasDoors(index.scene()) || points.size() < 2) return doors;
+  const Snapshot closed = closeDoors(index.scene(), snapshot);
   const auto prism = makePrismShape(agent.radius, agent.height, agent.height, settings);
   double distance = 0;
   for (std::size_t i = 1; i < points.size(); ++i) {
@@ -75,17 +86,29 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
     box.include(placeBox(prism->box, points[i]));
     box = inflated(box, settings.contactOffset);
     std::shared_ptr<const AvatarShape> swept;  // built for the first door that is near
-    for (const BodySnapshot& body : *snapshot.bodies) {
-      const BodySpec& spec = bodies[body.index];
-      if (!getTraits(spec.kind).isDoor ||
-          std::ranges::any_of(doors, [&](const DoorOnPath& d) { return d.body == body.index; }))
-        continue;
-      if (!overlaps(box, computeBodyAabb({index, snapshot}, body))) continue;
+    const auto touches = [&](const Snapshot& state, std::size_t body) {
+      const BodySnapshot& door = (*state.bodies)[body];
+      if (!overlaps(box, computeBodyAabb({index, state}, door))) return false;
       if (!swept) swept = makeSweptShape(*prism, leg);
       const auto separation =
-          computeSeparationFromShape(index, snapshot, swept, points[i - 1], body.id);
-      if (separation && separation->distance < computeContactThreshold(settings))
-        doors.push_back({body.index, distance, computeSecondsToOpen(spec, body.jointPosition)});
+          computeSeparationFromShape(index, state, swept, points[i - 1], door.id);
+      return separation && separation->distance < computeContactThreshold(settings);
+    };
+    for (std::size_t b = 0; b < snapshot.bodies->size(); ++b) {
+      const BodySnapshot& body = (*snapshot.bodies)[b];
+      const BodySpec& spec = bodies[body.index];
+      if (!getTraits(spec.kind).isDoor) continue;
+      const auto known =
+          std::ranges::find_if(doors, [&](const DoorOnPath& d) { return d.body == body.index; });
+      if (known != doors.end() && known->isInTheWay) continue;
+      const bool isInTheWay = touches(snapshot, b);
+      if (known != doors.end()) {
+        known->isInTheWay = isInTheWay;
+      } else if (isInTheWay || touches(closed, b)) {
+        const double rest = findOpenLimit(spec) - body.jointPosition;
+        doors.push_back(
+            {body.index, i - 1, distance, computeMotionSeconds(spec, rest), isInTheWay});
+      }
     }
     distance += leg.norm();
   }

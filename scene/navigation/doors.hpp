@@ -21,12 +21,14 @@ std::shared_ptr<const Snapshot> makeSnapshotWithOpenDoors(std::shared_ptr<const 
 
 struct DoorOnPath {
   std::uint32_t body = 0;    ///< index into Model::bodies
-  double distance = 0;       ///< metres from the start of the path to the leg on which it stands
-  double secondsToOpen = 0;  ///< at its own speed
+  std::size_t point = 0;     ///< index of the first point of the line on which it stands
+  double distance = 0;       ///< metres along the points from the start of the path to that line
+  double secondsToOpen = 0;  ///< at its own speed, from where it is
+  bool isInTheWay = false;   ///< as it is now
 };
 
-/// Doors that an agent on the path would touch at their poses in `snapshot`, in the order of the
-/// path; for each leg, by body.
+/// Doors that an agent on the path would touch as they are in `snapshot`, or if they were closed,
+/// in the order of the path; for each line, by body.
 std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings& settings,
                                         const Snapshot& snapshot, const NavigationAgent& agent,
                                         const std::vector<Vec3>& points);

@@ -112,7 +112,12 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
   return std::nullopt;
 }
 
-std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places) {
+std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind) {
+  const auto canWalk = [&](const Vec3& from, const Vec3& to) {
+    if (kind == Shortcuts::all) return walks(walker, from, to);
+    walker.returnTo(from);
+    return walker.isWayFree(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
+  };
   std::vector<Vec3> path{places.front()};
   for (std::size_t at = 0; at + 1 < places.size();) {
     // The farthest place that is found by doubling the distance, then by halving.
@@ -120,11 +125,11 @@ std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places) {
     for (std::size_t step = 2; reached + 1 < failed; step *= 2) {
       const std::size_t next = std::min(at + step, failed - 1);
       if (next <= reached) break;
-      (walks(walker, places[at], places[next]) ? reached : failed) = next;
+      (canWalk(places[at], places[next]) ? reached : failed) = next;
     }
     while (failed < places.size() && reached + 1 < failed) {
       const std::size_t middle = (reached + failed) / 2;
-      (walks(walker, places[at], places[middle]) ? reached : failed) = middle;
+      (canWalk(places[at], places[middle]) ? reached : failed) = middle;
     }
     at = reached;
     path.push_back(places[at]);

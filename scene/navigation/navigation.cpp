@@ -11,6 +11,8 @@
 #include <thread>
 #include <utility>
 
+#include "scene/navigation/link_routes.hpp"
+#include "scene/navigation/mesh/saved_meshes.hpp"
 #include "scene/navigation/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -20,9 +22,9 @@ namespace {
 constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile beyond the radius
 constexpr int kMaxRandomTries = 200;
 
-/// Puts a body where it rests in a snapshot.
-void placeBody(const BodySnapshot& body, Body& own) {
-  setBodyPose(own, body.pose.translation, body.pose.rotation);
+/// Puts a body where it rests.
+void placeBody(const collision::Pose& pose, Body& own) {
+  setBodyPose(own, pose.translation, pose.rotation);
   own.motionBounds = own.boxes.whole;
 }
 
@@ -35,9 +37,10 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
       world_(std::move(scene), settings),
       grid_(makeTileGrid(world_.scene().bounds(), agent)) {
   const auto start = std::chrono::steady_clock::now();
+  bodies_ = snapshot ? std::make_shared<const Snapshot>(*snapshot) : world_.snapshot();
   if (snapshot)
     for (const BodySnapshot& body : *snapshot->bodies)
-      placeBody(body, world_.data().bodies[body.index]);
+      placeBody(body.pose, world_.data().bodies[body.index]);
   std::vector<int> tiles(static_cast<std::size_t>(grid_.tilesX) *
                          static_cast<std::size_t>(grid_.tilesZ));
   std::iota(tiles.begin(), tiles.end(), 0);
@@ -49,7 +52,29 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
   report_.seconds = seconds.count();
 }
 
+Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
+                       const NavigationAgent& agent, std::span<const std::uint8_t> saved)
+    : agent_(agent),
+      world_(std::move(scene), settings),
+      grid_(makeTileGrid(world_.scene().bounds(), agent)) {
+  SavedMeshes meshes = loadMeshes(world_.data(), agent, grid_, saved);
+  bodies_ = world_.snapshot();
+  for (std::size_t i = 0; i < meshes.bodies.size(); ++i)
+    placeBody(meshes.bodies[i], world_.data().bodies[i]);
+  ampleTiles_ = std::move(meshes.ample);
+  scarceTiles_ = std::move(meshes.scarce);
+  assembleMeshes();
+}
+
 Navigation::~Navigation() = default;
+
+std::vector<std::uint8_t> Navigation::save() {
+  const std::lock_guard lock(mutex_);
+  SavedMeshes meshes{ampleTiles_, scarceTiles_, {}};
+  for (const Body& body : world_.data().bodies)
+    meshes.bodies.push_back({body.orientation, body.position});
+  return saveMeshes(world_.data(), agent_, meshes);
+}
 
 void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress) {
   const std::vector<Clearance> clearances{Clearance::ample, Clearance::scarce};
@@ -84,6 +109,7 @@ void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Pr
 
 void Navigation::assembleMeshes() {
   walker_.emplace(world_.data(), agent_);
+  links_.reset();
   unobstructed_.reset();
   ample_.emplace(grid_, ampleTiles_);
   scarce_.emplace(grid_, scarceTiles_);
@@ -103,6 +129,7 @@ void Navigation::assembleMeshes() {
 
 std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
   const std::lock_guard lock(mutex_);
+  bodies_ = std::make_shared<const Snapshot>(snapshot);
   WorldData& world = world_.data();
   std::vector<bool> isChanged(ampleTiles_.size(), false);
   const double margin = agent_.radius + kTileMargin;
@@ -123,7 +150,7 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
                                       own.orientation.coeffs() == body.pose.rotation.coeffs()))
       continue;
     markTiles(own.boxes.whole);
-    placeBody(body, own);
+    placeBody(body.pose, own);
     markTiles(own.boxes.whole);
   }
   std::vector<int> tiles;
@@ -149,14 +176,22 @@ NavigationMesh Navigation::buildMesh(Clearance clearance) const {
   return {grid_, std::move(tiles)};
 }
 
-NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to) {
+NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const PathOptions& options) {
   const std::lock_guard lock(mutex_);
   const auto unobstructed = [this]() -> const NavigationMesh& {
     if (!unobstructed_) unobstructed_.emplace(buildMesh(Clearance::none));
     return *unobstructed_;
   };
-  return scene::findPath({world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed}, from,
-                         to);
+  const PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};
+  NavigationPath path = scene::findPath(finder, from, to);
+  if (path.found()) {
+    path.seconds = path.length / agent_.speed;
+    path.legs.push_back({PathLeg::Kind::walk, 0, path.length, path.seconds});
+  }
+  if (options == PathOptions()) return path;
+  if (!links_ || links_->options() != options)
+    links_.emplace(world_.data(), agent_, *ample_, options);
+  return findLinkedPath(finder, *links_, *bodies_, from, to, std::move(path));
 }
 
 std::optional<NarrowPlace> Navigation::findNarrowest(const std::vector<Vec3>& points) {

@@ -7,10 +7,12 @@
 #include <mutex>
 #include <optional>
 #include <random>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "scene/navigation/clear_width.hpp"
+#include "scene/navigation/links.hpp"
 #include "scene/navigation/mesh/navigation_mesh.hpp"
 #include "scene/navigation/path_finder.hpp"
 #include "scene/navigation/walker.hpp"
@@ -54,7 +56,14 @@ class Navigation {
   Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
              const NavigationAgent& agent, const Snapshot* snapshot = nullptr, int threads = 2,
              const Progress& progress = {});
+  /// Takes the meshes of save() instead of building them, with bodies as they were then; update()
+  /// brings them to a later state. Throws MeshFileError if they belong to another scene or size.
+  Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
+             const NavigationAgent& agent, std::span<const std::uint8_t> saved);
   ~Navigation();
+
+  /// The meshes as bytes.
+  std::vector<std::uint8_t> save();
 
   /// Takes over the poses of bodies, and builds the tiles again in which they changed. Returns the
   /// number of these tiles.
@@ -65,8 +74,8 @@ class Navigation {
   std::string findEntityName(EntityId id) const { return world_.data().findEntityName(id); }
 
   /// A path from where an agent at `from` stands to where it stands at `to`. Both may be up to a
-  /// step above the floor.
-  NavigationPath findPath(const Vec3& from, const Vec3& to);
+  /// step above the floor. With jumps and lifts it is the quickest that is found.
+  NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {});
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
   std::optional<NarrowPlace> findNarrowest(const std::vector<Vec3>& points);
   /// The place in a box that is closest to its centre, horizontally.
@@ -97,8 +106,10 @@ class Navigation {
   std::optional<Walker> walker_;
   std::vector<TileMesh> ampleTiles_, scarceTiles_;
   std::optional<NavigationMesh> ample_, scarce_, unobstructed_;
-  std::vector<std::uint32_t> islands_;  ///< by polygon of `ample_`
-  std::vector<double> areaUpTo_;        ///< by polygon of `ample_`, cumulative
+  std::optional<Links> links_;              ///< of the options that were asked for last
+  std::shared_ptr<const Snapshot> bodies_;  ///< where they are
+  std::vector<std::uint32_t> islands_;      ///< by polygon of `ample_`
+  std::vector<double> areaUpTo_;            ///< by polygon of `ample_`, cumulative
   NavigationReport report_;
 };
 

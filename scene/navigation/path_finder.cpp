@@ -37,6 +37,7 @@ double computeLength(const std::vector<Vec3>& points) {
 struct Proof {
   GridSearch coarse{kCoarseSpacing, 1.5, kMaxRepairWalks};
   GridSearch fine{kFineSpacing, 0.7, kMaxRepairWalks};
+  bool isRepaired = false;       ///< the present proposal
   Vec3 failedAt = Vec3::Zero();  ///< where the last proof failed
   std::vector<Obstruction> met;
 };
@@ -71,6 +72,7 @@ bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& cor
       auto places = findGridPath(finder.walker, from, target, *search);
       if (!places) continue;
       path.points.insert(path.points.end(), places->begin() + 1, places->end());
+      proof.isRepaired = true;
       return true;
     }
   }
@@ -188,8 +190,10 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
     corners.push_back(to);
     path.points = {from};
     finder.walker.takeMetSteps();
+    proof.isRepaired = false;
     if (proveLegs(finder, corners, clearance, path, proof)) {
-      path.points = shortenPath(finder.walker, path.points);
+      path.points = shortenPath(finder.walker, path.points,
+                                proof.isRepaired ? Shortcuts::all : Shortcuts::free);
       path.length = computeLength(path.points);
       if (!finder.walker.takeMetSteps() || walksOn(finder.walker, path.points, proof)) return path;
     }

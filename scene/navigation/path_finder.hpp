@@ -18,10 +18,23 @@ struct Obstruction {
   double clearWidth = 0;         ///< metres between the obstacles there; 0: not measured
 };
 
+/// A part of a path, up to the first point of the next one.
+struct PathLeg {
+  enum class Kind : std::uint8_t { walk, drop, lift };
+  Kind kind = Kind::walk;
+  std::size_t first = 0;         ///< index of its first point
+  double length = 0;             ///< metres that the agent walks
+  double seconds = 0;            ///< expected; of a lift: until it has come, and of the ride
+  std::uint32_t body = kNoBody;  ///< lift: index into Model::bodies
+  std::uint32_t fromLevel = 0, toLevel = 0;  ///< lift: stops
+};
+
 struct NavigationPath {
   std::vector<Vec3> points;  ///< feet, scene frame, metres: way points of a Walk; empty: none found
-  double length = 0;         ///< metres, in space, along `points`
-  std::string reason;        ///< without a path: why
+  double length = 0;   ///< metres, in space, along `points`; of falls across, of rides nothing
+  double seconds = 0;  ///< expected, without waits for doors
+  std::vector<PathLeg> legs;
+  std::string reason;  ///< without a path: why
   std::optional<Obstruction> obstruction;
 
   bool found() const { return !points.empty(); }

@@ -26,7 +26,8 @@ constexpr double kEvenHeight = 1e-3;   // metres: a step that rises or sinks mor
 constexpr int kMaxTicksWithoutGain = 30;  // half a second: no progress towards the way point
 constexpr double kMinGain = 1e-3;         // metres in that time
 constexpr double kMinSlideGain = 1e-4;    // metres in a tick
-constexpr int kMaxTicks = 1'000'000;      // more than an hour: the goal is unreasonably far
+constexpr double kAnyLength = std::numeric_limits<double>::infinity();
+constexpr int kMaxTicks = 1'000'000;  // more than an hour: the goal is unreasonably far
 
 /// True if the feet rose or sank in a tick as on a step, or on a round or steep thing.
 bool isStep(const Vec3& before, const Vec3& after) {
@@ -135,6 +136,7 @@ void Walker::returnTo(const Vec3& footPosition) {
 }
 
 WalkOutcome Walker::walkTo(const Vec3& goal) {
+  const double stepHeight = world_.settings.stepHeight;
   const Vec3 start = avatar_.footPosition;
   hasStepped_ = isUneven_ = false;
   for (double least = std::numeric_limits<double>::infinity();;) {
@@ -145,14 +147,30 @@ WalkOutcome Walker::walkTo(const Vec3& goal) {
       if (!hasStepped_) return outcome;
       // Whether a step succeeds, and where it ends, may depend on where the ticks begin.
       returnTo(start);
-      return walkByTicks(goal, std::numeric_limits<double>::infinity(), false);
+      return walkByTicks(goal, kAnyLength, false, stepHeight);
     }
-    outcome = walkByTicks(goal, kTickedLength, false);
+    outcome = walkByTicks(goal, kTickedLength, false, stepHeight);
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (outcome.kind != WalkOutcome::Kind::arrived) return outcome;
     if (distance <= kArrivalDistance || !(distance < least)) return outcome;
     least = distance;
   }
+}
+
+bool Walker::isWayFree(const Vec3& goal) {
+  isUneven_ = false;
+  avatar_.shape = wideShape_;
+  bool isFree = true;
+  while (isFree) {
+    const double distance = computeGroundDistance(avatar_.footPosition, goal);
+    if (distance <= kArrivalDistance) break;
+    const double even = measureEvenFloor(goal, distance);
+    const double length = std::min({distance, kMaxStep, std::max(kLongStep, even)});
+    isFree = stepEvenly(projectToGround(goal - avatar_.footPosition) * (length / distance),
+                        length <= even);
+  }
+  avatar_.shape = shape_;
+  return isFree;
 }
 
 /// Walks with a wider shape, in long steps where the floor is even. Ends before the first place
@@ -208,31 +226,36 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
 
 /// Walks as an avatar in a world does, over at most `length` metres. Arrived: nothing stopped it,
 /// or, if it may slide, nothing for long.
-WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide) {
+WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, double maxDrop) {
   const Vec3 start = avatar_.footPosition;
   double lastFloor = start.y(), least = computeGroundDistance(start, goal);
   int ticksWithoutGain = 0;
-  for (;;) {
+  for (int ticks = 0;; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (avatar_.grounded && (distance <= kArrivalDistance ||
                              computeGroundDistance(start, avatar_.footPosition) >= length))
-      return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0};
+      return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0, ticks};
     ticksWithoutGain = distance < least - kMinGain ? 0 : ticksWithoutGain + 1;
     least = std::min(least, distance);
     if (ticksWithoutGain > kMaxTicksWithoutGain)
-      return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity};
+      return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity, ticks};
     const Vec3 before = avatar_.footPosition;
     step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));
     if (isStep(before, avatar_.footPosition)) hasStepped_ = metSteps_ = true;
     if (!avatar_.grounded) {
-      if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight)
-        return {WalkOutcome::Kind::fell, avatar_.footPosition, 0};
+      if (avatar_.footPosition.y() < lastFloor - maxDrop)
+        return {WalkOutcome::Kind::fell, avatar_.footPosition, 0, ticks};
+      if (before.y() - avatar_.footPosition.y() > kMinStepRise) ticksWithoutGain = 0;
       continue;
     }
     lastFloor = avatar_.footPosition.y();
     if (avatar_.blockedBy != 0 && !maySlide)
-      return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy};
+      return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy, ticks};
   }
+}
+
+WalkOutcome Walker::dropTo(const Vec3& goal, double maxDrop) {
+  return walkByTicks(goal, kAnyLength, false, maxDrop);
 }
 
 WalkOutcome Walker::walkOn(const Vec3& goal) {
@@ -241,7 +264,7 @@ WalkOutcome Walker::walkOn(const Vec3& goal) {
   const WalkOutcome outcome = walkWithMargin(goal);  // of the agent's own width
   if (outcome.kind == WalkOutcome::Kind::arrived && !isUneven_) return outcome;
   returnTo(start);
-  return walkByTicks(goal, std::numeric_limits<double>::infinity(), true);
+  return walkByTicks(goal, kAnyLength, true, world_.settings.stepHeight);
 }
 
 WalkOutcome Walker::slideTo(const Vec3& goal) {

@@ -26,6 +26,7 @@ struct WalkOutcome {
   Kind kind = Kind::arrived;
   Vec3 footPosition = Vec3::Zero();  ///< scene frame, metres: where the walk ended
   EntityId obstacle = 0;             ///< blocked: the entity that was hit
+  int ticks = 0;                     ///< of a walk tick by tick
 };
 
 /// Not thread-safe; several walkers may share a world that does not tick.
@@ -44,9 +45,15 @@ class Walker {
   /// or else walks tick by tick: a later walk along the same line differs by less than that.
   WalkOutcome walkTo(const Vec3& goal);
 
+  /// Whether nothing is met on the way to `goal`, with some millimetres more room, and the floor is
+  /// even. Quick; walkTo() also arrives over steps and through narrower places.
+  bool isWayFree(const Vec3& goal);
+
   /// As an avatar in a world walks on from where the walker stands; may slide along obstacles. Tick
   /// by tick off even floor.
   WalkOutcome walkOn(const Vec3& goal);
+  /// Walks tick by tick to `goal`, and may fall by up to `maxDrop` metres on the way.
+  WalkOutcome dropTo(const Vec3& goal, double maxDrop);
   /// Walks tick by tick towards `goal`, slides along obstacles, and ends where it gains nothing.
   WalkOutcome slideTo(const Vec3& goal);
 
@@ -55,11 +62,12 @@ class Walker {
   bool takeMetSteps() { return std::exchange(metSteps_, false); }
 
   const Vec3& footPosition() const { return avatar_.footPosition; }
+  EntityId groundEntity() const { return avatar_.groundEntity; }  ///< after a walk or place()
   const NavigationAgent& agent() const { return agent_; }
 
  private:
   WalkOutcome walkWithMargin(const Vec3& goal);
-  WalkOutcome walkByTicks(const Vec3& goal, double length, bool maySlide);
+  WalkOutcome walkByTicks(const Vec3& goal, double length, bool maySlide, double maxDrop);
   void prepareStep(const Vec3& velocity);
   void step(const Vec3& velocity);
   void collectNearObstacles();

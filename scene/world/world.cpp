@@ -71,6 +71,26 @@ std::optional<std::string> validateBodyCommand(const World& world, const BodyCom
   return "body: no body named '" + command.body + "'";
 }
 
+/// The doors and lifts of a walk must exist. `field` names the list.
+std::optional<std::string> validateWalkBodies(const World& world, const Order& order) {
+  const Walk* walk = std::get_if<Walk>(&order);
+  if (!walk) return std::nullopt;
+  const auto validate = [&](const std::string& field, BodyCommand command) {
+    auto error = validateBodyCommand(world, command);
+    return error ? std::optional(field + ": " + *error) : std::nullopt;
+  };
+  for (std::size_t i = 0; i < walk->opens.size(); ++i)
+    if (auto error = validate("opens[" + std::to_string(i) + "]",
+                              {walk->opens[i], BodyCommand::Action::open, 0, 0, std::nullopt}))
+      return error;
+  for (std::size_t i = 0; i < walk->rides.size(); ++i)
+    if (auto error = validate("rides[" + std::to_string(i) + "]",
+                              {walk->rides[i].lift, BodyCommand::Action::moveToLevel, 0,
+                               walk->rides[i].level, std::nullopt}))
+      return error;
+  return std::nullopt;
+}
+
 }  // namespace
 
 World::World(std::shared_ptr<const Scene> scene, const WorldSettings& settings)
@@ -91,6 +111,7 @@ std::shared_ptr<const Snapshot> World::snapshot() const {
 
 std::optional<std::string> submitAvatarCommand(World& world, Command command) {
   if (auto error = validateCommandFields(command, world.settings())) return error;
+  if (auto error = validateWalkBodies(world, command.order)) return error;
   WorldData& data = world.data();
   if (data.queuedOrderCount + computeOrderCost(command.order) > kMaxQueuedOrders)
     return std::to_string(kMaxQueuedOrders) +

@@ -414,6 +414,12 @@ void addRouteOptions(CLI::App& verb, CommandArguments& into) {
       ->capture_default_str();
   verb.add_flag("--doors-as-they-are", into.route.doorsAsTheyAre,
                 "Doors that move stay as in the file. Default: they are open");
+  verb.add_option("--drop", into.route.links.maxDrop,
+                  "Jumps down from edges, up to this height. 0: not at all")
+      ->type_name("METRES")
+      ->check(CLI::Range(0.0, 10.0))
+      ->capture_default_str();
+  verb.add_flag("--lifts", into.route.links.lifts, "Rides lifts");
   verb.add_flag("--json", into.json, "Print one JSON object");
   verb.add_option("--plan", into.plan, "File for a plan with the path (png)")
       ->check(CLI::Validator(validateFile, "FILE"));

@@ -59,6 +59,34 @@ Json toJson(const Vec3& point) {
   return Json::array({point.x(), point.y(), point.z()});
 }
 
+const char* toString(scene::PathLeg::Kind kind) {
+  switch (kind) {
+    case scene::PathLeg::Kind::drop:
+      return "drop";
+    case scene::PathLeg::Kind::lift:
+      return "lift";
+    default:
+      return "walk";
+  }
+}
+
+Json makeLegs(const scene::NavigationPath& path, const scene::Scene& scene) {
+  Json legs = Json::array();
+  for (const scene::PathLeg& leg : path.legs) {
+    Json one{{"kind", toString(leg.kind)},
+             {"first", leg.first},
+             {"length", leg.length},
+             {"seconds", leg.seconds}};
+    if (leg.kind == scene::PathLeg::Kind::lift) {
+      one["name"] = scene.model().bodies[leg.body].name;
+      one["from_level"] = leg.fromLevel;
+      one["to_level"] = leg.toLevel;
+    }
+    legs.push_back(std::move(one));
+  }
+  return legs;
+}
+
 Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
                 const std::optional<scene::NarrowPlace>& narrowest,
                 const std::vector<scene::DoorOnPath>& doors, const scene::Scene& scene,
@@ -67,9 +95,10 @@ Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
   Json report{{"found", path.found()}};
   if (path.found()) {
     report["length"] = path.length;
-    report["seconds"] = path.length / command.agent.speed;
+    report["seconds"] = path.seconds;
     report["points"] = Json::array();
     for (const Vec3& point : path.points) report["points"].push_back(toJson(point));
+    report["legs"] = makeLegs(path, scene);
     report["doors"] = Json::array();
     for (const scene::DoorOnPath& door : doors)
       report["doors"].push_back({{"name", scene.model().bodies[door.body].name},
@@ -104,12 +133,19 @@ std::string formatText(const RouteCommand& command, const scene::NavigationPath&
                        const std::vector<scene::DoorOnPath>& doors, const scene::Scene& scene) {
   if (!path.found())
     return fmt::format("no way from {} to {}: {}\n", command.from, command.to, path.reason);
-  std::string text =
-      fmt::format("{:.2f} m from {} to {}, {:.1f} s at {:.1f} m/s\n", path.length, command.from,
-                  command.to, path.length / command.agent.speed, command.agent.speed);
+  std::string text = fmt::format("{:.2f} m from {} to {}, {:.1f} s at {:.1f} m/s\n", path.length,
+                                 command.from, command.to, path.seconds, command.agent.speed);
   if (narrowest)
     text += fmt::format("narrowest: {:.3f} m at {:.2f}, {:.2f}, {:.2f}\n", narrowest->clearWidth,
                         narrowest->position.x(), narrowest->position.y(), narrowest->position.z());
+  for (const scene::PathLeg& leg : path.legs)
+    if (leg.kind == scene::PathLeg::Kind::drop)
+      text += fmt::format("drop: {:.2f} m\n",
+                          path.points[leg.first].y() - path.points[leg.first + 1].y());
+    else if (leg.kind == scene::PathLeg::Kind::lift)
+      text +=
+          fmt::format("lift: {}, from stop {} to {}, {:.1f} s\n",
+                      scene.model().bodies[leg.body].name, leg.fromLevel, leg.toLevel, leg.seconds);
   for (const scene::DoorOnPath& door : doors)
     text += fmt::format("door: {}, after {:.2f} m\n", scene.model().bodies[door.body].name,
                         door.distance);
@@ -160,7 +196,7 @@ ExitCode route(const RouteCommand& command) {
   bar.clear();
   const Vec3 from = resolvePlace(command.from, "FROM", *scene, navigation);
   const Vec3 to = resolvePlace(command.to, "TO", *scene, navigation);
-  const scene::NavigationPath path = navigation.findPath(from, to);
+  const scene::NavigationPath path = navigation.findPath(from, to, command.links);
   const auto narrowest =
       path.found() ? navigation.findNarrowest(path.points) : std::optional<scene::NarrowPlace>();
   scene::EntityIndex index(scene);

@@ -4,7 +4,7 @@
 #include <filesystem>
 #include <string>
 
-#include "scene/navigation/mesh/agent.hpp"
+#include "scene/navigation/links.hpp"
 #include "scene/world/data/world_settings.hpp"
 #include "server/base/exit_code.hpp"
 #include "server/base/load_scene.hpp"
@@ -16,6 +16,7 @@ struct RouteCommand {
   std::string from, to;  ///< "x,y,z" in metres, or the name of a room, a storey or an object
   scene::NavigationAgent agent;
   scene::WorldSettings settings;
+  scene::PathOptions links;
   bool doorsAsTheyAre = false;  ///< else all doors that move are open
   bool json = false;
   std::filesystem::path plan;  ///< picture of the path; empty: none

@@ -64,6 +64,8 @@ struct FrameSubscription {
   bool stale = false;            ///< the world was replaced meanwhile: render again
   std::uint64_t dropped = 0;     ///< since the start of the last frame
   std::uint64_t generation = 0;  ///< distinguishes it from a replaced subscription
+  /// For a flow channel: of the last picture, and where the flow of that one began.
+  std::shared_ptr<const scene::Snapshot> lastPicture, flowStart;
 };
 
 /// A client of the world.
@@ -81,6 +83,7 @@ struct Client {
   std::optional<PendingStep> pendingStep;
   std::map<std::uint32_t, FrameSubscription> frameSubscriptions;
   std::optional<PendingReply> pendingReply;
+  std::string upload;                 ///< parts that it has sent for a later request
   std::shared_ptr<WorldGroup> group;  ///< the worlds of its StepMany requests; null: none yet
 };
 

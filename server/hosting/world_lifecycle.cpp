@@ -62,14 +62,17 @@ void resetWorld(HostedWorld& hosted) {
 }
 
 void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts,
-                  const std::string& cause) {
+                  const std::string& cause, RecordingAfter recording) {
   const auto before = hosted.world.snapshot(), after = world.snapshot();
   v1::TickEvents ended = hosted.world.endContacts(v1::ContactEvent::REASON_SEEK);
   addPresenceNotices(*before, *after, v1::Notice::KIND_LEFT, cause, ended);
   broadcastEvents(hosted, ended);
   v1::TickEvents begun = activeContacts;
   addPresenceNotices(*after, *before, v1::Notice::KIND_SPAWNED, cause, begun);
-  hosted.world.switchTo(std::move(world));
+  if (recording == RecordingAfter::continues)
+    hosted.world.restore(std::move(world), activeContacts);
+  else
+    hosted.world.switchTo(std::move(world));
   resetHorizons(hosted);
   hosted.owners.clear();
   hosted.pendingRelease.clear();

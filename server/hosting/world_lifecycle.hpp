@@ -8,11 +8,14 @@ namespace enfilade::server {
 /// Resets the world to tick 0. Clients receive the end of contacts and the leave notices.
 void resetWorld(HostedWorld& hosted);
 
+/// What becomes of the recording of a world that is replaced.
+enum class RecordingAfter : std::uint8_t { ends, continues };
+
 /// Replaces the world by another one of the same scene (seek, restore). Clients receive the end of
 /// the old contacts, then `activeContacts`, states and frames; notices of avatars that appear or
 /// vanish name the `cause`. Avatars have no owner afterwards.
 void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents& activeContacts,
-                  const std::string& cause);
+                  const std::string& cause, RecordingAfter recording = RecordingAfter::ends);
 
 v1::Bye makeBye(v1::ErrorCode code, const std::string& reason);
 Buffer encodeBye(const v1::Bye& closeNotice);

@@ -250,7 +250,9 @@ void appendRun(std::string& text, std::size_t number, const RunStats& run) {
              run.start.scene().bodies_size());
   text += "  " + run.start.scene_file() + "\n";
   const v1::RecordingParent& parent = run.start.parent();
-  if (run.start.has_parent())
+  if (run.start.has_parent() && parent.file().empty())
+    text += "  restored from a checkpoint of tick " + std::to_string(parent.tick()) + "\n";
+  else if (run.start.has_parent())
     text += "  a branch of " + parent.file() + ", run " +
             std::to_string(std::max(parent.run(), 1U)) + ", after tick " +
             std::to_string(parent.tick()) + "\n";

@@ -74,6 +74,9 @@ OrderOrError walkFromProto(const v1::Walk& message) {
   scene::Walk walk;
   for (const v1::Vec3& point : message.along()) walk.waypoints.push_back(vectorFromProto(point));
   if (message.has_speed()) walk.speed = message.speed();
+  walk.opens.assign(message.opens().begin(), message.opens().end());
+  for (const v1::Walk::Ride& ride : message.rides())
+    walk.rides.push_back({ride.waypoint(), ride.lift(), ride.level()});
   return scene::Order(std::move(walk));
 }
 

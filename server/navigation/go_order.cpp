@@ -27,50 +27,52 @@ std::variant<v1::NavigationQuery, v1::Error> makePathQuery(const scene::World& w
   query.set_doors(command.go().doors());
   *query.mutable_path()->mutable_from()->mutable_point() = toProto(end->footPosition);
   *query.mutable_path()->add_to() = command.go().to();
+  query.mutable_path()->set_max_drop(command.go().max_drop());
+  query.mutable_path()->set_lifts(command.go().lifts());
   return query;
 }
 
 namespace {
 
-/// Seconds that the avatar must wait so that it reaches no door before that is open. Those that
-/// open by touch need no command.
-double openDoors(const v1::NavigationPath& path, double speed,
-                 std::vector<v1::BodyCommand>& commands) {
-  double wait = 0;
-  for (const v1::NavigationDoor& door : path.doors()) {
-    if (door.by_touch()) continue;
-    v1::BodyCommand& command = commands.emplace_back();
-    command.set_body(door.name());
-    command.mutable_open();
-    wait = std::max(wait, door.seconds() - door.distance() / speed);
+/// The doors that the walk opens, and the lifts that it rides. `skipped`: points before the first
+/// way point.
+void addBodies(const v1::NavigationPath& path, int skipped, v1::Walk& walk) {
+  const auto addRide = [&](int point, const v1::NavigationLeg& leg, std::uint32_t level) {
+    if (point >= path.points_size()) return;
+    v1::Walk::Ride& ride = *walk.add_rides();
+    ride.set_waypoint(static_cast<std::uint32_t>(point - skipped));
+    ride.set_lift(leg.name());
+    ride.set_level(level);
+  };
+  for (const v1::NavigationLeg& leg : path.legs()) {
+    const int first = static_cast<int>(leg.first());
+    if (leg.kind() == v1::NavigationLeg::KIND_DOOR && !leg.by_touch()) walk.add_opens(leg.name());
+    if (leg.kind() != v1::NavigationLeg::KIND_LIFT) continue;
+    addRide(first, leg, leg.from_level());  // in
+    addRide(first + 1, leg, leg.to_level());
+    addRide(first + 2, leg, leg.to_level());  // out
   }
-  return wait;
 }
 
 }  // namespace
 
-std::variant<GoOrders, v1::Error> makeGoOrders(
+std::variant<v1::Command, v1::Error> makeGoOrder(
     const v1::Command& command, const std::variant<v1::NavigationReply, v1::Error>& found) {
   if (const auto* error = std::get_if<v1::Error>(&found)) {
     v1::Error refused = *error;
     if (refused.field().starts_with("navigation.path.to")) refused.set_field("go.to");
+    if (refused.field() == "navigation.path.max_drop") refused.set_field("go.max_drop");
     return refused;
   }
   const v1::NavigationPath& path = std::get<v1::NavigationReply>(found).paths(0);
   if (!path.found()) return makeError(v1::ERROR_REFUSED_COMMAND, "go: " + path.reason(), "go.to");
-  GoOrders result;
-  const double speed = command.go().has_speed() ? command.go().speed() : scene::Walk().speed;
-  if (const double wait = openDoors(path, speed, result.doors); wait > 0) {
-    v1::Command& order = result.orders.emplace_back();
-    order.set_avatar(command.avatar());
-    order.mutable_wait()->set_seconds(wait);
-  }
-  v1::Command& walk = result.orders.emplace_back(command);
-  v1::Walk& order = *walk.mutable_walk();
-  for (int i = std::min(1, path.points_size() - 1); i < path.points_size(); ++i)
-    *order.add_along() = path.points(i);
-  if (command.go().has_speed()) order.set_speed(command.go().speed());
-  return result;
+  v1::Command order = command;
+  v1::Walk& walk = *order.mutable_walk();
+  const int skipped = std::min(1, path.points_size() - 1);
+  for (int i = skipped; i < path.points_size(); ++i) *walk.add_along() = path.points(i);
+  addBodies(path, skipped, walk);
+  if (command.go().has_speed()) walk.set_speed(command.go().speed());
+  return order;
 }
 
 }  // namespace enfilade::server

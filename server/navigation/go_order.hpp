@@ -2,7 +2,6 @@
 #pragma once
 
 #include <variant>
-#include <vector>
 
 #include "protocol/enfilade.pb.h"
 #include "scene/world/world.hpp"
@@ -13,13 +12,8 @@ namespace enfilade::server {
 std::variant<v1::NavigationQuery, v1::Error> makePathQuery(const scene::World& world,
                                                            const v1::Command& command);
 
-/// The orders that carry out a Go: its doors open, and the avatar waits for them and walks.
-struct GoOrders {
-  std::vector<v1::BodyCommand> doors;
-  std::vector<v1::Command> orders;
-};
-/// The orders for the path of the reply; an error without one.
-std::variant<GoOrders, v1::Error> makeGoOrders(
+/// The Walk for the path of the reply; an error without one.
+std::variant<v1::Command, v1::Error> makeGoOrder(
     const v1::Command& command, const std::variant<v1::NavigationReply, v1::Error>& found);
 
 }  // namespace enfilade::server

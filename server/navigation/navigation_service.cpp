@@ -7,12 +7,15 @@
 #include <functional>
 #include <optional>
 #include <random>
+#include <span>
 #include <string>
 
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/ghost.hpp"
+#include "scene/navigation/mesh/saved_meshes.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "server/messages/world_messages.hpp"
+#include "server/navigation/shared_meshes.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -23,6 +26,7 @@ constexpr std::size_t kMaxEntries = 8;         // sizes whose meshes are kept
 constexpr std::size_t kMaxIslandAreas = 1000;  // in a reply
 constexpr double kNextToObject = 1;            // metres
 constexpr double kMaxCoordinate = 1e7;         // metres
+constexpr double kMaxDrop = 10;                // metres
 
 v1::Error makeFieldError(const std::string& field, const std::string& remedy,
                          v1::ErrorCode code = v1::ERROR_BAD_MESSAGE) {
@@ -102,10 +106,15 @@ struct Answer {
     if (const auto island = navigation.islandOf(*place)) spot.set_island(*island);
   }
 
+  std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& ways,
+                                           const std::vector<Vec3>& points) const {
+    return scene::findDoorsOnPath(index(), state.settings, *state.snapshot, ways.agent(), points);
+  }
+
   /// The closed doors that stand on a path through open ones.
-  void addDoors(const scene::NavigationPath& path, v1::NavigationPath& message) const {
-    for (const scene::DoorOnPath& found : scene::findDoorsOnPath(
-             index(), state.settings, *state.snapshot, navigation.agent(), path.points)) {
+  void addDoors(const std::vector<scene::DoorOnPath>& doors, v1::NavigationPath& message) const {
+    for (const scene::DoorOnPath& found : doors) {
+      if (!found.isInTheWay) continue;
       const scene::BodySpec& spec = scene.model().bodies[found.body];
       v1::NavigationDoor& door = *message.add_doors();
       door.set_id(spec.objects.front() + 1);
@@ -116,23 +125,95 @@ struct Answer {
     }
   }
 
+  void addLeg(v1::NavigationLeg::Kind kind, std::size_t first, double length, double seconds,
+              std::optional<std::uint32_t> body, v1::NavigationPath& message) const {
+    v1::NavigationLeg& leg = *message.add_legs();
+    leg.set_kind(kind);
+    leg.set_first(static_cast<std::uint32_t>(first));
+    leg.set_length(length);
+    leg.set_seconds(seconds);
+    message.set_seconds(message.seconds() + seconds);
+    if (!body) return;
+    const scene::BodySpec& spec = scene.model().bodies[*body];
+    leg.set_id(spec.objects.front() + 1);
+    leg.set_name(spec.name);
+    leg.set_by_touch(spec.openedBy == scene::OpenedBy::touch);
+  }
+
+  /// The parts of a walk before, at and after its doors.
+  void addWalk(const scene::NavigationPath& path, const scene::PathLeg& walk, std::size_t end,
+               const std::vector<scene::DoorOnPath>& doors, v1::NavigationPath& message) const {
+    const double speed = navigation.agent().speed;
+    const auto lengthOf = [&](std::size_t from, std::size_t to) {
+      double length = 0;
+      for (std::size_t i = from; i < to; ++i)
+        length += (path.points[i + 1] - path.points[i]).norm();
+      return length;
+    };
+    std::size_t at = walk.first;
+    const auto walkTo = [&](std::size_t point) {
+      if (point == at) return;
+      const double length = lengthOf(at, point);
+      addLeg(v1::NavigationLeg::KIND_WALK, at, length, length / speed, std::nullopt, message);
+      at = point;
+    };
+    for (std::size_t i = 0; i < doors.size(); ++i) {
+      const scene::DoorOnPath& door = doors[i];
+      if (door.point < at || door.point >= end) continue;
+      walkTo(door.point);
+      // Doors on the same line, as the leaves of one, are legs without a length but for the last.
+      const bool isLast = i + 1 == doors.size() || doors[i + 1].point != door.point;
+      const double length = isLast ? lengthOf(door.point, door.point + 1) : 0;
+      addLeg(v1::NavigationLeg::KIND_DOOR, door.point, length,
+             length / speed + (isLast ? door.secondsToOpen : 0), door.body, message);
+      if (isLast) at = door.point + 1;
+    }
+    walkTo(end);
+  }
+
+  void addLegs(const scene::NavigationPath& path, const std::vector<scene::DoorOnPath>& doors,
+               v1::NavigationPath& message) const {
+    for (std::size_t i = 0; i < path.legs.size(); ++i) {
+      const scene::PathLeg& leg = path.legs[i];
+      const std::size_t end =
+          i + 1 < path.legs.size() ? path.legs[i + 1].first : path.points.size() - 1;
+      switch (leg.kind) {
+        case scene::PathLeg::Kind::walk:
+          addWalk(path, leg, end, doors, message);
+          break;
+        case scene::PathLeg::Kind::drop:
+          addLeg(v1::NavigationLeg::KIND_DROP, leg.first, leg.length, leg.seconds, std::nullopt,
+                 message);
+          break;
+        case scene::PathLeg::Kind::lift:
+          addLeg(v1::NavigationLeg::KIND_LIFT, leg.first, leg.length, leg.seconds, leg.body,
+                 message);
+          message.mutable_legs()->rbegin()->set_from_level(leg.fromLevel);
+          message.mutable_legs()->rbegin()->set_to_level(leg.toLevel);
+          break;
+      }
+    }
+  }
+
   /// Gives a closed door as the reason, if a path leads through it when it is open.
-  void explainByDoors(const Vec3& from, const Vec3& to, v1::NavigationPath& message) const {
+  void explainByDoors(const Vec3& from, const Vec3& to, const scene::PathOptions& options,
+                      v1::NavigationPath& message) const {
     if (doorsOpen || !withOpenDoors) return;
-    const scene::NavigationPath through = withOpenDoors().findPath(from, to);
+    scene::Navigation& open = withOpenDoors();
+    const scene::NavigationPath through = open.findPath(from, to, options);
     if (!through.found()) return;
-    const auto doors = scene::findDoorsOnPath(index(), state.settings, *state.snapshot,
-                                              navigation.agent(), through.points);
-    if (doors.empty()) return;
-    const scene::BodySpec& spec = scene.model().bodies[doors.front().body];
+    const auto doors = findDoors(open, through.points);
+    const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
+    if (first == doors.end()) return;
+    const scene::BodySpec& spec = scene.model().bodies[first->body];
     message.set_reason("the door '" + spec.name + "' is closed: open it, or ask with open doors");
     message.set_obstacle(spec.objects.front() + 1);
     message.set_obstacle_name(spec.name);
   }
 
-  void writePath(const Vec3& from, const Vec3& to, bool measuresWidth,
-                 v1::NavigationPath& message) const {
-    const scene::NavigationPath path = navigation.findPath(from, to);
+  void writePath(const Vec3& from, const Vec3& to, const scene::PathOptions& options,
+                 bool measuresWidth, v1::NavigationPath& message) const {
+    const scene::NavigationPath path = navigation.findPath(from, to, options);
     message.set_found(path.found());
     for (const Vec3& point : path.points) *message.add_points() = toProto(point);
     message.set_length(path.length);
@@ -143,9 +224,12 @@ struct Answer {
       *message.mutable_obstacle_at() = toProto(path.obstruction->position);
       message.set_clear_width(path.obstruction->clearWidth);
     }
-    if (path.found() && doorsOpen) addDoors(path, message);
-    if (!path.found()) explainByDoors(from, to, message);
-    if (!path.found() || !measuresWidth) return;
+    if (!path.found()) return explainByDoors(from, to, options, message);
+    const auto doors =
+        doorsOpen ? findDoors(navigation, path.points) : std::vector<scene::DoorOnPath>();
+    addDoors(doors, message);
+    addLegs(path, doors, message);
+    if (!measuresWidth) return;
     const auto narrowest = navigation.findNarrowest(path.points);
     if (!narrowest) return;
     message.set_clear_width(narrowest->clearWidth);
@@ -154,12 +238,15 @@ struct Answer {
 
   std::optional<v1::Error> operator()(const v1::NavigationQuery::Path& query) const {
     if (auto error = validateCount("path.to", query.to_size(), 100)) return error;
+    if (auto error = validateNumber("path.max_drop", query.max_drop(), 0, kMaxDrop)) return error;
+    const scene::PathOptions options{query.max_drop(), query.lifts()};
     const auto from = resolve(query.from(), "path.from");
     if (const auto* error = std::get_if<v1::Error>(&from)) return *error;
     for (int i = 0; i < query.to_size(); ++i) {
       const auto to = resolve(query.to(i), "path.to[" + std::to_string(i) + "]");
       if (const auto* error = std::get_if<v1::Error>(&to)) return *error;
-      writePath(std::get<Vec3>(from), std::get<Vec3>(to), query.narrowest(), *reply.add_paths());
+      writePath(std::get<Vec3>(from), std::get<Vec3>(to), options, query.narrowest(),
+                *reply.add_paths());
     }
     return std::nullopt;
   }
@@ -258,7 +345,7 @@ struct Answer {
       if (!place) continue;
       *island.mutable_at() = toProto(*place);
       if (i == 0) largest = place;
-      if (i > 0 && largest) writePath(*place, *largest, false, *island.mutable_path());
+      if (i > 0 && largest) writePath(*place, *largest, {}, false, *island.mutable_path());
     }
     return std::nullopt;
   }
@@ -306,14 +393,40 @@ NavigationService::Entry& NavigationService::prepare(const scene::NavigationAgen
   }
   const auto snapshot =
       doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
-  auto navigation =
-      std::make_unique<scene::Navigation>(scene_, state.settings, agent, snapshot.get());
+  auto navigation = makeNavigation(scene_, state.settings, agent, *snapshot);
   const scene::NavigationReport report = navigation->report();
   spdlog::info("navigation: radius {} m, height {} m: {:.1f} m2 in {} islands, built in {:.2f} s",
                agent.radius, agent.height, report.area, report.islandAreas.size(), report.seconds);
-  entries_.push_front({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
-  if (entries_.size() > kMaxEntries) entries_.pop_back();
+  keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
   return entries_.front();
+}
+
+void NavigationService::keep(Entry entry) {
+  entries_.push_front(std::move(entry));
+  if (entries_.size() > kMaxEntries) entries_.pop_back();
+}
+
+std::optional<v1::Error> NavigationService::load(const scene::NavigationAgent& agent,
+                                                 bool doorsOpen, const NavigationState& state,
+                                                 const std::string& mesh) {
+  try {
+    auto navigation = std::make_unique<scene::Navigation>(
+        scene_, state.settings, agent,
+        std::span(reinterpret_cast<const std::uint8_t*>(mesh.data()), mesh.size()));
+    const auto snapshot =
+        doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
+    const std::size_t rebuilt = navigation->update(*snapshot);
+    spdlog::info("navigation: loaded meshes for radius {} m, height {} m; {} tiles built again",
+                 agent.radius, agent.height, rebuilt);
+    std::erase_if(entries_, [&](const Entry& entry) {
+      return entry.agent == agent && entry.doorsOpen == doorsOpen &&
+             entry.settings == state.settings;
+    });
+    keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
+    return std::nullopt;
+  } catch (const scene::MeshFileError& error) {
+    return makeFieldError("load_mesh.mesh", error.what());
+  }
 }
 
 std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
@@ -327,8 +440,12 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   if (auto error = validateNumber("height", agent.height, 0.2, 10)) return std::move(*error);
   if (auto error = validateNumber("speed", agent.speed, 0.01, 20)) return std::move(*error);
   if (query.query_case() == v1::NavigationQuery::QUERY_NOT_SET)
-    return makeFieldError("query", "give path, random, snap, steps, clearance, map or islands");
+    return makeFieldError(
+        "query", "give path, random, snap, steps, clearance, map, islands, save_mesh or load_mesh");
   const bool doorsOpen = query.doors() == v1::NavigationQuery::DOORS_OPEN;
+  if (query.has_load_mesh())
+    if (auto error = load(agent, doorsOpen, state, query.load_mesh().mesh()))
+      return std::move(*error);
   Entry& entry = prepare(agent, doorsOpen, state);
   scene::Navigation& navigation = *entry.navigation;
   v1::NavigationReply reply;
@@ -362,6 +479,10 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
     case v1::NavigationQuery::kMap:
       error = answer.writeMap(query.map(), attachment);
       break;
+    case v1::NavigationQuery::kSaveMesh:
+      attachment = navigation.save();
+      break;
+    case v1::NavigationQuery::kLoadMesh:
     case v1::NavigationQuery::QUERY_NOT_SET:
       break;
   }

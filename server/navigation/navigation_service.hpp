@@ -6,6 +6,7 @@
 #include <list>
 #include <memory>
 #include <optional>
+#include <string>
 #include <variant>
 #include <vector>
 
@@ -42,6 +43,11 @@ class NavigationService {
   };
   /// The navigation of a size, brought to the state of the query.
   Entry& prepare(const scene::NavigationAgent& agent, bool doorsOpen, const NavigationState& state);
+
+  void keep(Entry entry);
+  /// Takes saved meshes for a size; nullopt: done.
+  std::optional<v1::Error> load(const scene::NavigationAgent& agent, bool doorsOpen,
+                                const NavigationState& state, const std::string& mesh);
 
   std::shared_ptr<const scene::Scene> scene_;
   std::optional<scene::EntityIndex> index_;  ///< built at first use

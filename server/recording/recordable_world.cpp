@@ -96,6 +96,11 @@ void RecordableWorld::reset(scene::World world) {
   if (recorder_) recorder_->onReset(world_);
 }
 
+void RecordableWorld::restore(scene::World world, const v1::TickEvents& activeContacts) {
+  world_ = std::move(world);
+  if (recorder_) recorder_->onRestore(world_, activeContacts);
+}
+
 void RecordableWorld::switchTo(scene::World world) {
   world_ = std::move(world);
   if (recorder_ && recorder_->close()) recordingFailed_ = true;

@@ -38,6 +38,9 @@ class RecordableWorld {
   v1::TickEvents endContacts(v1::ContactEvent::Reason reason, const std::string& leaveReason = {});
   /// Replaces the world by one at tick 0 of the same scene; the recording continues with a new run.
   void reset(scene::World world);
+  /// Replaces the world by another one of the same scene; the recording continues with a new run,
+  /// which begins with a checkpoint. `activeContacts`: as begin and enter events.
+  void restore(scene::World world, const v1::TickEvents& activeContacts);
   /// Replaces the world by another one of the same scene and ends the recording.
   void switchTo(scene::World world);
 

@@ -175,6 +175,20 @@ void WorldRecorder::onReset(const scene::World& world) {
   });
 }
 
+void WorldRecorder::onRestore(const scene::World& world, const v1::TickEvents& activeContacts) {
+  commands_.clear_commands();
+  nextImageTime_ = 0;
+  previousTicks_ = ticks_;
+  writeUnlessBroken([&] {
+    v1::RecordingStart start = makeRecordingStart(world, model_);
+    start.mutable_parent()->set_tick(world.snapshot()->tick);
+    file_.write(start, world.snapshot()->time);
+    writeCheckpoint(world);
+    if (viewerChannels_) viewerChannels_->writeScene(world);
+  });
+  onEvents(activeContacts);
+}
+
 bool WorldRecorder::areImagesDue(const scene::World& world) {
   const double time = world.snapshot()->time;
   if (error_ || imagePeriod_.value_or(0) <= 0) return false;

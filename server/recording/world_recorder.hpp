@@ -37,6 +37,9 @@ class WorldRecorder {
   void onEvents(const v1::TickEvents& events);
   /// Starts a new run after a reset of the world. Commands since the last tick are discarded.
   void onReset(const scene::World& world);
+  /// Starts a new run with a checkpoint, after the world was replaced by an earlier state or one of
+  /// another server. Commands since the last tick are discarded.
+  void onRestore(const scene::World& world, const v1::TickEvents& activeContacts);
   /// Writes buffered data to the file. Call it when no tick is expected soon.
   void flush();
 

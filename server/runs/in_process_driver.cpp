@@ -23,15 +23,11 @@ std::optional<v1::Error> InProcessDriver::go(const v1::Command& command) {
   if (auto* error = std::get_if<v1::Error>(&query)) return std::move(*error);
   if (!navigation_) navigation_.emplace(static_cast<const scene::World&>(world_).data().scene);
   std::vector<std::uint8_t> attachment;
-  auto made = makeGoOrders(command,
-                           navigation_->answer(std::get<v1::NavigationQuery>(query),
+  auto made =
+      makeGoOrder(command, navigation_->answer(std::get<v1::NavigationQuery>(query),
                                                {world_.snapshot(), world_.settings()}, attachment));
   if (auto* error = std::get_if<v1::Error>(&made)) return std::move(*error);
-  for (const v1::BodyCommand& door : std::get<GoOrders>(made).doors)
-    if (auto error = world_.submit(door)) return error;
-  for (const v1::Command& order : std::get<GoOrders>(made).orders)
-    if (auto error = world_.submit(order)) return error;
-  return std::nullopt;
+  return world_.submit(std::get<v1::Command>(made));
 }
 
 std::optional<v1::Error> InProcessDriver::submit(const v1::BodyCommand& command) {

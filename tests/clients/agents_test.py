@@ -1,7 +1,9 @@
 """Many worlds in one round trip, orders that turn and teleport, checkpoints, objects and cameras."""
 
+import json
 import math
 import os
+import subprocess
 import tempfile
 import unittest
 import unittest.mock
@@ -221,14 +223,51 @@ class OrdersTest(RoomCase):
                     other.restore(damaged)
             self.assertEqual(other.step(1).tick, 90 + 8 * 30 + 1, "a refused one changes nothing")
 
-    def test_a_recorded_world_is_not_restored(self):
+    def test_a_recording_continues_with_a_new_run(self):
         with tempfile.TemporaryDirectory() as folder:
-            with enfilade.serve(self.scene, "--record", str(Path(folder) / "w.mcap")) as server:
+            recording = Path(folder) / "w.mcap"
+            with enfilade.serve(self.scene, "--record", str(recording)) as server:
                 with server.connect() as client:
                     client.lockstep()
+                    ann = client.spawn("ann", at=(0, 0, 0))
+                    ann.walk((4.9, 0, 3))
+                    client.step(60)
                     saved = client.save()
-                    with self.assertRaisesRegex(enfilade.ServerError, "--record"):
-                        client.restore(saved)
+                    expected = client.step(90).state_hash
+                    client.restore(saved)
+                    self.assertEqual(client.step(90).state_hash, expected)
+                    client.restore(saved)
+                    enfilade.Avatar(client, "ann").drive((-1, 0, 0))
+                    other = client.step(30).state_hash
+            self.assertNotEqual(other, expected)
+            def replay(*options):
+                done = subprocess.run([enfilade.process.find_program(), "replay", str(recording), "--verify",
+                                       *options], capture_output=True, text=True, timeout=120)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                return json.loads(done.stdout)
+            self.assertEqual(replay()["ticks"], 150 + 90 + 30)
+            self.assertEqual(replay("--run", "2")["state_hash"], f"{expected:016x}")
+            last = replay("--run", "3", "--from", "70")
+            self.assertEqual((last["state_hash"], last["ticks"]), (f"{other:016x}", 30))
+
+    def test_a_checkpoint_larger_than_a_message_is_sent_in_parts(self):
+        ann = self.client.spawn("ann", at=(0, 0, 0))
+        for _ in range(6):
+            ann.walk(*((0.1 * (i % 20), 0, 0) for i in range(10_000)))
+        self.client.step(5)
+        saved = self.client.save()
+        self.assertGreater(len(saved), self.client.limits.max_message)
+        expected = self.client.step(20).state_hash
+        self.client.restore(saved)
+        self.assertEqual(self.client.step(20).state_hash, expected)
+        restore = enfilade.messages.RestoreWorld(uploaded=True)
+        with self.assertRaisesRegex(enfilade.ServerError, "nothing was uploaded"):
+            self.client.request(restore=restore)
+        self.client.request(upload=enfilade.messages.Upload(part=b"abc", first=True))
+        reply, _ = self.client.request(upload=enfilade.messages.Upload(part=b"de"))
+        self.assertEqual(reply.upload.bytes, 5)
+        with self.assertRaisesRegex(enfilade.ServerError, "not a checkpoint"):
+            self.client.request(restore=restore)
 
 
 class ObjectsTest(RoomCase):

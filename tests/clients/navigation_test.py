@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 import enfilade
-from enfilade.compat import GreedyGeodesicFollower, MultiGoalShortestPath, PathFinder, ShortestPath
+from enfilade.compat import (GreedyGeodesicFollower, MultiGoalShortestPath, NavMeshSettings, PathFinder,
+                             ShortestPath)
 from room import RoomCase, obj
 
 
@@ -146,6 +147,31 @@ class CompatTest(RoomCase):
         self.assertEqual(self.finder.get_topdown_view(0.1, 0).dtype, bool)
 
 
+    def test_meshes_are_saved_and_loaded(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = str(Path(folder) / "room.mesh")
+            self.assertTrue(self.finder.save_nav_mesh(file))
+            path = ShortestPath()
+            path.requested_start, path.requested_end = (2, 0, 0), (8, 0, 0)
+            self.assertTrue(self.finder.find_path(path))
+            with enfilade.serve(self.scene) as server, server.connect() as client:
+                finder = PathFinder(client.navigation(radius=0.1, height=1.5))
+                self.assertTrue(finder.load_nav_mesh(file))
+                again = ShortestPath()
+                again.requested_start, again.requested_end = (2, 0, 0), (8, 0, 0)
+                self.assertTrue(finder.find_path(again))
+                np.testing.assert_array_equal(again.points, path.points)
+                with self.assertRaisesRegex(enfilade.ServerError, "radius"):
+                    client.navigation(radius=0.2).load(file)
+                self.assertTrue(finder.build_nav_mesh(NavMeshSettings(agent_radius=0.2)))
+                self.assertEqual(finder.navigation.radius, 0.2)
+                with self.assertRaisesRegex(ValueError, "--step-height 0.2"):
+                    finder.build_nav_mesh(NavMeshSettings(agent_max_climb=0.2))
+            Path(file).write_bytes(b"no mesh")
+            with self.assertRaisesRegex(enfilade.ServerError, "not a navigation mesh"):
+                self.finder.load_nav_mesh(file)
+
+
 class DoorsTest(unittest.TestCase):
     """Two rooms with a door between them, and a platform that no step reaches."""
 
@@ -195,6 +221,40 @@ class DoorsTest(unittest.TestCase):
         self.assertNotIn("door", [one.b_name for one in client.contacts()])
         with self.assertRaisesRegex(ValueError, "doors"):
             ann.go((2, 0, 0), doors="closed")
+
+    def test_go_opens_a_door_that_closes_by_itself(self):
+        client = self.server(',"closes_after":0.2')
+        ann = client.spawn("ann", at=(-4, 0, 0))
+        path = client.navigation(doors="open").path((-4, 0, 0), (2, 0, 0))
+        self.assertEqual([leg.kind for leg in path.legs if leg.name == "door"], ["door"])
+        self.assertAlmostEqual(sum(leg.length for leg in path.legs), path.length, places=9)
+        self.assertGreater(path.seconds, path.length / 1.4)
+        self.assertEqual(ann.go_and_wait((2, 0, 0), doors="open", speed=0.8), "arrived")
+
+    def test_go_reports_the_door_that_is_shut_again_and_again(self):
+        client = self.server()
+        ann = client.spawn("ann", at=(-4, 0, 0))
+        client.subscribe(notices=True)
+        tag = ann.go((2, 0, 0), doors="open")
+        for _ in range(600):
+            client.body("door", close=True)
+            client.step(20)
+            ended = [one for one in client.notices() if one.tag == tag and one.kind == "blocked"]
+            if ended:
+                break
+        self.assertEqual(ended[0].obstacle_name, "door")
+        self.assertIn("commands", ended[0].text)
+
+    def test_go_jumps_down_from_the_platform(self):
+        client = self.server()
+        ann = client.spawn("ann", at=(-4, 1, -2))
+        with self.assertRaises(enfilade.ServerError):
+            ann.go((-2, 0, 2))
+        path = client.navigation().path((-4, 1, -2), (-2, 0, 2), max_drop=1.2)
+        self.assertEqual([leg.kind for leg in path.legs], ["walk", "drop", "walk"])
+        self.assertEqual(ann.go_and_wait((-2, 0, 2), max_drop=1.2), "arrived")
+        with self.assertRaisesRegex(enfilade.ServerError, "go.max_drop|0 to 10"):
+            ann.go((-2, 0, 2), max_drop=20)
 
     def test_a_door_that_opens_by_touch_needs_no_command(self):
         client = self.server(',"opened_by":"touch"')

@@ -149,6 +149,26 @@ std::uint32_t NavigationMesh::indexOf(std::uint32_t reference) const {
   return firstPolygonOfTile_[tile] + polygon;
 }
 
+std::vector<BoundaryEdge> NavigationMesh::collectBoundary() const {
+  std::vector<BoundaryEdge> edges;
+  for (std::uint32_t index = 0; index < polygonCount(); ++index) {
+    const dtPoly* polygon = nullptr;
+    const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
+    for (int k = 0; k < polygon->vertCount; ++k) {
+      if (polygon->neis[k] != 0) continue;
+      const Vec3 from = toVec3(&tile.verts[polygon->verts[k] * 3]);
+      const Vec3 to = toVec3(&tile.verts[polygon->verts[(k + 1) % polygon->vertCount] * 3]);
+      Vec3 outward(to.z() - from.z(), 0, from.x() - to.x());
+      const double length = outward.norm();
+      if (!(length > 0)) continue;
+      outward /= length;
+      if (outward.dot(centres_[index] - from) > 0) outward = -outward;
+      edges.push_back({index, from, to, outward});
+    }
+  }
+  return edges;
+}
+
 double NavigationMesh::area() const {
   return std::accumulate(areas_.begin(), areas_.end(), 0.0);
 }

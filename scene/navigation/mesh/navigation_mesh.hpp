@@ -36,6 +36,13 @@ struct Portal {
   Vec3 middle() const { return 0.5 * (low + high); }
 };
 
+/// A part of the rim of the mesh.
+struct BoundaryEdge {
+  std::uint32_t polygon = 0;
+  Vec3 from = Vec3::Zero(), to = Vec3::Zero();  ///< scene frame, metres
+  Vec3 outward = Vec3::Zero();                  ///< horizontal, unit
+};
+
 /// Copies share nothing. Const functions may be called from several threads.
 class NavigationMesh {
  public:
@@ -60,6 +67,8 @@ class NavigationMesh {
     return std::span(portals_).subspan(firstPortal_[polygon],
                                        firstPortal_[polygon + 1] - firstPortal_[polygon]);
   }
+  /// The edges of polygons without a neighbour.
+  std::vector<BoundaryEdge> collectBoundary() const;
   /// The cheapest corridor through the middles of open portals; nullopt: not connected.
   std::optional<Corridor> findCorridor(const MeshPoint& from, const MeshPoint& to) const;
   /// The corners of the shortest line within a corridor, with both ends.

@@ -43,6 +43,8 @@ void hashAvatar(const Avatar& avatar, Hasher& hash) {
   hash.add(std::uint64_t{avatar.walk.waypointIndex});
   hash.add(avatar.walk.minDistance);
   hash.add(avatar.walk.timeoutLeft);
+  if (avatar.walk.calls != 0 || avatar.walk.waitsFor != 0)  // hashes of other walks stay the same
+    hash.add((std::uint64_t{avatar.walk.calls} << 32) | avatar.walk.waitsFor);
   hash.add(avatar.waitTimeLeft);
   hash.add(avatar.stalledInAirTime);
   hashOptionalState(avatar, hash);

@@ -12,6 +12,7 @@
 #include "scene/world/avatars/order_context.hpp"
 #include "scene/world/avatars/spawn.hpp"
 #include "scene/world/avatars/turning.hpp"
+#include "scene/world/avatars/walk_bodies.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 #include "scene/world/avatars/yielding.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
@@ -99,6 +100,7 @@ OrderStatus executeOrder(const Walk& walk, OrderContext& context) {
   avatar.driveVelocity = Vec3::Zero();
   avatar.viewHeld = false;
   if (avatar.walk.minDistance < 0) startWaypoint(context.world, walk, avatar);
+  prepareWay(context.world, walk, avatar);
   return OrderStatus::running;
 }
 
@@ -250,7 +252,7 @@ Vec3 computeDesiredVelocity(const WorldData& world, const Avatar& avatar,
   if (queue.empty()) return driveVelocity;
   const Order& order = queue.front().order;
   if (const Walk* walk = std::get_if<Walk>(&order))
-    return avatar.walk.minDistance < 0
+    return avatar.walk.minDistance < 0 || avatar.walk.waitsFor != 0
                ? Vec3(Vec3::Zero())
                : computeWalkVelocity(avatar.footPosition,
                                      walk->waypoints[avatar.walk.waypointIndex], avatar.flying,
@@ -262,9 +264,9 @@ Vec3 computeDesiredVelocity(const WorldData& world, const Avatar& avatar,
   return keepsDriving ? driveVelocity : Vec3(Vec3::Zero());
 }
 
-void endWalk(OrderContext& context, Notice::Kind kind, std::string text = {}) {
-  context.emitNotice(kind, std::move(text),
-                     kind == Notice::Kind::blocked ? context.findAvatar()->blockedBy : 0);
+void endWalk(OrderContext& context, Notice::Kind kind, std::string text = {},
+             EntityId obstacle = 0) {
+  context.emitNotice(kind, std::move(text), obstacle);
   context.findAvatar()->walk = {};
   context.queue.orders.pop_front();
 }
@@ -278,14 +280,28 @@ std::string describeBlocking(const OrderContext& context, const Vec3& goal) {
   return "no progress for " + formatShortNumber(context.world.settings.stuckTimeout) + " s";
 }
 
+/// True in a fall that is faster than one from a step: it passes a way point above the landing.
+bool isFallingFar(const Avatar& avatar, const WorldSettings& settings) {
+  return !avatar.grounded && !avatar.flying && avatar.fallSpeed > 0 &&
+         avatar.fallSpeed * avatar.fallSpeed > 2 * settings.gravity * settings.stepHeight;
+}
+
 void updateWalk(const Walk& walk, OrderContext& context) {
   Avatar& avatar = *context.findAvatar();
   const Vec3& goal = walk.waypoints[avatar.walk.waypointIndex];
   const double distance = computeRemainingDistance(avatar, goal);
   const bool isLast = avatar.walk.waypointIndex + 1 == walk.waypoints.size();
+  const bool mayPass = !isLast && walk.rides.empty();
   const double arrivalDistance =
-      isLast ? kArrivalDistance : computePassingDistance(context.world, avatar);
-  if (distance <= arrivalDistance &&
+      mayPass ? computePassingDistance(context.world, avatar) : kArrivalDistance;
+  if (avatar.walk.waitsFor != 0) {
+    avatar.walk.timeoutLeft -= context.world.settings.tickDuration;
+    if (avatar.walk.timeoutLeft <= kTimeTolerance)
+      endWalk(context, Notice::Kind::blocked, describeWait(context.world, walk, avatar),
+              avatar.walk.waitsFor);
+    return;
+  }
+  if (distance <= arrivalDistance && !isFallingFar(avatar, context.world.settings) &&
       std::abs(goal.y() - avatar.footPosition.y()) <= kArrivalHeight) {
     ++avatar.walk.waypointIndex;
     if (!isLast) return startWaypoint(context.world, walk, avatar);
@@ -301,7 +317,7 @@ void updateWalk(const Walk& walk, OrderContext& context) {
   avatar.walk.timeoutLeft -= context.world.settings.tickDuration;
   if (avatar.walk.timeoutLeft > kTimeTolerance) return;
   emitBlocked(context.world, avatar, context.report, context.count);
-  endWalk(context, Notice::Kind::blocked, describeBlocking(context, goal));
+  endWalk(context, Notice::Kind::blocked, describeBlocking(context, goal), avatar.blockedBy);
 }
 
 /// Reports avatars that are blocked while driven or moving joints, once per block.
@@ -349,7 +365,7 @@ void removeLostAvatars(WorldData& world, TickReport& report) {
 
 std::size_t computeOrderCost(const Order& order) {
   const Walk* walk = std::get_if<Walk>(&order);
-  return 1 + (walk ? walk->waypoints.size() : 0);
+  return 1 + (walk ? walk->waypoints.size() + walk->opens.size() + walk->rides.size() : 0);
 }
 
 void runOrders(WorldData& world, TickReport& report, QueryCount& count) {

@@ -11,11 +11,6 @@ namespace {
 
 constexpr double kTimeRounding = 1e-9;  // seconds; tolerance of summed ticks against a delay
 
-double findOpenLimit(const BodySpec& spec) {
-  const auto [low, high] = getJointLimits(spec);
-  return high - spec.closedPosition >= spec.closedPosition - low ? high : low;
-}
-
 void startMotionTo(Body& body, double target, double speed) {
   KinematicDrive& drive = body.drive;
   drive.target = target;

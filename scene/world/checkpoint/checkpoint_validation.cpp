@@ -95,6 +95,8 @@ struct CheckpointChecker {
     const Walk* walk = order ? std::get_if<Walk>(order) : nullptr;
     require(avatar.walk.waypointIndex < (walk ? walk->waypoints.size() : 1),
             avatar.name + " has an unknown waypoint");
+    require(avatar.walk.waitsFor == 0 || (walk && findBody(avatar.walk.waitsFor)),
+            avatar.name + " waits for what is no body");
     const TurnProgress& turn = avatar.turn;
     require((turn.rate == 0 && turn.left == 0) || (order && std::holds_alternative<Turn>(*order)),
             avatar.name + " turns without a command");

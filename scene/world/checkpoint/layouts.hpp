@@ -110,8 +110,8 @@ template <>
 struct Layout<WalkProgress> {
   template <class A>
   static void archive(A& a, MaybeConst<A, WalkProgress>& walk) {
-    auto& [waypointIndex, minDistance, timeoutLeft, yields, flowTick] = walk;
-    a(waypointIndex, minDistance, timeoutLeft, yields, flowTick);
+    auto& [waypointIndex, minDistance, timeoutLeft, calls, waitsFor, yields, flowTick] = walk;
+    a(waypointIndex, minDistance, timeoutLeft, calls, waitsFor, yields, flowTick);
   }
 };
 

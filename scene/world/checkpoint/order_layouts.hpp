@@ -40,11 +40,19 @@ struct Layout<Spawn> {
   }
 };
 template <>
+struct Layout<Ride> {
+  template <class A>
+  static void archive(A& a, MaybeConst<A, Ride>& ride) {
+    auto& [waypoint, lift, level] = ride;
+    a(waypoint, lift, level);
+  }
+};
+template <>
 struct Layout<Walk> {
   template <class A>
   static void archive(A& a, MaybeConst<A, Walk>& walk) {
-    auto& [waypoints, speed] = walk;
-    a(waypoints, speed);
+    auto& [waypoints, speed, opens, rides] = walk;
+    a(waypoints, speed, opens, rides);
   }
 };
 template <>

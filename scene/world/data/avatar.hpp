@@ -21,6 +21,8 @@ struct WalkProgress {
   std::size_t waypointIndex = 0;  ///< index of the current way point
   double minDistance = -1;        ///< metres, horizontal or, if flying, in space; -1: none yet
   double timeoutLeft = 0;         ///< seconds
+  std::uint32_t calls = 0;        ///< commands that this walk has given to doors and lifts
+  EntityId waitsFor = 0;          ///< door or lift; 0: none
   bool yields = false;            ///< to a walker ahead of it (avatars/yielding.hpp)
   /// The tick in which the first of its queue was free. It passes from one to the next each tick,
   /// so it ages where a queue has no free first one.

@@ -49,11 +49,22 @@ struct Spawn {
   std::vector<Link> links = {};  ///< a chain on the parts or the prism
   bool selfContact = false;      ///< non-adjacent links collide with one another
 };
-/// Walks to the way points in sequence.
-struct Walk {
-  std::vector<Vec3> waypoints;  ///< way points, at least one
-  double speed = 1.4;           ///< metres per second, > 0
+/// A lift must stand at a stop before a walk continues.
+struct Ride {
+  std::uint32_t waypoint = 0;  ///< index: before the walk to this one
+  std::string lift;            ///< BodySpec::name
+  std::uint32_t level = 0;     ///< stop number, from 0
+  bool operator==(const Ride&) const = default;
 };
+/// Walks to the way points in sequence. Opens doors in its way, calls lifts, and waits for them.
+struct Walk {
+  std::vector<Vec3> waypoints;          ///< way points, at least one
+  double speed = 1.4;                   ///< metres per second, > 0
+  std::vector<std::string> opens = {};  ///< BodySpec::name of doors
+  std::vector<Ride> rides = {};         ///< ascending way points
+};
+/// Limits of a Walk order.
+inline constexpr std::size_t kMaxWalkDoors = 256, kMaxRides = 256;
 /// Turns the view to a point. While the avatar is driven, the view stays there until the next Drive
 /// or Walk.
 struct Look {

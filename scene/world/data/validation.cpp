@@ -103,6 +103,18 @@ OptionalError validateOrder(const Walk& walk, const WorldSettings& settings) {
   for (std::size_t i = 0; i < walk.waypoints.size(); ++i)
     if (auto error = validatePoint("along[" + std::to_string(i) + "]", walk.waypoints[i]))
       return error;
+  if (walk.opens.size() > kMaxWalkDoors)
+    return "opens has more than " + std::to_string(kMaxWalkDoors) + " doors";
+  if (walk.rides.size() > kMaxRides)
+    return "rides has more than " + std::to_string(kMaxRides) + " rides";
+  for (std::size_t i = 0; i < walk.rides.size(); ++i) {
+    const std::string field = "rides[" + std::to_string(i) + "].waypoint";
+    if (walk.rides[i].waypoint >= walk.waypoints.size())
+      return field + " is " + std::to_string(walk.rides[i].waypoint) + "; there are " +
+             std::to_string(walk.waypoints.size()) + " way points, counted from 0";
+    if (i > 0 && walk.rides[i].waypoint <= walk.rides[i - 1].waypoint)
+      return field + " must be above that of the ride before";
+  }
   return validatePositive("speed", walk.speed, settings.maxSpeed);
 }
 

@@ -1,5 +1,7 @@
 #include "server/hosting/requests/checkpoint_requests.hpp"
 
+#include <utility>
+
 #include "scene/world/active_contacts.hpp"
 #include "scene/world/checkpoint/checkpoint.hpp"
 #include "server/hosting/requests/clock_requests.hpp"
@@ -23,14 +25,37 @@ v1::TickEvents makeActiveContacts(const scene::World& world) {
 std::optional<v1::Error> validateRestorable(const HostedWorld& hosted) {
   if (hosted.replay)
     return makeError(v1::ERROR_NOT_ALLOWED, "the world replays a recording: use Seek instead");
-  if (hosted.world.recorder())
-    return makeError(v1::ERROR_NOT_ALLOWED,
-                     "the world is recorded, and its recording cannot continue from elsewhere: "
-                     "start the server without --record");
   return std::nullopt;
 }
 
 }  // namespace
+
+void handleUpload(const RequestContext& context, const v1::Upload& request) {
+  std::string& upload = context.client.upload;
+  if (request.first()) upload = {};
+  const std::size_t limit = context.hosted.limits.uploadBytes;
+  if (upload.size() + request.part().size() > limit) {
+    upload = {};
+    return replyError(context, v1::ERROR_TOO_LARGE,
+                      "the parts have more than " + std::to_string(limit) +
+                          " bytes (limits.max_upload); they were dropped",
+                      "upload.part");
+  }
+  upload += request.part();
+  v1::ServerMessage message;
+  message.mutable_upload()->set_bytes(upload.size());
+  sendReply(context, std::move(message));
+}
+
+std::variant<std::string, v1::Error> takeBytes(Client& client, const std::string& bytes,
+                                               bool uploaded, const std::string& field) {
+  if (!uploaded) return bytes;
+  if (!bytes.empty())
+    return makeError(v1::ERROR_BAD_MESSAGE, "give either the bytes or uploaded", field);
+  if (client.upload.empty())
+    return makeError(v1::ERROR_BAD_MESSAGE, "nothing was uploaded: send Upload first", field);
+  return std::exchange(client.upload, {});
+}
 
 void handleSaveWorld(const RequestContext& context) {
   const scene::World& world = context.hosted.world;
@@ -47,12 +72,17 @@ void handleRestoreWorld(const RequestContext& context, const v1::RestoreWorld& r
   if (!error) error = validateOwnsAvatars(context);
   if (!error) error = acquireClock(context);
   if (error) return replyError(context, std::move(*error));
-  const std::string& bytes = request.checkpoint();
+  auto taken =
+      takeBytes(context.client, request.checkpoint(), request.uploaded(), "restore.checkpoint");
+  if (auto* refused = std::get_if<v1::Error>(&taken))
+    return replyError(context, std::move(*refused));
+  const std::string& bytes = std::get<std::string>(taken);
   try {
     scene::World world = scene::restoreWorld(
         hosted.scene, {reinterpret_cast<const std::uint8_t*>(bytes.data()), bytes.size()});
     const v1::TickEvents contacts = makeActiveContacts(world);
-    replaceWorld(hosted, std::move(world), contacts, "the world was restored");
+    replaceWorld(hosted, std::move(world), contacts, "the world was restored",
+                 RecordingAfter::continues);
   } catch (const scene::CheckpointError& problem) {
     return replyError(context, v1::ERROR_BAD_MESSAGE, problem.what(), "restore.checkpoint");
   }

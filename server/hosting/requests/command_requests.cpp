@@ -80,14 +80,6 @@ void sendCommandReply(const RequestContext& context, std::optional<v1::Error> er
   sendReply(context, makeCommandReply(context.hosted, std::move(error)));
 }
 
-std::optional<v1::Error> submitGoOrders(HostedWorld& hosted, ClientId id, const GoOrders& made) {
-  for (const v1::BodyCommand& door : made.doors)
-    if (auto error = hosted.world.submit(door)) return error;
-  for (const v1::Command& order : made.orders)
-    if (auto error = submitCommand(hosted, id, order)) return error;
-  return std::nullopt;
-}
-
 /// Finds the path off the tick thread, then submits it as a Walk.
 void handleGo(const RequestContext& context, const v1::Command& command) {
   HostedWorld& hosted = context.hosted;
@@ -104,12 +96,12 @@ void handleGo(const RequestContext& context, const v1::Command& command) {
        requestId = context.message.request_id(), command](auto found) {
         post([reply, id, requestId, command, found = std::move(found)](HostedWorld& current) {
           if (!current.clients.contains(id)) return;
-          auto made = makeGoOrders(command, found);
+          auto made = makeGoOrder(command, found);
           std::optional<v1::Error> error;
           if (auto* refusal = std::get_if<v1::Error>(&made))
             error = std::move(*refusal);
           else
-            error = submitGoOrders(current, id, std::get<GoOrders>(made));
+            error = submitCommand(current, id, std::get<v1::Command>(made));
           v1::ServerMessage message = makeCommandReply(current, std::move(error));
           message.set_reply_to(requestId);
           reply(encodeShared(message));

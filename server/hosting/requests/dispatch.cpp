@@ -54,6 +54,7 @@ Role requiredRole(v1::ClientMessage::BodyCase body) {
     case v1::ClientMessage::kTakeOver:
     case v1::ClientMessage::kRestart:
     case v1::ClientMessage::kRestore:
+    case v1::ClientMessage::kUpload:
       return Role::drive;
     case v1::ClientMessage::kCreateWorld:
     case v1::ClientMessage::kDropWorld:
@@ -76,7 +77,8 @@ void refuseUnknownEnum(const RequestContext& context, const std::string& unknown
 
 void dispatchRequest(const RequestContext& context) {
   const v1::ClientMessage& message = context.message;
-  const Role required = requiredRole(message.body_case());
+  const Role required =
+      message.navigation().has_load_mesh() ? Role::drive : requiredRole(message.body_case());
   if (context.client.role < required) {
     return replyError(context, v1::ERROR_NOT_ALLOWED,
                       std::string("this needs a token with the role ") + toString(required) +
@@ -106,6 +108,8 @@ void dispatchRequest(const RequestContext& context) {
       return handleSaveWorld(context);
     case v1::ClientMessage::kRestore:
       return handleRestoreWorld(context, message.restore());
+    case v1::ClientMessage::kUpload:
+      return handleUpload(context, message.upload());
     case v1::ClientMessage::kSubscribe:
       return handleSubscribe(context, message.subscribe());
     case v1::ClientMessage::kFrame:

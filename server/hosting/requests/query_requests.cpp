@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "server/hosting/requests/checkpoint_requests.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -18,6 +19,18 @@ void forwardQuery(const RequestContext& context, const Query& query, const char*
   hosted.queries.submit(
       {hosted.world.snapshot(), context.message, hosted.world.settings(), hosted.limits},
       deferReply(context));
+}
+
+/// Passes the bytes of meshes on, also those of an upload.
+void loadMesh(const RequestContext& context, const v1::NavigationQuery& query) {
+  auto mesh = takeBytes(context.client, query.load_mesh().mesh(), query.load_mesh().uploaded(),
+                        "navigation.load_mesh.mesh");
+  if (auto* error = std::get_if<v1::Error>(&mesh)) return replyError(context, std::move(*error));
+  HostedWorld& hosted = context.hosted;
+  SceneQuery job{hosted.world.snapshot(), context.message, hosted.world.settings(), hosted.limits};
+  job.message.mutable_navigation()->mutable_load_mesh()->set_mesh(
+      std::get<std::string>(std::move(mesh)));
+  hosted.queries.submit(std::move(job), deferReply(context));
 }
 
 v1::Entity makeEntity(const scene::World& world, std::uint32_t id, bool details) {
@@ -73,6 +86,7 @@ void handleRays(const RequestContext& context, const v1::RayQuery& query) {
   forwardQuery(context, query, "rays.tick");
 }
 void handleNavigation(const RequestContext& context, const v1::NavigationQuery& query) {
+  if (query.has_load_mesh()) return loadMesh(context, query);
   forwardQuery(context, query, "navigation.tick");
 }
 void handleDistances(const RequestContext& context, const v1::DistanceQuery& query) {

@@ -31,6 +31,7 @@ v1::Welcome makeWelcome(const HostedWorld& hosted) {
   *welcome.mutable_policies() = toProto(hosted.world.settings());
   v1::Limits& limits = *welcome.mutable_limits();
   limits.set_max_message(protocol::kServerLimits.total);
+  limits.set_max_upload(hosted.limits.uploadBytes);
   limits.set_max_avatars(hosted.limits.avatars);
   limits.set_max_picture_width(hosted.limits.imageSide);
   limits.set_max_picture_height(hosted.limits.imageSide);

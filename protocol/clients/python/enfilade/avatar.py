@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, Optional, Sequence, Union
+from typing import TYPE_CHECKING, Any, Optional, Sequence, Tuple, Union
 
 from . import messages
 from .errors import OrderFailed
@@ -41,29 +41,33 @@ class Avatar:
         raise OrderFailed(f"avatar {self.name!r} did not enter within {ENTRY_TICKS} ticks; did "
                           "another call set the clock or drop its spawn?")
 
-    def walk(self, *along: Point, speed: Optional[float] = None) -> int:
-        """Walks to each of the points in turn."""
-        order = messages.Walk(along=[vec(point) for point in along])
+    def walk(self, *along: Point, speed: Optional[float] = None, opens: Sequence[str] = (),
+             rides: Sequence[Tuple[int, str, int]] = ()) -> int:
+        """Walks to each of the points in turn. Opens the doors `opens` when they are in its way. `rides`:
+        before point number WAYPOINT a LIFT must stand at a LEVEL; it is called."""
+        order = messages.Walk(along=[vec(point) for point in along], opens=opens, rides=[
+            messages.Walk.Ride(waypoint=waypoint, lift=lift, level=level) for waypoint, lift, level in rides])
         if speed is not None:
             order.speed = speed
         return self._client.command(self.name, walk=order)
 
     def go(self, to: Union[Point, str], *, speed: Optional[float] = None,
-           doors: str = "as_they_are") -> int:
+           doors: str = "as_they_are", max_drop: float = 0.0, lifts: bool = False) -> int:
         """Walks along a path to a point, or to a room, a storey or an object by name. With doors="open" it
-        opens the closed ones on the path. Raises ServerError with the reason if there is no path."""
+        opens those on the path. It may jump down by `max_drop` metres, and ride `lifts`. Raises ServerError
+        with the reason if there is no path."""
         place = messages.NavigationPlace(name=to) if isinstance(to, str) else \
             messages.NavigationPlace(point=vec(to))
-        return self._client.command(self.name, go=messages.Go(to=place, speed=speed, doors=doors_value(doors)))
+        return self._client.command(self.name, go=messages.Go(
+            to=place, speed=speed, doors=doors_value(doors), max_drop=max_drop, lifts=lifts))
 
-    def walk_and_wait(self, *along: Point, speed: Optional[float] = None) -> str:
+    def walk_and_wait(self, *along: Point, **options: Any) -> str:
         """walk(), then ticks in lockstep until it ends. Returns "arrived", or "blocked by NAME"."""
-        return self._wait_for(self.walk(*along, speed=speed))
+        return self._wait_for(self.walk(*along, **options))
 
-    def go_and_wait(self, to: Union[Point, str], *, speed: Optional[float] = None,
-                    doors: str = "as_they_are") -> str:
+    def go_and_wait(self, to: Union[Point, str], **options: Any) -> str:
         """go(), then ticks in lockstep until it ends; as walk_and_wait()."""
-        return self._wait_for(self.go(to, speed=speed, doors=doors))
+        return self._wait_for(self.go(to, **options))
 
     def _wait_for(self, tag: int) -> str:
         with self._client._with_notices():

@@ -8,7 +8,7 @@ import operator
 import time
 import warnings
 from collections import deque
-from typing import Any, Deque, Dict, Iterable, Iterator, List, Optional, Sequence, Tuple, Union
+from typing import Any, Deque, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -475,7 +475,7 @@ class Client:
               height_y: Optional[float] = None, near: Optional[float] = None,
               far: Optional[float] = None, channels: Sequence[str] = ("rgb",), glass: str = "",
               renderer: str = "", shadows: Optional[bool] = None, lens: str = "",
-              distortion: Sequence[float] = (), depth_noise: Optional[int] = None,
+              distortion: Sequence[float] = (), depth_noise: Union[None, int, Mapping[str, Any]] = None,
               flow_from: Optional[int] = None, flow_forward: Optional[Point] = None,
               collision_shapes: bool = False, samples: int = 1, tick: Optional[int] = None) -> Frame:
         """Returns a picture of the last tick. It is taken from the eyes of `avatar` (along `forward`
@@ -486,7 +486,8 @@ class Client:
         "depth", "ids", "normals", "range", "class", "thing". `glass`: "clear" or "solid". `renderer`: "gl" or "rays".
         `shadows`: of the sun, in the colour; None: where they cost little. `lens`: "fisheye" (OpenCV's model; `fov_y` is then the
         angle of the whole width, default pi; `distortion` k1 to k4) or "equirectangular".
-        `depth_noise`: the seed of a structured-light camera's noise in "depth". `flow_from`: the earlier tick of the channel "flow", of the last 32, and
+        `depth_noise`: the seed of a structured-light camera's noise in "depth", or {"model": "redwood",
+        "seed":, "scale":, "distortion": FILE}, see load_distortion(). `flow_from`: the earlier tick of the channel "flow", of the last 32, and
         `flow_forward` the direction in which the avatar looked then, if `forward` is given.
         `collision_shapes` draws avatars as the shapes that collide, not as people. `samples`: 1, 4 or
         16 of the colour in each pixel, which smooth its edges."""
@@ -658,10 +659,18 @@ class Client:
         _, attachment = self.request(save=messages.SaveWorld())
         return bytes(attachment)
 
+    def _upload(self, data: bytes) -> bool:
+        """Sends bytes ahead of a request that they do not fit into; False: they fit."""
+        room = self.limits.max_message - 4096  # for the request around them
+        for first in range(0, len(data) if len(data) > room else 0, room):
+            self.request(upload=messages.Upload(part=data[first:first + room], first=first == 0))
+        return len(data) > room
+
     def restore(self, checkpoint: bytes) -> Step:
         """Continues from a state that save() returned, in any server of the same version with the
         same scene. This client must drive the clock; it owns all avatars of the restored world."""
-        reply, _ = self.request(restore=messages.RestoreWorld(checkpoint=checkpoint))
+        sent = self._upload(checkpoint)
+        reply, _ = self.request(restore=messages.RestoreWorld(checkpoint=b"" if sent else checkpoint, uploaded=sent))
         self._horizons.clear()
         return Step(reply.restore.tick, reply.restore.time, reply.restore.state_hash, False)
 

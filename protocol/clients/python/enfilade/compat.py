@@ -45,6 +45,17 @@ class MultiGoalShortestPath:
         self.closest_end_point_index = -1
 
 
+@dataclass
+class NavMeshSettings:
+    """As habitat_sim.NavMeshSettings. The server chooses cells itself; the climb and the slope are those of
+    the world (`enfilade serve --step-height --slope`): None takes them."""
+
+    agent_radius: float = 0.1
+    agent_height: float = 1.5
+    agent_max_climb: Optional[float] = None  # metres
+    agent_max_slope: Optional[float] = None  # degrees
+
+
 @dataclass(frozen=True)
 class HitRecord:
     """As habitat_sim.HitRecord."""
@@ -99,6 +110,30 @@ class PathFinder:
 
     def _draw(self) -> int:
         return int(self._random.integers(0, 2 ** 63))
+
+    def build_nav_mesh(self, settings: NavMeshSettings) -> bool:
+        """Builds meshes for another agent, as habitat's recompute_navmesh(). Raises ValueError if the world
+        has another climb or slope."""
+        client = self.navigation._client
+        policies = client.welcome.policies
+        for name, wanted, given, option in (
+                ("agent_max_climb", settings.agent_max_climb, policies.step_height, "--step-height"),
+                ("agent_max_slope", settings.agent_max_slope, math.degrees(policies.walkable_slope),
+                 "--slope")):
+            if wanted is not None and not math.isclose(wanted, given, abs_tol=1e-6):
+                raise ValueError(f"{name} is {given:g} in this world, not {wanted:g}: start the server with "
+                                 f"{option} {wanted:g}")
+        self.navigation = client.navigation(settings.agent_radius, settings.agent_height)
+        return self.navigation.build_seconds >= 0
+
+    def save_nav_mesh(self, path: str) -> bool:
+        self.navigation.save(path)
+        return True
+
+    def load_nav_mesh(self, path: str) -> bool:
+        """Raises ServerError with the reason if the mesh belongs to another scene or agent."""
+        self.navigation.load(path)
+        return True
 
     def find_path(self, path: "ShortestPath | MultiGoalShortestPath") -> bool:
         """Fills in `points` and `geodesic_distance`. Returns whether there is a path."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import pathlib
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
 
@@ -28,7 +29,7 @@ class Path:
     the first."""
     found: bool
     points: np.ndarray
-    length: float  # metres; infinite without a path
+    length: float  # metres walked: of falls those across, of rides none; infinite without a path
     reason: str = ""
     obstacle: int = 0  # the entity in the way
     obstacle_name: str = ""
@@ -36,6 +37,8 @@ class Path:
     clear_width: Optional[float] = None  # metres: at the obstacle, or at the narrowest place of the path
     narrowest_at: Optional[Tuple[float, float, float]] = None
     doors: Tuple["Door", ...] = ()  # with doors="open": the closed ones on the path, in order
+    legs: Tuple["Leg", ...] = ()  # in order, of all points
+    seconds: float = math.inf  # expected: walking, falling, doors, waiting for lifts and riding
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,19 @@ class Door:
     distance: float  # metres from the start of the path
     seconds: float  # that it takes to open
     by_touch: bool  # an avatar that walks into it opens it
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A part of a path, up to the first point of the next one."""
+    kind: str  # "walk", "door", "drop" or "lift"
+    first: int  # index of its first point
+    length: float  # metres walked
+    seconds: float  # expected
+    id: int = 0  # of the door, also of one that is open now, or the lift
+    name: str = ""
+    from_level: int = 0  # of the lift: stops
+    to_level: int = 0
 
 
 @dataclass(frozen=True)
@@ -102,7 +118,11 @@ def _path(one: Any) -> Path:
         obstacle_at=_xyz(one.obstacle_at) if one.HasField("obstacle_at") else None,
         clear_width=one.clear_width or None,
         narrowest_at=_xyz(one.narrowest_at) if one.HasField("narrowest_at") else None,
-        doors=tuple(Door(d.id, d.name, d.distance, d.seconds, d.by_touch) for d in one.doors))
+        doors=tuple(Door(d.id, d.name, d.distance, d.seconds, d.by_touch) for d in one.doors),
+        legs=tuple(Leg(messages.NavigationLeg.Kind.Name(leg.kind)[len("KIND_"):].lower(), leg.first,
+                       leg.length, leg.seconds, leg.id, leg.name, leg.from_level, leg.to_level)
+                   for leg in one.legs),
+        seconds=one.seconds if one.found else math.inf)
 
 
 def _spot(one: Any) -> Optional[Spot]:
@@ -133,17 +153,20 @@ class Navigation:
         return messages.NavigationQuery(**self._options, path=messages.NavigationQuery.Path(
             **{"from": messages.NavigationPlace(avatar=avatar)}, to=[_place(goal) for goal in goals]))
 
-    def path(self, start: Place, goal: Place, *, narrowest: bool = False) -> Path:
-        """Returns the path from one place to another. `narrowest`: also measures its clear width."""
-        return self.paths(start, [goal], narrowest=narrowest)[0]
+    def path(self, start: Place, goal: Place, *, narrowest: bool = False, max_drop: float = 0.0,
+             lifts: bool = False) -> Path:
+        """Returns the path from one place to another. `narrowest`: also measures its clear width. With
+        `max_drop` metres it may fall from edges, and with `lifts` it may ride: then it is the quickest."""
+        return self.paths(start, [goal], narrowest=narrowest, max_drop=max_drop, lifts=lifts)[0]
 
-    def paths(self, start: Place, goals: Sequence[Place], *, narrowest: bool = False) -> List[Path]:
-        """Returns the paths from one place to many, in their order."""
+    def paths(self, start: Place, goals: Sequence[Place], *, narrowest: bool = False,
+              max_drop: float = 0.0, lifts: bool = False) -> List[Path]:
+        """Returns the paths from one place to many, in their order; options as for path()."""
         found: List[Path] = []
         for first in range(0, len(goals), _MOST_GOALS):
             reply, _ = self._ask(path=messages.NavigationQuery.Path(
                 **{"from": _place(start)}, to=[_place(goal) for goal in goals[first:first + _MOST_GOALS]],
-                narrowest=narrowest))
+                narrowest=narrowest, max_drop=max_drop, lifts=lifts))
             found += [_path(one) for one in reply.paths]
         return found
 
@@ -213,6 +236,19 @@ class Navigation:
         reply, attachment = self._ask(map=messages.NavigationQuery.Map(cell=cell, height=height))
         cells = np.frombuffer(attachment, np.uint8).reshape(reply.map_height, reply.map_width)
         return Map(cells.astype(bool), _xyz(reply.map_corner), cell)
+
+    def save(self, path: Union[str, pathlib.Path]) -> None:
+        """Writes the meshes of this size to a file, for load()."""
+        pathlib.Path(path).write_bytes(self._ask(save_mesh=messages.NavigationQuery.SaveMesh())[1])
+
+    def load(self, path: Union[str, pathlib.Path]) -> None:
+        """Takes the meshes of a file instead of building them, in any server of the same version with the
+        same scene. Raises ServerError with the reason if they belong to another scene, size or step height.
+        Paths are proved as ever, so a mesh can make none wrong."""
+        mesh = pathlib.Path(path).read_bytes()
+        uploaded = self._client._upload(mesh)
+        self._ask(load_mesh=messages.NavigationQuery.LoadMesh(mesh=b"" if uploaded else mesh,
+                                                              uploaded=uploaded))
 
     def _meshes(self) -> Any:
         if self._report is None:

@@ -1,0 +1,258 @@
+// Paths that jump down and ride lifts, and walks that open doors and call lifts.
+#include <gtest/gtest.h>
+
+#include "scene/navigation/doors.hpp"
+#include "scene/navigation/navigation.hpp"
+#include "tests/scene/body_fixture.hpp"
+
+namespace enfilade::scene::testing {
+namespace {
+
+constexpr double kGallery = 1.5;  // metres, height
+
+/// A floor, and above a part of it a gallery that only a jump leaves, with a railing on its sides.
+std::vector<NamedBox> gallery() {
+  return {{"floor", {0, -0.2, -3}, {12, 0, 3}},
+          {"gallery", {0, 0, -3}, {4, kGallery, 3}},
+          {"rail", {3.9, kGallery, -3}, {4, kGallery + 1, 1.5}}};
+}
+
+/// A shaft between two floors with a lift that is open towards +x.
+Model towerModel() {
+  Model model = boxModel({{"ground", {0, -0.2, -3}, {10, 0, 3}},
+                          {"upper", {4.05, 2.8, -3}, {10, 3, 3}},
+                          {"platform", {2, -0.1, -1}, {4, 0.002, 1}}});
+  BodySpec lift = bodySpec("lift", BodyKind::lift, {2});
+  lift.axis = Vec3::UnitY();
+  lift.low = 0;
+  lift.high = 3;
+  lift.stops = {0, 3};
+  lift.speed = 1;
+  model.bodies.push_back(lift);
+  return model;
+}
+
+Model doorModel(std::optional<double> autoClose, BodyKind kind = BodyKind::hinged) {
+  Model model = boxModel({{"floor", {0, -0.2, -3}, {12, 0, 3}},
+                          {"wall/left", {5.9, 0, -3}, {6.1, 2.5, -0.5}},
+                          {"wall/right", {5.9, 0, 0.5}, {6.1, 2.5, 3}},
+                          {"leaf", {5.98, 0.01, -0.49}, {6.02, 2, 0.49}}});
+  BodySpec door = bodySpec("door", kind, {3});
+  door.anchor = {6, 0, -0.49};
+  if (kind == BodyKind::sliding) door.axis = Vec3::UnitZ();
+  door.low = 0;
+  door.high = kind == BodyKind::hinged ? kQuarter : 0.95;
+  door.autoCloseDelay = autoClose;
+  model.bodies.push_back(door);
+  return model;
+}
+
+Spawn spawnAt(const Vec3& position) {
+  Spawn spawn;
+  spawn.position = position;
+  return spawn;
+}
+
+/// The walk along a path; `lift`: the name of the lift of its rides.
+Walk makeWalk(const NavigationPath& path, const std::string& lift = "") {
+  Walk walk;
+  walk.waypoints.assign(path.points.begin() + 1, path.points.end());
+  for (const PathLeg& leg : path.legs)
+    if (leg.kind == PathLeg::Kind::lift) {
+      const auto first = static_cast<std::uint32_t>(leg.first);
+      walk.rides = {{first - 1, lift, leg.fromLevel},
+                    {first, lift, leg.toLevel},
+                    {first + 1, lift, leg.toLevel}};
+    }
+  return walk;
+}
+
+Notice runToNotice(BodyFixture& fixture, int maxTicks = 60 * 60) {
+  for (int tick = 0; tick < maxTicks; ++tick)
+    for (const Notice& notice : fixture.step().notices)
+      if (notice.kind != Notice::Kind::spawned) return notice;
+  return {};
+}
+
+TEST(LinkRoutes, ADropJoinsAGalleryWithTheFloorBelow) {
+  const auto scene = boxScene(gallery());
+  Navigation navigation(scene, {}, {});
+  const Vec3 from(1, kGallery + 0.1, -2), to(10, 0.1, -2);
+  EXPECT_FALSE(navigation.findPath(from, to).found());
+  EXPECT_FALSE(navigation.findPath(from, to, {1.2, false}).found());  // not that deep
+  const NavigationPath path = navigation.findPath(from, to, {2, false});
+  ASSERT_TRUE(path.found()) << path.reason;
+  ASSERT_EQ(path.legs.size(), 3u);
+  EXPECT_EQ(path.legs[1].kind, PathLeg::Kind::drop);
+  const Vec3 edge = path.points[path.legs[1].first], landing = path.points[path.legs[1].first + 1];
+  EXPECT_NEAR(edge.y() - landing.y(), kGallery, 0.01);
+  EXPECT_GT(edge.z(), 1.5) << "through the railing";
+  double length = 0, seconds = 0;
+  for (const PathLeg& leg : path.legs) length += leg.length, seconds += leg.seconds;
+  EXPECT_NEAR(path.length, length, 1e-12);
+  EXPECT_NEAR(path.seconds, seconds, 1e-12);
+  EXPECT_NEAR(path.legs[1].length, std::hypot(landing.x() - edge.x(), landing.z() - edge.z()),
+              1e-9);
+  EXPECT_GT(path.legs[1].seconds, path.legs[1].length / 1.4 - 1e-9);
+  EXPECT_FALSE(navigation.findPath(to, from, {2, false}).found());  // not up
+
+  BodyFixture fixture(boxModel(gallery()));
+  fixture.order("ann", spawnAt(path.points.front()));
+  fixture.order("ann", makeWalk(path));
+  const Notice end = runToNotice(fixture);
+  EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
+  EXPECT_LT((end.position - path.points.back()).norm(), 0.01);
+  EXPECT_NEAR(static_cast<double>(fixture.world.snapshot()->tick) / 60, path.seconds,
+              0.05 * path.seconds);
+}
+
+TEST(LinkRoutes, AJumpIsChosenOverALongerWay) {
+  auto boxes = gallery();
+  for (int step = 0; step < 6; ++step)  // a stair at the far side, towards -z
+    boxes.push_back({"stair/" + std::to_string(step),
+                     {0, 0, -3.4 - 0.4 * step},
+                     {1.5, kGallery - 0.25 * (step + 1), -3 - 0.4 * step}});
+  boxes.push_back({"yard", {0, -0.2, -8}, {12, 0, -3}});
+  const auto scene = boxScene(boxes);
+  Navigation navigation(scene, {}, {});
+  const Vec3 from(3, kGallery + 0.1, 2), to(6, 0.1, 2);
+  const NavigationPath walked = navigation.findPath(from, to);
+  ASSERT_TRUE(walked.found()) << walked.reason;
+  EXPECT_EQ(walked.legs.size(), 1u);
+  const NavigationPath jumped = navigation.findPath(from, to, {2, false});
+  ASSERT_TRUE(jumped.found()) << jumped.reason;
+  EXPECT_LT(jumped.seconds, 0.5 * walked.seconds);
+  EXPECT_EQ(navigation.findPath(to, from, {2, false}).length, navigation.findPath(to, from).length);
+}
+
+TEST(LinkRoutes, ALiftIsCalledAndRidden) {
+  const auto scene = std::make_shared<const Scene>(towerModel());
+  Navigation navigation(scene, {}, {});
+  const Vec3 from(9, 0.1, 2), to(9, 3.1, -2);
+  EXPECT_FALSE(navigation.findPath(from, to).found());
+  for (const auto& [start, goal] : {std::pair(from, to), std::pair(to, from)}) {
+    const NavigationPath path = navigation.findPath(start, goal, {0, true});
+    ASSERT_TRUE(path.found()) << path.reason;
+    ASSERT_EQ(path.legs.size(), 3u);
+    const PathLeg& ride = path.legs[1];
+    EXPECT_EQ(ride.kind, PathLeg::Kind::lift);
+    EXPECT_EQ(ride.length, 0);
+    EXPECT_EQ(ride.fromLevel, start.y() < 1 ? 0u : 1u);
+    EXPECT_NEAR(ride.seconds, start.y() < 1 ? 3 : 6, 0.1);  // it has to come up first
+    BodyFixture fixture(towerModel());
+    fixture.order("ann", spawnAt(path.points.front()));
+    fixture.order("ann", makeWalk(path, "lift"));
+    const Notice end = runToNotice(fixture);
+    EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
+    EXPECT_LT((end.position - path.points.back()).norm(), 0.01);
+    EXPECT_NEAR(static_cast<double>(fixture.world.snapshot()->tick) / 60, path.seconds,
+                0.05 * path.seconds);
+  }
+}
+
+TEST(LinkRoutes, AWalkAfterTheRideDoesNotCrossWhereTheLiftWas) {
+  // The only way from the exit to the goal leads over the platform when it is below.
+  Model model = boxModel({{"ground", {4.01, -0.2, -3}, {10, 0, 3}},
+                          {"island", {-2, -0.2, -1}, {1.99, 0, 1}},
+                          {"upper", {4.05, 2.8, -3}, {10, 3, 3}},
+                          {"platform", {2, -0.1, -1}, {4, 0.002, 1}}});
+  BodySpec lift = towerModel().bodies.front();
+  lift.objects = {3};
+  model.bodies.push_back(lift);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  Navigation navigation(scene, {}, {});
+  EXPECT_TRUE(navigation.findPath({9, 0.1, 0}, {-1, 0.1, 0}).found());
+  const NavigationPath down = navigation.findPath({9, 3.1, 0}, {-1, 0.1, 0}, {0, true});
+  ASSERT_TRUE(down.found()) << down.reason;  // it leaves the lift on the side of the island
+  EXPECT_LT(down.points[down.legs.back().first + 1].x(), 2);
+}
+
+TEST(WalkBodies, ADoorIsOpenedWhenTheAvatarComesToIt) {
+  for (const BodyKind kind : {BodyKind::hinged, BodyKind::sliding}) {
+    BodyFixture fixture(doorModel({}, kind));
+    fixture.order("ann", spawnAt({0.5, 0, 0}));
+    fixture.order("ann", Walk{{{11, 0, 0}}, 1.4, {"door"}});
+    fixture.ticks(10);
+    EXPECT_EQ(fixture.body("door").drive.jointPosition, 0) << "it is far away";
+    const Notice end = runToNotice(fixture);
+    EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
+  }
+}
+
+TEST(WalkBodies, ADoorThatClosesBeforeTheAvatarIsThroughIsOpenedAgain) {
+  BodyFixture fixture(doorModel(0.1));
+  fixture.submit({"door", BodyCommand::Action::open, 0, 0, std::nullopt});
+  fixture.order("ann", spawnAt({1, 0, 0}));
+  fixture.order("ann", Walk{{{11, 0, 0}}, 0.7, {"door"}});
+  const Notice end = runToNotice(fixture);
+  EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
+  fixture.ticks(3 * 60);
+  EXPECT_EQ(fixture.body("door").drive.jointPosition, 0) << "no avatar holds it any more";
+}
+
+TEST(WalkBodies, ADoorThatIsShutInFrontOfTheAvatarIsOpenedAgain) {
+  BodyFixture fixture(doorModel({}));
+  fixture.order("ann", spawnAt({1, 0, 0}));
+  fixture.order("ann", Walk{{{11, 0, 0}}, 1.4, {"door"}});
+  Notice end;
+  bool isShut = false;
+  for (int tick = 0; tick < 60 * 60 && end.kind != Notice::Kind::arrived; ++tick) {
+    if (!isShut && fixture.body("door").drive.jointPosition == kQuarter) {
+      fixture.submit({"door", BodyCommand::Action::close, 0, 0, std::nullopt});
+      isShut = true;
+    }
+    for (const Notice& notice : fixture.step().notices) end = notice;
+  }
+  EXPECT_TRUE(isShut);
+  EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
+}
+
+TEST(WalkBodies, ADoorThatIsClosedAgainAndAgainBlocksTheWalk) {
+  BodyFixture fixture(doorModel({}));
+  fixture.order("ann", spawnAt({1, 0, 0}));
+  fixture.order("ann", Walk{{{11, 0, 0}}, 1.4, {"door"}});
+  Notice end;
+  for (int tick = 0; tick < 60 * 60 && end.kind != Notice::Kind::blocked; ++tick) {
+    if (fixture.body("door").drive.jointPosition > 0.3)
+      fixture.submit({"door", BodyCommand::Action::close, 0, 0, std::nullopt});
+    for (const Notice& notice : fixture.step().notices) end = notice;
+  }
+  ASSERT_EQ(end.kind, Notice::Kind::blocked);
+  EXPECT_EQ(end.obstacle, fixture.body("door").id);
+  EXPECT_NE(end.text.find("3 commands"), std::string::npos) << end.text;
+  EXPECT_LT(fixture.feet("ann").x(), 6);
+}
+
+TEST(WalkBodies, UnknownDoorsAndStopsAreRefused) {
+  BodyFixture fixture(towerModel());
+  const auto refuse = [&](Walk walk) {
+    walk.waypoints = {{5, 0, 0}};
+    return submitAvatarCommand(fixture.world, {"ann", walk, 0}).value_or("accepted");
+  };
+  EXPECT_NE(refuse({{}, 1, {"gate"}}).find("opens[0]: body: no body named 'gate'"),
+            std::string::npos);
+  EXPECT_NE(refuse({{}, 1, {"lift"}}).find("not a door"), std::string::npos);
+  EXPECT_NE(refuse({{}, 1, {}, {{0, "lift", 2}}}).find("rides[0]: level is 2"), std::string::npos);
+  EXPECT_NE(refuse({{}, 1, {}, {{1, "lift", 0}}}).find("rides[0].waypoint is 1"),
+            std::string::npos);
+  EXPECT_EQ(refuse({{}, 1, {}, {{0, "lift", 1}}}), "accepted");
+}
+
+TEST(Doors, ThoseOnAPathAreFoundOpenOrClosed) {
+  const auto scene = std::make_shared<const Scene>(doorModel({}));
+  const auto open = makeSnapshotWithOpenDoors(scene, {});
+  EntityIndex index(scene);
+  const std::vector<Vec3> points{{1, 0, 0}, {4, 0, 0}, {8, 0, 0}, {11, 0, 0}};
+  for (const auto& [snapshot, isClosed] :
+       {std::pair(open, false), std::pair(World(scene).snapshot(), true)}) {
+    const auto doors = findDoorsOnPath(index, {}, *snapshot, {}, points);
+    ASSERT_EQ(doors.size(), 1u);
+    EXPECT_EQ(doors[0].point, 1u);
+    EXPECT_EQ(doors[0].isInTheWay, isClosed);
+    EXPECT_NEAR(doors[0].secondsToOpen, isClosed ? kQuarter : 0, 1e-9);
+  }
+  EXPECT_TRUE(findDoorsOnPath(index, {}, *open, {}, {{1, 0, 0}, {4, 0, 2}}).empty());
+}
+
+}  // namespace
+}  // namespace enfilade::scene::testing
