@@ -219,7 +219,18 @@ float interpolateByDepth(float distance, float within, float distanceA, float a,
 
 }  // namespace
 
+// Every second pixel is a sample. The basis counts from the middle to the edge.
 AmbientOcclusion::AmbientOcclusion(const std::vector<float>& depth, const Camera& camera)
+    : AmbientOcclusion(depth, camera,
+                       static_cast<float>(computeCameraBasis(camera).scaleY) / 4 *
+                           static_cast<float>(camera.height)) {}
+
+AmbientOcclusion::AmbientOcclusion(const std::vector<float>& range, const Camera& camera,
+                                   double pixelsPerRadian)
+    : AmbientOcclusion(range, camera, static_cast<float>(0.5 * pixelsPerRadian)) {}
+
+AmbientOcclusion::AmbientOcclusion(const std::vector<float>& depth, const Camera& camera,
+                                   float scale)
     : depth_(depth),
       width_(static_cast<std::size_t>(camera.width)),
       parallel_(camera.projection == Camera::Projection::orthographic),
@@ -234,9 +245,7 @@ AmbientOcclusion::AmbientOcclusion(const std::vector<float>& depth, const Camera
     for (std::size_t i = 0; i < columns_; ++i)
       distance[i] = std::isnan(row[2 * i]) ? kNoSurface : row[2 * i];
   }
-  SampleGrid grid{
-      columns_, rows, parallel_, static_cast<float>(computeCameraBasis(camera).scaleY) / 4, {}};
-  grid.scale *= static_cast<float>(camera.height);
+  SampleGrid grid{columns_, rows, parallel_, scale, {}};
   grid.affineDepth.resize(sampleCount);
   const auto far = static_cast<float>(camera.far);
   for (std::size_t i = 0; i < sampleCount; ++i)

@@ -15,10 +15,17 @@ class AmbientOcclusion {
   /// `depth` is Frame::depth of a frame of `camera`; kept by reference.
   AmbientOcclusion(const std::vector<float>& depth, const Camera& camera);
 
+  /// Of a picture through a lens: `range` is Frame::range, `pixelsPerRadian` that of the lens. A
+  /// plane is nearly affine within the radius around a sample.
+  AmbientOcclusion(const std::vector<float>& range, const Camera& camera, double pixelsPerRadian);
+
   /// Writes the visibility of each pixel of row `y`: 255 means unoccluded. Thread-safe.
   void computeRow(int y, std::span<std::uint8_t> visibility) const;
 
  private:
+  /// `scale`: samples of the grid per unit of the direction's tangent, or per metre.
+  AmbientOcclusion(const std::vector<float>& depth, const Camera& camera, float scale);
+
   const std::vector<float>& depth_;
   std::size_t width_;
   bool parallel_;

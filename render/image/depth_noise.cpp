@@ -37,10 +37,39 @@ class PixelRandom {
   std::uint64_t key_, count_ = 0;
 };
 
+/// The device's distortion at a pixel.
+class Distortion {
+ public:
+  Distortion(const DepthNoise& noise, int width, int height)
+      : table_(noise.distortion), width_(width), height_(height), rows_(noise.distortionRows) {
+    if (rows_ > 0) columns_ = static_cast<int>(table_.size()) / (rows_ * kDistortionDepths);
+  }
+  /// The depth that the device takes for a true one; 0: none.
+  double at(int x, int y, double depth) const {
+    if (columns_ == 0) return depth;
+    const auto cell =
+        static_cast<std::size_t>(y * rows_ / height_ * columns_ + x * columns_ / width_);
+    const float* factors = &table_[cell * kDistortionDepths];
+    const double knot = std::clamp(0.5 * (depth - 1), 0.0, kDistortionDepths - 1.0);
+    const int below = std::min(static_cast<int>(knot), kDistortionDepths - 2);
+    const double part = knot - below;
+    const double factor = (1 - part) * static_cast<double>(factors[below]) +
+                          part * static_cast<double>(factors[below + 1]);
+    return factor < kMinFactor ? 0 : depth / factor;
+  }
+
+ private:
+  static constexpr double kMinFactor = 1e-5;
+  const std::vector<float>& table_;
+  int width_, height_, rows_, columns_ = 0;
+};
+
 /// The depth that the camera reports for a true one.
-double measure(double depth, double noise) {
+double measure(double seen, int x, int y, const Distortion& distortion, double noise) {
   constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
-  if (!(depth > 0 && depth < kMaxDepth)) return kNothing;
+  if (!(seen > 0 && seen < kMaxDepth)) return kNothing;
+  const double depth = distortion.at(x, y, seen);
+  if (!(depth > 0)) return kNothing;
   const double steps = std::floor(
       (kDisparityAtOneMetre / depth + noise * kDisparityDeviation) * kDisparitySteps + 0.5);
   return steps > 0 ? kDisparityAtOneMetre * kDisparitySteps / steps : kNothing;
@@ -51,6 +80,7 @@ double measure(double depth, double noise) {
 void addDepthNoise(std::vector<float>& depth, int width, int height, const DepthNoise& noise,
                    std::uint64_t frame) {
   const std::vector<float> clean = depth;
+  const Distortion distortion(noise, width, height);
   const std::uint64_t key = mix(mix(noise.seed) ^ frame);
   const auto neighbour = [&](int at, double shift, int end) {
     return std::clamp(static_cast<int>(std::floor(at + shift + 0.5)), 0, end - 1);
@@ -65,8 +95,8 @@ void addDepthNoise(std::vector<float>& depth, int width, int height, const Depth
       const int column = neighbour(x, deviation * random.normal(), width);
       const float seen = clean[static_cast<std::size_t>(row) * static_cast<std::size_t>(width) +
                                static_cast<std::size_t>(column)];
-      depth[pixel] =
-          static_cast<float>(measure(static_cast<double>(seen), noise.scale * random.normal()));
+      depth[pixel] = static_cast<float>(measure(static_cast<double>(seen), column, row, distortion,
+                                                noise.scale * random.normal()));
     }
 }
 

@@ -67,14 +67,15 @@ class LensTracer {
   LensTracer(const Camera& camera, const FrameOptions& options, const LensMapping& lens,
              const std::vector<const RayTree*>& opaqueTrees,
              const std::vector<const RayTree*>& transparentTrees, const Vec3& origin,
-             const MipTextures& textures, Frame& frame)
+             const MipTextures& textures, Frame& frame, std::vector<std::uint8_t>& transmittance)
       : camera_(camera),
         options_(options),
         lens_(lens),
         opaqueTrees_(opaqueTrees),
         transparentTrees_(transparentTrees),
         origin_(origin),
-        frame_(frame) {
+        frame_(frame),
+        transmittance_(transmittance) {
     faces_.reserve(6);
     for (const Camera& face : makeFaceCameras(camera, lens.pixelsPerRadian()))
       faces_.emplace_back(std::make_unique<Face>(face, textures));
@@ -137,7 +138,9 @@ class LensTracer {
       }
     }
     if (!options_.channels.rgb) return;
-    colour = blendTransparent(colour, face, at, near, z);
+    float transmittance = 1;
+    colour = blendTransparent(colour, face, at, near, z, transmittance);
+    transmittance_[pixel] = static_cast<std::uint8_t>(255 * transmittance + 0.5f);
     const float channels[3] = {colour.x, colour.y, colour.z};
     for (std::size_t i = 0; i < 3; ++i) frame_.rgb[3 * pixel + i] = linearToSrgb(channels[i]);
   }
@@ -145,7 +148,7 @@ class LensTracer {
   void write(std::size_t pixel, const ShadedTriangle& triangle, const Face& face,
              const FacePoint& at, double z, const Vec3& direction) {
     const double range = z * at.length;
-    if (options_.channels.depth) {
+    if (!frame_.range.empty()) {
       frame_.range[pixel] = static_cast<float>(range);
       frame_.depth[pixel] =
           static_cast<float>(range * direction.dot(camera_.forward.stableNormalized()));
@@ -159,7 +162,7 @@ class LensTracer {
 
   /// Blends the transparent surfaces before `z` over a colour, from back to front.
   glsl::vec3 blendTransparent(glsl::vec3 colour, Face& face, const FacePoint& at, double near,
-                              double z) {
+                              double z, float& transmittance) {
     if (options_.transparency == TransparencyMode::opaque || transparentTrees_.empty())
       return colour;
     const TraceContext trace = makeContext(face, transparentTrees_);
@@ -183,6 +186,7 @@ class LensTracer {
       const SurfaceColour layer = face.shading.shadeSurface(ShadedTriangle(source, face.rays), at.x,
                                                             at.y, -layers[i].first, 1.0f);
       colour = glsl::mix(colour, layer.rgb, layer.alpha);
+      transmittance *= 1 - layer.alpha;
     }
     return colour;
   }
@@ -193,6 +197,7 @@ class LensTracer {
   const std::vector<const RayTree*>&opaqueTrees_, &transparentTrees_;
   Vec3 origin_;
   Frame& frame_;
+  std::vector<std::uint8_t>& transmittance_;  ///< of the transparent surfaces before each pixel
   std::vector<std::unique_ptr<Face>> faces_;
 };
 
@@ -208,21 +213,38 @@ Frame traceLensFrame(const Camera& camera, const FrameOptions& options,
       static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
   Frame frame;
   frame.camera = camera;
-  if (options.channels.depth) {
+  if (options.channels.depth || options.channels.rgb) {
     frame.depth.assign(pixels, kNothing);
     frame.range.assign(pixels, kNothing);
   }
   if (options.channels.ids) frame.ids.assign(pixels, 0);
   if (options.channels.normals) frame.normals.assign(3 * pixels, 0.0f);
   if (options.channels.rgb) frame.rgb.assign(3 * pixels, 0);
+  std::vector<std::uint8_t> transmittance(options.channels.rgb ? pixels : 0, 255);
   const LensMapping lens(camera);
   workers.parallelFor(static_cast<std::size_t>(camera.height), kRowsPerTask,
                       [&](std::size_t from, std::size_t to) {
                         LensTracer tracer(camera, options, lens, opaqueTrees, transparentTrees,
-                                          origin, textures, frame);
+                                          origin, textures, frame, transmittance);
                         for (std::size_t y = from; y < to; ++y)
                           tracer.traceRow(static_cast<int>(y));
                       });
+  if (!options.channels.rgb) return frame;
+  const AmbientOcclusion occlusion(frame.range, camera, lens.pixelsPerRadian());
+  workers.parallelFor(static_cast<std::size_t>(camera.height), kRowsPerTask,
+                      [&](std::size_t from, std::size_t to) {
+                        const auto width = static_cast<std::size_t>(camera.width);
+                        std::vector<std::uint8_t> visibility(width);
+                        for (std::size_t y = from; y < to; ++y) {
+                          occlusion.computeRow(static_cast<int>(y), visibility);
+                          for (std::size_t x = 0; x < width; ++x) {
+                            const std::size_t pixel = y * width + x;
+                            std::uint8_t* rgb = &frame.rgb[3 * pixel];
+                            applyAo(rgb, visibility[x], transmittance[pixel], rgb);
+                          }
+                        }
+                      });
+  if (!options.channels.depth) frame.depth = frame.range = {};
   return frame;
 }
 

@@ -44,13 +44,29 @@ v1::Error prefixErrorField(v1::Error error) {
   return error;
 }
 
+/// Where the flow of the next picture begins: at the last picture that the client gets. The view
+/// follows the avatar: where that was not there yet, all points are new.
+std::variant<EarlierView, v1::Error> findFlowStart(
+    FrameSubscription& subscription, bool isLastSent,
+    const std::shared_ptr<const scene::Snapshot>& now) {
+  if (isLastSent || !subscription.flowStart) subscription.flowStart = subscription.lastPicture;
+  subscription.lastPicture = now;
+  if (subscription.flowStart) {
+    auto view = earlierViewFromProto(subscription.request, subscription.flowStart);
+    if (std::holds_alternative<EarlierView>(view)) return view;
+  }
+  subscription.flowStart = now;
+  return earlierViewFromProto(subscription.request, now);
+}
+
 void renderSubscription(HostedWorld& hosted, ClientId id, Client& client, std::uint32_t number,
                         FrameSubscription& subscription) {
   ENFILADE_ASSERT(!subscription.rendering && !subscription.stale);
   const auto snapshot = hosted.world.snapshot();
   auto view = viewFromProto(subscription.request, *snapshot);
   if (std::holds_alternative<v1::Error>(view)) return;
-  if (client.out->dropLatest(number)) ++subscription.dropped;
+  const bool isLastSent = !client.out->dropLatest(number);
+  if (!isLastSent) ++subscription.dropped;
   hosted.droppedFrames += subscription.dropped;
   subscription.rendering = true;
   FrameJob job{snapshot,
@@ -63,6 +79,14 @@ void renderSubscription(HostedWorld& hosted, ClientId id, Client& client, std::u
                hosted.renderedFrames};
   subscription.dropped = 0;
   job.onRendered = makeRecordingObserver(hosted, subscription.request);
+  if (hasFlow(subscription.request)) {
+    auto earlier = findFlowStart(subscription, isLastSent, snapshot);
+    if (std::holds_alternative<v1::Error>(earlier)) {
+      subscription.rendering = false;  // no camera that has a flow: the request was refused
+      return;
+    }
+    job.earlier = std::get<EarlierView>(std::move(earlier));
+  }
   renderAndPush(hosted, id, number, subscription.generation, client.out, std::move(job));
 }
 
@@ -97,13 +121,18 @@ std::optional<v1::Error> updateFrameSubscription(HostedWorld& hosted, ClientId i
   }
   if (hosted.frames.deviceName().empty())
     return makeError(v1::ERROR_NO_RENDERER, hosted.frames.unavailableReason());
-  if (hasFlow(request.frame()))
-    return makeError(v1::ERROR_BAD_MESSAGE, "channels: flow is only for FrameRequest",
-                     "watch_frames.frame.channels");
+  if (request.frame().has_flow_from() || request.frame().has_flow_forward())
+    return makeError(v1::ERROR_BAD_MESSAGE,
+                     "flow_from: the flow of a watch begins at its last picture; omit it",
+                     "watch_frames.frame.flow_from");
   const auto view = viewFromProto(request.frame(), *hosted.world.snapshot());
   const auto* error = std::get_if<v1::Error>(&view);
   // An unknown avatar may be spawned later; all other errors are permanent.
   if (error && error->code() != v1::ERROR_UNKNOWN_AVATAR) return prefixErrorField(*error);
+  if (!error && hasFlow(request.frame())) {
+    const auto flow = earlierViewFromProto(request.frame(), hosted.world.snapshot());
+    if (const auto* refused = std::get_if<v1::Error>(&flow)) return prefixErrorField(*refused);
+  }
   FrameSubscription subscription;
   subscription.request = request.frame();
   subscription.rate = request.rate();

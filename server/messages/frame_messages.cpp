@@ -71,8 +71,13 @@ void appendBytes(std::vector<std::uint8_t>& bytes, const std::vector<T>& values)
 std::vector<float> makeNoisyDepth(const render::Frame& frame, const v1::FrameRequest& request) {
   std::vector<float> depth = frame.depth;
   const double scale = request.depth_noise().scale();
-  render::addDepthNoise(depth, frame.camera.width, frame.camera.height,
-                        {request.depth_noise().seed(), scale == 0 ? 1 : scale}, frame.tick);
+  render::DepthNoise noise{request.depth_noise().seed(), scale == 0 ? 1 : scale, {}, 0};
+  const std::string& table = request.depth_noise().distortion();
+  noise.distortion.resize(table.size() / sizeof(float));
+  if (!table.empty())
+    std::memcpy(noise.distortion.data(), table.data(), noise.distortion.size() * sizeof(float));
+  noise.distortionRows = static_cast<int>(request.depth_noise().distortion_rows());
+  render::addDepthNoise(depth, frame.camera.width, frame.camera.height, noise, frame.tick);
   return depth;
 }
 
@@ -215,8 +220,22 @@ std::optional<v1::Error> applyLens(render::Camera& camera, const v1::FrameReques
 
 std::optional<v1::Error> validateNoise(const v1::FrameRequest& request) {
   const double scale = request.depth_noise().scale();
-  if (scale >= 0 && scale <= 10) return std::nullopt;
-  return makeError(v1::ERROR_BAD_MESSAGE, "scale: give 0 to 10", "depth_noise.scale");
+  if (!(scale >= 0 && scale <= 10))
+    return makeError(v1::ERROR_BAD_MESSAGE, "scale: give 0 to 10", "depth_noise.scale");
+  const std::string& table = request.depth_noise().distortion();
+  const std::size_t rows = request.depth_noise().distortion_rows();
+  const std::size_t rowBytes = sizeof(float) * render::kDistortionDepths * rows;
+  const auto refuse = [](const std::string& remedy) {
+    return makeError(v1::ERROR_BAD_MESSAGE, remedy, "depth_noise.distortion");
+  };
+  if (table.empty() != (rows == 0) || (rows > 0 && table.size() % rowBytes != 0))
+    return refuse("distortion: give 5 numbers for each cell of a grid, and its distortion_rows");
+  for (std::size_t at = 0; at < table.size(); at += sizeof(float)) {
+    float factor = 0;
+    std::memcpy(&factor, table.data() + at, sizeof factor);
+    if (!(factor >= 0 && factor <= 100)) return refuse("distortion: give factors of 0 to 100");
+  }
+  return std::nullopt;
 }
 
 std::optional<v1::Error> validateEnums(const v1::FrameRequest& request) {
@@ -327,6 +346,7 @@ v1::Frame toProto(const render::Frame& frame, const FrameSource& source,
                   std::vector<std::uint8_t>& attachment) {
   const v1::FrameRequest& request = source.request;
   v1::Frame message;
+  if (source.earlier) message.set_flow_from(source.earlier->snapshot->tick);
   message.set_tick(frame.tick);
   message.set_time(source.snapshot.time);
   message.set_renderer(frame.renderer);

@@ -339,6 +339,31 @@ class CamerasTest(RoomCase):
         self.assertFalse(np.array_equal(noisy[0], noisy[2], equal_nan=True))
 
 
+    def test_a_distortion_table_is_read_from_files(self):
+        view = dict(eye=(0, 1, 0), forward=(1, 0, 0), width=32, height=32, channels=("depth",))
+        table = np.ones((2, 4, 5), np.float32)
+        table[:, 2:] = 1.1  # the right half is reported too near
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        binary, text = Path(folder.name) / "t.npy", Path(folder.name) / "t.txt"
+        np.save(binary, table)
+        with open(text, "w", encoding="utf-8") as file:
+            file.write("2 4\n")
+            np.savetxt(file, table.reshape(-1, 5))
+        plain = self.client.frame(**view, depth_noise=7).depth
+        seen = [self.client.frame(**view, depth_noise={"model": "redwood", "seed": 7, "distortion": one}).depth
+                for one in (table, binary, text)]
+        np.testing.assert_array_equal(seen[0], seen[1])
+        np.testing.assert_array_equal(seen[0], seen[2])
+        ratio = np.nanmedian(plain[12:20] / seen[0][12:20], axis=0)
+        self.assertAlmostEqual(float(np.median(ratio[2:14])), 1.0, delta=0.01)
+        self.assertAlmostEqual(float(np.median(ratio[18:30])), 1.1, delta=0.03)
+        with self.assertRaisesRegex(ValueError, "rows x columns x 5"):
+            self.client.frame(**view, depth_noise={"distortion": np.ones((4, 4))})
+        with self.assertRaisesRegex(enfilade.ServerError, "factors"):
+            self.client.frame(**view, depth_noise={"distortion": -table})
+
+
 class FlowTest(RoomCase):
     VIEW = dict(width=48, height=36, channels=("flow", "depth", "ids"))
 
@@ -372,6 +397,25 @@ class FlowTest(RoomCase):
         np.testing.assert_allclose(frame.flow[seen], expected[seen], atol=2e-3)
         self.assertTrue(np.isnan(frame.flow[~seen]).all())
         self.assertGreater(np.abs(frame.flow[seen]).max(), 1)
+
+    def test_a_watchs_flow_begins_at_its_last_picture(self):
+        self.client.lockstep()
+        ann = self.client.spawn("ann", at=(0, 0, 0), facing=0)
+        ann.enter()
+        view = dict(eye=(-1, 1, 0), forward=(1, 0, 0), intrinsics=(40, 40, 24, 18), **self.VIEW)
+        self.client.watch(1, rate=15, **view)
+        last = next(self.client.frames(5))
+        self.assertEqual(last.message.flow_from, last.tick)
+        np.testing.assert_allclose(last.flow[last.ids != 0], 0, atol=1e-9)
+        ann.drive((0, 0, 1.2))
+        for _ in range(3):
+            self.client.step(4)
+            seen = next(self.client.frames(5))
+            self.assertEqual((seen.message.flow_from, seen.tick), (last.tick, last.tick + 4))
+            np.testing.assert_array_equal(seen.flow, self.client.frame(flow_from=last.tick, **view).flow)
+            last = seen
+        with self.assertRaisesRegex(enfilade.ServerError, "flow_from"):
+            self.client.watch(1, flow_from=0, **view)
 
     def test_moving_avatars_flow_and_ticks_that_are_gone_are_refused(self):
         self.client.lockstep()

@@ -155,6 +155,42 @@ TEST(Lens, InTheMiddleColoursAreThoseOfAPinhole) {
   EXPECT_GT(close, a.rgb.size() * 95 / 100) << "but for ambient occlusion and edges";
 }
 
+TEST(Lens, CornersAreDarkerThanTheMiddleOfWalls) {
+  PlacedBox floor, wall;
+  floor.centre = {2, -1.6, 0}, floor.size = {8, 0.2, 8};
+  wall.centre = {3.1, 0, 0}, wall.size = {0.2, 4, 8};
+  floor.material = wall.material = coloured(0.6f, 0.6f, 0.6f, 1);
+  RayRenderer renderer(sceneOf({floor, wall}));
+  for (const auto kind : {Camera::Lens::Kind::fisheye, Camera::Lens::Kind::equirectangular}) {
+    Camera camera = lensCamera(kind, 400, 200);
+    camera.eye = Vec3::Zero();
+    camera.forward = Vec3::UnitX();
+    camera.up = Vec3::UnitY();
+    FrameOptions options;
+    options.channels = {true, true, false, false};
+    const Frame frame = renderer.render({}, camera, options);
+    const LensMapping lens(camera);
+    const auto greyAlong = [&](double up) {  // of the wall, at this height
+      double least = 1e9;
+      const Vec3 target(3, up, 0);
+      int at = -1;
+      for (int pixel = 0; pixel < 400 * 200; ++pixel) {
+        const auto direction = lens.directionAt(pixel % 400 + 0.5, pixel / 400 + 0.5);
+        if (direction && (*direction - target.normalized()).norm() < least)
+          least = (*direction - target.normalized()).norm(), at = pixel;
+      }
+      return int{frame.rgb[3 * static_cast<std::size_t>(at)]};
+    };
+    EXPECT_LT(greyAlong(-1.45), greyAlong(-0.7) - 5);
+    EXPECT_NEAR(greyAlong(-0.7), greyAlong(-0.5), 4);
+    EXPECT_TRUE(frame.range.size() == frame.depth.size() && !frame.range.empty());
+    options.channels = {true, false, false, false};
+    const Frame colours = renderer.render({}, camera, options);
+    EXPECT_EQ(colours.rgb, frame.rgb);
+    EXPECT_TRUE(colours.depth.empty() && colours.range.empty());
+  }
+}
+
 TEST(Lens, UnusableLensesAreNamed) {
   Camera camera = lensCamera(Camera::Lens::Kind::fisheye, 64, 64);
   camera.lens->width = 7;
@@ -171,7 +207,7 @@ TEST(DepthNoise, DependsOnSeedFrameAndPixelAlone) {
   const std::vector<float> clean(64 * 48, 2.5f);
   const auto noisy = [&](std::uint64_t seed, std::uint64_t frame) {
     std::vector<float> depth = clean;
-    addDepthNoise(depth, 64, 48, {seed, 1}, frame);
+    addDepthNoise(depth, 64, 48, {.seed = seed}, frame);
     return depth;
   };
   EXPECT_EQ(noisy(1, 7), noisy(1, 7));
@@ -179,10 +215,29 @@ TEST(DepthNoise, DependsOnSeedFrameAndPixelAlone) {
   EXPECT_NE(noisy(1, 7), noisy(1, 8));
 }
 
+TEST(DepthNoise, ADistortionTableDividesDepths) {
+  // Two columns; the right one is off by 2 % at 1 m and 4 % at 3 m, and sees nothing at 9 m.
+  DepthNoise noise{4, 1e-9, {1, 1, 1, 1, 1, 1.02f, 1.04f, 1.04f, 1.04f, 0}, 1};
+  const auto measure = [&](float depth) {
+    std::vector<float> pixels(8, depth);
+    addDepthNoise(pixels, 8, 1, noise, 0);
+    EXPECT_EQ(pixels[0], pixels[3]);
+    EXPECT_EQ(pixels[4], pixels[7]);
+    return std::pair(static_cast<double>(pixels[0]), static_cast<double>(pixels[4]));
+  };
+  for (const auto& [depth, factor] : {std::pair(1.0, 1.02), {2.0, 1.03}, {0.6, 1.02}, {4.0, 1.04}}) {
+    const auto [left, right] = measure(static_cast<float>(depth));
+    EXPECT_NEAR(35.13 / left, 35.13 / depth, 1.0 / 16);
+    EXPECT_NEAR(35.13 / right, 35.13 / (depth / factor), 1.0 / 16);
+  }
+  EXPECT_TRUE(std::isnan(measure(9).second));
+  EXPECT_FALSE(std::isnan(measure(9).first));
+}
+
 TEST(DepthNoise, HasTheDeviationAndTheStepsOfTheModel) {
   constexpr double kDisparity = 11.75;  // 94 steps of an eighth: rounding is symmetric
   std::vector<float> depth(200 * 200, static_cast<float>(35.13 / kDisparity));
-  addDepthNoise(depth, 200, 200, {4, 1}, 0);
+  addDepthNoise(depth, 200, 200, {.seed = 4}, 0);
   double sum = 0, squares = 0;
   for (const float d : depth) {
     const double steps = 35.13 * 8 / static_cast<double>(d);
@@ -196,7 +251,7 @@ TEST(DepthNoise, HasTheDeviationAndTheStepsOfTheModel) {
   const double expected = std::sqrt(std::erfc(2.25 / std::sqrt(2.0))) / 8;
   EXPECT_NEAR(std::sqrt(squares / count - mean * mean), expected, 0.1 * expected);
   std::vector<float> far{12.0f, std::numeric_limits<float>::quiet_NaN()};
-  addDepthNoise(far, 2, 1, {4, 1}, 0);
+  addDepthNoise(far, 2, 1, {.seed = 4}, 0);
   EXPECT_TRUE(std::isnan(far[0]) && std::isnan(far[1]));
 }
 

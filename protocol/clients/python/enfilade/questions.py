@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Optional, Sequence
+from pathlib import Path
+from typing import Any, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
@@ -79,6 +80,39 @@ def _set_lens(asked: Any, lens: str, width: Optional[float], distortion: Sequenc
         setattr(asked.lens.fisheye, name, value)
 
 
+def load_distortion(table: Any) -> np.ndarray:
+    """Returns a distortion table as rows x columns x 5 factors. `table` is an array, an .npy file of this
+    shape, or a text file: a line for each cell of the grid, row by row, with five numbers, after a first
+    line with the number of rows and of columns."""
+    if isinstance(table, (str, Path)):
+        if str(table).endswith(".npy"):
+            table = np.load(table, allow_pickle=False)
+        else:
+            with open(table, encoding="utf-8") as file:
+                rows, columns = (int(word) for word in file.readline().split())
+                table = np.loadtxt(file).reshape(rows, columns, -1)
+    array = np.ascontiguousarray(table, "<f4")
+    if array.ndim != 3 or array.shape[2] != 5 or 0 in array.shape:
+        raise ValueError(f"distortion: a table has rows x columns x 5 factors, not {array.shape}")
+    return array
+
+
+def _depth_noise(noise: Union[int, Mapping[str, Any]]) -> Any:
+    if not isinstance(noise, Mapping):
+        return messages.DepthNoise(seed=noise)
+    unknown = set(noise) - {"model", "seed", "scale", "distortion"}
+    if unknown:
+        raise ValueError(f"depth_noise: unknown {sorted(unknown)}; give model, seed, scale, distortion")
+    if noise.get("model", "redwood") != "redwood":
+        raise ValueError(f"depth_noise: the model is 'redwood', not {noise['model']!r}")
+    message = messages.DepthNoise(seed=noise.get("seed", 0), scale=noise.get("scale", 0.0))
+    if noise.get("distortion") is not None:
+        table = load_distortion(noise["distortion"])
+        message.distortion = table.tobytes()
+        message.distortion_rows = table.shape[0]
+    return message
+
+
 def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Optional[Point] = None,
                   forward: Optional[Point] = None, up: Optional[Point] = None, width: int = 640,
                   height: int = 480, fov_y: Optional[float] = None,
@@ -86,7 +120,7 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
                   near: Optional[float] = None, far: Optional[float] = None,
                   channels: Sequence[str] = ("rgb",), glass: str = "", renderer: str = "",
                   shadows: Optional[bool] = None, lens: str = "", distortion: Sequence[float] = (),
-                  depth_noise: Optional[int] = None, flow_from: Optional[int] = None,
+                  depth_noise: Union[None, int, Mapping[str, Any]] = None, flow_from: Optional[int] = None,
                   flow_forward: Optional[Point] = None, collision_shapes: bool = False,
                   samples: int = 1, tick: Optional[int] = None) -> Any:
     """Returns the FrameRequest that Client.frame() sends."""
@@ -124,7 +158,7 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
     if flow_forward is not None:
         asked.flow_forward.CopyFrom(vec(flow_forward))
     if depth_noise is not None:
-        asked.depth_noise.seed = depth_noise
+        asked.depth_noise.CopyFrom(_depth_noise(depth_noise))
     if glass:
         asked.glass = _named("GLASS_", glass, "glass")
     if renderer:
