@@ -66,10 +66,11 @@ void appendCommand(DrawList& list, const DrawItem& item, AlphaMode alphaMode,
   ENFILADE_ASSERT(!list.instances.empty());
   const auto instance = static_cast<std::uint32_t>(list.instances.size() - 1);
   const bool sameBatch = !list.batches.empty() && list.batches.back().alphaMode == alphaMode &&
+                         list.batches.back().coloured == item.coloured &&
                          list.batches.back().texture == item.texture;
   if (!sameBatch) {
-    list.batches.push_back(
-        {alphaMode, item.texture, static_cast<std::uint32_t>(list.commands.size()), 0});
+    list.batches.push_back({alphaMode, item.coloured, item.texture,
+                            static_cast<std::uint32_t>(list.commands.size()), 0});
   }
   Batch& batch = list.batches.back();
   // Consecutive items with the same mesh become one instanced draw.
@@ -132,12 +133,14 @@ std::vector<DrawItem> buildDrawItems(const scene::Model& model) {
       const std::uint32_t materialIndex = model.meshes[m].material;
       const scene::Material& material = findMaterial(model, materialIndex);
       items.push_back({transformItemAabb(object.worldFromMesh, meshBoxes[m]), o, m,
-                       findTexture(model, material), toAlphaMode(material), body});
+                       findTexture(model, material), toAlphaMode(material),
+                       !model.meshes[m].colours.empty(), body});
     }
   }
   const auto key = [](const DrawItem& item) {
     // Transparent items are sorted again in every frame; here only the object counts.
-    return std::tuple(item.alphaMode, item.alphaMode == AlphaMode::blend ? -1 : item.texture);
+    const bool blend = item.alphaMode == AlphaMode::blend;
+    return std::tuple(item.alphaMode, blend ? -1 : item.texture, !blend && item.coloured);
   };
   std::stable_sort(items.begin(), items.end(),
                    [&](const DrawItem& a, const DrawItem& b) { return key(a) < key(b); });

@@ -37,6 +37,7 @@ struct DrawItem {
   std::uint32_t object = 0, mesh = 0;
   std::int32_t texture = -1;
   AlphaMode alphaMode = AlphaMode::opaque;
+  bool coloured = false;         ///< the mesh has vertex colours
   std::uint32_t body = kNoBody;  ///< index into Model::bodies
 };
 
@@ -67,6 +68,7 @@ struct DrawCommand {
 /// Consecutive commands with the same program and texture.
 struct Batch {
   AlphaMode alphaMode = AlphaMode::opaque;
+  bool coloured = false;  ///< with vertex colours
   std::int32_t texture = -1;
   std::uint32_t firstCommand = 0, commandCount = 0;
 };
@@ -88,8 +90,8 @@ std::vector<BodyPlacement> computeBodyPlacements(const scene::Scene& scene,
                                                  const scene::Snapshot& snapshot);
 
 /// All items of the model except triggers and collision-only objects, in drawing order: by alpha
-/// mode, texture, object. The order never depends on the camera, so that depth ties are resolved
-/// equally in every frame.
+/// mode, texture, vertex colours, object. The order never depends on the camera, so that depth ties
+/// are resolved equally in every frame.
 std::vector<DrawItem> buildDrawItems(const scene::Model& model);
 
 /// The data to draw a scene; `ranges` and `materials` have one entry per mesh.

@@ -18,7 +18,7 @@ class DynamicInstances {
   const std::vector<BodyPlacement>& bodyPlacements() const { return placements_; }
   const AvatarMeshes& avatars() const { return meshes_; }
   Geometry avatarGeometry(const std::vector<GlTexture>& textures) const {
-    return {vertices_.name(), indices_.name(), textures};
+    return {vertices_.name(), indices_.name(), 0, textures};
   }
 
  private:

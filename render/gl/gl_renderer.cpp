@@ -158,8 +158,8 @@ DrawList GlRenderer::State::drawSurfaces(const FrameJob& job, const VisibleSet& 
   DrawLists lists =
       buildDrawLists({scene->model(), items, buffers.ranges, buffers.materials},
                      dynamicInstances.bodyPlacements(), job.camera, job.options, visibleSet.items);
-  surfacePass->draw(lists.surfaces,
-                    {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
+  surfacePass->draw(lists.surfaces, {buffers.vertices.name(), buffers.indices.name(),
+                                     buffers.colours.name(), buffers.textures});
   surfacePass->draw(
       buildAvatarDrawList(dynamicInstances.avatars(), job.camera, visibleSet.avatarItems),
       dynamicInstances.avatarGeometry(buffers.textures));
@@ -172,8 +172,8 @@ void GlRenderer::State::drawTransparent(const DrawList& transparent) {
   surfacePass->drawSky();
   if (transparent.commands.empty()) return;
   surfacePass->beginTransparentPass();
-  surfacePass->draw(transparent,
-                    {buffers.vertices.name(), buffers.indices.name(), buffers.textures});
+  surfacePass->draw(transparent, {buffers.vertices.name(), buffers.indices.name(),
+                                  buffers.colours.name(), buffers.textures});
 }
 
 void GlRenderer::State::readDepth(const Camera& camera) {

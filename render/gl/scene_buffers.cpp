@@ -16,20 +16,28 @@ namespace {
 
 struct BufferSizes {
   std::uint64_t vertices = 0, indices = 0;
+  std::uint64_t colours = 0;  ///< vertices of meshes with colours
 };
 
-/// Lays out the meshes consecutively; throws RenderError if the indices overflow.
+/// Lays out the meshes consecutively, those with vertex colours first, so that their colours need a
+/// buffer for these alone. Throws RenderError if the indices overflow.
 BufferSizes layOutMeshes(const scene::Model& model, std::vector<MeshRange>& ranges) {
   BufferSizes totals;
-  for (const scene::Mesh& mesh : model.meshes) {
-    scene::Aabb box;
-    for (const Eigen::Vector3f& position : mesh.positions) box.include(position.cast<double>());
-    ranges.push_back({static_cast<std::uint32_t>(totals.indices),
-                      static_cast<std::uint32_t>(mesh.indices.size()),
-                      static_cast<std::int32_t>(totals.vertices),
-                      box.empty() ? Vec3(Vec3::Zero()) : box.centre()});
-    totals.vertices += mesh.positions.size();
-    totals.indices += mesh.indices.size();
+  ranges.resize(model.meshes.size());
+  for (const bool coloured : {true, false}) {
+    for (std::size_t m = 0; m < ranges.size(); ++m) {
+      const scene::Mesh& mesh = model.meshes[m];
+      if (mesh.colours.empty() == coloured) continue;
+      scene::Aabb box;
+      for (const Eigen::Vector3f& position : mesh.positions) box.include(position.cast<double>());
+      ranges[m] = {static_cast<std::uint32_t>(totals.indices),
+                   static_cast<std::uint32_t>(mesh.indices.size()),
+                   static_cast<std::int32_t>(totals.vertices),
+                   box.empty() ? Vec3(Vec3::Zero()) : box.centre()};
+      totals.vertices += mesh.positions.size();
+      totals.indices += mesh.indices.size();
+    }
+    if (coloured) totals.colours = totals.vertices;
   }
   if (totals.vertices > std::numeric_limits<std::int32_t>::max() ||
       totals.indices > std::numeric_limits<std::uint32_t>::max()) {
@@ -100,6 +108,7 @@ SceneBuffers uploadModel(const scene::Model& model) {
   ENFILADE_ASSERT(buffers.ranges.size() == model.meshes.size());
   buffers.vertices = makeBuffer(totals.vertices * sizeof(Vertex));
   buffers.indices = makeBuffer(totals.indices * sizeof(std::uint32_t));
+  buffers.colours = makeBuffer(totals.colours * sizeof(scene::VertexColour));
   checkGl("making the model's buffers");
   for (std::size_t m = 0; m < model.meshes.size(); ++m) {
     const scene::Mesh& mesh = model.meshes[m];
@@ -110,6 +119,10 @@ SceneBuffers uploadModel(const scene::Model& model) {
                 vertices.data(), vertices.size() * sizeof(Vertex));
     writeBuffer(buffers.indices, std::uint64_t{sizeof(std::uint32_t)} * range.firstIndex,
                 mesh.indices.data(), mesh.indices.size() * sizeof(std::uint32_t));
+    writeBuffer(
+        buffers.colours,
+        std::uint64_t{sizeof(scene::VertexColour)} * static_cast<unsigned>(range.baseVertex),
+        mesh.colours.data(), mesh.colours.size() * sizeof(scene::VertexColour));
     buffers.materials.push_back(makeMaterialData(model, mesh));
   }
   checkGl("uploading the model's meshes");

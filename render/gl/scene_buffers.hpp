@@ -12,6 +12,7 @@ namespace enfilade::render {
 struct SceneBuffers {
   GlBuffer vertices;
   GlBuffer indices;
+  GlBuffer colours;                     ///< of the first vertices: those of meshes with colours
   std::vector<MeshRange> ranges;        ///< one per mesh
   std::vector<MaterialData> materials;  ///< one per mesh
   std::vector<GlTexture> textures;      ///< one per texture of the model

@@ -26,6 +26,10 @@ layout(location = 6) in vec4 baseColour;
 layout(location = 7) in vec4 emissive;
 layout(location = 8) in vec4 surface;
 layout(location = 9) in uint id;
+#ifdef COLOURED
+layout(location = 10) in vec4 colour;  // sRGB with linear alpha
+out vec4 tint;                         // linear
+#endif
 
 invariant gl_Position;  // prepass and shading must compute equal depth
 out vec3 point;
@@ -46,6 +50,10 @@ void main() {
                                       dot(cross(rowZ.xyz, rowX.xyz), normal.xyz),
                                       dot(cross(rowX.xyz, rowY.xyz), normal.xyz));
   texCoord = uv;
+#ifdef COLOURED
+  vec3 steep = pow((colour.rgb + 0.055) / 1.055, vec3(2.4));
+  tint = vec4(mix(colour.rgb / 12.92, steep, greaterThan(colour.rgb, vec3(0.04045))), colour.a);
+#endif
   base = baseColour;
   glow = emissive;
   finish = surface;
@@ -65,6 +73,9 @@ constexpr const char* kSurfaceFragment = R"(
 in vec3 point;
 in vec3 softNormal;
 in vec2 texCoord;
+#ifdef COLOURED
+in vec4 tint;
+#endif
 flat in vec4 base;
 flat in vec4 glow;
 flat in vec4 finish;
@@ -117,6 +128,9 @@ void main() {
   vec3 n = facingNormal(toEye);  // before any discard: derivatives are undefined after it
 #endif
   vec4 albedo = base;
+#ifdef COLOURED
+  albedo *= tint;
+#endif
 #ifdef TEXTURED
   albedo *= texture(baseColourTexture, texCoord);
 #endif
@@ -178,12 +192,14 @@ void main() {
 
 }  // namespace
 
-std::string surfaceVertexSource() {
-  return std::string(kVersion) + kFrameBlock + kSurfaceVertex;
+std::string surfaceVertexSource(const SurfaceVariant& variant) {
+  return std::string(kVersion) + (variant.coloured ? "#define COLOURED\n" : "") + kFrameBlock +
+         kSurfaceVertex;
 }
 
 std::string surfaceFragmentSource(const SurfaceVariant& variant) {
   std::string source = kVersion;
+  if (variant.coloured) source += "#define COLOURED\n";
   if (variant.textured) source += "#define TEXTURED\n";
   if (variant.mask) source += "#define MASK\n";
   if (variant.blend) source += "#define BLEND\n";

@@ -9,15 +9,16 @@ namespace enfilade::render {
 /// not pay for unused features.
 struct SurfaceVariant {
   bool textured = false;
-  bool mask = false;     ///< alpha test; disables the early depth test
-  bool blend = false;    ///< colour only, with alpha
-  bool normals = false;  ///< writes normals to colour attachment 2
-  bool shadows = false;  ///< reads the shadow mask at texture binding 1
-  bool plan = false;     ///< orthographic; otherwise perspective
-  bool shaded = true;    ///< false: only depth and id, bit-identical to those of the shaded variant
+  bool coloured = false;  ///< with vertex colours
+  bool mask = false;      ///< alpha test; disables the early depth test
+  bool blend = false;     ///< colour only, with alpha
+  bool normals = false;   ///< writes normals to colour attachment 2
+  bool shadows = false;   ///< reads the shadow mask at texture binding 1
+  bool plan = false;      ///< orthographic; otherwise perspective
+  bool shaded = true;  ///< false: only depth and id, bit-identical to those of the shaded variant
 };
 
-std::string surfaceVertexSource();
+std::string surfaceVertexSource(const SurfaceVariant& variant);
 std::string surfaceFragmentSource(const SurfaceVariant& variant);
 std::string skyVertexSource();
 std::string skyFragmentSource();
@@ -43,7 +44,8 @@ enum class Attribute : unsigned {
   baseColour,
   emissive,  ///< w: 1 if the transform mirrors
   surface,   ///< alpha cutoff, metallic, roughness, 1 when double-sided
-  id
+  id,
+  colour  ///< per vertex: sRGB with linear alpha; enabled for meshes with vertex colours
 };
 
 }  // namespace enfilade::render

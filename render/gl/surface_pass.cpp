@@ -14,7 +14,8 @@
 namespace enfilade::render {
 namespace {
 
-constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kFrameUniformBinding = 0;
+constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kColourBinding = 2;
+constexpr GLuint kFrameUniformBinding = 0;
 
 void setVec4(float (&target)[4], const Vec3& xyz, double w) {
   for (int i = 0; i < 3; ++i) target[i] = static_cast<float>(xyz[i]);
@@ -131,6 +132,7 @@ unsigned SurfacePass::findProgram(const Batch& batch) {
   SurfaceVariant variant;
   variant.mask = batch.alphaMode == AlphaMode::mask;
   variant.shaded = shaded_;
+  variant.coloured = batch.coloured && (shaded_ || variant.mask);
   variant.textured = batch.texture >= 0 && (shaded_ || variant.mask);
   variant.blend = shaded_ && batch.alphaMode == AlphaMode::blend;
   variant.normals = shaded_ && normals_;
@@ -138,13 +140,26 @@ unsigned SurfacePass::findProgram(const Batch& batch) {
   variant.shadows = shaded_ && shadows_ && !variant.blend;
   std::size_t index = 0;
   for (const bool has : {variant.mask, variant.shaded, variant.textured, variant.blend,
-                         variant.normals, variant.plan, variant.shadows})
+                         variant.normals, variant.plan, variant.shadows, variant.coloured})
     index = 2 * index + (has ? 1 : 0);
   std::optional<GlProgram>& program = surfaces_[index];
   if (!program) {
-    program = buildProgram("surface", surfaceVertexSource(), surfaceFragmentSource(variant));
+    program = buildProgram("surface", surfaceVertexSource(variant), surfaceFragmentSource(variant));
   }
   return program->name();
+}
+
+/// An enabled attribute needs a buffer, also if the program does not read it.
+void SurfacePass::enableColours(bool coloured) {
+  if (coloured_ == coloured) return;
+  coloured_ = coloured;
+  const auto location = static_cast<GLuint>(Attribute::colour);
+  if (coloured) {
+    bindAttribute(vertexArray_.name(), Attribute::colour, kColourBinding, 4, GL_UNSIGNED_BYTE, true,
+                  0);
+  } else {
+    glDisableVertexArrayAttrib(vertexArray_.name(), location);
+  }
 }
 
 void SurfacePass::begin(const Camera& camera) {
@@ -190,10 +205,14 @@ void SurfacePass::draw(const DrawList& list, const Geometry& geometry) {
   const GLuint array = vertexArray_.name();
   glVertexArrayVertexBuffer(array, kVertexBinding, geometry.vertices, 0, sizeof(Vertex));
   glVertexArrayVertexBuffer(array, kInstanceBinding, instances_.name(), 0, sizeof(Instance));
+  if (geometry.colours != 0)
+    glVertexArrayVertexBuffer(array, kColourBinding, geometry.colours, 0,
+                              sizeof(scene::VertexColour));
   glVertexArrayElementBuffer(array, geometry.indices);
   glBindBuffer(GL_DRAW_INDIRECT_BUFFER, commands_.name());
   for (const Batch& batch : list.batches) {
     glUseProgram(findProgram(batch));
+    enableColours(batch.coloured);
     if (batch.texture >= 0) {
       ENFILADE_ASSERT(static_cast<std::size_t>(batch.texture) < geometry.textures.size());
       glBindTextureUnit(0, geometry.textures[static_cast<std::size_t>(batch.texture)].name());

@@ -25,6 +25,7 @@ class StreamBuffer {
 /// The buffers and textures of a draw list.
 struct Geometry {
   unsigned vertices, indices;              ///< buffer names
+  unsigned colours;                        ///< buffer name; 0: no mesh has vertex colours
   const std::vector<GlTexture>& textures;  ///< indexed by Batch::texture
 };
 
@@ -49,12 +50,14 @@ class SurfacePass {
 
  private:
   unsigned findProgram(const Batch& batch);
+  void enableColours(bool coloured);
 
   GlVertexArray vertexArray_;
   GlBuffer uniforms_;
   GlProgram sky_;
-  std::array<std::optional<GlProgram>, 128> surfaces_;  ///< see findProgram()
+  std::array<std::optional<GlProgram>, 256> surfaces_;  ///< see findProgram()
   bool shaded_ = true, normals_ = false, plan_ = false, shadows_ = false;
+  bool coloured_ = false;  ///< the attribute is enabled
   StreamBuffer instances_, commands_;
 };
 

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "render/camera_basis.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::render {
 namespace glsl {
@@ -48,6 +49,14 @@ Value interpolate(const std::array<double, 3>& weights, const std::array<Value, 
   return weights[0] * corners[0] + weights[1] * corners[1] + weights[2] * corners[2];
 }
 
+Eigen::Vector4d decodeColour(const scene::VertexColour& colour) {
+  Eigen::Vector4f linear;
+  for (int c = 0; c < 3; ++c)
+    linear[c] = scene::srgbByteToLinear(colour[static_cast<std::size_t>(c)]);
+  linear[3] = static_cast<float>(colour[3]) / 255;
+  return linear.cast<double>();
+}
+
 }  // namespace
 
 Vec3 sunDirection() {
@@ -76,15 +85,23 @@ ShadedTriangle::ShadedTriangle(const BatchTriangle& source, const PrimaryRays& r
       vertexNormals[i] = {rowX.dot(n), rowY.dot(n), rowZ.dot(n)};
     }
     if (uv) uvs[i] = mesh.uvs[corner].cast<double>();
+    if (!mesh.colours.empty()) colours[i] = decodeColour(mesh.colours[corner]);
   }
 }
 
 Texel Shading::computeAlbedo(const ShadedTriangle& triangle, double x, double y) const {
   const float* base = triangle.batch->material->baseColour;
   Texel albedo{base[0], base[1], base[2], base[3]};
+  const bool coloured = !triangle.batch->mesh->colours.empty();
+  if (triangle.batch->texture < 0 && !coloured) return albedo;
+  const Barycentrics barycentrics = computeBarycentrics(triangle.weights, x, y);
+  if (coloured) {
+    const Eigen::Vector4d tint = interpolate(barycentrics.weights, triangle.colours);
+    for (std::size_t c = 0; c < 4; ++c)
+      albedo[c] *= static_cast<float>(tint[static_cast<Eigen::Index>(c)]);
+  }
   if (triangle.batch->texture < 0) return albedo;
   const MipTexture& texture = textures_[static_cast<std::size_t>(triangle.batch->texture)];
-  const Barycentrics barycentrics = computeBarycentrics(triangle.weights, x, y);
   const Eigen::Vector2d uv = interpolate(barycentrics.weights, triangle.uvs);
   const Eigen::Array2d size(texture.width(), texture.height());
   const double across =
@@ -100,13 +117,19 @@ Texel Shading::computeAlbedo(const ShadedTriangle& triangle, double x, double y)
 
 float Shading::sampleAlpha(const BatchTriangle& triangle, float u, float v) const {
   const TriangleBatch& batch = *triangle.batch;
-  const float alpha = batch.material->baseColour[3];
+  float alpha = batch.material->baseColour[3];
   const scene::Mesh& mesh = *batch.mesh;
+  const std::uint32_t* corners = &mesh.indices[3 * std::size_t{triangle.triangle}];
+  const std::array<float, 3> weights{1 - u - v, u, v};
+  if (!mesh.colours.empty()) {
+    float tint = 0;
+    for (std::size_t i = 0; i < 3; ++i)
+      tint += weights[i] * static_cast<float>(mesh.colours[corners[i]][3]) / 255;
+    alpha *= tint;
+  }
   if (batch.texture < 0 || mesh.uvs.size() != mesh.positions.size()) return alpha;
-  const auto corner = [&](std::size_t i) {
-    return mesh.uvs[mesh.indices[3 * std::size_t{triangle.triangle} + i]];
-  };
-  const Eigen::Vector2f uv = (1 - u - v) * corner(0) + u * corner(1) + v * corner(2);
+  Eigen::Vector2f uv = Eigen::Vector2f::Zero();
+  for (std::size_t i = 0; i < 3; ++i) uv += weights[i] * mesh.uvs[corners[i]];
   const MipTexture& texture = textures_[static_cast<std::size_t>(batch.texture)];
   return alpha * texture.sample(uv.x(), uv.y(), 0)[3];
 }

@@ -18,10 +18,11 @@ struct ShadedTriangle {
   const TriangleBatch* batch;
   PlaneDepth depth;
   BarycentricWeights weights;
-  Vec3 faceNormal;                       ///< any length, world; on the counter-clockwise side
-  bool hasVertexNormals = false;         ///< true: the mesh has vertex normals
-  std::array<Vec3, 3> vertexNormals;     ///< any length, world
-  std::array<Eigen::Vector2d, 3> uvs{};  ///< zero if the mesh has none
+  Vec3 faceNormal;                         ///< any length, world; on the counter-clockwise side
+  bool hasVertexNormals = false;           ///< true: the mesh has vertex normals
+  std::array<Vec3, 3> vertexNormals;       ///< any length, world
+  std::array<Eigen::Vector2d, 3> uvs{};    ///< zero if the mesh has none
+  std::array<Eigen::Vector4d, 3> colours;  ///< linear RGBA; set if the mesh has vertex colours
 };
 
 /// Exposed linear RGB, 0..1, and opacity.
@@ -36,7 +37,7 @@ class Shading {
   Shading(const PrimaryRays& rays, const MipTextures& textures)
       : rays_(rays), textures_(textures) {}
 
-  /// Base colour times texture, linear.
+  /// Base colour times texture and vertex colour, linear.
   Texel computeAlbedo(const ShadedTriangle& triangle, double x, double y) const;
   /// Unfiltered alpha at the barycentric coordinates (u, v) of corners 1 and 2.
   float sampleAlpha(const BatchTriangle& triangle, float u, float v) const;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Geometry>
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -37,16 +38,28 @@ struct Texture {
   std::vector<std::uint8_t> rgba;
 };
 
+/// 8-bit sRGB with linear alpha.
+using VertexColour = std::array<std::uint8_t, 4>;
+
 /// Triangles of one material, in the mesh's own frame and unit. Counter-clockwise is the outside.
 struct Mesh {
   std::string name;
   std::vector<Eigen::Vector3f> positions;
   std::vector<Eigen::Vector3f> normals;  ///< empty, or one per position; unit length
   std::vector<Eigen::Vector2f> uvs;  ///< empty, or one per position; (0,0) is the image's top left
+  /// Empty, or one per position; they multiply the material's base colour.
+  std::vector<VertexColour> colours;
   std::vector<std::uint32_t> indices;  ///< three per triangle
   std::uint32_t material = 0;
 
   std::size_t triangleCount() const { return indices.size() / 3; }
+};
+
+/// A property of an object that its file defines, such as "_ID" of an instance (glTF).
+struct ObjectAttribute {
+  std::string name;
+  std::vector<double> values;  ///< finite
+  bool operator==(const ObjectAttribute&) const = default;
 };
 
 /// A node that carries meshes, as a person would name it. Its id is its index.
@@ -80,6 +93,7 @@ struct Object {
   std::string className = {};
   /// The first object of those that are one thing by the sidecar or the node's extras.
   std::optional<std::uint32_t> thing = std::nullopt;
+  std::vector<ObjectAttribute> attributes = {};  ///< by ascending names
 };
 
 /// A level of a building, as an IfcBuildingStorey.
@@ -120,6 +134,11 @@ struct Model {
   /// Name of the map whose coordinates the file's are, such as "EPSG:25832": x east, y up, -z
   /// north. Empty: not on a map.
   std::string map;
+  /// Direction of true north in the scene: its x and z, unit length. nullopt: the file states none.
+  std::optional<Eigen::Vector2d> north;
+  /// Names of the scenes in the file (glTF), of which `fileScene` was read; a name may be empty.
+  std::vector<std::string> fileScenes;
+  std::uint32_t fileScene = 0;
   char upAxis = 'y';  ///< the file's up axis; coordinates are already converted to Y up
   /// Subtracted from the file's coordinates (metres, Y up) so that the scene lies near its origin;
   /// zero unless the scene lies far from it. file = scene + offset.

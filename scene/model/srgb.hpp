@@ -35,4 +35,9 @@ inline std::uint8_t linearToSrgbByte(double linear) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(linearToSrgb(linear), 0.0, 1.0) * 255));
 }
 
+/// Rounds a channel to 8 bits. Values beyond 0..1 are clamped; NaN becomes 0.
+inline std::uint8_t toByte(double c) {
+  return c > 0 ? static_cast<std::uint8_t>(std::lround(std::min(c, 1.0) * 255)) : std::uint8_t{0};
+}
+
 }  // namespace enfilade::scene

@@ -85,16 +85,18 @@ std::vector<InstanceGroup> chooseInstanceGroups(const scene::Model& model,
 
 std::vector<MeshBatch> makeBatches(const scene::Model& model, const std::vector<bool>& isMerged) {
   const std::vector<std::uint32_t> equalMaterials = findEqualMaterials(model);
-  std::map<std::pair<std::uint32_t, bool>, MeshBatch> batches;
+  std::map<std::tuple<std::uint32_t, bool, bool>, MeshBatch> batches;
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
     if (!isMerged[i]) continue;
     for (const std::uint32_t index : collectMeshesWithTriangles(model, model.objects[i])) {
       const scene::Mesh& mesh = model.meshes[index];
       const std::uint32_t material = findMaterial(mesh, equalMaterials);
       const bool hasNormals = mesh.normals.size() == mesh.positions.size();
-      MeshBatch& batch = batches[{material, hasNormals}];
+      const bool hasColours = !mesh.colours.empty();
+      MeshBatch& batch = batches[{material, hasNormals, hasColours}];
       batch.material = material;
       batch.hasNormals = hasNormals;
+      batch.hasColours = hasColours;
       batch.uses.push_back({i, index});
     }
   }

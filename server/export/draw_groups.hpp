@@ -53,6 +53,7 @@ struct MeshUse {
 struct MeshBatch {
   std::uint32_t material = 0;  ///< see findEqualMaterials(); may lie behind the model's materials
   bool hasNormals = false;     ///< all of its meshes have normals, or none
+  bool hasColours = false;     ///< all of its meshes have vertex colours, or none
   std::vector<MeshUse> uses;   ///< by object, ascending
 };
 

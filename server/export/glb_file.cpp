@@ -76,6 +76,15 @@ std::size_t GlbFile::addPositions(std::span<const float> numbers) {
   return accessor;
 }
 
+std::size_t GlbFile::addColours(std::span<const std::uint16_t> numbers) {
+  const std::size_t view = addView(numbers.data(), numbers.size_bytes(), GlbTarget::vertices);
+  return add("accessors", {{"bufferView", view},
+                           {"componentType", kUnsignedShort},
+                           {"normalized", true},
+                           {"count", numbers.size() / 4},
+                           {"type", "VEC4"}});
+}
+
 std::size_t GlbFile::addIndices(std::span<const std::uint32_t> indices, std::size_t vertexCount) {
   const bool isShort = vertexCount <= kMaxShortVertices;
   std::size_t view = 0;

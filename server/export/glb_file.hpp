@@ -25,6 +25,8 @@ class GlbFile {
   std::size_t addFloats(std::span<const float> numbers, const char* type, GlbTarget target);
   /// Like addFloats() with VEC3, and with the bounds that glTF requires of positions.
   std::size_t addPositions(std::span<const float> numbers);
+  /// Adds colours of vertices: VEC4, 65535 is 1. Returns the accessor's index.
+  std::size_t addColours(std::span<const std::uint16_t> numbers);
   /// Adds indices of a primitive with this number of vertices, in 16 bits if they suffice.
   std::size_t addIndices(std::span<const std::uint32_t> indices, std::size_t vertexCount);
   /// Adds an encoded image. Returns its index.

@@ -1,6 +1,9 @@
 #include "server/export/primitive_data.hpp"
 
 #include <algorithm>
+#include <cmath>
+
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -67,6 +70,18 @@ void appendUvs(PrimitiveData& into, const scene::Mesh& mesh) {
   }
 }
 
+/// 16 bits, because glTF's colours are linear: 8 of them would show steps in the dark.
+std::uint16_t toLinear16(std::uint8_t srgb) {
+  return static_cast<std::uint16_t>(std::lround(scene::srgbByteToLinear(srgb) * 65535));
+}
+
+void appendColours(PrimitiveData& into, const scene::Mesh& mesh) {
+  for (const scene::VertexColour& colour : mesh.colours) {
+    for (std::size_t c = 0; c < 3; ++c) into.colours.push_back(toLinear16(colour[c]));
+    into.colours.push_back(static_cast<std::uint16_t>(colour[3] * 257));
+  }
+}
+
 /// Appends all but the positions, which are already there.
 void appendRest(PrimitiveData& into, const scene::Mesh& mesh, const collision::Mat3& linear) {
   const std::size_t firstVertex = into.vertexCount() - mesh.positions.size();
@@ -78,6 +93,7 @@ void appendRest(PrimitiveData& into, const scene::Mesh& mesh, const collision::M
       into.indices.push_back(static_cast<std::uint32_t>(firstVertex + mesh.indices[corner]));
   }
   if (into.hasUvs) appendUvs(into, mesh);
+  if (into.hasColours) appendColours(into, mesh);
   if (!into.hasNormals) return;
   appendNormals(into, mesh, computeNormalMatrix(linear));
   replaceZeroNormals(into, firstVertex, firstIndex);

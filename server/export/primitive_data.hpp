@@ -10,9 +10,10 @@
 namespace enfilade::server {
 
 struct PrimitiveData {
-  bool hasNormals = false, hasUvs = false;
+  bool hasNormals = false, hasUvs = false, hasColours = false;
   std::vector<float> positions, normals, uvs;
-  std::vector<float> entities;  ///< entity id of each vertex; empty: not merged
+  std::vector<std::uint16_t> colours;  ///< linear RGBA, four per vertex, 65535 is 1
+  std::vector<float> entities;         ///< entity id of each vertex; empty: not merged
   std::vector<std::uint32_t> indices;
 
   std::size_t vertexCount() const { return positions.size() / 3; }

@@ -64,7 +64,8 @@ class SceneWriter {
   void addInstances(const InstanceGroup& group);
   void addBody(std::uint32_t body);
   std::size_t addBodyObject(std::uint32_t object, const Vec3& bodyOrigin);
-  PrimitiveData makeData(std::uint32_t material, bool hasNormals) const;
+  PrimitiveData makeData(std::uint32_t material, bool hasNormals, bool hasColours) const;
+  PrimitiveData makeData(std::uint32_t material, const scene::Mesh& mesh) const;
   GlbJson addPrimitive(const PrimitiveData& data, std::uint32_t material);
   GlbJson sharePrimitive(std::uint32_t mesh);
   std::size_t shareMesh(const std::vector<std::uint32_t>& meshes);
@@ -86,11 +87,17 @@ class SceneWriter {
   SceneGlb result_;
 };
 
-PrimitiveData SceneWriter::makeData(std::uint32_t material, bool hasNormals) const {
+PrimitiveData SceneWriter::makeData(std::uint32_t material, bool hasNormals,
+                                    bool hasColours) const {
   PrimitiveData data;
+  data.hasColours = hasColours;
   data.hasNormals = hasNormals;
   data.hasUvs = materials_.isTextured(material);
   return data;
+}
+
+PrimitiveData SceneWriter::makeData(std::uint32_t material, const scene::Mesh& mesh) const {
+  return makeData(material, mesh.normals.size() == mesh.positions.size(), !mesh.colours.empty());
 }
 
 GlbJson SceneWriter::addPrimitive(const PrimitiveData& data, std::uint32_t material) {
@@ -99,6 +106,7 @@ GlbJson SceneWriter::addPrimitive(const PrimitiveData& data, std::uint32_t mater
     attributes["NORMAL"] = file_.addFloats(data.normals, "VEC3", GlbTarget::vertices);
   if (data.hasUvs)
     attributes["TEXCOORD_0"] = file_.addFloats(data.uvs, "VEC2", GlbTarget::vertices);
+  if (data.hasColours) attributes["COLOR_0"] = file_.addColours(data.colours);
   if (!data.entities.empty())
     attributes["_ENTITY_ID"] = file_.addFloats(data.entities, "SCALAR", GlbTarget::vertices);
   return {{"attributes", std::move(attributes)},
@@ -112,11 +120,13 @@ GlbJson SceneWriter::addPrimitive(const PrimitiveData& data, std::uint32_t mater
 /// file. Refuses it before the memory is needed.
 void SceneWriter::requireWritable(const DrawGroups& groups) const {
   constexpr std::size_t kVertexBytes = (3 + 3 + 2 + 1) * sizeof(float);
+  constexpr std::size_t kColourBytes = 4 * sizeof(std::uint16_t);
   std::size_t bytes = 0;
   for (const MeshBatch& batch : groups.batches)
     for (const MeshUse& use : batch.uses) {
       const scene::Mesh& mesh = model_.meshes[use.mesh];
-      bytes += mesh.positions.size() * kVertexBytes + mesh.indices.size() * sizeof(std::uint32_t);
+      bytes += mesh.positions.size() * kVertexBytes + mesh.colours.size() * kColourBytes +
+               mesh.indices.size() * sizeof(std::uint32_t);
     }
   if (bytes > kMaxMergedBytes)
     throw std::runtime_error("the merged meshes need " + std::to_string(bytes >> 20) +
@@ -125,7 +135,7 @@ void SceneWriter::requireWritable(const DrawGroups& groups) const {
 }
 
 void SceneWriter::addBatch(const MeshBatch& batch) {
-  PrimitiveData data = makeData(batch.material, batch.hasNormals);
+  PrimitiveData data = makeData(batch.material, batch.hasNormals, batch.hasColours);
   std::vector<std::uint32_t> entities;
   std::vector<std::size_t> triangles;
   for (const MeshUse& use : batch.uses) {
@@ -183,7 +193,7 @@ GlbJson SceneWriter::sharePrimitive(std::uint32_t index) {
   if (found != primitives_.end()) return found->second;
   const scene::Mesh& mesh = model_.meshes[index];
   const std::uint32_t material = findMaterial(mesh, equalMaterials_);
-  PrimitiveData data = makeData(material, mesh.normals.size() == mesh.positions.size());
+  PrimitiveData data = makeData(material, mesh);
   appendMesh(data, mesh);
   return primitives_[index] = addPrimitive(data, material);
 }
@@ -248,7 +258,7 @@ std::size_t SceneWriter::addBakedMesh(const std::vector<std::uint32_t>& meshes,
   for (const std::uint32_t index : meshes) {
     const scene::Mesh& mesh = model_.meshes[index];
     const std::uint32_t material = findMaterial(mesh, equalMaterials_);
-    PrimitiveData data = makeData(material, mesh.normals.size() == mesh.positions.size());
+    PrimitiveData data = makeData(material, mesh);
     appendTransformed(data, mesh, transform);
     primitives.push_back(addPrimitive(data, material));
   }

@@ -15,6 +15,8 @@ void requireValidMesh(const scene::ScanMesh& mesh) {
   require(mesh.indices.size() % 3 == 0, "triangles have three corners");
   require(mesh.normals.empty() || mesh.normals.size() == mesh.positions.size(),
           "each vertex has a normal");
+  require(mesh.colours.empty() || mesh.colours.size() == mesh.positions.size(),
+          "each vertex has a colour");
   for (const std::uint32_t i : mesh.indices) {
     require(i < mesh.positions.size(), "indices are in range");
     require(mesh.positions[i].allFinite(), "used vertices are finite");

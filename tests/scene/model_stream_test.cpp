@@ -23,6 +23,7 @@ Model smallModel() {
   mesh.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
   mesh.normals.assign(3, Eigen::Vector3f::UnitZ());
   mesh.uvs = {{0, 0}, {1, 0}, {0, 1}};
+  mesh.colours = {{255, 0, 0, 255}, {0, 128, 0, 255}, {1, 2, 3, 4}};
   mesh.indices = {0, 1, 2};
   mesh.material = 1;
   model.meshes.assign(2, mesh);
@@ -37,11 +38,15 @@ Model smallModel() {
   object.meshes = {0, 1};
   object.worldFromMesh = Eigen::Translation3d(0.1, 0.2, 0.3) * Eigen::Scaling(-1.0, 2.0, 1.0);
   object.storey = 1;
+  object.attributes = {{"_COLOR_0", {0.25, 0.5, 1}}, {"_ID", {4294967295.0}}};
   model.objects.push_back(object);
   model.storeys = {{"cellar", "", -2.5}, {"ground floor", "1xS3BCk291UvhgP2dvNflr", 0.25}};
   model.spaces = {{"101", "Kitchen", "0BTBFw6f90Nfh9rP1dl_3P", 1, {{0, 0.25, 0}, {3, 2.75, 4}}},
                   {"102", "", "", std::nullopt, {}}};
   model.map = "EPSG:25832";
+  model.north = Eigen::Vector2d(0.6, -0.8);
+  model.fileScenes = {"day", "night"};
+  model.fileScene = 1;
   model.metresPerUnit = 0.3048;
   model.upAxis = 'z';
   model.offset = {459123, 113, -5428311};
@@ -74,6 +79,17 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
   EXPECT_EQ(back.spaces[0].box.max, Vec3(3, 2.75, 4));
   EXPECT_TRUE(back.spaces[1].box.empty());
   EXPECT_EQ(back.map, "EPSG:25832");
+  EXPECT_EQ(back.north, Eigen::Vector2d(0.6, -0.8));
+  EXPECT_EQ(back.fileScenes, (std::vector<std::string>{"day", "night"}));
+  EXPECT_EQ(back.fileScene, 1u);
+  EXPECT_EQ(back.meshes[0].colours, smallModel().meshes[0].colours);
+  EXPECT_EQ(back.objects[0].attributes, smallModel().objects[0].attributes);
+}
+
+TEST(ModelStream, ColoursThatAreNotOnePerVertexAreRefused) {
+  Model model = smallModel();
+  model.meshes[0].colours.pop_back();
+  EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
 }
 
 TEST(ModelStream, AStoreyThatIsMissingIsRefused) {

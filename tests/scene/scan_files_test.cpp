@@ -140,10 +140,9 @@ TEST_P(ScanFiles, GiveTheBoxWithItsUpAxis) {
   EXPECT_EQ(countOf(model, "no_unit"), 1u);
   EXPECT_EQ(model.meshes.at(0).positions.size(), 8u);
   EXPECT_EQ(model.meshes[0].triangleCount(), 12u);
-  EXPECT_EQ(countOf(model, "vertex_colours_ignored"), GetParam().coloured ? 1u : 0u);
-  if (GetParam().coloured) {
-    EXPECT_EQ(model.materials.at(0).baseColour, Eigen::Vector4f(1, 0, 0, 1));
-  }
+  EXPECT_EQ(countOf(model, "vertex_colours_ignored"), 0u);
+  EXPECT_EQ(model.meshes[0].colours,
+            std::vector<VertexColour>(GetParam().coloured ? 8 : 0, {255, 0, 0, 255}));
   const Scene scene{Model(model)};
   EXPECT_LT((scene.bounds().size() - Vec3(8, 3, 6)).norm(), 1e-9);
   // The winding is kept: the surface bounds the room's volume.

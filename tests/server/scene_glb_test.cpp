@@ -211,6 +211,30 @@ TEST(SceneGlb, TexturesAndTransparencyAreKept) {
   EXPECT_EQ(uvs[17], 0) << "a mesh without coordinates shows the first texel";
 }
 
+TEST(SceneGlb, VertexColoursAreLinearAndOnlyWhereMeshesHaveThem) {
+  Model model = boxes(2);
+  model.meshes[0].colours.assign(8, {255, 188, 0, 51});
+  const GlbReader file(writeSceneGlb(Scene(model)).bytes);
+  const auto& meshes = file.json.at("meshes");
+  ASSERT_EQ(meshes.size(), 2u) << "one batch with colours, one without";
+  std::size_t coloured = 0;
+  for (const auto& mesh : meshes) {
+    const auto& attributes = mesh.at("primitives").at(0).at("attributes");
+    if (!attributes.contains("COLOR_0")) continue;
+    ++coloured;
+    EXPECT_EQ(
+        file.json.at("accessors").at(attributes.at("COLOR_0").get<std::size_t>()).at("normalized"),
+        true);
+    const auto colours = file.numbers<std::uint16_t>(attributes.at("COLOR_0"));
+    ASSERT_EQ(colours.size(), 32u);
+    EXPECT_EQ(colours[0], 65535);
+    EXPECT_NEAR(colours[1], 0.5 * 65535, 400) << "188 in sRGB is one half";
+    EXPECT_EQ(colours[2], 0);
+    EXPECT_EQ(colours[3], 51 * 257);
+  }
+  EXPECT_EQ(coloured, 1u);
+}
+
 TEST(SceneGlb, EqualTexturesAreStoredOnce) {
   Model model = boxes(3);
   model.textures.assign(3, {"", 1, 1, {1, 2, 3, 255}});

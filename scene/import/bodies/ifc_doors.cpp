@@ -144,6 +144,7 @@ class MeshSplitter {
       result.positions.push_back(mesh.positions[from]);
       if (!mesh.normals.empty()) result.normals.push_back(mesh.normals[from]);
       if (!mesh.uvs.empty()) result.uvs.push_back(mesh.uvs[from]);
+      if (!mesh.colours.empty()) result.colours.push_back(mesh.colours[from]);
     }
     return result;
   }

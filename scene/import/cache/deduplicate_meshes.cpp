@@ -25,6 +25,9 @@ std::uint64_t computeMeshHash(const Mesh& mesh) {
   addVectorBits(hash, mesh.positions);
   addVectorBits(hash, mesh.normals);
   addVectorBits(hash, mesh.uvs);
+  hash.add(std::uint64_t{mesh.colours.size()});
+  for (const VertexColour colour : mesh.colours)
+    hash.add(std::uint64_t{std::bit_cast<std::uint32_t>(colour)});
   hash.add(std::uint64_t{mesh.indices.size()});
   for (const std::uint32_t i : mesh.indices) hash.add(std::uint64_t{i});
   hash.add(std::uint64_t{mesh.material});
@@ -45,7 +48,7 @@ bool areBitwiseEqual(const std::vector<Vector>& a, const std::vector<Vector>& b)
 bool areMeshesEqual(const Mesh& a, const Mesh& b) {
   return a.material == b.material && a.indices == b.indices &&
          areBitwiseEqual(a.positions, b.positions) && areBitwiseEqual(a.normals, b.normals) &&
-         areBitwiseEqual(a.uvs, b.uvs);
+         areBitwiseEqual(a.uvs, b.uvs) && a.colours == b.colours;
 }
 
 /// Returns for each mesh the index of the first equal one.

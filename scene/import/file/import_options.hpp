@@ -29,6 +29,8 @@ struct ImportOptions {
   /// IFC: applies the file's map conversion. The file's coordinates are then those of the map: x
   /// east, y up, -z north.
   bool georeference = false;
+  /// glTF: the scene to read, by its name or its number from 0; empty: the file's default.
+  std::string gltfScene;
   double timeLimit = 120;                          ///< seconds of wall-clock time
   std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes, of each reading process
 };

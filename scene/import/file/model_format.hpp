@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <optional>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -30,6 +31,8 @@ struct FileMetadata {
   char assimpUp = 'y';
   /// Triangles that the file declares, each mesh once; nullopt: unknown.
   std::optional<std::size_t> triangles;
+  std::vector<std::string> scenes;  ///< glTF: names; see Model::fileScenes
+  std::uint32_t scene = 0;
   std::vector<Diagnostic> problems;  ///< no_unit, unit_assumed, mended_text
 };
 

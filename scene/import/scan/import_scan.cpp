@@ -11,7 +11,6 @@
 #include "scene/import/scan/stl_file.hpp"
 #include "scene/import/scan/up_axis.hpp"
 #include "scene/model/add_diagnostic.hpp"
-#include "scene/model/srgb.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -70,6 +69,7 @@ Mesh convertScanMesh(const ScanMesh& scan, const Vec3& shift, const std::string&
     if (newIndex[old] == kUnused) {
       newIndex[old] = static_cast<std::uint32_t>(mesh.positions.size());
       mesh.positions.push_back((scan.positions[old] - shift).cast<float>());
+      if (!scan.colours.empty()) mesh.colours.push_back(scan.colours[old]);
       if (normals) mesh.normals.push_back(scan.normals[old].normalized());
     }
     mesh.indices.push_back(newIndex[old]);
@@ -90,7 +90,7 @@ Mesh convertScanMesh(const ScanMesh& scan, const Vec3& shift, const std::string&
   return mesh;
 }
 
-/// The mean colour of the vertices as the material of the whole mesh.
+/// White under vertex colours, which multiply it.
 Material makeScanMaterial(const ScanMesh& scan, const std::string& name,
                           std::vector<Diagnostic>& diagnostics) {
   Material material;
@@ -99,9 +99,9 @@ Material makeScanMaterial(const ScanMesh& scan, const std::string& name,
   if (!scan.textureFile.empty())
     addDiagnostic(diagnostics, "missing_texture",
                   scan.textureFile + ": textures of PLY are not read");
-  if (!scan.colour) return material;
-  material.baseColour.head<3>() = scan.colour->unaryExpr(&srgbToLinear);
-  addDiagnostic(diagnostics, "vertex_colours_ignored", name + ": drawn in their mean colour");
+  if (scan.hasFaceColours)
+    addDiagnostic(diagnostics, "vertex_colours_ignored", name + ": colours of its faces");
+  if (!scan.colours.empty()) material.baseColour.setOnes();
   return material;
 }
 

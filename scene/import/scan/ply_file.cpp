@@ -11,6 +11,7 @@
 #include "scene/import/scan/ply_header.hpp"
 #include "scene/import/scan/polygon.hpp"
 #include "scene/import/scan/scan_bytes.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -100,7 +101,6 @@ class PlyReader {
     }
     if (mesh_.positions.empty()) failPly("contains no vertices");
     addFaces();
-    finishColour();
     mesh_.textureFile = header_.textureFile;
     return std::move(mesh_);
   }
@@ -134,6 +134,7 @@ class PlyReader {
     hasColours_ = has[6] && has[7] && has[8];
     mesh_.positions.reserve(element.count);
     if (hasNormals_) mesh_.normals.reserve(element.count);
+    if (hasColours_) mesh_.colours.reserve(element.count);
     for (std::size_t i = 0; i < element.count; ++i) {
       VertexValues vertex{};
       for (std::size_t p = 0; p < fields.size(); ++p) {
@@ -153,8 +154,10 @@ class PlyReader {
   void addVertex(const VertexValues& v) {
     mesh_.positions.emplace_back(v[0], v[1], v[2]);
     if (hasNormals_) mesh_.normals.push_back(Vec3(v[3], v[4], v[5]).cast<float>());
-    const Vec3 colour(v[6], v[7], v[8]);
-    if (hasColours_ && colour.allFinite()) colourSum_ += colour;
+    if (!hasColours_) return;
+    // Writers of PLY give sRGB. Their alpha is left out: the surface of a scan is opaque.
+    const auto channel = [&](std::size_t field) { return toByte(v[field] / fullColour_); };
+    mesh_.colours.push_back({channel(6), channel(7), channel(8), 255});
   }
 
   /// Reads the length of a list; it is no longer than the bytes that follow.
@@ -173,6 +176,8 @@ class PlyReader {
 
   void readOthers(const PlyElement& element) {
     const bool face = element.name == "face", strips = element.name == "tristrips";
+    for (const PlyProperty& property : element.properties)
+      mesh_.hasFaceColours |= face && property.name == "red";
     for (std::size_t i = 0; i < element.count; ++i) {
       for (const PlyProperty& property : element.properties) {
         const bool corners = property.name == "vertex_indices" || property.name == "vertex_index";
@@ -247,12 +252,6 @@ class PlyReader {
     }
   }
 
-  void finishColour() {
-    if (!hasColours_) return;
-    const Vec3 mean = colourSum_ / (static_cast<double>(mesh_.positions.size()) * fullColour_);
-    mesh_.colour = mean.cwiseMax(0).cwiseMin(1).cast<float>();
-  }
-
   static constexpr std::uint32_t kNoVertex = 0xffffffff;
   struct Run {
     std::size_t first;  ///< index into corners_
@@ -264,7 +263,6 @@ class PlyReader {
   ScanMesh mesh_;
   bool hasNormals_ = false, hasColours_ = false;
   double fullColour_ = 255;
-  Vec3 colourSum_ = Vec3::Zero();
   std::vector<std::uint32_t> corners_;
   std::vector<Run> runs_;
 };

@@ -21,13 +21,20 @@ void writeToPipe(const void* data, std::size_t size) {
 
 }  // namespace
 
-void sendMessage(ImportMessage kind, const void* data, std::size_t size) {
-  const std::uint64_t length = size;
+void beginMessage(ImportMessage kind, std::uint64_t size) {
   char header[ImportMessageHeader::kSize];
   header[0] = static_cast<char>(kind);
-  std::memcpy(header + 1, &length, sizeof length);
+  std::memcpy(header + 1, &size, sizeof size);
   writeToPipe(header, sizeof header);
+}
+
+void continueMessage(const void* data, std::size_t size) {
   writeToPipe(data, size);
+}
+
+void sendMessage(ImportMessage kind, const void* data, std::size_t size) {
+  beginMessage(kind, size);
+  continueMessage(data, size);
 }
 
 void sendProgress(const std::string& stage, double fraction) {

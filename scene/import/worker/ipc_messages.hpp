@@ -41,6 +41,9 @@ inline constexpr int kFirstParentDescriptor = 10;
 // ---- for the worker: it exits if the parent is gone ---------------------------------------------
 
 void sendMessage(ImportMessage kind, const void* data, std::size_t size);
+/// The header of a message in pieces; `size` bytes follow by continueMessage().
+void beginMessage(ImportMessage kind, std::uint64_t size);
+void continueMessage(const void* data, std::size_t size);
 void sendProgress(const std::string& stage, double fraction);
 void sendError(const std::string& text);
 

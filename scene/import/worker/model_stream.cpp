@@ -1,137 +1,14 @@
 #include "scene/import/worker/model_stream.hpp"
 
 #include <array>
-#include <bit>
-#include <cmath>
-#include <cstring>
-#include <type_traits>
+
+#include "scene/import/worker/stream_bytes.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the stream has memory byte order");
-
 constexpr std::uint32_t kNone = 0xffffffff;   // an absent index
 constexpr std::uint32_t kMagic = 0x4d464e45;  // "ENFM"
-
-/// Scalars of a vector of scalars or of fixed-size Eigen vectors, which lie without gaps.
-template <class T>
-constexpr std::size_t kPackedSize = sizeof(T);
-static_assert(sizeof(Eigen::Vector3f) == 12 && sizeof(Eigen::Vector2f) == 8);
-
-class StreamWriter {
- public:
-  template <class T>
-  requires std::is_arithmetic_v<T>
-  void put(T value) { append(&value, sizeof value); }
-  void put(const std::string& text) {
-    put(std::uint64_t{text.size()});
-    append(text.data(), text.size());
-  }
-  template <class T>
-  void putArray(const std::vector<T>& values) {
-    put(std::uint64_t{values.size()});
-    append(values.data(), values.size() * kPackedSize<T>);
-  }
-  template <class Derived>
-  void putMatrix(const Eigen::MatrixBase<Derived>& m) {
-    for (Eigen::Index r = 0; r < m.rows(); ++r) {
-      for (Eigen::Index c = 0; c < m.cols(); ++c) put(m(r, c));
-    }
-  }
-  void reserve(std::size_t size) { bytes_.reserve(size); }
-
-  std::vector<std::byte> finish() {
-    const std::uint64_t size = bytes_.size();
-    std::memcpy(bytes_.data() + 8, &size, sizeof size);
-    return std::move(bytes_);
-  }
-
- private:
-  void append(const void* data, std::size_t size) {
-    if (size == 0) return;
-    const auto* begin = static_cast<const std::byte*>(data);
-    bytes_.insert(bytes_.end(), begin, begin + size);
-  }
-  std::vector<std::byte> bytes_;
-};
-
-class StreamReader {
- public:
-  explicit StreamReader(std::span<const std::byte> bytes) : bytes_(bytes) {}
-
-  template <class T>
-  requires std::is_arithmetic_v<T> T get(const char* field) {
-    T value;
-    take(&value, sizeof value, field);
-    return value;
-  }
-  bool getBool(const char* field) { return getUpTo(1, field) == 1; }
-  std::uint8_t getUpTo(std::uint8_t maxValue, const char* field) {
-    const auto value = get<std::uint8_t>(field);
-    if (value > maxValue) fail(field, "value " + std::to_string(value) + " is unknown");
-    return value;
-  }
-  double getFinite(const char* field) {
-    const double value = get<double>(field);
-    if (!std::isfinite(value)) fail(field, "not a finite number");
-    return value;
-  }
-  std::string getText(const char* field) {
-    std::string text(count(1, field), '\0');
-    take(text.data(), text.size(), field);
-    return text;
-  }
-  std::vector<std::uint8_t> getBytes(const char* field) {
-    const std::size_t size = count(1, field);
-    const auto* first = reinterpret_cast<const std::uint8_t*>(bytes_.data() + position_);
-    position_ += size;
-    return {first, first + size};
-  }
-  template <class T>
-  std::vector<T> getArray(const char* field) {
-    std::vector<T> values(count(kPackedSize<T>, field));
-    take(values.data(), values.size() * kPackedSize<T>, field);
-    return values;
-  }
-  template <class Matrix>
-  Matrix getMatrix(const char* field) {
-    Matrix m;
-    for (Eigen::Index r = 0; r < m.rows(); ++r) {
-      for (Eigen::Index c = 0; c < m.cols(); ++c) {
-        m(r, c) = get<typename Matrix::Scalar>(field);
-        if (!std::isfinite(m(r, c))) fail(field, "not a finite number");
-      }
-    }
-    return m;
-  }
-  /// Reads a count of items that take at least `smallest` bytes each.
-  std::size_t count(std::size_t smallest, const char* field) {
-    const auto n = get<std::uint64_t>(field);
-    if (n > remaining() / smallest) {
-      fail(field, "count " + std::to_string(n) + " exceeds the " + std::to_string(remaining()) +
-                      " bytes that remain");
-    }
-    return static_cast<std::size_t>(n);
-  }
-  std::size_t remaining() const { return bytes_.size() - position_; }
-
-  [[noreturn]] void fail(const char* field, const std::string& what) const {
-    throw ModelStreamError("model stream, byte " + std::to_string(position_) + ", " + field + ": " +
-                           what);
-  }
-
- private:
-  void take(void* to, std::size_t size, const char* field) {
-    if (size > remaining()) fail(field, "the stream ends here");
-    // Eigen vectors are plain arrays of scalars, as checked above; hence void.
-    if (size > 0) std::memcpy(to, bytes_.data() + position_, size);
-    position_ += size;
-  }
-
-  std::span<const std::byte> bytes_;
-  std::size_t position_ = 0;
-};
 
 // ---- one pair of functions per type -------------------------------------------------------------
 
@@ -189,6 +66,7 @@ void write(StreamWriter& out, const Mesh& m) {
   out.putArray(m.positions);
   out.putArray(m.normals);
   out.putArray(m.uvs);
+  out.putArray(m.colours);
   out.putArray(m.indices);
   out.put(m.material);
 }
@@ -199,6 +77,7 @@ Mesh readMesh(StreamReader& in, std::size_t materials) {
   m.positions = in.getArray<Eigen::Vector3f>("positions");
   m.normals = in.getArray<Eigen::Vector3f>("normals");
   m.uvs = in.getArray<Eigen::Vector2f>("uvs");
+  m.colours = in.getArray<VertexColour>("colours");
   m.indices = in.getArray<std::uint32_t>("indices");
   m.material = in.get<std::uint32_t>("mesh material");
   const std::size_t n = m.positions.size();
@@ -207,6 +86,7 @@ Mesh readMesh(StreamReader& in, std::size_t materials) {
   }
   if (!m.normals.empty() && m.normals.size() != n) in.fail("normals", "not one per position");
   if (!m.uvs.empty() && m.uvs.size() != n) in.fail("uvs", "not one per position");
+  if (!m.colours.empty() && m.colours.size() != n) in.fail("colours", "not one per position");
   if (m.indices.size() % 3 != 0) in.fail("indices", "not three per triangle");
   for (const std::uint32_t i : m.indices) {
     if (i >= n) in.fail("indices", "no vertex " + std::to_string(i));
@@ -276,6 +156,11 @@ void write(StreamWriter& out, const Object& o) {
   out.put(o.partOf.value_or(kNone));
   out.put(o.className);
   out.put(o.thing.value_or(kNone));
+  out.put(std::uint64_t{o.attributes.size()});
+  for (const ObjectAttribute& attribute : o.attributes) {
+    out.put(attribute.name);
+    out.putArray(attribute.values);
+  }
 }
 
 /// Parts may precede their whole; that index is checked when all objects are read.
@@ -304,6 +189,14 @@ Object readObject(StreamReader& in, std::size_t meshes, std::size_t storeys) {
   o.className = in.getText("class");
   const auto thing = in.get<std::uint32_t>("thing");
   if (thing != kNone) o.thing = thing;
+  const std::size_t attributes = in.count(16, "attributes");
+  for (std::size_t i = 0; i < attributes; ++i) {
+    ObjectAttribute& attribute = o.attributes.emplace_back();
+    attribute.name = in.getText("attribute name");
+    attribute.values = in.getArray<double>("attribute values");
+    for (const double value : attribute.values)
+      if (!std::isfinite(value)) in.fail("attribute values", "not a finite number");
+  }
   return o;
 }
 
@@ -410,13 +303,6 @@ void readAll(StreamReader& in, std::vector<T>& values, std::size_t smallest, con
   for (std::size_t i = 0; i < n; ++i) values.push_back(read());
 }
 
-std::size_t estimateSize(const Model& model) {
-  std::size_t size = 1024 + model.objects.size() * 256;
-  for (const Texture& t : model.textures) size += t.rgba.size() + 256;
-  for (const Mesh& m : model.meshes) size += m.positions.size() * 32 + m.indices.size() * 4 + 256;
-  return size;
-}
-
 void readHeader(StreamReader& in, std::size_t size) {
   if (in.get<std::uint32_t>("magic") != kMagic) in.fail("magic", "not a model stream");
   const auto version = in.get<std::uint32_t>("version");
@@ -431,14 +317,10 @@ void readHeader(StreamReader& in, std::size_t size) {
   }
 }
 
-}  // namespace
-
-std::vector<std::byte> serialiseModel(const Model& model) {
-  StreamWriter out;
-  out.reserve(estimateSize(model));
+void writeAllOf(StreamWriter& out, const Model& model, std::uint64_t length) {
   out.put(kMagic);
   out.put(kModelStreamVersion);
-  out.put(std::uint64_t{0});  // the length, set by finish()
+  out.put(length);
   out.put(model.source);
   out.put(model.reader);
   writeAll(out, model.textures);
@@ -450,12 +332,41 @@ std::vector<std::byte> serialiseModel(const Model& model) {
   writeAll(out, model.bodies);
   out.put(model.metresPerUnit);
   out.put(model.map);
+  out.put(static_cast<std::uint8_t>(model.north.has_value()));
+  if (model.north) out.putMatrix(*model.north);
+  out.put(std::uint64_t{model.fileScenes.size()});
+  for (const std::string& name : model.fileScenes) out.put(name);
+  out.put(model.fileScene);
   out.put(static_cast<std::uint8_t>(model.upAxis));
   out.putMatrix(model.offset);
   writeAll(out, model.diagnostics);
   out.put(std::uint64_t{model.dependencies.size()});
   for (const std::string& file : model.dependencies) out.put(file);
+}
+
+}  // namespace
+
+std::uint64_t measureModelStream(const Model& model) {
+  const ModelStreamSink none;
+  StreamWriter out(none);
+  writeAllOf(out, model, 0);
   return out.finish();
+}
+
+void writeModelStream(const Model& model, std::uint64_t size, const ModelStreamSink& sink) {
+  StreamWriter out(sink);
+  writeAllOf(out, model, size);
+  if (out.finish() != size) throw ModelStreamError("model stream: its size was measured wrong");
+}
+
+std::vector<std::byte> serialiseModel(const Model& model) {
+  const std::uint64_t size = measureModelStream(model);
+  std::vector<std::byte> bytes;
+  bytes.reserve(size);
+  writeModelStream(model, size, [&](std::span<const std::byte> block) {
+    bytes.insert(bytes.end(), block.begin(), block.end());
+  });
+  return bytes;
 }
 
 Model deserialiseModel(std::span<const std::byte> bytes) {
@@ -467,10 +378,10 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   readAll(in, model.textures, 24, "textures", [&] { return readTexture(in); });
   readAll(in, model.materials, 50, "materials",
           [&] { return readMaterial(in, model.textures.size()); });
-  readAll(in, model.meshes, 44, "meshes", [&] { return readMesh(in, model.materials.size()); });
+  readAll(in, model.meshes, 52, "meshes", [&] { return readMesh(in, model.materials.size()); });
   readAll(in, model.storeys, 24, "storeys", [&] { return readStorey(in); });
   readAll(in, model.spaces, 29, "spaces", [&] { return readSpace(in, model.storeys.size()); });
-  readAll(in, model.objects, 162, "objects",
+  readAll(in, model.objects, 170, "objects",
           [&] { return readObject(in, model.meshes.size(), model.storeys.size()); });
   for (const Object& object : model.objects) {
     if (object.partOf && *object.partOf >= model.objects.size())
@@ -483,6 +394,11 @@ Model deserialiseModel(std::span<const std::byte> bytes) {
   model.metresPerUnit = in.getFinite("metres per unit");
   if (model.metresPerUnit <= 0) in.fail("metres per unit", "not positive");
   model.map = in.getText("map");
+  if (in.getBool("has north")) model.north = in.getMatrix<Eigen::Vector2d>("north");
+  readAll(in, model.fileScenes, 8, "file scenes", [&] { return in.getText("file scene"); });
+  model.fileScene = in.get<std::uint32_t>("file scene");
+  if (model.fileScene > 0 && model.fileScene >= model.fileScenes.size())
+    in.fail("file scene", "no such scene");
   model.upAxis = static_cast<char>(in.get<std::uint8_t>("up axis"));
   if (model.upAxis < 'x' || model.upAxis > 'z') in.fail("up axis", "neither x, y nor z");
   model.offset = in.getMatrix<Vec3>("offset");

@@ -3,6 +3,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <functional>
 #include <span>
 #include <stdexcept>
 #include <vector>
@@ -12,14 +14,25 @@
 namespace enfilade::scene {
 
 /// Increases with every change of the layout; other versions are refused.
-inline constexpr std::uint32_t kModelStreamVersion = 6;
+inline constexpr std::uint32_t kModelStreamVersion = 7;
 
 /// Reports what is wrong and at which byte.
 struct ModelStreamError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Little-endian: magic, version, total length, then the fields in the order of model.hpp.
+/// Takes the bytes of a stream, block by block.
+using ModelStreamSink = std::function<void(std::span<const std::byte>)>;
+
+/// The size of the stream in bytes.
+std::uint64_t measureModelStream(const Model& model);
+
+/// Writes the stream without keeping it: a model may take most of the memory. `size` is that of
+/// measureModelStream().
+void writeModelStream(const Model& model, std::uint64_t size, const ModelStreamSink& sink);
+
+/// The stream in one piece. Little-endian: magic, version, total length, then the fields in the
+/// order of model.hpp.
 std::vector<std::byte> serialiseModel(const Model& model);
 
 /// Validates everything: counts against the remaining bytes, indices against their targets, enums

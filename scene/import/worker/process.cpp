@@ -106,7 +106,7 @@ struct SpawnSettings {
 
 // ---- starting -----------------------------------------------------------------------------------
 
-constexpr std::size_t kArgumentCount = 15;
+constexpr std::size_t kArgumentCount = 16;
 
 /// Formats as "x,y,z".
 std::string formatVec3(const Vec3& v) {
@@ -125,6 +125,7 @@ std::array<std::string, kArgumentCount> makeArguments(const ImportRequest& reque
           request.options.offset ? formatVec3(*request.options.offset) : "-",
           std::to_string(static_cast<int>(request.options.ifcReader)),
           request.options.georeference ? "map" : "-",
+          request.options.gltfScene,
           std::to_string(request.firstProduct),
           request.program,
           request.script,
@@ -280,10 +281,11 @@ std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& pare
   if (std::string_view(argv[8]) != "-") request.options.offset = parseVec3(argv[8]);
   request.options.ifcReader = static_cast<IfcReader>(parseArgument<int>(argv[9]));
   request.options.georeference = std::string_view(argv[10]) == "map";
-  request.firstProduct = parseArgument<std::uint32_t>(argv[11]);
-  request.program = argv[12];
-  request.script = argv[13];
-  request.file = argv[14];
+  request.options.gltfScene = argv[11];
+  request.firstProduct = parseArgument<std::uint32_t>(argv[12]);
+  request.program = argv[13];
+  request.script = argv[14];
+  request.file = argv[15];
   return request;
 }
 

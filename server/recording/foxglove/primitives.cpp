@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <map>
+#include <utility>
 
 #include "scene/model/srgb.hpp"
 
@@ -27,6 +28,19 @@ foxglove::Color materialColour(const scene::Material& material) {
                             isTransparent ? static_cast<double>(base[3]) : 1.0);
 }
 
+/// The colours of a mesh's vertices, times its material's.
+void addVertexColours(foxglove::TriangleListPrimitive& into, const scene::Mesh& mesh,
+                      scene::Material material) {
+  const Eigen::Vector4f base = material.baseColour;
+  for (const scene::VertexColour& colour : mesh.colours) {
+    for (int c = 0; c < 3; ++c)
+      material.baseColour[c] =
+          base[c] * scene::srgbByteToLinear(colour[static_cast<std::size_t>(c)]);
+    material.baseColour[3] = base[3] * static_cast<float>(colour[3]) / 255;
+    *into.add_colors() = materialColour(material);
+  }
+}
+
 /// Appends an object's mesh, relative to `origin`.
 void addMesh(foxglove::TriangleListPrimitive& into, const scene::Object& object,
              const scene::Mesh& mesh, const scene::Vec3& origin) {
@@ -36,19 +50,21 @@ void addMesh(foxglove::TriangleListPrimitive& into, const scene::Object& object,
   for (const std::uint32_t index : mesh.indices) into.add_indices(first + index);
 }
 
-/// Adds the objects' triangles, one list per material.
+/// Adds the objects' triangles, one list per material; meshes with vertex colours apart.
 void addObjects(foxglove::SceneEntity& entity, const scene::Model& model,
                 const std::vector<std::uint32_t>& objects, const scene::Vec3& origin) {
-  std::map<std::uint32_t, foxglove::TriangleListPrimitive*> lists;
+  std::map<std::pair<std::uint32_t, bool>, foxglove::TriangleListPrimitive*> lists;
   for (const std::uint32_t index : objects) {
     const scene::Object& object = model.objects[index];
     for (const std::uint32_t number : object.meshes) {
       const scene::Mesh& mesh = model.meshes[number];
-      auto& list = lists[mesh.material];
+      const scene::Material& material = model.materials[mesh.material];
+      auto& list = lists[{mesh.material, !mesh.colours.empty()}];
       if (!list) {
         list = entity.add_triangles();
-        *list->mutable_color() = materialColour(model.materials[mesh.material]);
+        *list->mutable_color() = materialColour(material);
       }
+      addVertexColours(*list, mesh, material);
       addMesh(*list, object, mesh, origin);
     }
   }
