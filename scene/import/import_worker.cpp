@@ -135,12 +135,18 @@ std::string readDescriptor(int descriptor) {
                     "(parse)");
 }
 
-/// Passes a glTF file through the pre-pass. assimp recognises GLB files by their extension.
-std::vector<std::string> prepareGltf(ConvertInput& input, AssimpInput& file) {
-  PlainGltf plain = makePlainGltf(input.file, input.format);
+bool isGltf(ModelFormat format) {
+  return format == ModelFormat::gltf || format == ModelFormat::glb;
+}
+
+/// Passes a glTF file through the pre-pass. `rewrite`: also if it seems plain. assimp recognises
+/// GLB files by their extension.
+std::vector<std::string> prepareGltf(ConvertInput& input, AssimpInput& file, bool rewrite) {
+  PlainGltf plain = makePlainGltf(input.file, input.format, {input.options.gltfScene, rewrite});
   input.metadata.triangles = plain.triangles;
-  std::vector<Diagnostic>& problems = input.metadata.problems;
-  problems.insert(problems.end(), plain.problems.begin(), plain.problems.end());
+  input.metadata.scenes = std::move(plain.scenes);
+  input.metadata.scene = plain.scene;
+  input.metadata.problems = std::move(plain.problems);
   input.gltfJson = std::move(plain.json);
   if (plain.glb.empty()) return {};
   file.text = std::move(plain.glb);
@@ -170,12 +176,17 @@ Model importByAssimp(const ImportRequest& request) {
       file.text = std::move(rebased.text);
       input.shift = rebased.shift;
     }
-    if (input.format == ModelFormat::gltf || input.format == ModelFormat::glb)
-      dependencies = prepareGltf(input, file);
+    if (isGltf(input.format)) dependencies = prepareGltf(input, file, false);
   }
   sendProgress("parse", 0);
-  const AssimpOutput read = readWithAssimp(file);
+  AssimpOutput read = readWithAssimp(file);
+  if (read.scene == nullptr && isGltf(input.format) && file.text.empty()) {
+    // One damaged mesh fails the whole file; the pre-pass replaces it.
+    dependencies = prepareGltf(input, file, true);
+    read = readWithAssimp(file);
+  }
   if (read.scene == nullptr) throwReadFailure(input, read.failure);
+  input.joined = read.joined;
   Model model = convertScene(*read.scene, read.materials, input, sendProgress);
   reportMissingMaterials(read.dependencies, model.diagnostics);
   dependencies.insert(dependencies.end(), read.dependencies.begin(), read.dependencies.end());
@@ -189,6 +200,9 @@ Model importByFormat(const ImportRequest& request) {
   if (request.options.georeference && format != ModelFormat::ifc)
     throw ImportError(request.file +
                       ": --georeference needs an IFC file: no other format has a map (open)");
+  if (!request.options.gltfScene.empty() && !isGltf(format))
+    throw ImportError(request.file +
+                      ": --gltf-scene needs a glTF file: no other format has scenes (open)");
   switch (format) {
     case ModelFormat::ifc:
       return importIfc(request, sendProgress);
@@ -202,8 +216,11 @@ Model importByFormat(const ImportRequest& request) {
 
 void sendModel(const Model& model) {
   sendProgress("send", 0);
-  const std::vector<std::byte> stream = serialiseModel(model);
-  sendMessage(ImportMessage::model, stream.data(), stream.size());
+  const std::uint64_t size = measureModelStream(model);
+  beginMessage(ImportMessage::model, size);
+  writeModelStream(model, size, [](std::span<const std::byte> block) {
+    continueMessage(block.data(), block.size());
+  });
 }
 
 /// Restarts this program in the same process without address randomisation, because ifcplusplus'

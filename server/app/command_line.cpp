@@ -38,7 +38,7 @@ void applyBranch(const CommandArguments& read, ReplayCommand& command) {
 std::string validateRecordedOptions(const CLI::App& verb) {
   for (const char* option :
        {"--step-height", "--epsilon", "--slope", "--speed-limit", "--sliding", "--near-miss",
-        "--unit", "--up", "--ifc-reader", "--ifc-doors", "--georeference"})
+        "--unit", "--up", "--ifc-reader", "--ifc-doors", "--georeference", "--gltf-scene"})
     if (verb.count(option) > 0)
       return std::string(option) +
              " cannot be given: the recording "
@@ -190,8 +190,9 @@ std::variant<ProgramCommand, ExitCode> makeExportReplayCommand(const CLI::App& v
   const VerifyCommand files = makeVerifyCommand(read);
   if (!protocol::mcap::isMcap(files.recording))
     return reportMisuse("export", files.recording.string() + ": not a recording; --html needs one");
-  const std::string option = findModelOption(
-      verb, {"--unit", "--up", "--offset", "--ifc-reader", "--ifc-doors", "--georeference"});
+  const std::string option =
+      findModelOption(verb, {"--unit", "--up", "--offset", "--ifc-reader", "--ifc-doors",
+                             "--georeference", "--gltf-scene"});
   if (!option.empty())
     return reportMisuse("export", option + " cannot be given: the recording sets it");
   return ExportReplayCommand{files.recording,       read.html,         files.scene,
@@ -216,7 +217,7 @@ std::variant<ProgramCommand, ExitCode> makeExportCommand(const CLI::App& verb,
   if (writesScene) return ExportSceneCommand{makeModelOptions(read.model), read.glb};
   const std::string option =
       findModelOption(verb, {"--unit", "--up", "--offset", "--no-cache", "--ifc-reader",
-                             "--ifc-doors", "--georeference"});
+                             "--ifc-doors", "--georeference", "--gltf-scene"});
   if (!option.empty()) return reportMisuse("export", option + " needs a model and --glb");
   return ExportCommand{read.model.file, read.out};
 }

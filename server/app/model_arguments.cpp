@@ -43,6 +43,9 @@ void addModel(CLI::App& verb, ModelArguments& into) {
       ->check(CLI::IsMember({"move", "still", "open", "none"}));
   verb.add_flag("--georeference", into.georeference,
                 "IFC: apply the file's map conversion, so that coordinates are the map's");
+  verb.add_option("--gltf-scene", into.gltfScene,
+                  "glTF: scene to read, by name or by number from 0. Default: the file's default")
+      ->type_name("NAME|N");
 }
 
 ModelOptions makeModelOptions(const ModelArguments& read) {
@@ -57,6 +60,7 @@ ModelOptions makeModelOptions(const ModelArguments& read) {
       scene::parseIfcReader(read.ifcReader).value_or(scene::IfcReader::automatic);
   options.doors = scene::parseIfcDoors(read.ifcDoors);
   options.import.georeference = read.georeference;
+  options.import.gltfScene = read.gltfScene;
   return options;
 }
 

@@ -13,7 +13,7 @@ class App;
 namespace enfilade::server {
 
 struct ModelArguments {
-  std::string file, unit, up, ifcReader = "auto", ifcDoors = "move";
+  std::string file, unit, up, ifcReader = "auto", ifcDoors = "move", gltfScene;
   std::vector<double> offset;
   bool noCache = false, georeference = false;
 };

@@ -131,6 +131,8 @@ std::string makeInstancesJson(const scene::Model& model, const std::vector<Avata
       one["class_id"] = classes.classOf(id);
     }
     one["thing"] = classes.thingOf(id);
+    for (const scene::ObjectAttribute& attribute : object.attributes)
+      one["attributes"][attribute.name] = attribute.values;
     if (object.storey) one["storey"] = model.storeys[*object.storey].name;
     if (!object.operationType.empty()) one["operation"] = object.operationType;
     if (!bodies[i].empty()) one["body"] = bodies[i];

@@ -268,6 +268,7 @@ v1::ModelChoices toProto(const ModelOptions& model) {
     if (reader == model.import.ifcReader) message.set_ifc_reader(name);
   message.set_ifc_doors(toString(model.doors));
   message.set_georeference(model.import.georeference);
+  message.set_gltf_scene(model.import.gltfScene);
   return message;
 }
 
@@ -280,6 +281,7 @@ ModelOptions modelOptionsFromProto(const v1::ModelChoices& message) {
       scene::parseIfcReader(message.ifc_reader()).value_or(scene::IfcReader::automatic);
   model.doors = scene::parseIfcDoors(message.ifc_doors());
   model.import.georeference = message.georeference();
+  model.import.gltfScene = message.gltf_scene();
   return model;
 }
 

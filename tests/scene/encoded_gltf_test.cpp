@@ -4,6 +4,7 @@
 #include <webp/encode.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 
 #include "scene/import/import_model.hpp"
@@ -204,13 +205,46 @@ TEST(GltfInstances, EachIsAnObjectWhetherTheExtensionIsRequiredOrNot) {
     const Model model = importModel(folder.write("instances.glb", file.glb()));
     ASSERT_EQ(model.objects.size(), 3u);
     EXPECT_EQ(model.meshes.size(), 1u);
-    EXPECT_EQ(countOf(model, "instance_attributes_ignored"), 1u);
+    EXPECT_EQ(countOf(model, "instance_attributes_ignored"), 0u);
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(model.objects[i].path, "terrace/terrace[" + std::to_string(i) + "]");
       expectSameTriangles(listTriangles(wanted, wanted.objects[i]),
                           listTriangles(model, model.objects[i]), 1e-3);
     }
   }
+}
+
+TEST(GltfInstances, KeepTheirOwnAttributes) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::instancedTerrace(true);
+  Json& attributes = file.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
+  const std::vector<std::uint32_t> ids{7, 4294967295, 9};
+  attributes["_ID"] = file.addIndices(ids);
+  const unsigned colours = file.addView(std::string("\xff\0\x33\0\0\xff\0\0\0\0\xff\0", 12));
+  attributes["_COLOR_0"] = file.addAccessor(static_cast<int>(colours), 5121, 3, "VEC4", true);
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    ASSERT_EQ(model.objects[i].attributes.size(), 2u);
+    EXPECT_EQ(model.objects[i].attributes[1],
+              (ObjectAttribute{"_ID", {static_cast<double>(ids[i])}}));
+  }
+  EXPECT_EQ(model.objects[0].attributes[0], (ObjectAttribute{"_COLOR_0", {1, 0, 0.2, 0}}));
+}
+
+TEST(GltfInstances, AttributesThatCannotBeReadAreReportedAndTheInstancesStay) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::instancedTerrace(true);
+  Json& attributes = file.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"];
+  attributes["_FEW"] = file.addPoints({{1, 2, 3}});
+  attributes["_ABSENT"] = 999;
+  attributes["_NAN"] = file.addPoints({{NAN, 0, 0}, {0, 0, 0}, {0, 0, 0}});
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 3u);
+  EXPECT_EQ(countOf(model, "instance_attributes_ignored"), 3u);
+  EXPECT_NE(diagnosticText(model, "instance_attributes_ignored").find("terrace: _ABSENT: "),
+            std::string::npos);
+  ASSERT_EQ(model.objects[0].attributes.size(), 1u) << "_ID";
 }
 
 TEST(GltfInstances, TheNodesOwnTransformAndChildrenStay) {
@@ -251,18 +285,6 @@ TEST(GltfExtensions, UnlistedOnesAreReportedUnlessTheyChangeNoShape) {
   const Model model = importModel(folder.write("hidden.glb", file.glb()));
   EXPECT_EQ(countOf(model, "ignored_extension"), 1u);
   EXPECT_EQ(diagnosticText(model, "ignored_extension"), "KHR_node_visibility");
-}
-
-TEST(GltfExtensions, OtherScenesAreReported) {
-  const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
-  file.json["nodes"].push_back({{"name", "second"}, {"mesh", 0}});
-  file.json["scenes"].push_back({{"nodes", {1}}});
-  file.json["scene"] = 1;
-  const Model model = importModel(folder.write("a.glb", file.glb()));
-  ASSERT_EQ(model.objects.size(), 1u);
-  EXPECT_EQ(model.objects[0].path, "second");
-  EXPECT_EQ(countOf(model, "other_scenes"), 1u);
 }
 
 TEST(GltfExtensions, GltfOneIsRefusedInWords) {

@@ -122,11 +122,13 @@ class MeshTable {
       : sourceMeshes_(from), model_(model), index_(from.size(), kUnused) {}
 
   std::uint32_t addShared(std::uint32_t mesh) {
-    if (index_[mesh] == kUnused) index_[mesh] = addMesh(sourceMeshes_[mesh]);
+    if (index_[mesh] == kUnused) index_[mesh] = addMesh(std::move(sourceMeshes_[mesh]));
     return index_[mesh];
   }
   std::uint32_t addTransformed(std::uint32_t mesh, const Eigen::Affine3d& transform) {
-    return addMesh(transformMesh(sourceMeshes_[mesh], transform));
+    const bool moved = index_[mesh] != kUnused;
+    return addMesh(
+        transformMesh(moved ? model_.meshes[index_[mesh]] : sourceMeshes_[mesh], transform));
   }
 
  private:
@@ -153,9 +155,10 @@ Eigen::Affine3d chooseObjectFrame(const ImportedNode& imported, const Vec3& offs
   return Eigen::Affine3d(Eigen::Translation3d(offset));
 }
 
-/// Gives the object one transform: meshes with another transform are moved into the shared frame.
-Object finishObject(const ImportedNode& imported, const Vec3& offset, MeshTable& meshes) {
-  Object object = imported.object;
+/// Takes the object out of the node and gives it one transform: meshes with another transform are
+/// moved into the shared frame.
+Object finishObject(ImportedNode& imported, const Vec3& offset, MeshTable& meshes) {
+  Object object = std::move(imported.object);
   const Eigen::Affine3d frame = chooseObjectFrame(imported, offset);
   for (const auto& p : imported.instances) {
     if (p.worldFromMesh.matrix() == frame.matrix()) {
@@ -251,7 +254,8 @@ void finishModel(std::vector<ImportedNode> importedNodes, std::vector<Mesh> mesh
   model.offset = offset.value_or(computeSceneOffset(objectBoxes));
   reportUnusualTransforms(importedNodes, model.diagnostics);
   MeshTable table(meshes, model);
-  for (const ImportedNode& imported : importedNodes) {
+  model.objects.reserve(importedNodes.size());
+  for (ImportedNode& imported : importedNodes) {
     model.objects.push_back(finishObject(imported, model.offset, table));
   }
 }

@@ -44,12 +44,14 @@ std::string encodePathSegment(std::string_view name) {
 }
 
 std::string SiblingNames::makeUnique(const std::string& name) {
-  std::string unique = name;
-  std::size_t& repeats = repeats_[name];
-  while (!taken_.insert(unique).second) {
+  if (repeats_.try_emplace(name, 0).second) return name;
+  std::size_t repeats = repeats_[name];
+  std::string unique;
+  do {
     ++repeats;
     unique = name + "#" + std::to_string(repeats + 1);
-  }
+  } while (!repeats_.try_emplace(unique, 0).second);
+  repeats_[name] = repeats;
   return unique;
 }
 

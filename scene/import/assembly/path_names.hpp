@@ -1,10 +1,10 @@
 // Names on the paths of objects: stable, unique, valid UTF-8.
 #pragma once
 
-#include <map>
-#include <set>
+#include <cstddef>
 #include <string>
 #include <string_view>
+#include <unordered_map>
 
 namespace enfilade::scene {
 
@@ -14,12 +14,15 @@ std::string encodePathSegment(std::string_view name);
 /// Makes names unique below one parent.
 class SiblingNames {
  public:
+  SiblingNames() = default;
+  /// `count`: of the names to come; some parents have a million children.
+  explicit SiblingNames(std::size_t count) { repeats_.reserve(count); }
+
   /// `name`, or `name#2`, `name#3`, ... if it is taken.
   std::string makeUnique(const std::string& name);
 
  private:
-  std::set<std::string> taken_;
-  std::map<std::string, std::size_t> repeats_;
+  std::unordered_map<std::string, std::size_t> repeats_;  // of each name that is taken
 };
 
 }  // namespace enfilade::scene

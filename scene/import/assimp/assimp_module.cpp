@@ -8,6 +8,7 @@
 #include <assimp/version.h>
 #include <dlfcn.h>
 
+#include <algorithm>
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
 #include <cstdint>
@@ -136,10 +137,15 @@ void readFile(const AssimpInput& file, AssimpOutput& to) {
   importer->SetProgressHandler(new ProgressForwarder);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
   importer->SetPropertyBool(AI_CONFIG_IMPORT_COLLADA_USE_COLLADA_NAMES, true);
-  constexpr unsigned kSteps = aiProcess_Triangulate | aiProcess_JoinIdenticalVertices;
+  constexpr unsigned kSteps = aiProcess_Triangulate;
   const aiScene* scene =
       file.isIfc ? importer->ReadFileFromMemory(file.text.data(), file.text.size(), kSteps, "ifc")
                  : importer->ReadFile(file.file, kSteps);
+  if (scene != nullptr) {
+    to.joined = std::none_of(scene->mMeshes, scene->mMeshes + scene->mNumMeshes,
+                             [](const aiMesh* mesh) { return mesh->HasVertexColors(0); });
+    if (to.joined) scene = importer->ApplyPostProcessing(aiProcess_JoinIdenticalVertices);
+  }
   if (scene == nullptr || scene->mRootNode == nullptr) {
     to.failure = importer->GetErrorString();
     return;
@@ -152,8 +158,8 @@ void readFile(const AssimpInput& file, AssimpOutput& to) {
 }  // namespace
 }  // namespace enfilade::scene
 
-extern "C" [[gnu::visibility("default")]] void enfiladeReadByAssimp1(
+extern "C" [[gnu::visibility("default")]] void enfiladeReadByAssimp2(
     const enfilade::scene::AssimpInput& file, enfilade::scene::AssimpOutput& read) {
   enfilade::scene::readFile(file, read);
 }
-static_assert(std::is_same_v<decltype(enfiladeReadByAssimp1), enfilade::scene::AssimpReadFunction>);
+static_assert(std::is_same_v<decltype(enfiladeReadByAssimp2), enfilade::scene::AssimpReadFunction>);

@@ -35,7 +35,9 @@ struct AssimpInput {
 
 /// The result of reading a file with assimp.
 struct AssimpOutput {
-  const aiScene* scene = nullptr;         ///< lives as long as the process; null: see `failure`
+  const aiScene* scene = nullptr;  ///< lives as long as the process; null: see `failure`
+  /// Equal vertices are one. False if any mesh has vertex colours, which assimp would ignore.
+  bool joined = true;
   std::vector<FileMaterial> materials;    ///< in assimp's order
   std::vector<std::string> dependencies;  ///< files that assimp opened or looked for
   std::string failure;
@@ -50,6 +52,6 @@ AssimpOutput readWithAssimp(const AssimpInput& file);
 /// The module's exported function; its symbol is kAssimpReadSymbol. Increase the number in the
 /// symbol whenever this signature, its structs or the progress message changes.
 using AssimpReadFunction = void(const AssimpInput& file, AssimpOutput& read);
-inline constexpr const char* kAssimpReadSymbol = "enfiladeReadByAssimp1";
+inline constexpr const char* kAssimpReadSymbol = "enfiladeReadByAssimp2";
 
 }  // namespace enfilade::scene

@@ -1,7 +1,9 @@
 #include "scene/import/assimp/convert_scene.hpp"
 
+#include <assimp/material.h>
 #include <assimp/scene.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <span>
@@ -48,6 +50,26 @@ void reportMissingTriangles(const aiScene& scene, const ConvertInput& input,
                   used - read);
 }
 
+/// Vertex colours multiply the material, and a material without a colour is grey here, as assimp's
+/// own default is. Meshes with vertex colours get a white one in its place.
+void whitenUncolouredMaterials(const std::vector<FileMaterial>& materials,
+                               std::vector<Mesh>& meshes, Model& model) {
+  std::map<std::uint32_t, std::uint32_t> whitened;  // by material
+  for (Mesh& mesh : meshes) {
+    if (mesh.colours.empty() || mesh.material >= materials.size()) continue;
+    const FileMaterial& stated = materials[mesh.material];
+    if (stated.baseColour && stated.name != AI_DEFAULT_MATERIAL_NAME) continue;
+    const auto [known, isNew] =
+        whitened.try_emplace(mesh.material, static_cast<std::uint32_t>(model.materials.size()));
+    if (isNew) {
+      Material white = model.materials[mesh.material];
+      white.baseColour.head<3>().setOnes();
+      model.materials.push_back(std::move(white));
+    }
+    mesh.material = known->second;
+  }
+}
+
 }  // namespace
 
 Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materials,
@@ -62,25 +84,30 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
   }
   model.metresPerUnit = input.options.metresPerUnit.value_or(input.metadata.metresPerUnit);
   model.upAxis = input.options.up.value_or(input.metadata.up);
+  model.fileScenes = input.metadata.scenes;
+  model.fileScene = input.metadata.scene;
   convertMaterials(scene, materials, input.file, input.format, model, progress);
 
   if (progress) progress("convert", 0);
-  std::vector<Mesh> meshes = convertMeshes(scene, model.diagnostics);
+  const bool gltf = input.format == ModelFormat::gltf || input.format == ModelFormat::glb;
+  std::vector<Mesh> meshes = convertMeshes(scene, gltf, !input.joined, model.diagnostics);
+  whitenUncolouredMaterials(materials, meshes, model);
   reportMissingTriangles(scene, input, model.diagnostics);
   Eigen::Affine3d worldFromRoot = Eigen::Affine3d::Identity();
   worldFromRoot.linear() = makeYUpRotation(model.upAxis) * model.metresPerUnit *
                            computeAssimpFromFile(input.metadata, input.format).inverse();
   worldFromRoot.translate(input.shift);
-  const bool gltf = input.format == ModelFormat::gltf || input.format == ModelFormat::glb;
   const GltfNodes exact = gltf ? readGltfNodes(scene, input.gltfJson) : GltfNodes();
   NodeTransforms transforms;
-  std::vector<ImportedNode> importedNodes = collectObjects(
-      scene, input.format, worldFromRoot, exact, meshes, model.diagnostics, transforms);
+  const bool bodies = gltf && mayHaveGltfBodies(input.gltfJson);
+  std::vector<ImportedNode> importedNodes =
+      collectObjects(scene, input.format, worldFromRoot, exact, meshes, model.diagnostics,
+                     bodies ? &transforms : nullptr);
   if (progress) progress("convert", 0.5);
 
   finishModel(std::move(importedNodes), std::move(meshes), input.file, input.options.offset, model);
   std::set<std::uint32_t> staticObjects;
-  if (gltf) staticObjects = addGltfBodies(input.file, input.gltfJson, transforms, model);
+  if (bodies) staticObjects = addGltfBodies(input.file, input.gltfJson, transforms, model);
   if (input.format != ModelFormat::ifc) addNamedBodies(model, staticObjects);
   return model;
 }

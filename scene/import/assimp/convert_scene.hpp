@@ -17,6 +17,7 @@ struct ConvertInput {
   FileMetadata metadata;
   ImportOptions options;
   std::string gltfJson;       ///< of a glTF file, as assimp read it
+  bool joined = true;         ///< see AssimpOutput::joined
   Vec3 shift = Vec3::Zero();  ///< subtracted before assimp read the file; file units and axes
 };
 

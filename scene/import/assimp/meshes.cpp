@@ -3,10 +3,17 @@
 #include <assimp/scene.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <span>
+#include <type_traits>
+#include <unordered_map>
 
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/hasher.hpp"
+#include "scene/model/srgb.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -84,7 +91,74 @@ void copyUvs(const aiMesh& from, Mesh& to) {
   }
 }
 
-Mesh convertMesh(const aiMesh& from, std::vector<Diagnostic>& diagnostics) {
+/// Copies the vertex colours unless all are white. Some writers of text formats count to 255.
+void copyColours(const aiMesh& from, bool gltf, Mesh& to) {
+  if (!from.HasVertexColors(0)) return;
+  const std::span colours(from.mColors[0], from.mNumVertices);
+  const bool bytes = !gltf && std::any_of(colours.begin(), colours.end(), [](const aiColor4D& c) {
+    return std::max({c.r, c.g, c.b}) > 1.001f;  // rounded ones stay ones
+  });
+  const auto encode = [&](float channel) {
+    const double c = static_cast<double>(channel);
+    return toByte(gltf ? linearToSrgb(c) : bytes ? c / 255 : c);
+  };
+  bool white = true;
+  to.colours.reserve(colours.size());
+  for (const aiColor4D& c : colours) {
+    // Only glTF defines that the alpha of a vertex is opacity.
+    const std::uint8_t alpha = gltf ? toByte(static_cast<double>(c.a)) : std::uint8_t{255};
+    to.colours.push_back({encode(c.r), encode(c.g), encode(c.b), alpha});
+    white = white && to.colours.back() == VertexColour{255, 255, 255, 255};
+  }
+  if (white) to.colours = {};
+}
+
+/// The words of a vertex, bit by bit: position, normal, texture coordinates, colour.
+using VertexWords = std::array<std::uint32_t, 9>;
+
+VertexWords listWords(const Mesh& mesh, std::uint32_t vertex) {
+  VertexWords words{};
+  std::memcpy(words.data(), mesh.positions[vertex].data(), 12);
+  if (!mesh.normals.empty()) std::memcpy(words.data() + 3, mesh.normals[vertex].data(), 12);
+  if (!mesh.uvs.empty()) std::memcpy(words.data() + 6, mesh.uvs[vertex].data(), 8);
+  if (!mesh.colours.empty()) std::memcpy(words.data() + 8, mesh.colours[vertex].data(), 4);
+  return words;
+}
+
+/// Makes equal vertices one. Files without shared vertices have three per triangle.
+void joinVertices(Mesh& mesh) {
+  const auto hash = [&](std::uint32_t vertex) {
+    Hasher hasher;
+    for (const std::uint32_t word : listWords(mesh, vertex)) hasher.add(std::uint64_t{word});
+    return static_cast<std::size_t>(hasher.value());
+  };
+  const auto equal = [&](std::uint32_t a, std::uint32_t b) {
+    return listWords(mesh, a) == listWords(mesh, b);
+  };
+  std::unordered_map<std::uint32_t, std::uint32_t, decltype(hash), decltype(equal)> newIndex(
+      mesh.positions.size(), hash, equal);
+  std::vector<std::uint32_t> kept;
+  for (std::uint32_t& index : mesh.indices) {
+    const auto [known, isNew] =
+        newIndex.try_emplace(index, static_cast<std::uint32_t>(kept.size()));
+    if (isNew) kept.push_back(index);
+    index = known->second;
+  }
+  newIndex.clear();  // it reads the vertices, which move now
+  const auto gather = [&](auto& values) {
+    if (values.empty()) return;
+    std::remove_reference_t<decltype(values)> joined;
+    joined.reserve(kept.size());
+    for (const std::uint32_t vertex : kept) joined.push_back(values[vertex]);
+    values = std::move(joined);
+  };
+  gather(mesh.positions);
+  gather(mesh.normals);
+  gather(mesh.uvs);
+  gather(mesh.colours);
+}
+
+Mesh convertMesh(const aiMesh& from, bool gltf, bool join, std::vector<Diagnostic>& diagnostics) {
   Mesh to;
   to.name.assign(from.mName.C_Str(), from.mName.length);
   to.material = from.mMaterialIndex;
@@ -95,20 +169,22 @@ Mesh convertMesh(const aiMesh& from, std::vector<Diagnostic>& diagnostics) {
   const FaceCounts counts = copyTriangles(from, to);
   copyNormals(from, to);
   copyUvs(from, to);
+  copyColours(from, gltf, to);
+  if (join) joinVertices(to);
   addDiagnostic(diagnostics, "points_and_lines_dropped", to.name, counts.pointsAndLines);
   addDiagnostic(diagnostics, "broken_triangle_dropped",
                 to.name + ": a vertex is NaN, infinite or beyond 1e9", counts.invalid);
   addDiagnostic(diagnostics, "degenerate_triangle", to.name, counts.degenerate);
-  if (from.HasVertexColors(0)) addDiagnostic(diagnostics, "vertex_colours_ignored", to.name);
   return to;
 }
 
 }  // namespace
 
-std::vector<Mesh> convertMeshes(const aiScene& scene, std::vector<Diagnostic>& diagnostics) {
+std::vector<Mesh> convertMeshes(const aiScene& scene, bool gltf, bool join,
+                                std::vector<Diagnostic>& diagnostics) {
   std::vector<Mesh> meshes;
   for (const aiMesh* mesh : std::span(scene.mMeshes, scene.mNumMeshes)) {
-    meshes.push_back(convertMesh(*mesh, diagnostics));
+    meshes.push_back(convertMesh(*mesh, gltf, join, diagnostics));
   }
   return meshes;
 }

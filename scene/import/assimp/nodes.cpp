@@ -50,17 +50,23 @@ std::string parseGlobalId(std::string_view name) {
 class NodeCollector {
  public:
   NodeCollector(ModelFormat format, const GltfNodes& exact, const std::vector<Mesh>& meshes,
-                std::vector<Diagnostic>& diagnostics, NodeTransforms& transforms)
+                std::vector<Diagnostic>& diagnostics, NodeTransforms* transforms)
       : ifc_(format == ModelFormat::ifc),
         exactNodes_(exact),
         meshes_(meshes),
         diagnostics_(diagnostics),
-        transforms_(transforms) {}
+        transforms_(transforms) {
+    importedNodes_.reserve(exact.size());
+  }
 
-  Eigen::Affine3d parentFromNode(const aiNode& node) const {
+  /// The node of the glTF file; null: none, or its tree differs.
+  const GltfNode* findExact(const aiNode& node) const {
     const auto exact = exactNodes_.find(&node);
-    return exact == exactNodes_.end() ? toAffine(node.mTransformation)
-                                      : exact->second.parentFromNode;
+    return exact == exactNodes_.end() ? nullptr : &exact->second;
+  }
+
+  static Eigen::Affine3d parentFromNode(const aiNode& node, const GltfNode* exact) {
+    return exact == nullptr ? toAffine(node.mTransformation) : exact->parentFromNode;
   }
 
   /// The state that a node inherits from its ancestors.
@@ -76,7 +82,6 @@ class NodeCollector {
 
   /// Reports a node whose float translation has visible rounding steps.
   void reportCoarsePlacement(const aiNode& node, const VisitState& state) {
-    if (exactNodes_.contains(&node)) return;
     const Vec3 translation = toAffine(node.mTransformation).translation();
     const double step = (state.worldFromParent.linear() * translation).norm() * 0x1p-23;
     if (!(step > kMaxFloatSpacing)) return;
@@ -92,15 +97,16 @@ class NodeCollector {
                         " levels deep; re-export the file with a flatter tree (convert)");
     }
     const std::string_view name(node.mName.C_Str(), node.mName.length);
-    const Eigen::Affine3d worldFromNode = state.worldFromParent * parentFromNode(node);
-    reportCoarsePlacement(node, state);
+    const GltfNode* const exact = findExact(node);
+    const Eigen::Affine3d worldFromNode = state.worldFromParent * parentFromNode(node, exact);
+    if (exact == nullptr) reportCoarsePlacement(node, state);
     if (ifc_ && name.starts_with("$Rel"))
       return visitChildren(node, inheritState(state, worldFromNode));
     if (ifc_ && state.product != kNone && parseGlobalId(name).empty()) {
       addMeshInstances(node, worldFromNode, importedNodes_[state.product]);
       return visitChildren(node, inheritState(state, worldFromNode));
     }
-    const std::string path = state.parentPath + state.siblings->makeUnique(makePathSegment(name));
+    std::string path = state.parentPath + state.siblings->makeUnique(makePathSegment(name));
     const std::size_t nodeIndex = importedNodes_.size();
     ImportedNode& imported = importedNodes_.emplace_back();
     imported.object.path = path;
@@ -109,13 +115,15 @@ class NodeCollector {
       imported.object.ifcClass = name.substr(0, name.find('_'));
     if (isSolid(name, node)) addMeshInstances(node, worldFromNode, importedNodes_[nodeIndex]);
     const bool takesParts = ifc_ && isSolid(name, node);
-    SiblingNames names;
+    SiblingNames names(node.mNumChildren);
     VisitState childState{worldFromNode,   path + "/",       &names, takesParts ? nodeIndex : kNone,
                           state.depth + 1, state.parentIndex};
-    if (const auto known = exactNodes_.find(&node); known != exactNodes_.end()) {
-      childState.parentIndex = known->second.index;
-      transforms_.emplace(known->second.index,
-                          NodeTransform{path, worldFromNode, state.parentIndex});
+    if (exact != nullptr) {
+      childState.parentIndex = exact->index;
+      importedNodes_[nodeIndex].object.attributes = exact->attributes;
+      if (transforms_ != nullptr)
+        transforms_->emplace(exact->index,
+                             NodeTransform{std::move(path), worldFromNode, state.parentIndex});
     }
     visitChildren(node, childState);
   }
@@ -166,7 +174,7 @@ class NodeCollector {
   const GltfNodes& exactNodes_;
   const std::vector<Mesh>& meshes_;
   std::vector<Diagnostic>& diagnostics_;
-  NodeTransforms& transforms_;
+  NodeTransforms* transforms_;
   std::vector<ImportedNode> importedNodes_;
 };
 
@@ -184,13 +192,14 @@ std::vector<ImportedNode> collectObjects(const aiScene& scene, ModelFormat forma
                                          const Eigen::Affine3d& worldFromRoot,
                                          const GltfNodes& exact, const std::vector<Mesh>& meshes,
                                          std::vector<Diagnostic>& diagnostics,
-                                         NodeTransforms& transforms) {
+                                         NodeTransforms* transforms) {
   NodeCollector collector(format, exact, meshes, diagnostics, transforms);
-  SiblingNames names;
-  NodeCollector::VisitState state{worldFromRoot, "", &names};
   const aiNode& root = *scene.mRootNode;
+  SiblingNames names(root.mNumChildren);
+  NodeCollector::VisitState state{worldFromRoot, "", &names};
   if (isSyntheticRoot(root, format)) {
-    state.worldFromParent = worldFromRoot * collector.parentFromNode(root);
+    state.worldFromParent =
+        worldFromRoot * NodeCollector::parentFromNode(root, collector.findExact(root));
     collector.visitChildren(root, state);
   } else {
     collector.visit(root, state);

@@ -11,11 +11,12 @@
 namespace enfilade::scene {
 
 /// The nodes that have triangles, in document order. `worldFromRoot` is applied after the root's
-/// own transform. The transforms of the nodes of `exact` are added to `transforms`.
+/// own transform. The transforms of the nodes of `exact` are added to `transforms`, unless
+/// it is null.
 std::vector<ImportedNode> collectObjects(const aiScene& scene, ModelFormat format,
                                          const Eigen::Affine3d& worldFromRoot,
                                          const GltfNodes& exact, const std::vector<Mesh>& meshes,
                                          std::vector<Diagnostic>& diagnostics,
-                                         NodeTransforms& transforms);
+                                         NodeTransforms* transforms);
 
 }  // namespace enfilade::scene

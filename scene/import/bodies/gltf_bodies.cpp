@@ -10,6 +10,7 @@
 #include "scene/import/bodies/gltf_tree.hpp"
 #include "scene/import/bodies/sidecar.hpp"
 #include "scene/import/file/import_options.hpp"
+#include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
@@ -118,12 +119,14 @@ class ExtrasReader {
 
 }  // namespace
 
+bool mayHaveGltfBodies(const std::string& text) {
+  return mentions(text, "walk_") || mentions(text, "KHR_physics_rigid_bodies") ||
+         mentions(text, "\"class\"");
+}
+
 std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, const std::string& text,
                                       const NodeTransforms& transforms, Model& model) {
-  const bool says = text.find("walk_") != std::string::npos ||
-                    text.find("KHR_physics_rigid_bodies") != std::string::npos ||
-                    text.find("\"class\"") != std::string::npos;
-  if (!says) return {};
+  if (!mayHaveGltfBodies(text)) return {};
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return {};
   std::set<std::uint32_t> staticObjects;

@@ -11,9 +11,11 @@
 
 namespace enfilade::scene {
 
-/// Adds the bodies and collision shapes that the JSON of a glTF file declares for its nodes;
-/// `file` is for errors. Returns the
-/// objects that it declares static. Throws ImportError.
+/// Whether the JSON may declare bodies or classes. Without, addGltfBodies() does nothing.
+bool mayHaveGltfBodies(const std::string& text);
+
+/// Adds the bodies, collision shapes and classes that the JSON of a glTF file declares for its
+/// nodes; `file` is for errors. Returns the objects that it declares static. Throws ImportError.
 std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, const std::string& text,
                                       const NodeTransforms& transforms, Model& model);
 

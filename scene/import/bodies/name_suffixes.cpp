@@ -69,10 +69,7 @@ ParsedName parseName(std::string_view name) {
 
 class NamedBodyBuilder {
  public:
-  explicit NamedBodyBuilder(Model& model) : model_(model) {
-    for (std::uint32_t i = 0; i < model.objects.size(); ++i)
-      byName_.emplace(stripNumbers(splitPath(model.objects[i].path).name), i);
-  }
+  explicit NamedBodyBuilder(Model& model) : model_(model) {}
 
   void apply(std::uint32_t index) {
     // a copy: byName_ refers to the model's own
@@ -108,9 +105,17 @@ class NamedBodyBuilder {
     model_.objects[*drawn].usage = Object::Usage::visualOnly;
   }
 
+  /// Most files have no shapes by name, and some have a million objects.
+  void indexNames() {
+    if (!byName_.empty()) return;
+    for (std::uint32_t i = 0; i < model_.objects.size(); ++i)
+      byName_.emplace(stripNumbers(splitPath(model_.objects[i].path).name), i);
+  }
+
   /// Returns the target: a sibling, else the only object of that name.
   std::optional<std::uint32_t> findTarget(std::uint32_t index, std::string_view above,
-                                          std::string_view name) const {
+                                          std::string_view name) {
+    indexNames();
     std::optional<std::uint32_t> sibling, anywhere;
     std::size_t count = 0;
     const auto [begin, end] = byName_.equal_range(name);

@@ -142,8 +142,9 @@ void GltfBuffers::fail(const std::string& message) const {
 void GltfBuffers::spend(std::size_t count, std::size_t bytesEach, const std::string& what) {
   const std::size_t limit = kMaxExpansion * loaded_ + kFreeBytes;
   if (bytesEach > 0 && count > (limit - std::min(spent_, limit)) / bytesEach)
-    fail(what + " has " + std::to_string(count) + " elements, more than the file's " +
-         std::to_string(loaded_) + " bytes can contain");
+    throw UnreadableGltf(file_.string() + ": " + what + " has " + std::to_string(count) +
+                         " elements, more than the file's " + std::to_string(loaded_) +
+                         " bytes can contain; export the file again (open)");
   spent_ += count * bytesEach;
 }
 
@@ -182,8 +183,8 @@ std::string GltfBuffers::readBuffer(std::size_t index) {
     loaded_ += bytes.size();
     return bytes;
   }
-  throw ImportError(file_.string() + ": its buffer '" + uri +
-                    "' is missing; put it next to the model, or export the file again (open)");
+  throw UnreadableGltf(file_.string() + ": its buffer '" + uri +
+                       "' is missing; put it next to the model, or export the file again (open)");
 }
 
 const std::string& GltfBuffers::getBuffer(std::size_t index) {
@@ -315,14 +316,33 @@ std::vector<double> GltfBuffers::readNumbers(std::size_t accessor, std::size_t p
   return values;
 }
 
-std::vector<float> GltfBuffers::readFloats(std::size_t accessor, std::size_t perElement) {
+std::vector<float> GltfBuffers::readFloats(std::size_t accessor, std::size_t perElement,
+                                           bool normalise) {
   const GltfElements elements = readElements(accessor, perElement);
   const std::size_t size = getComponentSize(elements.componentType);
+  normalise = normalise || elements.normalised;
   std::vector<float> values;
   values.reserve(elements.bytes.size() / size);
   for (std::size_t at = 0; at < elements.bytes.size(); at += size)
     values.push_back(static_cast<float>(
-        readComponent(elements.bytes.data() + at, elements.componentType, elements.normalised)));
+        readComponent(elements.bytes.data() + at, elements.componentType, normalise)));
+  return values;
+}
+
+std::vector<double> GltfBuffers::readValues(std::size_t accessor, std::size_t& perElement) {
+  const Json* type = findMember(&getEntry("accessors", accessor), "type");
+  perElement = type != nullptr && *type == "VEC2"   ? 2
+               : type != nullptr && *type == "VEC3" ? 3
+               : type != nullptr && *type == "VEC4" ? 4
+                                                    : 1;
+  const GltfElements elements = readElements(accessor, perElement);
+  const std::size_t size = getComponentSize(elements.componentType);
+  spend(elements.count * perElement, sizeof(double), "accessors[" + std::to_string(accessor) + "]");
+  std::vector<double> values;
+  values.reserve(elements.bytes.size() / size);
+  for (std::size_t at = 0; at < elements.bytes.size(); at += size)
+    values.push_back(
+        readComponent(elements.bytes.data() + at, elements.componentType, elements.normalised));
   return values;
 }
 

@@ -13,9 +13,16 @@
 #include <string_view>
 #include <vector>
 
+#include "scene/import/file/import_options.hpp"
 #include "scene/import/file/model_format.hpp"
 
 namespace enfilade::scene {
+
+/// An error that makes the whole file unreadable, not one of its meshes: a missing buffer, or more
+/// data than the file can contain.
+struct UnreadableGltf : ImportError {
+  using ImportError::ImportError;
+};
 
 /// The elements of an accessor, without gaps, as the file stores them.
 struct GltfElements {
@@ -34,8 +41,14 @@ class GltfBuffers {
   /// Throws ImportError, also for any other type.
   std::vector<double> readNumbers(std::size_t accessor, std::size_t perElement);
 
-  /// All components as floats; integers are normalised if the accessor says so. May contain NaN.
-  std::vector<float> readFloats(std::size_t accessor, std::size_t perElement);
+  /// All components as floats; integers are normalised if the accessor says so, or if `normalise`
+  /// does. May contain NaN.
+  std::vector<float> readFloats(std::size_t accessor, std::size_t perElement,
+                                bool normalise = false);
+
+  /// All components of an accessor of scalars or vectors, as the file means them. Sets their number
+  /// per element. Integers keep all digits.
+  std::vector<double> readValues(std::size_t accessor, std::size_t& perElement);
 
   /// The unsigned integers of an accessor of scalars.
   std::vector<std::uint32_t> readIndices(std::size_t accessor);

@@ -10,7 +10,8 @@
 namespace enfilade::scene {
 
 /// Replaces the mesh of each instanced node by child nodes NAME[0], NAME[1], ..., appended to the
-/// file's nodes. Indices of existing nodes stay. Adds findings to `problems`. Throws ImportError.
+/// file's nodes. Indices of existing nodes stay. Attributes of instances that do not place them
+/// become extras of their nodes. Adds findings to `problems`. Throws ImportError.
 void expandInstances(nlohmann::json& gltf, GltfBuffers& buffers, std::vector<Diagnostic>& problems);
 
 }  // namespace enfilade::scene

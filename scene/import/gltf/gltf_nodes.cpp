@@ -41,32 +41,92 @@ bool isSameTransform(const Eigen::Affine3d& exact, const aiMatrix4x4& rounded) {
          ((exactRows - other).col(3).cwiseAbs().maxCoeff() <= kMatchTolerance * maxTranslation);
 }
 
+/// The extras whose names begin with "_" and whose values are numbers: own attributes of instances.
+std::vector<ObjectAttribute> readOwnAttributes(const Json& node) {
+  std::vector<ObjectAttribute> attributes;
+  const Json* extras = findMember(&node, "extras");
+  if (extras == nullptr || !extras->is_object()) return attributes;
+  for (const auto& [name, value] : extras->items()) {
+    if (!name.starts_with("_")) continue;
+    ObjectAttribute attribute{name, {}};
+    const Json numbers = value.is_array() ? value : Json::array({value});
+    for (const Json& number : numbers)
+      if (number.is_number()) attribute.values.push_back(number.get<double>());
+    if (!numbers.empty() && attribute.values.size() == numbers.size())
+      attributes.push_back(std::move(attribute));
+  }
+  return attributes;
+}
+
+/// What the import needs of a node of the JSON. A file may have a million nodes, so they are read
+/// one by one, and their JSON is not kept.
+struct PlainNode {
+  bool isObject = false, hasChildList = true;
+  Eigen::Affine3d parentFromNode = Eigen::Affine3d::Identity();
+  std::vector<std::size_t> children;  ///< kNoIndex: not a number
+  std::vector<ObjectAttribute> attributes;
+};
+
+std::vector<std::size_t> readIndices(const Json& list) {
+  std::vector<std::size_t> indices;
+  indices.reserve(list.size());
+  for (const Json& index : list)
+    indices.push_back(index.is_number_unsigned() ? index.get<std::size_t>() : kNoIndex);
+  return indices;
+}
+
+PlainNode readPlainNode(const Json& json) {
+  PlainNode node;
+  if (!json.is_object()) return node;
+  node.isObject = true;
+  node.parentFromNode = readNodeTransform(json);
+  node.attributes = readOwnAttributes(json);
+  if (const Json* children = findMember(&json, "children")) {
+    node.hasChildList = children->is_array();
+    if (node.hasChildList) node.children = readIndices(*children);
+  }
+  return node;
+}
+
+/// Parses the scenes and, one by one, the nodes; null: not a JSON object.
+Json parseScenesAndNodes(const std::string& text, std::vector<PlainNode>& nodes) {
+  bool inNodes = false;
+  const auto keep = [&](int depth, Json::parse_event_t event, Json& value) {
+    using Event = Json::parse_event_t;
+    if (event == Event::key && depth == 1) {
+      inNodes = value == "nodes";
+      return inNodes || value == "scene" || value == "scenes";
+    }
+    const bool ends =
+        event == Event::object_end || event == Event::array_end || event == Event::value;
+    if (!inNodes || depth != 2 || !ends) return true;
+    nodes.push_back(readPlainNode(value));
+    return false;
+  };
+  return Json::parse(text, keep, false);
+}
+
 class NodeMatcher {
  public:
-  NodeMatcher(const Json& nodes, GltfNodes& matchedNodes)
+  NodeMatcher(const std::vector<PlainNode>& nodes, GltfNodes& matchedNodes)
       : nodes_(nodes), matchedNodes_(matchedNodes) {}
 
   /// Stops where the trees differ; assimp's transforms are used there.
-  void visit(const Json& index, const aiNode& node, int depth) {
-    if (!index.is_number_unsigned() || depth > kMaxNodeDepth) return;
-    const auto i = index.get<std::size_t>();
-    if (i >= nodes_.size() || !nodes_[i].is_object()) return;
-    const Json& json = nodes_[i];
-    const Eigen::Affine3d exact = readNodeTransform(json);
-    if (!isSameTransform(exact, node.mTransformation)) return;
-    matchedNodes_.emplace(&node, GltfNode{exact, i});
-    visitChildren(json.value("children", Json::array()), node, depth + 1);
+  void visit(std::size_t index, const aiNode& node, int depth) {
+    if (index >= nodes_.size() || depth > kMaxNodeDepth || !nodes_[index].isObject) return;
+    const PlainNode& plain = nodes_[index];
+    if (!isSameTransform(plain.parentFromNode, node.mTransformation)) return;
+    matchedNodes_.emplace(&node, GltfNode{plain.parentFromNode, index, plain.attributes});
+    if (plain.hasChildList) visitChildren(plain.children, node, depth + 1);
   }
 
-  void visitChildren(const Json& indices, const aiNode& parent, int depth) {
-    if (!indices.is_array() || indices.size() != parent.mNumChildren) return;
-    for (std::size_t i = 0; i < indices.size(); ++i) {
-      visit(indices[i], *parent.mChildren[i], depth);
-    }
+  void visitChildren(const std::vector<std::size_t>& indices, const aiNode& parent, int depth) {
+    if (indices.size() != parent.mNumChildren) return;
+    for (std::size_t i = 0; i < indices.size(); ++i) visit(indices[i], *parent.mChildren[i], depth);
   }
 
  private:
-  const Json& nodes_;
+  const std::vector<PlainNode>& nodes_;
   GltfNodes& matchedNodes_;
 };
 
@@ -92,17 +152,17 @@ Eigen::Affine3d readNodeTransform(const Json& node) {
 
 GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson) {
   GltfNodes transforms;
-  const Json json = Json::parse(gltfJson, nullptr, false);
-  if (!json.is_object() || !json.contains("nodes") || !json.contains("scenes")) return transforms;
-  if (!json["nodes"].is_array()) return transforms;
-  const Json chosen = json.value("scene", Json(0u));
-  const std::size_t index = chosen.is_number_unsigned() ? chosen.get<std::size_t>() : 0;
-  if (!json["scenes"].is_array() || index >= json["scenes"].size()) return transforms;
-  const Json& one = json["scenes"][index];
-  const Json roots = one.is_object() ? one.value("nodes", Json::array()) : Json::array();
-  NodeMatcher walker(json["nodes"], transforms);
+  std::vector<PlainNode> nodes;
+  const Json json = parseScenesAndNodes(gltfJson, nodes);
+  if (!json.is_object()) return transforms;
+  const Json& scenes = getArray(json, "scenes");
+  const std::size_t index = readIndexMember(&json, "scene").value_or(0);
+  if (index >= scenes.size()) return transforms;
+  const std::vector<std::size_t> roots = readIndices(getArray(scenes[index], "nodes"));
+  transforms.reserve(nodes.size());
+  NodeMatcher walker(nodes, transforms);
   // assimp adds a root node above several roots, but not above a single one.
-  if (roots.is_array() && roots.size() == 1) {
+  if (roots.size() == 1) {
     walker.visit(roots[0], *scene.mRootNode, 0);
   } else {
     walker.visitChildren(roots, *scene.mRootNode, 0);

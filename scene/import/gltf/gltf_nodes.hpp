@@ -9,8 +9,10 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
+#include <unordered_map>
+#include <vector>
 
-#include "collision/types.hpp"
+#include "scene/model/model.hpp"
 
 struct aiNode;
 struct aiScene;
@@ -20,9 +22,10 @@ namespace enfilade::scene {
 /// A node with the glTF file's own double-precision transform; assimp rounds it to floats.
 struct GltfNode {
   Eigen::Affine3d parentFromNode;
-  std::size_t index;  ///< index into the file's list of nodes
+  std::size_t index;                        ///< index into the file's list of nodes
+  std::vector<ObjectAttribute> attributes;  ///< extras whose names begin with "_"
 };
-using GltfNodes = std::map<const aiNode*, GltfNode>;
+using GltfNodes = std::unordered_map<const aiNode*, GltfNode>;
 
 /// The transform of a node of the file's JSON, in doubles.
 Eigen::Affine3d readNodeTransform(const nlohmann::json& node);

@@ -16,6 +16,8 @@
 #include "scene/import/gltf/gltf_rest_pose.hpp"
 #include "scene/import/gltf/plain_primitives.hpp"
 #include "scene/import/gltf/texture_mapping.hpp"
+#include "scene/import/gltf/unreadable_mesh.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -79,6 +81,20 @@ bool isPlainAttribute(const Json& accessors, const Json& index) {
          readIndexMember(&accessor, "bufferView").has_value();
 }
 
+/// Whether assimp reads these colours right: floats with alpha, one per position.
+bool isPlainColour(const Json& accessors, const Json& index, const Json& attributes) {
+  const auto entry = [&](const Json* number) {
+    const bool known = number != nullptr && number->is_number_unsigned() &&
+                       number->get<std::size_t>() < accessors.size();
+    return known ? &accessors[number->get<std::size_t>()] : nullptr;
+  };
+  const Json* colours = entry(&index);
+  const Json* type = findMember(colours, "type");
+  return isPlainAttribute(accessors, index) && type != nullptr && *type == "VEC4" &&
+         readIndexMember(colours, "count") ==
+             readIndexMember(entry(findMember(&attributes, "POSITION")), "count");
+}
+
 bool isPlainPrimitive(const Json& primitive, const Json& accessors) {
   const std::size_t mode = readIndexMember(&primitive, "mode").value_or(4);
   if (mode == 5 || mode == 6) return false;  // strips and fans
@@ -87,6 +103,7 @@ bool isPlainPrimitive(const Json& primitive, const Json& accessors) {
   return std::all_of(attributes->items().begin(), attributes->items().end(), [&](const auto& item) {
     const std::string& name = item.key();
     const bool used = name == "POSITION" || name == "NORMAL" || name.starts_with("TEXCOORD_");
+    if (name == "COLOR_0") return isPlainColour(accessors, item.value(), *attributes);
     return !used || isPlainAttribute(accessors, item.value());
   });
 }
@@ -112,7 +129,7 @@ bool usesFirstTexCoords(const Json& sections) {
 bool needsRewriting(const std::string& text, const Json& sections,
                     const std::filesystem::path& folder) {
   if (std::any_of(kRewrittenTexts.begin(), kRewrittenTexts.end(),
-                  [&](std::string_view mark) { return text.find(mark) != std::string::npos; }))
+                  [&](std::string_view mark) { return mentions(text, mark); }))
     return true;
   const Json& buffers = getArray(sections, "buffers");
   if (!std::all_of(buffers.begin(), buffers.end(),
@@ -130,32 +147,98 @@ bool needsRewriting(const std::string& text, const Json& sections,
 
 // ---- rewriting ----------------------------------------------------------------------------------
 
+/// Rewrites the primitives of a file one by one. One that cannot be read is replaced or removed.
+class MeshRewriter {
+ public:
+  MeshRewriter(const Json& original, GltfBuffers& buffers, GltfBinary& binary,
+               std::vector<Diagnostic>& problems)
+      : original_(original),
+        binary_(binary),
+        problems_(problems),
+        primitives_(original, buffers, binary, problems) {}
+
+  /// `pose`: null for the pose of the file's vertices.
+  void rewrite(Json& mesh, const std::string& name, const RestPose* pose) {
+    readAny_ = false;
+    Json kept = Json::array();
+    if (!mesh.is_object() || getArray(mesh, "primitives").empty())
+      addDiagnostic(problems_, "missing_mesh", name + " has no primitives");
+    if (!mesh.is_object()) mesh = Json::object();
+    for (std::size_t p = 0; p < getArray(mesh, "primitives").size(); ++p) {
+      Json primitive = rewritePrimitive(mesh["primitives"][p],
+                                        name + ".primitives[" + std::to_string(p) + "]", pose);
+      if (!primitive.is_null()) kept.push_back(std::move(primitive));
+    }
+    mesh["primitives"] = std::move(kept);
+    mesh.erase("weights");
+  }
+
+  /// Whether any primitive of the last mesh could be read.
+  bool readAny() const { return readAny_; }
+  const std::string& firstError() const { return firstError_; }
+
+ private:
+  Json rewritePrimitive(Json& primitive, const std::string& place, const RestPose* pose) {
+    const Json original = primitive;
+    std::string fault;
+    try {
+      if (pose != nullptr) {
+        primitives_.rewritePosed(primitive, place, *pose);
+      } else {
+        primitives_.rewrite(primitive, place);
+      }
+      readAny_ = true;
+      return std::move(primitive);
+    } catch (const UnreadableGltf&) {
+      throw;
+    } catch (const ImportError& error) {
+      fault = error.what();
+    } catch (const Json::exception& error) {
+      fault = std::string("its JSON is not valid glTF: ") + error.what();
+    }
+    if (firstError_.empty()) firstError_ = fault;
+    if (fault.find(place) == std::string::npos) fault = place + ": " + fault;
+    return replaceUnreadable(original, getArray(original_, "accessors"), fault, binary_, problems_);
+  }
+
+  const Json& original_;
+  GltfBinary& binary_;
+  std::vector<Diagnostic>& problems_;
+  PlainPrimitives primitives_;
+  bool readAny_ = false;
+  std::string firstError_;
+};
+
+/// The meshes that nodes refer to, by index.
+std::vector<bool> findUsedMeshes(const Json& gltf) {
+  std::vector<bool> used(getArray(gltf, "meshes").size());
+  for (const Json& node : getArray(gltf, "nodes"))
+    if (const auto mesh = readIndexMember(&node, "mesh"); mesh && *mesh < used.size())
+      used[*mesh] = true;
+  return used;
+}
+
+/// Throws ImportError if no mesh that nodes use can be read.
 void rewriteMeshes(Json& gltf, GltfBuffers& buffers, GltfBinary& binary,
                    std::vector<Diagnostic>& problems) {
   const Json original{{"accessors", getArray(gltf, "accessors")},
                       {"materials", getArray(gltf, "materials")}};
-  PlainPrimitives primitives(original, buffers, binary, problems);
+  MeshRewriter rewriter(original, buffers, binary, problems);
   const auto meshes = gltf.find("meshes");
   if (meshes == gltf.end() || !meshes->is_array()) return;
   const std::map<std::size_t, RestPose> poses = separatePosedMeshes(gltf, buffers, problems);
+  const std::vector<bool> used = findUsedMeshes(gltf);
+  bool readAny = false;
   for (std::size_t m = 0; m < meshes->size(); ++m) {
-    Json& mesh = (*meshes)[m];
-    const std::string name = "meshes[" + std::to_string(m) + "]";
-    if (!mesh.is_object() || getArray(mesh, "primitives").empty())
-      buffers.fail(name + " has no primitives");
-    mesh.erase("weights");
-    for (std::size_t p = 0; p < mesh["primitives"].size(); ++p) {
-      Json& primitive = mesh["primitives"][p];
-      const std::string place = name + ".primitives[" + std::to_string(p) + "]";
-      if (!primitive.is_object()) buffers.fail(place + " is not an object");
-      if (const auto pose = poses.find(m); pose != poses.end()) {
-        primitives.rewritePosed(primitive, place, pose->second);
-      } else {
-        primitives.rewrite(primitive, place);
-      }
-    }
+    const auto pose = poses.find(m);
+    rewriter.rewrite((*meshes)[m], "meshes[" + std::to_string(m) + "]",
+                     pose == poses.end() ? nullptr : &pose->second);
+    readAny = readAny || (rewriter.readAny() && used[m]);
   }
+  if (!readAny && !rewriter.firstError().empty()) throw ImportError(rewriter.firstError());
 }
+
+constexpr std::string_view kNoImage = "none";  // bytes in place of an image that cannot be read
 
 /// Copies images that lie in buffers.
 void rewriteImages(Json& gltf, GltfBuffers& buffers, GltfBinary& binary) {
@@ -164,7 +247,15 @@ void rewriteImages(Json& gltf, GltfBuffers& buffers, GltfBinary& binary) {
   for (Json& image : *images) {
     const auto view = readIndexMember(&image, "bufferView");
     if (!view) continue;
-    const std::string_view bytes = buffers.getView(*view);
+    std::string_view bytes;
+    try {
+      bytes = buffers.getView(*view);
+    } catch (const UnreadableGltf&) {
+      throw;
+    } catch (const ImportError&) {
+      // Its texture is reported as unreadable.
+      bytes = kNoImage;
+    }
     buffers.spend(bytes.size(), 1, "an image");
     image["bufferView"] = binary.addView(bytes);
   }
@@ -201,6 +292,7 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   GltfBuffers buffers(file, format, original);
   GltfBinary binary;
   Json gltf = original;
+  gltf["scene"] = to.scene;
   try {
     expandInstances(gltf, buffers, to.problems);
     rewriteMeshes(gltf, buffers, binary, to.problems);
@@ -220,9 +312,56 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   to.dependencies = buffers.dependencies();
 }
 
+// ---- scenes -------------------------------------------------------------------------------------
+
+std::string listScenes(const std::vector<std::string>& scenes) {
+  constexpr std::size_t kMaxListed = 20;
+  std::string text;
+  for (std::size_t i = 0; i < scenes.size() && i < kMaxListed; ++i)
+    text +=
+        (i > 0 ? ", " : "") + std::to_string(i) + (scenes[i].empty() ? "" : " '" + scenes[i] + "'");
+  return text + (scenes.size() > kMaxListed ? ", .." : "");
+}
+
+/// The scene that `choice` names or numbers. A name takes precedence over a number.
+std::uint32_t findScene(const std::vector<std::string>& scenes, const std::string& choice,
+                        const std::filesystem::path& file) {
+  const auto named = std::find(scenes.begin(), scenes.end(), choice);
+  if (named != scenes.end()) return static_cast<std::uint32_t>(named - scenes.begin());
+  for (std::size_t i = 0; i < scenes.size(); ++i)
+    if (choice == std::to_string(i)) return static_cast<std::uint32_t>(i);
+  throw ImportError(file.string() + ": no scene '" + choice + "'; its scenes are " +
+                    listScenes(scenes) + " (open)");
+}
+
+/// Reads the scenes of a file and chooses one. Returns whether it is not the file's default.
+bool chooseScene(const Json& sections, const std::string& choice, const std::filesystem::path& file,
+                 PlainGltf& to) {
+  for (const Json& scene : getArray(sections, "scenes")) {
+    const Json* name = findMember(&scene, "name");
+    to.scenes.push_back(name != nullptr && name->is_string() ? name->get<std::string>() : "");
+  }
+  if (to.scenes.empty())
+    throw ImportError(file.string() + ": has no scene; export it with one (open)");
+  const std::size_t standard = readIndexMember(&sections, "scene").value_or(0);
+  if (choice.empty() && standard >= to.scenes.size())
+    throw ImportError(file.string() + ": its default scene " + std::to_string(standard) +
+                      " is missing; choose one by --gltf-scene: " + listScenes(to.scenes) +
+                      " (open)");
+  to.scene =
+      choice.empty() ? static_cast<std::uint32_t>(standard) : findScene(to.scenes, choice, file);
+  if (to.scenes.size() > 1)
+    to.problems.push_back({"other_scenes", to.scenes.size() - 1,
+                           "scene " + std::to_string(to.scene) + " was read" +
+                               (choice.empty() ? ", which is the file's default" : "") + ", of " +
+                               listScenes(to.scenes)});
+  return to.scene != standard;
+}
+
 }  // namespace
 
-PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
+PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
+                        const GltfChoice& choice) {
   PlainGltf plain;
   plain.json = readGltfJson(file, format);
   bool tooDeep = false;
@@ -234,14 +373,8 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format) {
   if (!sections.is_object()) return plain;
   requireVersion2(sections, file);
   plain.problems = checkGltfExtensions(sections, extensions, file);
-  if (getArray(sections, "scenes").empty())
-    throw ImportError(file.string() + ": has no scene; export it with one (open)");
-  if (const std::size_t scenes = getArray(sections, "scenes").size(); scenes > 1)
-    plain.problems.push_back({"other_scenes", scenes - 1,
-                              "scene " +
-                                  std::to_string(readIndexMember(&sections, "scene").value_or(0)) +
-                                  " was read, which is the file's default"});
-  if (needsRewriting(plain.json, sections, file.parent_path())) {
+  const bool other = chooseScene(sections, choice.scene, file, plain);
+  if (other || choice.rewrite || needsRewriting(plain.json, sections, file.parent_path())) {
     rewriteGltf(file, format, plain);
     sections = parseMeshSections(plain.json, tooDeep, extensions);
   }

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -20,12 +21,20 @@ struct PlainGltf {
   std::string json;                      ///< as assimp reads it; empty or invalid if the file is
   std::string glb;                       ///< the rewritten file; empty: the file itself is plain
   std::optional<std::size_t> triangles;  ///< in all meshes, each once; nullopt: unknown
+  std::vector<std::string> scenes;       ///< names of all scenes; some may be empty
+  std::uint32_t scene = 0;               ///< the one that is read
   std::vector<Diagnostic> problems;
   std::vector<std::string> dependencies;  ///< files that were read or looked for
 };
 
-/// Throws ImportError for damaged data, for glTF 1.0, and for required extensions that are not
-/// read.
-PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format);
+struct GltfChoice {
+  std::string scene = {};  ///< name or number; empty: the file's default
+  bool rewrite = false;    ///< rewrite the file also if assimp should read it right
+};
+
+/// Throws ImportError for missing buffers, for glTF 1.0, for required extensions that are not read,
+/// and if no mesh can be read. Of several meshes, one that cannot be read is reported.
+PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
+                        const GltfChoice& choice = {});
 
 }  // namespace enfilade::scene

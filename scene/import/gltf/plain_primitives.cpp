@@ -11,11 +11,25 @@ namespace {
 
 using Json = nlohmann::json;
 
+constexpr const char* kColours = "COLOR_0";
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
 constexpr std::size_t kTriangleMode = 4, kStripMode = 5, kFanMode = 6;  // glTF 2.0, 5.24.4
 /// Bytes of Draco's output that count as one of those that the file must justify: Draco compresses
 /// regular grids far better than other codecs, and draco_mesh.cpp bounds its counts itself.
 constexpr std::size_t kDracoBytesPerByte = 32;
+
+/// Colours without alpha become opaque, because assimp reads four channels.
+std::vector<float> addAlpha(const std::vector<float>& rgb) {
+  std::vector<float> rgba;
+  rgba.reserve(rgb.size() / 3 * 4);
+  for (std::size_t i = 0; i + 2 < rgb.size(); i += 3)
+    rgba.insert(rgba.end(), {rgb[i], rgb[i + 1], rgb[i + 2], 1.0f});
+  return rgba;
+}
+
+std::string getPlainName(const std::string& attribute) {
+  return attribute.starts_with("TEXCOORD_") ? "TEXCOORD_0" : attribute;
+}
 
 }  // namespace
 
@@ -47,28 +61,58 @@ std::size_t PlainPrimitives::countElements(std::size_t accessor) const {
   return readIndexMember(&gltf_.at("accessors").at(accessor), "count").value_or(0);
 }
 
+/// Channels of the vertex colours: 3 or 4; 0 for none, or if they are not what glTF allows.
+std::size_t PlainPrimitives::findColourWidth(const Json& attributes, const std::string& name) {
+  if (!attributes.contains(kColours)) return 0;
+  const auto accessor = readIndexMember(&attributes, kColours);
+  const Json& accessors = getArray(gltf_, "accessors");
+  const Json none;
+  const Json& colours = accessor && *accessor < accessors.size() ? accessors[*accessor] : none;
+  const Json* type = findMember(&colours, "type");
+  const bool isRgb = type != nullptr && *type == "VEC3",
+             isRgba = type != nullptr && *type == "VEC4";
+  const std::size_t component = readIndexMember(&colours, "componentType").value_or(0);
+  const bool isNumber = component == 5121 || component == 5123 || component == 5126;
+  const auto positions = readIndexMember(&attributes, "POSITION");
+  const bool matches =
+      positions && *positions < accessors.size() &&
+      readIndexMember(&colours, "count") == readIndexMember(&accessors[*positions], "count");
+  if ((isRgb || isRgba) && isNumber && matches) return isRgb ? 3 : 4;
+  addDiagnostic(
+      problems_, "vertex_colours_ignored",
+      name + ": " + (matches ? "of a type that glTF does not allow" : "not one per vertex"));
+  return 0;
+}
+
 PlainPrimitives::Widths PlainPrimitives::listAttributes(const Json& attributes,
-                                                        const TextureMapping& mapping) const {
+                                                        const TextureMapping& mapping,
+                                                        const std::string& name) {
   Widths widths{{"POSITION", 3}};
   if (attributes.contains("NORMAL")) widths["NORMAL"] = 3;
   const std::string uvs = "TEXCOORD_" + std::to_string(mapping.set);
   if (attributes.contains(uvs)) widths[uvs] = 2;
+  if (const std::size_t channels = findColourWidth(attributes, name); channels > 0)
+    widths[kColours] = channels;
   return widths;
 }
 
-std::size_t PlainPrimitives::writeFloats(std::vector<float> values, std::size_t width,
-                                         const TextureMapping& mapping) {
+std::size_t PlainPrimitives::writeFloats(const std::string& attribute, std::vector<float> values,
+                                         std::size_t width, const TextureMapping& mapping) {
   if (width == 2 && !mapping.isIdentity()) mapping.apply(values);
+  if (attribute == kColours && width == 3) return binary_.addFloats(addAlpha(values), 4);
   return binary_.addFloats(values, width);
 }
 
-std::size_t PlainPrimitives::writeAttribute(std::size_t accessor, std::size_t width,
-                                            const TextureMapping& mapping) {
+std::size_t PlainPrimitives::writeAttribute(const std::string& attribute, std::size_t accessor,
+                                            std::size_t width, const TextureMapping& mapping) {
+  const bool colours = attribute == kColours;
   const std::string key =
-      std::to_string(accessor) + (width == 2 ? " uv " + mapping.makeKey() : " vector");
+      std::to_string(accessor) +
+      (width == 2 ? " uv " + mapping.makeKey() : std::string(colours ? " colour" : " vector"));
   const auto known = written_.find(key);
   if (known != written_.end()) return known->second;
-  return written_[key] = writeFloats(buffers_.readFloats(accessor, width), width, mapping);
+  return written_[key] =
+             writeFloats(attribute, buffers_.readFloats(accessor, width, colours), width, mapping);
 }
 
 DracoMesh PlainPrimitives::decodeDraco(const Json& extension, const Json& attributes,
@@ -78,7 +122,7 @@ DracoMesh PlainPrimitives::decodeDraco(const Json& extension, const Json& attrib
     const auto id = readIndexMember(findMember(&extension, "attributes"), attribute.c_str());
     if (id && *id <= 0xffffffff)
       wanted[attribute] = {static_cast<std::uint32_t>(*id), width,
-                           isNormalised(attributes.at(attribute))};
+                           attribute == kColours || isNormalised(attributes.at(attribute))};
   }
   if (!wanted.contains("POSITION")) buffers_.fail(name + ": its Draco data has no positions");
   DracoMesh mesh;
@@ -105,7 +149,8 @@ const PlainPrimitives::WrittenDraco& PlainPrimitives::writeDraco(const Json& ext
   to.vertices = mesh.attributes.at("POSITION").size() / 3;
   to.indices = binary_.addIndices(mesh.indices);
   for (auto& [attribute, values] : mesh.attributes)
-    to.attributes[attribute] = writeFloats(std::move(values), widths.at(attribute), mapping);
+    to.attributes[attribute] =
+        writeFloats(attribute, std::move(values), widths.at(attribute), mapping);
   return to;
 }
 
@@ -141,8 +186,7 @@ void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
   if (!positions) buffers_.fail(name + ": has no positions");
   const TextureMapping mapping =
       readTextureMapping(gltf_, readIndexMember(&primitive, "material").value_or(kNoIndex));
-  const Widths widths = listAttributes(attributes, mapping);
-  if (attributes.contains("COLOR_0")) addDiagnostic(problems_, "vertex_colours_ignored", name);
+  const Widths widths = listAttributes(attributes, mapping, name);
   Json plain = Json::object();
   std::map<std::string, std::size_t> written;
   const Json* draco = findMember(findMember(&primitive, "extensions"), kDraco);
@@ -156,9 +200,9 @@ void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
     if (!written.contains(attribute)) {
       const auto accessor = readIndexMember(&attributes, attribute.c_str());
       if (!accessor) buffers_.fail(name + ": its " + attribute + " is not an accessor");
-      written[attribute] = writeAttribute(*accessor, width, mapping);
+      written[attribute] = writeAttribute(attribute, *accessor, width, mapping);
     }
-    plain[width == 2 ? "TEXCOORD_0" : attribute] = written[attribute];
+    plain[getPlainName(attribute)] = written[attribute];
   }
   if (draco == nullptr) rewriteIndices(primitive, countElements(*positions));
   primitive["attributes"] = std::move(plain);
@@ -180,7 +224,7 @@ PrimitiveArrays PlainPrimitives::readArrays(Json& primitive, const Json& attribu
     if (arrays.contains(attribute)) continue;
     const auto accessor = readIndexMember(&attributes, attribute.c_str());
     if (!accessor) buffers_.fail(name + ": its " + attribute + " is not an accessor");
-    arrays[attribute] = buffers_.readFloats(*accessor, width);
+    arrays[attribute] = buffers_.readFloats(*accessor, width, attribute == kColours);
   }
   if (draco == nullptr) rewriteIndices(primitive, arrays.at("POSITION").size() / 3);
   return arrays;
@@ -191,7 +235,7 @@ void PlainPrimitives::rewritePosed(Json& primitive, const std::string& name, con
   if (!readIndexMember(&attributes, "POSITION")) buffers_.fail(name + ": has no positions");
   const TextureMapping mapping =
       readTextureMapping(gltf_, readIndexMember(&primitive, "material").value_or(kNoIndex));
-  const Widths kept = listAttributes(attributes, mapping);
+  const Widths kept = listAttributes(attributes, mapping, name);
   Widths widths = kept;
   if (!pose.nodeFromJoint.empty()) {
     for (const auto& [attribute, accessor] : attributes.items())
@@ -203,8 +247,8 @@ void PlainPrimitives::rewritePosed(Json& primitive, const std::string& name, con
   if (!pose.nodeFromJoint.empty()) applySkin(pose, buffers_, name, arrays);
   Json plain = Json::object();
   for (const auto& [attribute, width] : kept)
-    plain[width == 2 ? "TEXCOORD_0" : attribute] =
-        writeFloats(std::move(arrays.at(attribute)), width, mapping);
+    plain[getPlainName(attribute)] =
+        writeFloats(attribute, std::move(arrays.at(attribute)), width, mapping);
   primitive["attributes"] = std::move(plain);
   for (const char* member : {"targets", "extensions"}) primitive.erase(member);
 }

@@ -23,8 +23,8 @@ class PlainPrimitives {
                   std::vector<Diagnostic>& problems)
       : gltf_(gltf), buffers_(buffers), binary_(binary), problems_(problems) {}
 
-  /// Rewrites one primitive in place. It keeps its material, positions, normals and the texture
-  /// coordinates that its material uses; `name` is for errors. Throws ImportError.
+  /// Rewrites one primitive in place. It keeps its material, positions, normals, vertex colours
+  /// and the texture coordinates that its material uses; `name` is for errors. Throws ImportError.
   void rewrite(nlohmann::json& primitive, const std::string& name);
   /// As rewrite(), with the vertices in a rest pose.
   void rewritePosed(nlohmann::json& primitive, const std::string& name, const RestPose& pose);
@@ -37,7 +37,9 @@ class PlainPrimitives {
   };
   using Widths = std::map<std::string, std::size_t>;
 
-  Widths listAttributes(const nlohmann::json& attributes, const TextureMapping& mapping) const;
+  Widths listAttributes(const nlohmann::json& attributes, const TextureMapping& mapping,
+                        const std::string& name);
+  std::size_t findColourWidth(const nlohmann::json& attributes, const std::string& name);
   DracoMesh decodeDraco(const nlohmann::json& extension, const nlohmann::json& attributes,
                         const Widths& widths, const std::string& name);
   PrimitiveArrays readArrays(nlohmann::json& primitive, const nlohmann::json& attributes,
@@ -45,10 +47,10 @@ class PlainPrimitives {
   const WrittenDraco& writeDraco(const nlohmann::json& extension, const nlohmann::json& attributes,
                                  const Widths& widths, const TextureMapping& mapping,
                                  const std::string& name);
-  std::size_t writeAttribute(std::size_t accessor, std::size_t width,
+  std::size_t writeAttribute(const std::string& attribute, std::size_t accessor, std::size_t width,
                              const TextureMapping& mapping);
-  std::size_t writeFloats(std::vector<float> values, std::size_t width,
-                          const TextureMapping& mapping);
+  std::size_t writeFloats(const std::string& attribute, std::vector<float> values,
+                          std::size_t width, const TextureMapping& mapping);
   void rewriteIndices(nlohmann::json& primitive, std::size_t vertices);
   bool isNormalised(const nlohmann::json& accessor) const;
   std::size_t countElements(std::size_t accessor) const;

@@ -27,6 +27,10 @@ std::string readGltfJson(const std::filesystem::path& file, ModelFormat format) 
   return text;
 }
 
+bool mentions(const std::string& text, std::string_view words) {
+  return memmem(text.data(), text.size(), words.data(), words.size()) != nullptr;
+}
+
 const nlohmann::json* findMember(const nlohmann::json* json, const char* key) {
   if (json == nullptr || !json->is_object()) return nullptr;
   const auto found = json->find(key);

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "scene/import/file/model_format.hpp"
 
@@ -18,6 +19,10 @@ inline constexpr std::size_t kNoIndex = ~std::size_t{0};  ///< in place of a mem
 
 /// The JSON text of a glTF or GLB file; empty if it cannot be read.
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format);
+
+/// Whether the text contains the words. Several times as fast as std::string::find if the text has
+/// many characters like the first of them, as JSON has quotes.
+bool mentions(const std::string& text, std::string_view words);
 
 /// Returns the member of an object; null if the member is missing, or if `json` is null or no
 /// object.
