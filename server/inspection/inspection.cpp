@@ -3,6 +3,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdarg>
 #include <cstdio>
 #include <map>
@@ -87,6 +88,17 @@ Json spacesToJson(const scene::Model& model) {
   return list;
 }
 
+/// Degrees in the plane of the floor: 0 looks along +x, 90 along -z.
+double computeFacing(const Eigen::Vector2d& direction) {
+  constexpr double kDegrees = 57.29577951308232;
+  return std::atan2(-direction.y(), direction.x()) * kDegrees;
+}
+
+Json northToJson(const std::optional<Eigen::Vector2d>& north) {
+  if (!north) return nullptr;
+  return {{"x", north->x()}, {"z", north->y()}, {"facing", computeFacing(*north)}};
+}
+
 Json objectsToJson(const scene::Scene& scene) {
   Json list = Json::array();
   for (std::uint32_t i = 0; i < scene.model().objects.size(); ++i) {
@@ -98,6 +110,8 @@ Json objectsToJson(const scene::Scene& scene) {
     if (object.storey) entry["storey"] = scene.model().storeys[*object.storey].name;
     if (!object.operationType.empty()) entry["operation"] = object.operationType;
     if (object.partOf) entry["piece_of"] = *object.partOf + 1;
+    for (const scene::ObjectAttribute& attribute : object.attributes)
+      entry["attributes"][attribute.name] = attribute.values;
     if (object.usage != scene::Object::Usage::both)
       entry["only"] = object.usage == scene::Object::Usage::visualOnly ? "drawn" : "solid";
     list.push_back(std::move(entry));
@@ -186,6 +200,15 @@ void addSummary(const Inspection& inspection, TextTable& table) {
                    model.offset.y(), model.offset.z());
   if (!model.map.empty())
     table.appendLine("  map         %s: x east, y up, -z north", model.map.c_str());
+  if (model.north)
+    table.appendLine("  north       facing %.3f: x %.6f, z %.6f", computeFacing(*model.north),
+                     model.north->x(), model.north->y());
+  if (model.fileScenes.size() > 1) {
+    table.appendLine("  scenes      %zu in the file, of which %u was read", model.fileScenes.size(),
+                     model.fileScene);
+    for (std::size_t i = 0; i < model.fileScenes.size(); ++i)
+      table.appendLine("              %zu  %s", i, model.fileScenes[i].c_str());
+  }
   table.appendLine("  objects     %zu, of which %zu are solid; %zu meshes", report.objects,
                    report.solidObjects, report.meshes);
   table.appendLine("  triangles   %zu; %zu in the meshes", report.triangles,
@@ -341,6 +364,8 @@ std::string formatInspectionJson(const Inspection& inspection,
   all["up"] = std::string(1, model.upAxis);
   all["offset"] = toJson(model.offset);
   all["map"] = model.map;
+  all["north"] = northToJson(model.north);
+  all["scenes"] = {{"names", model.fileScenes}, {"read", model.fileScene}};
   all["convex_parts"] = report.shells.exact + report.shells.nearlyConvex;
   all["convex_triangles"] = report.hullTriangles;
   all["triangle_parts"] = report.partTriangles;

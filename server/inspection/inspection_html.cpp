@@ -18,6 +18,11 @@ std::string formatPoint(const Vec3& point) {
   return fmt::format("{:.3f}, {:.3f}, {:.3f} m", point.x(), point.y(), point.z());
 }
 
+std::string describeNorth(const std::optional<Eigen::Vector2d>& north) {
+  if (!north) return "not stated by the file";
+  return fmt::format("x {:.6f}, z {:.6f}", north->x(), north->y());
+}
+
 void addFacts(const Inspection& inspection, HtmlPage& page) {
   const scene::Scene& scene = *inspection.loaded.scene;
   const scene::SceneReport& report = inspection.report;
@@ -33,7 +38,8 @@ void addFacts(const Inspection& inspection, HtmlPage& page) {
        {"Triangles", fmt::format("{}; {} in the meshes", report.triangles, report.uniqueTriangles)},
        {"Collision", fmt::format("{} convex parts replace {} triangles; {} triangles remain",
                                  convex, report.hullTriangles, report.partTriangles)},
-       {"Import", fmt::format("{:.2f} s", inspection.loaded.importSeconds)}});
+       {"Import", fmt::format("{:.2f} s", inspection.loaded.importSeconds)},
+       {"North", describeNorth(scene.model().north)}});
 }
 
 void addProblems(const Inspection& inspection, const std::vector<std::string>& accepted,

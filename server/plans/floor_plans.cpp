@@ -170,7 +170,7 @@ void drawSheet(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
   drawCut(canvas, view, scene);
   if (storey.storey) drawSpaceNames(canvas, view, scene.model(), *storey.storey);
   const double below = view.topLeft.y + view.height();
-  drawScaleBar(canvas, view, {view.topLeft.x, below + 34 * view.unit});
+  drawScaleBar(canvas, view, {view.topLeft.x, below + 34 * view.unit}, scene.model().north);
   drawTitle(canvas, view, scene, storey, scale);
   reportMissingFont(canvas);
 }

@@ -249,7 +249,8 @@ Image composeMap(const WalkTrace& trace, std::vector<Storey>& storeys, const sce
       drawSpaceNames(canvas, view, scene->model(), *named->storey);
     StoreyMarks(canvas, storeys, storey).draw(trace);
   }
-  drawScaleBar(canvas, storeys.front().view, {kBorder, legendTop - 1.6 * kLineHeight});
+  drawScaleBar(canvas, storeys.front().view, {kBorder, legendTop - 1.6 * kLineHeight},
+               scene ? scene->model().north : std::nullopt);
   drawLegend(canvas, legend, legendTop);
   reportMissingFont(canvas);
   return canvas.toImage();

@@ -157,6 +157,24 @@ void forEachGridLine(double from, double to, double step, const Visit& visit) {
   for (double k = std::ceil(from / step); k * step <= to; ++k) visit(k == 0 ? 0.0 : k * step);
 }
 
+/// A needle, half filled, and an N beyond its tip. The page's axes are the scene's x and z.
+void drawNorthArrow(Canvas& canvas, const PlanView& view, Point centre,
+                    const Eigen::Vector2d& north) {
+  const double length = 15 * view.unit, half = 6 * view.unit;
+  const auto at = [&](double along, double across) {
+    return Point{centre.x + along * north.x() - across * north.y(),
+                 centre.y + along * north.y() + across * north.x()};
+  };
+  const Point tip = at(length, 0), notch = at(-0.4 * length, 0);
+  const Point left = at(-length, -half), right = at(-length, half);
+  canvas.fill(std::vector<std::vector<Point>>{{tip, notch, left}}, kPlanInk);
+  canvas.polyline(std::array{tip, left, notch, right, tip}, 1.2 * view.unit, kPlanInk);
+  TextStyle style;
+  style.size = kTextSize * view.unit, style.colour = kPlanInk, style.bold = true;
+  const Point beyond = at(length + 0.8 * style.size, 0);
+  canvas.text({beyond.x, beyond.y - 0.6 * style.size}, "N", style, render::Align::centre);
+}
+
 }  // namespace
 
 PlanView makePlanView(const render::Camera& camera, double floor, Point topLeft,
@@ -218,7 +236,8 @@ void reportMissingFont(const Canvas& canvas) {
       canvas.textWithoutFont());
 }
 
-void drawScaleBar(Canvas& canvas, const PlanView& view, Point at) {
+void drawScaleBar(Canvas& canvas, const PlanView& view, Point at,
+                  const std::optional<Eigen::Vector2d>& north) {
   const double step = chooseGridStep(view), length = step * view.unitsPerMetre;
   const double height = 5 * view.unit, middle = at.y + 0.6 * kTextSize * view.unit;
   TextStyle style;
@@ -253,6 +272,8 @@ void drawScaleBar(Canvas& canvas, const PlanView& view, Point at) {
       1.2 * view.unit, kAxis);
   canvas.text({origin.x + arm + 5 * view.unit, origin.y - 0.6 * style.size}, "x", style);
   canvas.text({origin.x + 6 * view.unit, origin.y + arm - 0.8 * style.size}, "z", style);
+  if (north)
+    drawNorthArrow(canvas, view, {origin.x + arm + 60 * view.unit, origin.y + 0.5 * arm}, *north);
 }
 
 bool CaptionPlacer::isFree(const Rectangle& r) const {

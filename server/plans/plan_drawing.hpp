@@ -2,6 +2,8 @@
 // swing, a grid with coordinates, scale bar and axes.
 #pragma once
 
+#include <optional>
+
 #include "render/image/canvas.hpp"
 #include "scene/world/data/scene.hpp"
 #include "server/plans/plan_image.hpp"
@@ -42,8 +44,10 @@ void drawSpaceNames(render::Canvas& canvas, const PlanView& view, const scene::M
 /// Draws grid lines and their coordinates outside of the view, and a frame around it.
 void drawGrid(render::Canvas& canvas, const PlanView& view);
 
-/// Draws a scale bar with its top left corner at `at`, and the axes right of it.
-void drawScaleBar(render::Canvas& canvas, const PlanView& view, render::Point at);
+/// Draws a scale bar with its top left corner at `at`, and right of it the axes and, if it is
+/// known, north: its direction in x and z.
+void drawScaleBar(render::Canvas& canvas, const PlanView& view, render::Point at,
+                  const std::optional<Eigen::Vector2d>& north);
 
 /// Warns in the log if letters of a plan have no font here.
 void reportMissingFont(const render::Canvas& canvas);

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "scene/import/ifc/class_names.hpp"
-#include "scene/import/ifc/import_ifc.hpp"
+#include "scene/import/ifc/spatial_structure.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
 
 namespace enfilade::scene {

@@ -185,46 +185,6 @@ TEST(ImportIfc, AMapPositionIsReportedAndMovesNothing) {
   }
 }
 
-TEST(ImportIfc, OnRequestCoordinatesAreThoseOfTheMap) {
-  const TemporaryFolder folder;
-  IfcHouse house;
-  // The file's x axis points north on the map.
-  house.more =
-      "#600=IFCMAPCONVERSION(#20,#601,456789.,5428000.,110.,0.,1.,$);\n"
-      "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
-      "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-  const auto file = folder.write("house.ifc", house.text());
-  for (const IfcReader reader : readersHere()) {
-    ImportOptions options = by(reader);
-    options.georeference = true;
-    const Model model = importModel(file, options);
-    SCOPED_TRACE(model.reader);
-    EXPECT_EQ(model.map, "EPSG:25832");
-    // A corner of the file's (1.5, 0.1) is 0.1 m west and 1.5 m north of the origin; -z is north.
-    const Vec3 door = objectOf(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
-    EXPECT_LT((door - Vec3(456789 - 0.1, 110, -(5428000 + 1.5))).norm(), 1e-6) << door.transpose();
-    EXPECT_LT(Scene(Model(model)).bounds().size().z(), 4.01);
-    EXPECT_GT(Scene(Model(model)).bounds().size().z(), 3.99) << "the wall runs north";
-    EXPECT_LT(Scene(Model(model)).bounds().max.norm(), 100) << "the scene lies near its origin";
-  }
-}
-
-TEST(ImportIfc, AMapThatIsMissingIsAnErrorOnRequest) {
-  const TemporaryFolder folder;
-  ImportOptions options;
-  options.georeference = true;
-  for (const auto& file : {folder.write("house.ifc", IfcHouse().text()),
-                           folder.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")}) {
-    try {
-      importModel(file, options);
-      ADD_FAILURE() << file << " was read";
-    } catch (const ImportError& error) {
-      EXPECT_NE(std::string(error.what()).find("--georeference"), std::string::npos)
-          << error.what();
-    }
-  }
-}
-
 TEST(ImportIfc, ATechnicalCorrigendumOfAReleaseIsReadAsTheRelease) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
@@ -235,24 +195,6 @@ TEST(ImportIfc, ATechnicalCorrigendumOfAReleaseIsReadAsTheRelease) {
   const Model model = importModel(folder.write("house.ifc", text), by(IfcReader::webIfc));
   EXPECT_EQ(model.reader, "web-ifc");
   EXPECT_TRUE(objectOf(model, "IfcDoor").worldFromPlacement);
-}
-
-TEST(ImportIfc, AMapOfAnotherScaleIsRefusedOnRequest) {
-  const TemporaryFolder folder;
-  IfcHouse house;
-  house.more =
-      "#600=IFCMAPCONVERSION(#20,#601,456789.,5428000.,110.,1.,0.,40.);\n"
-      "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
-      "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-  ImportOptions options;
-  options.georeference = true;
-  try {
-    importModel(folder.write("house.ifc", house.text()), options);
-    ADD_FAILURE() << "a map forty times as large was applied";
-  } catch (const ImportError& error) {
-    EXPECT_NE(std::string(error.what()).find("IfcMapConversion scales by 40"), std::string::npos)
-        << error.what();
-  }
 }
 
 TEST(ImportIfc, StoreysAndSpacesAreKept) {
@@ -450,6 +392,11 @@ TEST(ImportIfc, AnArchiveIsUnpacked) {
 
 TEST(ImportIfc, AnArchiveWithZeroSeveralOrTooLargeModelsIsRefused) {
   const TemporaryFolder folder;
+  const auto xml = folder.write("xml.ifczip", tests::storedZip({{"house.ifcXML", "<ifcXML/>"}}));
+  EXPECT_NE(failureOf(xml).find("xml.ifczip: contains house.ifcXML, and IFC in XML is not read; "
+                                "export it as .ifc"),
+            std::string::npos)
+      << failureOf(xml);
   const auto none = folder.write("none.ifczip", tests::storedZip({{"readme.txt", "x"}}));
   EXPECT_NE(failureOf(none).find("none.ifczip: contains no .ifc file"), std::string::npos);
   EXPECT_NE(failureOf(folder.write("empty.ifczip", tests::storedZip({})))

@@ -64,6 +64,23 @@ TEST_F(Inspect, ListsStoreysOfIfcWithTheirObjects) {
   EXPECT_NE(table.out.find("0.000 m       2  Ground/floor"), std::string::npos) << table.out;
 }
 
+TEST_F(Inspect, ReportsNorthOnlyIfTheFileStatesIt) {
+  std::string text = tests::IfcHouse().text();
+  write(folder_ / "house.ifc", text);
+  const auto report = [&] {
+    const Ended ended = run({"inspect", path("house.ifc"), "--json"});
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return nlohmann::json::parse(ended.out).at("north");
+  };
+  EXPECT_TRUE(report().is_null());
+  const std::string context = "1.E-05,#11,$)";
+  text.replace(text.find(context), context.size(), "1.E-05,#11,#16)");
+  text.insert(text.find("#20="), "#16=IFCDIRECTION((1.,0.));\n");
+  write(folder_ / "house.ifc", text);
+  EXPECT_NEAR(report().at("x"), 1, 1e-12);
+  EXPECT_NEAR(report().at("facing"), 0, 1e-9);
+}
+
 TEST_F(Inspect, DescribesThePathOfABody) {
   write(folder_ / "room.walk.json",
         R"({"walk":1,"bodies":[{"name":"sign","kind":"path","objects":["room_wall"],

@@ -67,16 +67,21 @@ void seekToOnlyMember(unzFile archive, const fs::path& file, const std::string& 
   std::string names;
   std::size_t count = 0, found = 0;
   bool encrypted = false;
+  std::string xml;
   unz64_file_pos place{};
   int code = unzGoToFirstFile(archive);
   for (; code == UNZ_OK; code = unzGoToNextFile(archive), ++count) {
     const ArchiveMember member = readCurrentMember(archive, file);
+    if (extension == ".ifc" && isWantedName(member.name, ".ifcxml")) xml = member.name;
     if (!isWantedName(member.name, extension)) continue;
     if (++found <= 5) names += (names.empty() ? "" : ", ") + member.name;
     encrypted = member.encrypted;
     if (unzGetFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
   }
   if (code != UNZ_END_OF_LIST_OF_FILE) throwDamaged(file, kDamagedDirectory);
+  if (found == 0 && !xml.empty())
+    throw ImportError(file.string() + ": contains " + xml +
+                      ", and IFC in XML is not read; export it as .ifc, the STEP form (unzip)");
   if (found == 0) throwNoMember(file, extension, count);
   if (found > 1) {
     throw ImportError(file.string() + ": has " + std::to_string(found) + " " + extension +

@@ -40,12 +40,6 @@ void appendValue(std::vector<std::byte>& to, T value) {
   to.insert(to.end(), bytes, bytes + sizeof value);
 }
 
-Eigen::Vector3f readVector(MessageReader& in) {
-  Eigen::Vector3f v;
-  for (int axis = 0; axis < 3; ++axis) v[axis] = in.read<float>();
-  return v;
-}
-
 bool readGeometry(std::span<const std::byte> body, IfcMeshes& meshes) {
   MessageReader in(body);
   const auto id = in.read<std::uint32_t>();
@@ -54,14 +48,19 @@ bool readGeometry(std::span<const std::byte> body, IfcMeshes& meshes) {
   const std::uint64_t size = std::uint64_t{vertices} * 24 + std::uint64_t{indices} * 4;
   if (!in.isComplete() || in.remaining() != size || indices % 3 != 0) return false;
   IfcGeometry geometry;
-  for (std::uint32_t i = 0; i < vertices; ++i) {
-    geometry.positions.push_back(readVector(in));
-    geometry.normals.push_back(readVector(in));
+  const std::span<const std::byte> rest = in.rest();  // of the right size, as checked above
+  geometry.positions.resize(vertices);
+  geometry.normals.resize(vertices);
+  for (std::size_t i = 0; i < vertices; ++i) {
+    std::memcpy(geometry.positions[i].data(), rest.data() + 24 * i, 12);
+    std::memcpy(geometry.normals[i].data(), rest.data() + 24 * i + 12, 12);
   }
-  for (std::uint32_t i = 0; i < indices; ++i) {
-    geometry.indices.push_back(in.read<std::uint32_t>());
-    if (geometry.indices.back() >= vertices) return false;
-  }
+  geometry.indices.resize(indices);
+  if (indices > 0)
+    std::memcpy(geometry.indices.data(), rest.data() + std::size_t{24} * vertices,
+                std::size_t{4} * indices);
+  for (const std::uint32_t index : geometry.indices)
+    if (index >= vertices) return false;
   meshes.geometries[id] = std::move(geometry);
   return true;
 }

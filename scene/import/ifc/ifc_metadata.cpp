@@ -61,6 +61,28 @@ std::optional<Eigen::Affine3d> readAxisPlacement(const StepFile& file, std::uint
   return placement;
 }
 
+/// TrueNorth of an IfcGeometricRepresentationContext (identifier, type, dimensions, precision,
+/// placement, true north). It refers to the axes of the placement. Contexts of three dimensions
+/// come first.
+std::optional<Vec3> readTrueNorth(const StepFile& file) {
+  std::optional<Vec3> flat;
+  for (const StepStatement& statement : file.statements()) {
+    if (statement.type != "IFCGEOMETRICREPRESENTATIONCONTEXT") continue;
+    const Arguments arguments = splitStepArguments(statement.arguments);
+    const auto direction = readStepVector(file, getArgument(arguments, 5), "IFCDIRECTION");
+    if (!direction) continue;
+    Vec3 north = *direction;
+    const auto placement = parseStepReference(getArgument(arguments, 4));
+    if (const auto axes = placement ? readAxisPlacement(file, *placement, 1) : std::nullopt)
+      north = axes->linear() * north;
+    north.z() = 0;
+    if (!north.allFinite() || !(north.norm() > 1e-9)) continue;
+    if (parseStepNumber(getArgument(arguments, 2)) == 3) return north.normalized();
+    if (!flat) flat = north.normalized();
+  }
+  return flat;
+}
+
 // ---- bodies -------------------------------------------------------------------------------------
 
 /// Whether a representation declares triangles. Identifiers vary between exporters, so known
@@ -211,6 +233,9 @@ class IfcMetadataReader {
       metadata_.unitAssumption = "no length unit in IFCUNITASSIGNMENT: metres assumed";
     }
     metadata_.mapConversion = readIfcMapConversion(file_, metadata_.metresPerUnit);
+    metadata_.trueNorth = readTrueNorth(file_);
+    if (!metadata_.trueNorth && metadata_.mapConversion)
+      metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
   }
 
   void readStatement(const StepStatement& statement) {

@@ -42,6 +42,8 @@ struct IfcMetadata {
   std::optional<std::string> unitAssumption;  ///< the reason if the unit is assumed
   bool siUnit = true;                         ///< false: feet and other conversion-based units
   std::optional<IfcMapConversion> mapConversion;
+  /// Horizontal direction of north in the file's axes: of its context, otherwise of its map.
+  std::optional<Vec3> trueNorth;
   std::string schema;
   bool complete = true;                           ///< END-ISO-10303-21 is present
   std::vector<IfcProduct> products;               ///< in file order; one per express id

@@ -2,9 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <map>
+#include <sstream>
 #include <string_view>
 #include <vector>
+
+#include "scene/import/file/import_options.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -56,6 +60,147 @@ double computeMapScale(double scale, double mapUnits) {
   return std::abs(std::log(converted)) < std::abs(std::log(scale)) ? converted : scale;
 }
 
+/// The numbers of a georeference as the file states them.
+struct MapNumbers {
+  std::string source, crs;
+  std::optional<double> unit;  ///< metres per unit of the map; nullopt: not stated
+  double east = 0, north = 0, height = 0, xAxisEast = 1, xAxisNorth = 0, scale = 1;
+  Eigen::Vector3d axisScale = Eigen::Vector3d::Ones();
+};
+
+using MapArguments = std::vector<std::string_view>;
+
+double readMapNumber(const MapArguments& arguments, std::size_t index, double fallback) {
+  if (index >= arguments.size()) return fallback;
+  return parseStepNumber(arguments[index]).value_or(fallback);
+}
+
+/// The target of a conversion: an IfcProjectedCRS, whose first argument is the name, the seventh
+/// the unit. Returns false for a system of angles.
+bool readMapSystem(const StepFile& file, const MapArguments& arguments, MapNumbers& to) {
+  const auto crs = arguments.size() > 1 ? parseStepReference(arguments[1]) : std::nullopt;
+  const StepStatement* map = crs ? file.find(*crs) : nullptr;
+  if (map == nullptr) return true;
+  if (map->type == "IFCGEOGRAPHICCRS") return false;
+  const MapArguments system = splitStepArguments(map->arguments);
+  if (!system.empty()) to.crs = parseStepString(system[0]).value_or("");
+  const auto unit = system.size() > 6 ? parseStepReference(system[6]) : std::nullopt;
+  if (unit) to.unit = resolveMetres(file, *unit);
+  return true;
+}
+
+/// IfcMapConversion (source, target, eastings, northings, height, x axis abscissa and ordinate,
+/// scale) and IfcMapConversionScaled (.., factors of x, y and z).
+std::optional<MapNumbers> readMapConversion(const StepFile& file) {
+  for (const StepStatement& statement : file.statements()) {
+    const bool scaled = statement.type == "IFCMAPCONVERSIONSCALED";
+    if (!scaled && statement.type != "IFCMAPCONVERSION") continue;
+    const MapArguments arguments = splitStepArguments(statement.arguments);
+    const auto number = [&](std::size_t index, double fallback) {
+      return readMapNumber(arguments, index, fallback);
+    };
+    MapNumbers numbers;
+    numbers.source = scaled ? "IfcMapConversionScaled" : "IfcMapConversion";
+    if (!readMapSystem(file, arguments, numbers)) return std::nullopt;
+    numbers.east = number(2, 0), numbers.north = number(3, 0), numbers.height = number(4, 0);
+    numbers.xAxisEast = number(5, 1), numbers.xAxisNorth = number(6, 0);
+    numbers.scale = number(7, 1);
+    if (scaled) numbers.axisScale = {number(8, 1), number(9, 1), number(10, 1)};
+    return numbers;
+  }
+  return std::nullopt;
+}
+
+/// IfcRigidOperation (source, target, first and second coordinate, height): it does not rotate.
+std::optional<MapNumbers> readRigidOperation(const StepFile& file) {
+  for (const StepStatement& statement : file.statements()) {
+    if (statement.type != "IFCRIGIDOPERATION") continue;
+    const MapArguments arguments = splitStepArguments(statement.arguments);
+    MapNumbers numbers;
+    numbers.source = "IfcRigidOperation";
+    if (arguments.size() < 4 || arguments[2].starts_with("IFCPLANEANGLEMEASURE") ||
+        !readMapSystem(file, arguments, numbers))
+      return std::nullopt;
+    numbers.east = readMapNumber(arguments, 2, 0);
+    numbers.north = readMapNumber(arguments, 3, 0);
+    numbers.height = readMapNumber(arguments, 4, 0);
+    return numbers;
+  }
+  return std::nullopt;
+}
+
+std::string toUpperCase(std::string text) {
+  for (char& letter : text)
+    if (letter >= 'a' && letter <= 'z') letter = static_cast<char>(letter - 'a' + 'A');
+  return text;
+}
+
+/// The single values of the first property set of this name, by their names; both in upper case.
+/// Writers differ in capitals: ePSet, ePset.
+std::map<std::string, std::string_view> readPropertySet(const StepFile& file,
+                                                        const std::string& name) {
+  std::map<std::string, std::string_view> values;
+  for (const StepStatement& statement : file.statements()) {
+    if (statement.type != "IFCPROPERTYSET") continue;
+    const MapArguments set = splitStepArguments(statement.arguments);
+    if (set.size() < 5 || toUpperCase(parseStepString(set[2]).value_or("")) != name) continue;
+    for (const std::uint32_t id : parseStepReferences(set[4])) {
+      const StepStatement* property = file.findOfType(id, "IFCPROPERTYSINGLEVALUE");
+      if (property == nullptr) continue;
+      const MapArguments single = splitStepArguments(property->arguments);
+      if (single.size() > 2)
+        values.emplace(toUpperCase(parseStepString(single[0]).value_or("")), single[2]);
+    }
+    return values;
+  }
+  return values;
+}
+
+/// A text such as IFCLABEL('EPSG:25832').
+std::string parseLabel(std::string_view value) {
+  const std::size_t open = value.find('('), close = value.rfind(')');
+  if (open != std::string_view::npos && close != std::string_view::npos && open < close)
+    value = value.substr(open + 1, close - open - 1);
+  return parseStepString(value).value_or("");
+}
+
+/// The names of units that property sets give as texts.
+std::optional<double> parseUnitName(const std::string& name) {
+  static const std::map<std::string, double> kUnits{
+      {"METRE", 1},          {"METER", 1},        {"M", 1},
+      {"MILLIMETRE", 0.001}, {"MM", 0.001},       {"CENTIMETRE", 0.01},
+      {"FOOT", 0.3048},      {"FEET", 0.3048},    {"FT", 0.3048},
+      {"INCH", 0.0254},      {"KILOMETRE", 1000}, {"US SURVEY FOOT", 1200.0 / 3937}};
+  const auto unit = kUnits.find(toUpperCase(name));
+  return unit == kUnits.end() ? std::nullopt : std::optional(unit->second);
+}
+
+/// IFC2x3 has no entity for maps; buildingSMART's guide to georeferencing gives it property sets.
+std::optional<MapNumbers> readMapProperties(const StepFile& file) {
+  const auto values = readPropertySet(file, "EPSET_MAPCONVERSION");
+  if (!values.contains("EASTINGS") || !values.contains("NORTHINGS")) return std::nullopt;
+  const auto number = [&](const char* name, double fallback) {
+    const auto value = values.find(name);
+    return value == values.end() ? fallback : parseStepNumber(value->second).value_or(fallback);
+  };
+  const auto system = readPropertySet(file, "EPSET_PROJECTEDCRS");
+  const auto text = [&](const char* name) {
+    const auto value = system.find(name);
+    return value == system.end() ? std::string() : parseLabel(value->second);
+  };
+  MapNumbers numbers;
+  numbers.source = "ePSet_MapConversion";
+  numbers.crs = text("NAME");
+  if (const auto target = values.find("TARGETCRS"); numbers.crs.empty() && target != values.end())
+    numbers.crs = parseLabel(target->second);
+  numbers.unit = parseUnitName(text("MAPUNIT"));
+  numbers.east = number("EASTINGS", 0), numbers.north = number("NORTHINGS", 0);
+  numbers.height = number("ORTHOGONALHEIGHT", 0);
+  numbers.xAxisEast = number("XAXISABSCISSA", 1), numbers.xAxisNorth = number("XAXISORDINATE", 0);
+  numbers.scale = number("SCALE", 1);
+  return numbers;
+}
+
 }  // namespace
 
 std::optional<double> readIfcMetresPerUnit(const StepFile& file, bool& siUnit) {
@@ -72,47 +217,37 @@ std::optional<double> readIfcMetresPerUnit(const StepFile& file, bool& siUnit) {
   return std::nullopt;
 }
 
-/// IfcMapConversion (source, target, eastings, northings, height, x axis abscissa and ordinate,
-/// scale); its target is an IfcProjectedCRS, whose first argument is the name, the seventh the
-/// unit.
 std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, double metresPerUnit) {
   constexpr double kMaxCoordinate = 1e9;  // metres; larger than any map
-  for (const StepStatement& statement : file.statements()) {
-    if (statement.type != "IFCMAPCONVERSION") continue;
-    const std::vector<std::string_view> arguments = splitStepArguments(statement.arguments);
-    const auto number = [&](std::size_t index, double fallback) {
-      if (index >= arguments.size()) return fallback;
-      return parseStepNumber(arguments[index]).value_or(fallback);
-    };
-    IfcMapConversion conversion;
-    const double scale = number(7, 1);
-    // Without a unit of its own the map has that of the file, unless the scale leads to metres.
-    double unit = computeMapScale(scale, 1 / metresPerUnit) == scale ? metresPerUnit : 1;
-    const auto crs = arguments.size() > 1 ? parseStepReference(arguments[1]) : std::nullopt;
-    if (const StepStatement* map = crs ? file.find(*crs) : nullptr) {
-      const std::vector<std::string_view> crsArguments = splitStepArguments(map->arguments);
-      if (!crsArguments.empty()) conversion.crs = parseStepString(crsArguments[0]).value_or("");
-      const auto mapUnit =
-          crsArguments.size() > 6 ? parseStepReference(crsArguments[6]) : std::nullopt;
-      if (mapUnit) unit = resolveMetres(file, *mapUnit).value_or(unit);
-    }
-    conversion.east = unit * number(2, 0), conversion.north = unit * number(3, 0);
-    conversion.height = unit * number(4, 0);
-    const double xAxisEast = number(5, 1), xAxisNorth = number(6, 0);
-    conversion.rotation = std::atan2(xAxisNorth, xAxisEast);
-    const double length = std::sqrt(xAxisEast * xAxisEast + xAxisNorth * xAxisNorth);
-    if (length > 0) {
-      conversion.xAxisEast = xAxisEast / length;
-      conversion.xAxisNorth = xAxisNorth / length;
-    }
-    conversion.scale = computeMapScale(scale, unit / metresPerUnit);
-    const double maxCoordinate = std::max(
-        {std::abs(conversion.east), std::abs(conversion.north), std::abs(conversion.height)});
-    const bool isValid = unit > 0 && maxCoordinate <= kMaxCoordinate && conversion.scale > 0 &&
-                         conversion.scale <= kMaxCoordinate && (xAxisEast != 0 || xAxisNorth != 0);
-    return isValid ? std::optional(conversion) : std::nullopt;
+  std::optional<MapNumbers> numbers = readMapConversion(file);
+  if (!numbers) numbers = readRigidOperation(file);
+  if (!numbers) numbers = readMapProperties(file);
+  if (!numbers) return std::nullopt;
+  // Without a unit of its own the map has that of the file, unless the scale leads to metres.
+  const bool inFileUnits = computeMapScale(numbers->scale, 1 / metresPerUnit) == numbers->scale;
+  const double unit = numbers->unit.value_or(inFileUnits ? metresPerUnit : 1);
+  IfcMapConversion conversion;
+  conversion.source = numbers->source;
+  conversion.crs = numbers->crs;
+  conversion.east = unit * numbers->east, conversion.north = unit * numbers->north;
+  conversion.height = unit * numbers->height;
+  const double xAxisEast = numbers->xAxisEast, xAxisNorth = numbers->xAxisNorth;
+  conversion.rotation = std::atan2(xAxisNorth, xAxisEast);
+  const double length = std::sqrt(xAxisEast * xAxisEast + xAxisNorth * xAxisNorth);
+  if (length > 0) {
+    conversion.xAxisEast = xAxisEast / length;
+    conversion.xAxisNorth = xAxisNorth / length;
   }
-  return std::nullopt;
+  // A rigid operation keeps lengths; in other units they are the same metres.
+  if (numbers->source != "IfcRigidOperation")
+    conversion.scale = computeMapScale(numbers->scale, unit / metresPerUnit);
+  conversion.axisScale = numbers->axisScale;
+  const double maxCoordinate = std::max(
+      {std::abs(conversion.east), std::abs(conversion.north), std::abs(conversion.height)});
+  const bool isValid = unit > 0 && maxCoordinate <= kMaxCoordinate && conversion.scale > 0 &&
+                       conversion.scale <= kMaxCoordinate && (xAxisEast != 0 || xAxisNorth != 0) &&
+                       conversion.axisScale.minCoeff() > 0 && conversion.axisScale.allFinite();
+  return isValid ? std::optional(conversion) : std::nullopt;
 }
 
 Eigen::Affine3d computeMapFromFile(const IfcMapConversion& conversion) {
@@ -120,8 +255,36 @@ Eigen::Affine3d computeMapFromFile(const IfcMapConversion& conversion) {
   map.linear() << conversion.xAxisEast, -conversion.xAxisNorth, 0, conversion.xAxisNorth,
       conversion.xAxisEast, 0, 0, 0, 1;
   map.linear() *= conversion.scale;
+  map.linear() = map.linear() * conversion.axisScale.asDiagonal();
   map.translation() = Eigen::Vector3d(conversion.east, conversion.north, conversion.height);
   return map;
+}
+
+Eigen::Vector3d computeGridNorth(const IfcMapConversion& conversion) {
+  return {conversion.xAxisNorth, conversion.xAxisEast, 0};
+}
+
+std::string formatMapConversion(const IfcMapConversion& conversion) {
+  constexpr double kDegrees = 57.29577951308232;
+  char text[160];
+  std::snprintf(text, sizeof text,
+                "the file's origin is at E %.3f, N %.3f, H %.3f m, its x axis %.6f degrees from "
+                "east to north, scale %.9g",
+                conversion.east, conversion.north, conversion.height,
+                conversion.rotation * kDegrees, conversion.scale);
+  return (conversion.crs.empty() ? "unnamed map" : conversion.crs) + ": " + text;
+}
+
+/// Coordinates of another size than a projection's are not what was meant.
+void requireMapScale(const IfcMapConversion& conversion) {
+  const double min = conversion.scale * conversion.axisScale.minCoeff();
+  const double max = conversion.scale * conversion.axisScale.maxCoeff();
+  if (min >= 0.5 && max <= 2) return;
+  std::ostringstream scale;
+  scale << (max > 2 ? max : min);
+  throw ImportError("--georeference: its " + conversion.source + " scales by " + scale.str() +
+                    "; leave the option out, or correct its Scale, which converts from the file's "
+                    "length unit to the map's (open)");
 }
 
 }  // namespace enfilade::scene

@@ -8,7 +8,6 @@
 
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/finish_model.hpp"
-#include "scene/import/assembly/path_names.hpp"
 #include "scene/import/ifc/elevators.hpp"
 #include "scene/import/ifc/ifc_file.hpp"
 #include "scene/import/ifc/ifc_readers.hpp"
@@ -22,44 +21,11 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr int kMaxPathDepth = 100;  // levels from the project to a product
 constexpr double kImportTimeFraction =
     0.95;  // of the time limit; the rest is for sending the result
 constexpr double kReaderTimeFraction = 0.6;  // of the remaining time, if another reader may follow
 constexpr std::size_t kTextMemoryDivisor = 8;  // the text may take 1/8 of the memory limit
 constexpr std::size_t kMaxTextBytes = std::size_t{4} << 30;  // bytes, without a memory limit
-
-class PathBuilder {
- public:
-  explicit PathBuilder(const IfcMetadata& metadata) : metadata_(metadata) {}
-
-  const std::string& buildPath(std::uint32_t id, int depth = 0) {
-    const auto known = paths_.find(id);
-    if (known != paths_.end()) return known->second;
-    const IfcProduct* product = metadata_.find(id);
-    const std::uint32_t parent = product == nullptr ? 0 : findParent(*product, depth);
-    const std::string above = parent == 0 ? std::string() : buildPath(parent, depth + 1) + "/";
-    return paths_[id] = above + siblings_[parent].makeUnique(makePathSegment(id, product));
-  }
-  std::map<std::uint32_t, std::string> takePaths() { return std::move(paths_); }
-
- private:
-  std::uint32_t findParent(const IfcProduct& product, int depth) const {
-    const bool known =
-        metadata_.find(product.parent) != nullptr || metadata_.projects.contains(product.parent);
-    return known && product.parent != product.id && depth < kMaxPathDepth ? product.parent : 0;
-  }
-  std::string makePathSegment(std::uint32_t id, const IfcProduct* product) const {
-    const auto project = metadata_.projects.find(id);
-    const std::string& name = product != nullptr ? product->name : project->second;
-    if (!name.empty()) return encodePathSegment(name);
-    return product != nullptr ? product->ifcClass : "IfcProject";
-  }
-
-  const IfcMetadata& metadata_;
-  std::map<std::uint32_t, std::string> paths_;
-  std::map<std::uint32_t, SiblingNames> siblings_;
-};
 
 std::string describeProduct(const IfcProduct& product) {
   std::string text = product.globalId + " (" + product.ifcClass;
@@ -79,12 +45,30 @@ class NodeBuilder {
         worldFromReader_(worldFromFile * Eigen::Affine3d(makeYUpRotation('z').transpose())),
         model_(model) {}
 
-  void addProduct(const IfcProduct& product, const IfcMeshes& meshes) {
+  /// Moves geometries of these meshes out of them, instead of copying: those of one colour that no
+  /// space needs.
+  void moveGeometries(const IfcMeshes& meshes) {
+    std::map<std::uint32_t, const IfcPlacedGeometry*> first;
+    std::set<std::uint32_t> kept;
+    for (const auto& [id, parts] : meshes.products) {
+      const IfcProduct* product = metadata_.find(id);
+      const bool space = product == nullptr || product->role == IfcProduct::Role::space;
+      for (const IfcPlacedGeometry& placed : parts) {
+        const auto known = first.try_emplace(placed.geometry, &placed).first;
+        if (space || known->second->colour != placed.colour) kept.insert(placed.geometry);
+      }
+    }
+    for (const auto& [geometry, placed] : first)
+      if (!kept.contains(geometry) && !meshes.geometries.at(geometry).indices.empty())
+        movable_.emplace(&meshes, geometry);
+  }
+
+  void addProduct(const IfcProduct& product, IfcMeshes& meshes) {
     ImportedNode imported;
     imported.object = makeObject(product);
     for (const IfcPlacedGeometry& placed : meshes.products.at(product.id)) {
-      const IfcGeometry& geometry = meshes.geometries.at(placed.geometry);
-      if (geometry.indices.empty()) continue;
+      const bool moved = movable_.contains({&meshes, placed.geometry});
+      if (!moved && meshes.geometries.at(placed.geometry).indices.empty()) continue;
       imported.instances.push_back(
           {findOrAddMesh(meshes, placed, product), worldFromReader_ * placed.worldFromGeometry});
     }
@@ -119,18 +103,20 @@ class NodeBuilder {
   std::vector<Mesh> convertedMeshes;
 
  private:
-  std::uint32_t findOrAddMesh(const IfcMeshes& meshes, const IfcPlacedGeometry& placed,
+  std::uint32_t findOrAddMesh(IfcMeshes& meshes, const IfcPlacedGeometry& placed,
                               const IfcProduct& product) {
     const std::uint32_t material = findOrAddMaterial(placed.colour);
     const auto [known, isNew] = meshByGeometry_.try_emplace(
         {&meshes, placed.geometry, material}, static_cast<std::uint32_t>(convertedMeshes.size()));
     if (!isNew) return known->second;
-    const IfcGeometry& geometry = meshes.geometries.at(placed.geometry);
+    IfcGeometry& source = meshes.geometries.at(placed.geometry);
+    IfcGeometry geometry =
+        movable_.contains({&meshes, placed.geometry}) ? std::move(source) : source;
     Mesh mesh;
     mesh.name = product.name.empty() ? product.ifcClass : product.name;
-    mesh.positions = geometry.positions;
-    mesh.normals = geometry.normals;
-    mesh.indices = geometry.indices;
+    mesh.positions = std::move(geometry.positions);
+    mesh.normals = std::move(geometry.normals);
+    mesh.indices = std::move(geometry.indices);
     mesh.material = material;
     convertedMeshes.push_back(std::move(mesh));
     return known->second;
@@ -160,6 +146,7 @@ class NodeBuilder {
   std::map<std::array<float, 4>, std::uint32_t> materialByColour_;
   std::map<std::tuple<const IfcMeshes*, std::uint32_t, std::uint32_t>, std::uint32_t>
       meshByGeometry_;
+  std::set<std::pair<const IfcMeshes*, std::uint32_t>> movable_;
 };
 
 /// Whether a geometry of the product has floats coarser than kMaxFloatSpacing.
@@ -175,27 +162,6 @@ bool isLowPrecision(const IfcMeshes& meshes, std::uint32_t product) {
         const double scale = placed.worldFromGeometry.linear().cwiseAbs().maxCoeff();
         return static_cast<double>(maxCoordinate) * scale * 0x1p-23 > kMaxFloatSpacing;
       });
-}
-
-std::string formatMapConversion(const IfcMapConversion& conversion) {
-  constexpr double kDegrees = 57.29577951308232;
-  char text[160];
-  std::snprintf(text, sizeof text,
-                "the file's origin is at E %.3f, N %.3f, H %.3f m, its x axis %.6f degrees from "
-                "east to north, scale %.9g",
-                conversion.east, conversion.north, conversion.height,
-                conversion.rotation * kDegrees, conversion.scale);
-  return (conversion.crs.empty() ? "unnamed map" : conversion.crs) + ": " + text;
-}
-
-/// A projection scales by less than a percent; coordinates of another size are not what was meant.
-void requireMapScale(const IfcMapConversion& conversion) {
-  if (conversion.scale >= 0.5 && conversion.scale <= 2) return;
-  std::ostringstream scale;
-  scale << conversion.scale;
-  throw ImportError("--georeference: its IfcMapConversion scales by " + scale.str() +
-                    "; leave the option out, or correct its Scale, which converts from the file's "
-                    "length unit to the map's (open)");
 }
 
 class IfcImport {
@@ -214,14 +180,7 @@ class IfcImport {
                         "ISO-10303-21); export it again as IFC (open)");
     }
     reportProgress("index", 0);
-    const StepFile file(std::move(text));
-    metadata_ = readIfcMetadata(file);
-    reportMetadata(file);
-    wanted_ = collectWantedProducts();
-    std::vector<std::uint32_t> read = wanted_;
-    for (const IfcProduct& product : metadata_.products)
-      if (product.hasBody && product.role == IfcProduct::Role::space) read.push_back(product.id);
-    input_.emplace(request_, file.text(), std::move(read));
+    readText(std::move(text));
     Model model = readMeshes();
     model.source = request_.file;
     reportProgress("openings", 0);
@@ -232,6 +191,18 @@ class IfcImport {
   }
 
  private:
+  /// Reads the metadata and passes the text on to the readers; it is not kept.
+  void readText(std::string text) {
+    const StepFile file(std::move(text));
+    metadata_ = readIfcMetadata(file);
+    reportMetadata(file);
+    wanted_ = collectWantedProducts();
+    std::vector<std::uint32_t> read = wanted_;
+    for (const IfcProduct& product : metadata_.products)
+      if (product.hasBody && product.role == IfcProduct::Role::space) read.push_back(product.id);
+    input_.emplace(request_, file.text(), std::move(read));
+  }
+
   void reportProgress(const char* stage, double fraction) const {
     if (progress_) progress_(stage, fraction);
   }
@@ -253,9 +224,13 @@ class IfcImport {
     }
     if (request_.options.georeference && !metadata_.mapConversion)
       throw ImportError(request_.file +
-                        ": --georeference: the file has no IfcMapConversion; leave "
-                        "the option out, or export the file with its map (open)");
-    if (request_.options.georeference) requireMapScale(*metadata_.mapConversion);
+                        ": --georeference: the file has no IfcMapConversion, IfcRigidOperation "
+                        "or ePSet_MapConversion in metres; leave the option out, or export the "
+                        "file with its map (open)");
+    if (request_.options.georeference) {
+      requireMapScale(*metadata_.mapConversion);
+      metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
+    }
     if (metadata_.mapConversion)
       addDiagnostic(diagnostics_, "map_place", formatMapConversion(*metadata_.mapConversion));
     for (const IfcProduct& product : metadata_.products) {
@@ -300,12 +275,12 @@ class IfcImport {
 
   Model readMeshes() {
     if (isReaderAllowed(IfcReader::webIfc)) {
-      const IfcReadResult web = readWithWebIfc(*input_, readerTimeLimit(), progress_);
+      IfcReadResult web = readWithWebIfc(*input_, readerTimeLimit(), progress_);
       recordFailure("web-ifc", web);
       if (hasTriangles(web.meshes)) return makeModel(web.meshes, "web-ifc");
     }
     if (isReaderAllowed(IfcReader::ifcPlusPlus)) {
-      const IfcReadResult plus = readWithIfcPlusPlus(*input_, readerTimeLimit(), progress_);
+      IfcReadResult plus = readWithIfcPlusPlus(*input_, readerTimeLimit(), progress_);
       recordFailure("ifcplusplus", plus);
       if (hasTriangles(plus.meshes)) return makeModel(plus.meshes, "ifcplusplus");
     }
@@ -356,28 +331,34 @@ class IfcImport {
   /// The reader whose meshes a product gets.
   enum class Source : std::uint8_t { none, first, second };
 
-  Model makeModel(const IfcMeshes& meshes, const std::string& reader) {
-    const std::optional<IfcReadResult> second = readMissingProducts(meshes, reader);
+  Model makeModel(IfcMeshes& meshes, const std::string& reader) {
+    std::optional<IfcReadResult> second = readMissingProducts(meshes, reader);
     reportProgress("convert", 0);
     std::map<std::uint32_t, Source> sources;
+    bool anySecond = false;
     for (const std::uint32_t id : wanted_) {
       const bool other =
           second && second->meshes.countTriangles(id) > 0 && needsSecondReader(meshes, id);
       const bool own = meshes.countTriangles(id) > 0;
+      anySecond = anySecond || other;
       sources[id] = other ? Source::second : own ? Source::first : Source::none;
     }
-    Model model = buildModel(meshes, second, sources, reader);
-    if (dropFullyCutHosts(model, meshes, sources))
-      model = buildModel(meshes, second, sources, reader);
+    // Walls of the second reader alone may be dropped, which takes another build.
+    Model model = buildModel(meshes, second, sources, reader, !anySecond);
+    if (anySecond && dropFullyCutHosts(model, meshes, sources))
+      model = buildModel(meshes, second, sources, reader, true);
     reportSources(meshes, sources);
     return model;
   }
 
-  Model buildModel(const IfcMeshes& first, const std::optional<IfcReadResult>& second,
-                   const std::map<std::uint32_t, Source>& sources,
-                   const std::string& reader) const {
+  /// `isLast`: the geometries may be moved into the model.
+  Model buildModel(IfcMeshes& first, std::optional<IfcReadResult>& second,
+                   const std::map<std::uint32_t, Source>& sources, const std::string& reader,
+                   bool isLast) const {
     Model model = makeEmptyModel(reader);
     NodeBuilder builder(metadata_, computeWorldFromFile(model), model);
+    if (isLast) builder.moveGeometries(first);
+    if (isLast && second) builder.moveGeometries(second->meshes);
     for (const auto& product : metadata_.products) {
       const auto source = sources.find(product.id);
       if (source == sources.end() || source->second == Source::none) continue;
@@ -486,12 +467,6 @@ class IfcImport {
 };
 
 }  // namespace
-
-std::map<std::uint32_t, std::string> buildIfcPaths(const IfcMetadata& metadata) {
-  PathBuilder paths(metadata);
-  for (const IfcProduct& product : metadata.products) paths.buildPath(product.id);
-  return paths.takePaths();
-}
 
 Model importIfc(const ImportRequest& request, const ImportProgress& progress) {
   return IfcImport(request, progress).run();

@@ -2,10 +2,6 @@
 // Runs in the import worker, which starts one process per reader.
 #pragma once
 
-#include <cstdint>
-#include <map>
-#include <string>
-
 #include "scene/import/ifc/ifc_metadata.hpp"
 #include "scene/import/worker/process.hpp"
 
@@ -13,8 +9,5 @@ namespace enfilade::scene {
 
 /// Throws ImportError if no reader can read the file.
 Model importIfc(const ImportRequest& request, const ImportProgress& progress);
-
-/// Unique path of each product from the project down, by express id.
-std::map<std::uint32_t, std::string> buildIfcPaths(const IfcMetadata& metadata);
 
 }  // namespace enfilade::scene

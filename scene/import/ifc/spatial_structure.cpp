@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <utility>
 
+#include "scene/import/assembly/path_names.hpp"
+
 namespace enfilade::scene {
 namespace {
 
 constexpr int kMaxContainers = 100;  // around a product; files may have rings
+constexpr int kMaxPathDepth = 100;   // levels from the project to a product
 
 bool isStorey(const IfcProduct& product) {
   return product.ifcClass == "IfcBuildingStorey";
@@ -26,7 +29,55 @@ Aabb computeSpaceBox(const IfcMeshes& meshes, std::uint32_t space,
   return box;
 }
 
+/// North in the scene's horizontal plane; nullopt if the file states none, or an --up axis turned
+/// it upright.
+std::optional<Eigen::Vector2d> computeSceneNorth(const std::optional<Vec3>& trueNorth,
+                                                 const Eigen::Affine3d& worldFromFile) {
+  if (!trueNorth) return std::nullopt;
+  const Vec3 north = (worldFromFile.linear() * *trueNorth).normalized();
+  const Eigen::Vector2d level(north.x(), north.z());
+  return level.norm() > 0.99 ? std::optional<Eigen::Vector2d>(level.normalized()) : std::nullopt;
+}
+
+class PathBuilder {
+ public:
+  explicit PathBuilder(const IfcMetadata& metadata) : metadata_(metadata) {}
+
+  const std::string& buildPath(std::uint32_t id, int depth = 0) {
+    const auto known = paths_.find(id);
+    if (known != paths_.end()) return known->second;
+    const IfcProduct* product = metadata_.find(id);
+    const std::uint32_t parent = product == nullptr ? 0 : findParent(*product, depth);
+    const std::string above = parent == 0 ? std::string() : buildPath(parent, depth + 1) + "/";
+    return paths_[id] = above + siblings_[parent].makeUnique(makePathSegment(id, product));
+  }
+  std::map<std::uint32_t, std::string> takePaths() { return std::move(paths_); }
+
+ private:
+  std::uint32_t findParent(const IfcProduct& product, int depth) const {
+    const bool known =
+        metadata_.find(product.parent) != nullptr || metadata_.projects.contains(product.parent);
+    return known && product.parent != product.id && depth < kMaxPathDepth ? product.parent : 0;
+  }
+  std::string makePathSegment(std::uint32_t id, const IfcProduct* product) const {
+    const auto project = metadata_.projects.find(id);
+    const std::string& name = product != nullptr ? product->name : project->second;
+    if (!name.empty()) return encodePathSegment(name);
+    return product != nullptr ? product->ifcClass : "IfcProject";
+  }
+
+  const IfcMetadata& metadata_;
+  std::map<std::uint32_t, std::string> paths_;
+  std::map<std::uint32_t, SiblingNames> siblings_;
+};
+
 }  // namespace
+
+std::map<std::uint32_t, std::string> buildIfcPaths(const IfcMetadata& metadata) {
+  PathBuilder paths(metadata);
+  for (const IfcProduct& product : metadata.products) paths.buildPath(product.id);
+  return paths.takePaths();
+}
 
 Vec3 findStoreyOrigin(const IfcProduct& storey) {
   return storey.fileFromPlacement ? Vec3(storey.fileFromPlacement->translation())
@@ -61,6 +112,7 @@ std::optional<std::uint32_t> StoreyTable::find(const IfcProduct& product) const 
 void addSpatialStructure(const IfcMetadata& metadata, const StoreyTable& storeys,
                          const IfcMeshes& meshes, const Eigen::Affine3d& worldFromFile,
                          const Eigen::Affine3d& worldFromReader, Model& model) {
+  model.north = computeSceneNorth(metadata.trueNorth, worldFromFile);
   for (const std::uint32_t id : storeys.storeys()) {
     const IfcProduct& product = *metadata.find(id);
     model.storeys.push_back({product.name.empty() ? product.longName : product.name,

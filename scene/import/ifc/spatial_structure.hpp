@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "scene/import/ifc/ifc_meshes.hpp"
@@ -28,11 +29,14 @@ class StoreyTable {
   std::map<std::uint32_t, std::uint32_t> indexById_;
 };
 
+/// Unique path of each product from the project down, by express id.
+std::map<std::uint32_t, std::string> buildIfcPaths(const IfcMetadata& metadata);
+
 /// The origin of a storey in the file's axes, metres: of its placement, otherwise as stated.
 Vec3 findStoreyOrigin(const IfcProduct& storey);
 
-/// Adds storeys and spaces to a model that is otherwise complete. `meshes` may have the spaces'
-/// geometry. The transforms lead to the scene's frame before its offset is subtracted.
+/// Adds storeys, spaces and north to a model that is otherwise complete. `meshes` may have the
+/// spaces' geometry. The transforms lead to the scene's frame before its offset is subtracted.
 void addSpatialStructure(const IfcMetadata& metadata, const StoreyTable& storeys,
                          const IfcMeshes& meshes, const Eigen::Affine3d& worldFromFile,
                          const Eigen::Affine3d& worldFromReader, Model& model);

@@ -14,12 +14,13 @@ const IFC_FILE = 4;
 const WANTED = 5;
 const FLOATS_A_VERTEX = 6; // position and normal, as web-ifc delivers them
 
-function sendFrame(kind, ...parts) {
-  const bytes = Buffer.concat(parts);
+// Sends small parts in one piece, and large blocks after them without copying them.
+function sendFrame(kind, parts = [], blocks = []) {
   const header = Buffer.alloc(9);
+  const size = [...parts, ...blocks].reduce((sum, part) => sum + part.length, 0);
   header.write(kind, 0, 'latin1');
-  header.writeBigUInt64LE(BigInt(bytes.length), 1);
-  for (const block of [header, bytes]) {
+  header.writeBigUInt64LE(BigInt(size), 1);
+  for (const block of [Buffer.concat([header, ...parts]), ...blocks]) {
     for (let sent = 0; sent < block.length; ) sent += fs.writeSync(ANSWER, block, sent);
   }
 }
@@ -32,12 +33,14 @@ function words(...values) {
   return Buffer.from(Uint32Array.from(values).buffer);
 }
 
-function bytesOf(typedArray) {
-  return Buffer.from(typedArray.buffer, typedArray.byteOffset, typedArray.byteLength);
+// Words of 32 bits in the memory of web-ifc, as bytes, without the copy that GetVertexArray makes.
+// Valid until web-ifc allocates.
+function wordsOf(api, address, count) {
+  return Buffer.from(api.wasmModule.HEAPF32.buffer, address, 4 * count);
 }
 
 function sendProgress(stage, fraction) {
-  sendFrame('P', doubles(fraction), Buffer.from(stage));
+  sendFrame('P', [doubles(fraction), Buffer.from(stage)]);
 }
 
 function readAll(descriptor) {
@@ -64,10 +67,10 @@ function sendGeometry(api, model, id, known) {
   if (known.has(id)) return;
   known.add(id);
   const geometry = api.GetGeometry(model, id);
-  const vertices = api.GetVertexArray(geometry.GetVertexData(), geometry.GetVertexDataSize());
-  const indices = api.GetIndexArray(geometry.GetIndexData(), geometry.GetIndexDataSize());
-  sendFrame('G', words(id, vertices.length / FLOATS_A_VERTEX, indices.length), bytesOf(vertices),
-            bytesOf(indices));
+  const vertices = wordsOf(api, geometry.GetVertexData(), geometry.GetVertexDataSize());
+  const indices = wordsOf(api, geometry.GetIndexData(), geometry.GetIndexDataSize());
+  sendFrame('G', [words(id, vertices.length / 4 / FLOATS_A_VERTEX, indices.length / 4)],
+            [vertices, indices]);
   geometry.delete();
 }
 
@@ -80,7 +83,7 @@ function sendProduct(api, model, mesh, known) {
     const { x, y, z, w } = placed.color;
     parts.push(words(placed.geometryExpressID), doubles(x, y, z, w, ...placed.flatTransformation));
   }
-  sendFrame('O', words(mesh.expressID, count), ...parts);
+  sendFrame('O', [words(mesh.expressID, count), ...parts]);
 }
 
 // Whether the heap of web-ifc may be corrupt: a WebAssembly trap corrupts it, web-ifc's own
@@ -104,17 +107,17 @@ async function main() {
   const wanted = new Uint32Array(wantedBytes.buffer, 0, wantedBytes.length / 4);
   const model = api.OpenModel(withKnownSchema(readAll(IFC_FILE)));
   if (model < 0) {
-    sendFrame('E', Buffer.from('web-ifc does not know its schema'));
+    sendFrame('E', [Buffer.from('web-ifc does not know its schema')]);
     return 1;
   }
   const known = new Set();
   for (let i = first; i < wanted.length; ++i) {
-    sendFrame('T', words(i)); // identifies the product if this process dies
+    sendFrame('T', [words(i)]); // identifies the product if this process dies
     if (i % 64 === 0) sendProgress('shapes (web-ifc)', i / wanted.length);
     try {
       api.StreamMeshes(model, [wanted[i]], (mesh) => sendProduct(api, model, mesh, known));
     } catch (error) {
-      sendFrame('F', words(wanted[i]), Buffer.from(textOf(error)));
+      sendFrame('F', [words(wanted[i]), Buffer.from(textOf(error))]);
       if (isBroken(error)) return 1; // the importer starts another process for the rest
     }
   }
@@ -125,7 +128,7 @@ async function main() {
 main().then(
   (code) => process.exit(code),
   (error) => {
-    sendFrame('E', Buffer.from(textOf(error)));
+    sendFrame('E', [Buffer.from(textOf(error))]);
     process.exit(1);
   },
 );
