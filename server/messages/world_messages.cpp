@@ -5,6 +5,7 @@
 
 #include "collision/assert.hpp"
 #include "server/messages/body_messages.hpp"
+#include "server/messages/event_place.hpp"
 
 namespace enfilade::server {
 
@@ -188,6 +189,11 @@ void describeObject(const scene::Model& model, scene::EntityId entity, v1::Entit
   into.set_operation(object.operationType);
   into.set_ifc_class(object.ifcClass);
   if (object.storey) into.set_storey(model.storeys[*object.storey].name);
+  for (const scene::ObjectAttribute& attribute : object.attributes) {
+    v1::Attribute& message = *into.add_attributes();
+    message.set_name(attribute.name);
+    message.mutable_values()->Add(attribute.values.begin(), attribute.values.end());
+  }
 }
 
 void describeDetails(const scene::Scene& scene, scene::EntityId entity, v1::Entity& into) {
@@ -221,6 +227,10 @@ v1::ContactEvent toProto(const scene::World& world, const scene::ContactEvent& e
   message.set_b_name(scene::findEntityName(world, event.b));
   message.set_a_global_id(findGlobalId(world.scene().model(), event.a));
   message.set_b_global_id(findGlobalId(world.scene().model(), event.b));
+  const EventPlace place = findEventPlace(world.scene().model(), event);
+  message.set_storey(place.storey);
+  message.set_room(place.room);
+  message.set_room_name(place.roomName);
   setSeparation(event.separation, message);
   return message;
 }

@@ -101,6 +101,9 @@ std::string formatContactLine(const v1::ContactEvent& event) {
             {"decided_by", event.decided_by() == v1::DECIDED_BY_FILTER ? "filter" : "rational"}};
   if (!event.a_global_id().empty()) line["a_global_id"] = event.a_global_id();
   if (!event.b_global_id().empty()) line["b_global_id"] = event.b_global_id();
+  if (!event.storey().empty()) line["storey"] = event.storey();
+  if (!event.room().empty()) line["room"] = event.room();
+  if (!event.room_name().empty()) line["room_name"] = event.room_name();
   if (event.kind() == v1::ContactEvent::KIND_END || event.kind() == v1::ContactEvent::KIND_LEAVE)
     line["reason"] = toString(event.reason());
   if (event.kind() == v1::ContactEvent::KIND_NEAR) line["phase"] = toString(event.phase());

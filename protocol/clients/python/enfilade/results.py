@@ -46,6 +46,11 @@ class Contact:
     decided_by: str  # "filter" or "rational"
     feature_a: str  # of the nearest part, at point_a: "vertex", "edge", "face"; "" if they
     feature_b: str  # penetrate, and for "left_world"
+    a_global_id: str = ""  # IFC GlobalIds
+    b_global_id: str = ""
+    storey: str = ""  # where the contact lies: PROTOCOL.md, "Events"
+    room: str = ""  # number of the IFC space
+    room_name: str = ""
 
 
 def contact(event: Any) -> Contact:
@@ -59,7 +64,9 @@ def contact(event: Any) -> Contact:
         verdict=_verdict(event.verdict), distance=event.distance, error_bound=event.error_bound,
         point_a=vector(event.point_a), point_b=vector(event.point_b), normal=vector(event.normal),
         decided_by=messages.word(messages.DecidedBy, event.decided_by, "DECIDED_BY_"),
-        feature_a=_feature(event.feature_a), feature_b=_feature(event.feature_b))
+        feature_a=_feature(event.feature_a), feature_b=_feature(event.feature_b),
+        a_global_id=event.a_global_id, b_global_id=event.b_global_id,
+        storey=event.storey, room=event.room, room_name=event.room_name)
 
 
 @dataclass(frozen=True)
@@ -333,12 +340,14 @@ class ObjectInfo:
     storey: str
     material: str
     global_id: str  # IFC GlobalId, or ""
+    attributes: Dict[str, Tuple[float, ...]]  # that the file gives it, as "_ID" of a glTF instance
 
 
 def object_info(message: Any) -> ObjectInfo:
     box = (vector(message.box.min), vector(message.box.max)) if message.HasField("box") else None
     return ObjectInfo(message.id, message.name, message.class_name, message.class_id, message.thing,
-                      box, message.storey, message.material, message.global_id)
+                      box, message.storey, message.material, message.global_id,
+                      {one.name: tuple(one.values) for one in message.attributes})
 
 
 @dataclass(frozen=True)
