@@ -1,11 +1,13 @@
 #!/usr/bin/env python3
-"""Makes the report of the renderers' benchmark: render.md and its plots.
+"""Makes the report of the renderers' benchmark: NAME.md and its plots.
 
-render_report.py RESULTS_FOLDER REPORT_FOLDER [--quick]
+render_report.py RESULTS_FOLDER REPORT_FOLDER [--quick] [--name NAME] [--machine TEXT] [--notes FILE]
 
-Reads depth.jsonl, as render_depth writes it.
+Reads depth.jsonl, as render_depth writes it. With results of another machine, --machine names it,
+--name (default: render) is the report's name, and --notes is Markdown to insert after the introduction.
 """
 
+import argparse
 import datetime
 import sys
 from pathlib import Path
@@ -15,6 +17,12 @@ from report import find, machine, names, picture, read, short, table
 
 OURS = {"GL renderer", "rays robust (renderer)"}
 LEAST_ERROR = 1e-6  # mm, where an error of 0 is drawn
+# About rows measured with Mesa on a busy machine.
+WAITING = """
+Wall-clock time beyond the CPU time is waiting for a busy core: in 12 s of frames of the district, measured
+once by `/proc/PID/task/*/schedstat`, each of Mesa's two threads ran 3.0 s and waited 6.1 s, and the drawing
+thread ran 2.5 s and waited 2.1 s. An idle machine needs no more than the CPU time.
+"""
 
 
 def millimetres(value):
@@ -72,27 +80,39 @@ def ids_table(rows):
                   "next to one", "elsewhere"], body)
 
 
-def speed_error(rows, out, scene, size):
+def speed_error(rows, out, scene, size, report):
     points = []
     for row in rows:
         if row["scene"] != scene or row["size"] != size:
             continue
         most = row["depth"]["away_from_edges"]["max_mm"]
         points.append((row["method"], max(LEAST_ERROR, most), row["ms"], ""))
-    name = f"render_{scene.replace(' ', '_')}"
+    name = f"{report}_{scene.replace(' ', '_')}"
     title = f"Speed against error of depth: {scene}, {size.replace('x', '×')}"
     plot.marks(out / f"{name}.svg", title, "maximum error away from edges, mm",
                "ms a frame (median)", points, OURS)
     return picture(out, name, title)
 
 
+def parse_arguments():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("results", type=Path)
+    parser.add_argument("report", type=Path)
+    parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--name", default="render")
+    parser.add_argument("--machine", default=machine().split(", ours")[0])
+    parser.add_argument("--notes", type=Path)
+    return parser.parse_args()
+
+
 def main():
-    results, out = Path(sys.argv[1]), Path(sys.argv[2])
+    arguments = parse_arguments()
+    out, quick = arguments.report, arguments.quick
     out.mkdir(parents=True, exist_ok=True)
-    quick = "--quick" in sys.argv
-    rows = read(results, "depth")
+    rows = read(arguments.results, "depth")
     if not rows:
-        sys.exit(f"{results}/depth.jsonl: nothing was measured")
+        sys.exit(f"{arguments.results}/depth.jsonl: nothing was measured")
+    device = find(rows, method="GL renderer")["renderer"]
     sizes = names(rows, "size")
     about = table(["scene", "objects", "triangles"],
                   [[scene, f"{row['objects']:,}", f"{row['triangles']:,}"]
@@ -100,8 +120,8 @@ def main():
     parts = [f"""\
 # Renderers: speed against error
 
-Made by `./dev bench render{' --quick' if quick else ''}` on {datetime.date.today()}: {machine().split(', ours')[0]},
-OpenGL by Mesa in software. {'**A quick run: few cameras, one size.** ' if quick else ''}The machine is
+Made by `./dev bench render{' --quick' if quick else ''}` on {datetime.date.today()}: {arguments.machine},
+OpenGL by {device}. {'**A quick run: few cameras, one size.** ' if quick else ''}The machine is
 noisy (other load), so only ratios within a table are meaningful: methods take turns at each camera,
 times are medians.
 
@@ -111,20 +131,20 @@ without textures, masks and transparency. Every pixel is compared with a ray in 
 or leaves the pixel's plane by a thousandth of the depth. *GL D24 standard* to *D32F reversed* draw all
 triangles at once into that depth buffer and read it back. *GL renderer* and *rays robust* are the renderers
 of `enfilade`; rays use two threads.
-
-Wall-clock time beyond the CPU time is waiting for a busy core: in 12 s of frames of the district, measured
-once by `/proc/PID/task/*/schedstat`, each of Mesa's two threads ran 3.0 s and waited 6.1 s, and the drawing
-thread ran 2.5 s and waited 2.1 s. An idle machine needs no more than the CPU time. Each camera takes three
-images after an untimed one, so the GL renderer's visibility cache is warm; `render_bench` measures walks.
-""", about, "## Speed\n", speed_table(rows, sizes), "## Error of depth\n"]
+{WAITING if "llvmpipe" in device else ""}
+Each camera takes three images after an untimed one, so the GL renderer's visibility cache is warm;
+`render_bench` measures walks.
+""", arguments.notes.read_text() if arguments.notes else "", about, "## Speed\n", speed_table(rows, sizes),
+             "## Error of depth\n"]
     for scene in names(rows, "scene"):
         parts += [f"### {scene}\n", error_table(rows, scene, sizes[-1]),
-                  speed_error(rows, out, scene, sizes[-1])]
+                  speed_error(rows, out, scene, sizes[-1], arguments.name)]
     parts += ["## Ids\n", """\
 *Tied*: the drawn object is within 0.02 mm and a millionth of the depth of the nearest one.
 """, ids_table(rows)]
-    (out / "render.md").write_text("\n".join(part for part in parts if part))
-    print(out / "render.md")
+    page = out / f"{arguments.name}.md"
+    page.write_text("\n".join(part for part in parts if part))
+    print(page)
 
 
 if __name__ == "__main__":
