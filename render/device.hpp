@@ -6,12 +6,22 @@
 
 namespace enfilade::render {
 
+/// Source of Frame::depth in the OpenGL renderer.
+enum class DepthSource {
+  automatic,  ///< plane on a GPU, buffer on a CPU
+  buffer,     ///< the depth buffer
+  plane       ///< the plane of each triangle, at the pixel's centre
+};
+
 /// The requested device.
 struct DeviceChoice {
   /// "": the first device with a context, hardware before software. Otherwise an index into the
   /// list of `enfilade doctor`, a part of a device name (case-insensitive), or a UUID.
   std::string device;
   bool requireGpu = false;  ///< rejects devices that draw on the CPU
+  DepthSource depthSource = DepthSource::automatic;
+  /// Rounds vertices to 1/256 pixel in the shader, as GPUs do; for tests on a CPU.
+  bool roundsVertices = false;
 };
 
 /// The result of probing one EGL device or platform.

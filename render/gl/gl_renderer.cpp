@@ -75,7 +75,8 @@ struct FrameJob {
   const FrameOptions& options;
   BoxVisibility visibility;
   FrameStatistics statistics;
-  std::vector<float> metres;  ///< Frame::depth; empty: not computed yet
+  bool planeDepth;            ///< depth channel and ambient occlusion use the plane depth
+  std::vector<float> metres;  ///< depth of the depth buffer; empty: not computed yet
 
   bool needsShadows() const { return options.shadows && options.channels.rgb; }
 };
@@ -94,6 +95,8 @@ struct GlRenderer::State {
   RenderTarget target;
   VisibilityCache visibilityCache;
   DepthPyramid depthPyramid;
+  bool planeDepth;              // DepthSource::plane
+  bool roundsVertices;          // see DeviceChoice
   bool depthIsCurrent = false;  // the pyramid's base level holds the current depth buffer
   std::uint64_t frameNumber = 0;
 
@@ -122,7 +125,13 @@ struct GlRenderer::State {
 
 GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device,
                          ShadowMaskFunction shadows)
-    : scene(std::move(shared)), shadowMask(std::move(shadows)), context(device) {
+    : scene(std::move(shared)),
+      shadowMask(std::move(shadows)),
+      context(device),
+      planeDepth(device.depthSource == DepthSource::automatic
+                     ? !context.software()
+                     : device.depthSource == DepthSource::plane),
+      roundsVertices(device.roundsVertices) {
   if (!scene) throw RenderError("GlRenderer: there is no scene");
 }
 
@@ -132,7 +141,7 @@ void GlRenderer::State::prepareScene() {
   buffers = uploadModel(scene->model());
   items = buildDrawItems(scene->model());
   culler.emplace(items);
-  surfacePass.emplace();
+  surfacePass.emplace(roundsVertices);
 }
 
 GlRenderer::State::~State() {
@@ -195,10 +204,10 @@ const std::vector<float>& GlRenderer::State::getDepthMetres(FrameJob& job) {
 /// Prepares shading at equal depth; the depth buffer must be complete.
 void GlRenderer::State::beginShading(FrameJob& job) {
   const Channels& channels = job.options.channels;
-  target.setDrawChannels(channels);
+  target.setDrawChannels(channels, job.planeDepth);
   if (job.needsShadows())
     target.setShadowMask(shadowMask(job.snapshot, job.camera, job.options, getDepthMetres(job)));
-  surfacePass->beginEqualDepthPass(channels.normals, job.needsShadows());
+  surfacePass->beginEqualDepthPass(channels.normals, job.needsShadows(), job.planeDepth);
 }
 
 std::size_t GlRenderer::State::countTriangles(const std::vector<std::uint32_t>& some) const {
@@ -235,11 +244,11 @@ DrawList GlRenderer::State::drawAllInFrustum(FrameJob& job, const VisibleSet& al
   job.statistics.frustumCulled = static_cast<std::uint32_t>(items.size() - all.items.size());
   if (job.needsShadows()) {
     target.setDrawChannels({false, false, false, false});
-    surfacePass->beginDepthPrepass();
+    surfacePass->beginDepthPrepass(false);
     drawSurfaces(job, all);
     beginShading(job);
   } else {
-    surfacePass->beginForwardPass(job.options.channels.normals);
+    surfacePass->beginForwardPass(job.options.channels.normals, job.planeDepth);
   }
   return drawSurfaces(job, all);
 }
@@ -366,8 +375,8 @@ DrawList GlRenderer::State::drawVisible(FrameJob& job) {
   VisibleSet drawn = predictVisible(job, cached);
   const Channels& channels = job.options.channels;
   bool done = !channels.rgb && !channels.normals;
-  target.setDrawChannels({false, done && channels.ids, false, false});
-  surfacePass->beginDepthPrepass();
+  target.setDrawChannels({false, done && channels.ids, false, false}, done && job.planeDepth);
+  surfacePass->beginDepthPrepass(done && job.planeDepth);
   drawSurfaces(job, drawn);
   readDepth(job.camera);
   depthPyramid.build();
@@ -386,7 +395,8 @@ DrawList GlRenderer::State::drawVisible(FrameJob& job) {
       // Read the depth now and not after shading, so that CPU work overlaps with shading. The
       // pyramid is not rebuilt: it is conservative, because its depth is farther in places. Without
       // drawn items, it is empty and must be rebuilt.
-      readDepth(job.camera);
+      depthIsCurrent = false;
+      if (!job.planeDepth || drawn.items.empty()) readDepth(job.camera);
       if (drawn.items.empty()) depthPyramid.build();
       ++job.statistics.passes;
     }
@@ -424,9 +434,11 @@ Frame GlRenderer::renderOnce(const scene::Snapshot& snapshot, const Camera& came
     s.target = RenderTarget(camera.width, camera.height);
   }
   s.surfacePass->begin(camera);
-  s.target.begin(options.channels);
+  const bool needsDepth = options.channels.depth || options.channels.rgb;
+  const bool planeDepth = s.planeDepth && needsDepth;
+  s.target.begin(options.channels, planeDepth);
   s.depthIsCurrent = false;
-  FrameJob job{snapshot, camera, options, BoxVisibility(camera), {}, {}};
+  FrameJob job{snapshot, camera, options, BoxVisibility(camera), {}, planeDepth, {}};
   if (job.needsShadows() && !s.shadowMask)
     throw RenderError("GlRenderer: shadows need a shadow mask");
   const DrawList transparent = options.culling == Culling::occlusion
@@ -437,7 +449,9 @@ Frame GlRenderer::renderOnce(const scene::Snapshot& snapshot, const Camera& came
   frame.renderer = deviceName();
   frame.software = software();
   frame.statistics = job.statistics;
-  if (options.channels.depth || options.channels.rgb) {
+  if (planeDepth) {
+    s.target.readPlaneDepth(frame.depth);
+  } else if (needsDepth) {
     glFlush();  // if the depth was already read, the device works while this thread continues
     s.getDepthMetres(job);
     frame.depth = std::move(job.metres);

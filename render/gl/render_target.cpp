@@ -51,25 +51,31 @@ RenderTarget::RenderTarget(int width, int height)
   checkComplete(fbo, width, height);
 }
 
-void RenderTarget::addNormals() {
-  normals_ = makeTexture(GL_RGBA32F, width_, height_);
-  glNamedFramebufferTexture(framebuffer_.name(), GL_COLOR_ATTACHMENT2, normals_.name(), 0);
+/// Adds an attachment that few frames need, with the first frame that does.
+void RenderTarget::addAttachment(GlTexture& texture, unsigned format, unsigned attachment) {
+  if (texture.name() != 0) return;
+  texture = makeTexture(format, width_, height_);
+  glNamedFramebufferTexture(framebuffer_.name(), attachment, texture.name(), 0);
   checkComplete(framebuffer_.name(), width_, height_);
 }
 
-void RenderTarget::begin(const Channels& channels) {
-  if (channels.normals && normals_.name() == 0) addNormals();
+void RenderTarget::begin(const Channels& channels, bool planeDepth) {
+  if (channels.normals) addAttachment(normals_, GL_RGBA32F, GL_COLOR_ATTACHMENT2);
+  if (planeDepth) addAttachment(planeDepth_, GL_R32F, GL_COLOR_ATTACHMENT3);
   const GLuint fbo = framebuffer_.name();
   glBindFramebuffer(GL_FRAMEBUFFER, fbo);
-  setDrawChannels(channels);
+  setDrawChannels(channels, planeDepth);
   glViewport(0, 0, width_, height_);
   constexpr std::array<GLfloat, 4> kBlack{0, 0, 0, 1}, kNone{0, 0, 0, 0};
+  constexpr GLfloat kNaN = std::numeric_limits<GLfloat>::quiet_NaN();
+  constexpr std::array<GLfloat, 4> kNoDepth{kNaN, kNaN, kNaN, kNaN};
   constexpr std::array<GLuint, 4> kNothing{0, 0, 0, 0};
   constexpr GLfloat kFarthest = 0;
   glDepthMask(GL_TRUE);
   if (channels.rgb) glClearNamedFramebufferfv(fbo, GL_COLOR, 0, kBlack.data());
   if (channels.ids) glClearNamedFramebufferuiv(fbo, GL_COLOR, 1, kNothing.data());
   if (channels.normals) glClearNamedFramebufferfv(fbo, GL_COLOR, 2, kNone.data());
+  if (planeDepth) glClearNamedFramebufferfv(fbo, GL_COLOR, 3, kNoDepth.data());
   glClearNamedFramebufferfv(fbo, GL_DEPTH, 0, &kFarthest);
 }
 
@@ -84,12 +90,12 @@ void RenderTarget::setShadowMask(const std::vector<std::uint8_t>& mask) {
   glBindTextureUnit(kUnit, shadowMask_.name());
 }
 
-void RenderTarget::setDrawChannels(const Channels& channels) const {
+void RenderTarget::setDrawChannels(const Channels& channels, bool planeDepth) const {
   const auto target = [](bool on, GLenum attachment) { return on ? attachment : GLenum{GL_NONE}; };
-  const std::array<GLenum, 3> targets{target(channels.rgb, GL_COLOR_ATTACHMENT0),
-                                      target(channels.ids, GL_COLOR_ATTACHMENT1),
-                                      target(channels.normals, GL_COLOR_ATTACHMENT2)};
-  glNamedFramebufferDrawBuffers(framebuffer_.name(), 3, targets.data());
+  const std::array<GLenum, 4> targets{
+      target(channels.rgb, GL_COLOR_ATTACHMENT0), target(channels.ids, GL_COLOR_ATTACHMENT1),
+      target(channels.normals, GL_COLOR_ATTACHMENT2), target(planeDepth, GL_COLOR_ATTACHMENT3)};
+  glNamedFramebufferDrawBuffers(framebuffer_.name(), 4, targets.data());
 }
 
 void RenderTarget::readColour(Frame& frame, const AmbientOcclusion& ambientOcclusion) {
@@ -129,6 +135,12 @@ void RenderTarget::readDepth(std::vector<float>& depth) const {
   glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, depth.data());
+}
+
+void RenderTarget::readPlaneDepth(std::vector<float>& metres) const {
+  metres.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  readAttachment(framebuffer_.name(), GL_COLOR_ATTACHMENT3, width_, height_, GL_RED, GL_FLOAT,
+                 metres.data());
 }
 
 /// Computes in floats, which adds an error of about 2e-7 of the distance to the buffer's rounding.

@@ -16,11 +16,12 @@ class RenderTarget {
   RenderTarget(int width, int height);
 
   bool hasSize(int width, int height) const { return width == width_ && height == height_; }
-  /// Binds and clears it: colour black, id 0, normals 0, depth 0 (the farthest); enables
-  /// `channels`. Throws RenderError if the device rejects the normals attachment.
-  void begin(const Channels& channels);
+  /// Binds and clears it: colour black, id 0, normals 0, depth 0 (the farthest), plane depth NaN;
+  /// enables `channels` and the plane depth. Throws RenderError if the device rejects the
+  /// attachment of normals or plane depth.
+  void begin(const Channels& channels, bool planeDepth);
   /// Enables drawing into these channels; the depth mask controls depth.
-  void setDrawChannels(const Channels& channels) const;
+  void setDrawChannels(const Channels& channels, bool planeDepth = false) const;
   /// Sets the shadow mask of the following draws: 255 per sunlit pixel, 0 in shadow.
   void setShadowMask(const std::vector<std::uint8_t>& mask);
   /// Reads ids and normals, if requested, into `frame`.
@@ -30,12 +31,14 @@ class RenderTarget {
   void readColour(Frame& frame, const AmbientOcclusion& ambientOcclusion);
   /// Reads the buffer depth: 1 near; 0 far and background.
   void readDepth(std::vector<float>& depth) const;
+  /// Reads the plane depth in metres; NaN for the background.
+  void readPlaneDepth(std::vector<float>& metres) const;
 
  private:
-  void addNormals();
+  void addAttachment(GlTexture& texture, unsigned format, unsigned attachment);
 
   int width_ = 0, height_ = 0;
-  GlTexture colour_, ids_, depth_, normals_, shadowMask_;
+  GlTexture colour_, ids_, depth_, normals_, planeDepth_, shadowMask_;
   std::vector<std::uint8_t> rgba_;  ///< readback buffer
   GlFramebuffer framebuffer_;
 };

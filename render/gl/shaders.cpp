@@ -59,6 +59,12 @@ void main() {
   finish = surface;
   entity = id;
   gl_Position = clipFromRelative * vec4(point, 1.0);
+#ifdef ROUNDED
+  // Vertices behind the eye are clipped first and keep their positions.
+  vec2 grid = 256.0 * vec2(rightByX.w, upByY.w);
+  float w = gl_Position.w;
+  if (w > 0.0) gl_Position.xy = round(gl_Position.xy / w * grid) / grid * w;
+#endif
 }
 )";
 
@@ -88,6 +94,9 @@ layout(location = 1) out uint visibleId;
 #ifdef NORMALS
 layout(location = 2) out vec4 facing;
 #endif
+#ifdef PLANE_DEPTH
+layout(location = 3) out float planeDepth;
+#endif
 #ifdef TEXTURED
 layout(binding = 0) uniform sampler2D baseColourTexture;
 #endif
@@ -114,7 +123,29 @@ vec3 facingNormal(vec3 toEye) {
   return size > 0.0 ? n * inversesqrt(size) : toEye;
 }
 
+#ifdef PLANE_DEPTH
+// GPUs round vertices to 1/256 pixel and interpolate between the rounded ones, the depth buffer
+// included. `point` is then a point of the triangle's plane that projects next to the pixel's
+// centre. The inverse depth (orthographic: the depth) is affine in the image, so its gradient leads
+// from there to the centre.
+float depthAtCentre() {
+  const float kMaxRounding = 1.0 / 16.0;  // pixels; OpenGL's coarsest grid of vertices
+  bool parallel = forward.w > 0.5;
+  vec4 clip = clipFromRelative * vec4(point, 1.0);
+  vec2 halfSize = vec2(rightByX.w, upByY.w);
+  vec2 position = halfSize + halfSize * vec2(1.0, -1.0) * clip.xy / clip.w;
+  vec2 offset = clamp(gl_FragCoord.xy - position, -kMaxRounding, kMaxRounding);
+  float affine = parallel ? dot(forward.xyz, point) : 1.0 / clip.w;
+  // Equal bits in all programs.
+  precise float atCentre = affine + dFdx(affine) * offset.x + dFdy(affine) * offset.y;
+  return parallel ? atCentre : 1.0 / atCentre;
+}
+#endif
+
 void main() {
+#ifdef PLANE_DEPTH
+  planeDepth = depthAtCentre();  // before any discard, as below
+#endif
 #ifdef SHADED
 #ifdef PLAN
   float distance = 0.0;
@@ -192,9 +223,9 @@ void main() {
 
 }  // namespace
 
-std::string surfaceVertexSource(const SurfaceVariant& variant) {
-  return std::string(kVersion) + (variant.coloured ? "#define COLOURED\n" : "") + kFrameBlock +
-         kSurfaceVertex;
+std::string surfaceVertexSource(const SurfaceVariant& variant, bool roundsVertices) {
+  return std::string(kVersion) + (variant.coloured ? "#define COLOURED\n" : "") +
+         (roundsVertices ? "#define ROUNDED\n" : "") + kFrameBlock + kSurfaceVertex;
 }
 
 std::string surfaceFragmentSource(const SurfaceVariant& variant) {
@@ -206,6 +237,7 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
   if (variant.normals) source += "#define NORMALS\n";
   if (variant.shaded) source += "#define SHADED\n";
   if (variant.shadows) source += "#define SHADOWS\n";
+  if (variant.planeDepth) source += "#define PLANE_DEPTH\n";
   if (variant.plan) source += "#define PLAN\n";
   return source + kFrameBlock + kShadingSource + kSurfaceFragment;
 }

@@ -9,16 +9,18 @@ namespace enfilade::render {
 /// not pay for unused features.
 struct SurfaceVariant {
   bool textured = false;
-  bool coloured = false;  ///< with vertex colours
-  bool mask = false;      ///< alpha test; disables the early depth test
-  bool blend = false;     ///< colour only, with alpha
-  bool normals = false;   ///< writes normals to colour attachment 2
-  bool shadows = false;   ///< reads the shadow mask at texture binding 1
-  bool plan = false;      ///< orthographic; otherwise perspective
+  bool coloured = false;    ///< with vertex colours
+  bool mask = false;        ///< alpha test; disables the early depth test
+  bool blend = false;       ///< colour only, with alpha
+  bool normals = false;     ///< writes normals to colour attachment 2
+  bool shadows = false;     ///< reads the shadow mask at texture binding 1
+  bool planeDepth = false;  ///< writes depth in metres to colour attachment 3
+  bool plan = false;        ///< orthographic; otherwise perspective
   bool shaded = true;  ///< false: only depth and id, bit-identical to those of the shaded variant
 };
 
-std::string surfaceVertexSource(const SurfaceVariant& variant);
+/// `roundsVertices`: see DeviceChoice.
+std::string surfaceVertexSource(const SurfaceVariant& variant, bool roundsVertices);
 std::string surfaceFragmentSource(const SurfaceVariant& variant);
 std::string skyVertexSource();
 std::string skyFragmentSource();
@@ -29,8 +31,8 @@ struct FrameUniforms {
   float clipFromRelative[16];  ///< column-major; reversed depth: near 1, far 0
   float forward[4];            ///< w: 1 orthographic, 0 perspective
   float middle[4];             ///< world direction of the image centre; z along forward is 1
-  float rightByX[4];           ///< world right / CameraBasis::scaleX
-  float upByY[4];              ///< world up / CameraBasis::scaleY
+  float rightByX[4];           ///< world right / CameraBasis::scaleX; w: half the width in pixels
+  float upByY[4];              ///< world up / CameraBasis::scaleY; w: half the height in pixels
 };
 
 /// Attribute locations shared by the shaders and the vertex array.

@@ -54,8 +54,8 @@ FrameUniforms makeFrameUniforms(const Camera& camera) {
           basis.forward - basis.shiftX / basis.scaleX * basis.right -
               basis.shiftY / basis.scaleY * basis.up,
           0);
-  setVec4(uniforms.rightByX, basis.right / basis.scaleX, 0);
-  setVec4(uniforms.upByY, basis.up / basis.scaleY, 0);
+  setVec4(uniforms.rightByX, basis.right / basis.scaleX, camera.width / 2.0);
+  setVec4(uniforms.upByY, basis.up / basis.scaleY, camera.height / 2.0);
   return uniforms;
 }
 
@@ -120,8 +120,9 @@ void StreamBuffer::fill(const void* data, std::size_t bytes) {
   glNamedBufferSubData(buffer_.name(), 0, static_cast<GLsizeiptr>(bytes), data);
 }
 
-SurfacePass::SurfacePass()
-    : vertexArray_(makeVertexArray()),
+SurfacePass::SurfacePass(bool roundsVertices)
+    : roundsVertices_(roundsVertices),
+      vertexArray_(makeVertexArray()),
       uniforms_(GlBuffer::create()),
       sky_(buildProgram("sky", skyVertexSource(), skyFragmentSource())) {
   glNamedBufferStorage(uniforms_.name(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
@@ -138,13 +139,16 @@ unsigned SurfacePass::findProgram(const Batch& batch) {
   variant.normals = shaded_ && normals_;
   variant.plan = shaded_ && plan_;
   variant.shadows = shaded_ && shadows_ && !variant.blend;
+  variant.planeDepth = planeDepth_ && !variant.blend;
   std::size_t index = 0;
-  for (const bool has : {variant.mask, variant.shaded, variant.textured, variant.blend,
-                         variant.normals, variant.plan, variant.shadows, variant.coloured})
+  for (const bool has :
+       {variant.mask, variant.shaded, variant.textured, variant.blend, variant.normals,
+        variant.plan, variant.shadows, variant.coloured, variant.planeDepth})
     index = 2 * index + (has ? 1 : 0);
   std::optional<GlProgram>& program = surfaces_[index];
   if (!program) {
-    program = buildProgram("surface", surfaceVertexSource(variant), surfaceFragmentSource(variant));
+    program = buildProgram("surface", surfaceVertexSource(variant, roundsVertices_),
+                           surfaceFragmentSource(variant));
   }
   return program->name();
 }
@@ -176,24 +180,27 @@ void SurfacePass::begin(const Camera& camera) {
   glDisable(GL_CULL_FACE);  // models have inconsistent winding
 }
 
-void SurfacePass::beginDepthPrepass() {
+void SurfacePass::beginDepthPrepass(bool planeDepth) {
   shaded_ = false;
+  planeDepth_ = planeDepth;
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GEQUAL);
 }
 
-void SurfacePass::beginEqualDepthPass(bool normals, bool shadows) {
+void SurfacePass::beginEqualDepthPass(bool normals, bool shadows, bool planeDepth) {
   shaded_ = true;
   normals_ = normals;
   shadows_ = shadows;
+  planeDepth_ = planeDepth;
   glDepthMask(GL_FALSE);
   glDepthFunc(GL_EQUAL);
 }
 
-void SurfacePass::beginForwardPass(bool normals) {
+void SurfacePass::beginForwardPass(bool normals, bool planeDepth) {
   shaded_ = true;
   normals_ = normals;
   shadows_ = false;
+  planeDepth_ = planeDepth;
   glDepthMask(GL_TRUE);
   glDepthFunc(GL_GEQUAL);  // at equal depth the last draw wins, as in beginEqualDepthPass()
 }

@@ -32,17 +32,19 @@ struct Geometry {
 /// Programs and state of all passes. Needs a current context, always the same.
 class SurfacePass {
  public:
-  SurfacePass();
+  /// `roundsVertices`: see DeviceChoice.
+  explicit SurfacePass(bool roundsVertices);
 
   /// Sets the common state and the camera.
   void begin(const Camera& camera);
-  /// The following draws write only depth and id; at equal depth, the last draw wins.
-  void beginDepthPrepass();
+  /// The following draws write only depth and id; at equal depth, the last draw wins. In all
+  /// passes, `planeDepth` also writes RenderTarget's plane depth.
+  void beginDepthPrepass(bool planeDepth);
   /// The following draws shade pixels of equal depth. `shadows`: uses
   /// RenderTarget::setShadowMask().
-  void beginEqualDepthPass(bool normals, bool shadows);
+  void beginEqualDepthPass(bool normals, bool shadows, bool planeDepth);
   /// The following draws write depth and shade; at equal depth, the last draw wins.
-  void beginForwardPass(bool normals);
+  void beginForwardPass(bool normals, bool planeDepth);
   void draw(const DrawList& list, const Geometry& geometry);
   void drawSky() const;
   /// The following draws blend over the colour; its alpha channel accumulates the transmittance.
@@ -52,11 +54,12 @@ class SurfacePass {
   unsigned findProgram(const Batch& batch);
   void enableColours(bool coloured);
 
+  bool roundsVertices_;
   GlVertexArray vertexArray_;
   GlBuffer uniforms_;
   GlProgram sky_;
-  std::array<std::optional<GlProgram>, 256> surfaces_;  ///< see findProgram()
-  bool shaded_ = true, normals_ = false, plan_ = false, shadows_ = false;
+  std::array<std::optional<GlProgram>, 512> surfaces_;  ///< see findProgram()
+  bool shaded_ = true, normals_ = false, plan_ = false, shadows_ = false, planeDepth_ = false;
   bool coloured_ = false;  ///< the attribute is enabled
   StreamBuffer instances_, commands_;
 };

@@ -99,8 +99,8 @@ TEST(DepthPyramid, HidesABoxExactlyIfEveryPixelHidesIt) {
   EXPECT_GT(shown, 2000);
 }
 
-TEST(Culling, PicturesFromAnywhereAreThoseOfDrawingEverything) {
-  GlRenderer renderer(sceneOf(rooms(1)));
+void expectSameFromAnywhere(DepthSource depthSource) {
+  GlRenderer renderer(sceneOf(rooms(1)), {.device = "", .depthSource = depthSource});
   Random random(5);
   std::uint64_t occluded = 0;
   for (int i = 0; i < 60; ++i) {
@@ -117,6 +117,14 @@ TEST(Culling, PicturesFromAnywhereAreThoseOfDrawingEverything) {
     occluded += culled.statistics.occluded;
   }
   EXPECT_GT(occluded, 60u * 50u);
+}
+
+TEST(Culling, PicturesFromAnywhereAreThoseOfDrawingEverything) {
+  expectSameFromAnywhere(DepthSource::buffer);
+}
+
+TEST(Culling, ThePlaneDepthIsThatOfDrawingEverything) {
+  expectSameFromAnywhere(DepthSource::plane);
 }
 
 TEST(Culling, AWalkKeepsItsPicturesAndMostlyDrawsOnce) {

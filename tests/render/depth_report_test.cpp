@@ -85,6 +85,37 @@ TEST(DepthReport, GlIsWithinItsPromiseAndRaysWithinTheirs) {
   EXPECT_LT(castReport.awayFromEdges.mean(), glReport.awayFromEdges.mean());
 }
 
+/// Errors of a GPU, which rounds vertices to 1/256 pixel.
+DepthReport reportRoundedVertices(DepthSource depthSource, bool orthographic) {
+  const auto scene = sceneOf(opaque(crowd(300)));
+  ReferenceTracer rays(scene);
+  GlRenderer gl(scene, {.device = "", .depthSource = depthSource, .roundsVertices = true});
+  Camera camera = lookingIn(160, 120, orthographic);
+  DepthReport report;
+  for (int i = 0; i < 4; ++i) {
+    camera.forward = {std::cos(1.5 * i), -0.4, std::sin(1.5 * i)};
+    for (const bool rgb : {true, false}) {  // depth alone takes another path
+      const FrameOptions options{.channels = {rgb, false, true, false}};
+      mergeReports(report,
+                   compareWithReference(gl.render({}, camera, options), rays.render({}, camera)));
+    }
+  }
+  EXPECT_GT(report.awayFromEdges.pixels, 1000u);
+  EXPECT_LT(report.missing + report.extra, report.pixels / 2000);
+  return report;
+}
+
+TEST(DepthReport, ThePlaneDepthIsExactWhereVerticesAreRounded) {
+  for (const bool orthographic : {false, true}) {
+    const DepthErrors plane = reportRoundedVertices(DepthSource::plane, orthographic).awayFromEdges;
+    const DepthErrors buffer =
+        reportRoundedVertices(DepthSource::buffer, orthographic).awayFromEdges;
+    EXPECT_LT(plane.mean(), 2e-6) << orthographic;
+    EXPECT_LT(plane.mean(), buffer.mean() / 10) << orthographic;
+    EXPECT_LT(plane.max, buffer.max / 4) << orthographic;
+  }
+}
+
 TEST(DepthReport, ErrorsAreFoundWhereTheyWereMade) {
   const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}});
   ReferenceTracer rays(scene);
