@@ -7,6 +7,10 @@
 
 #include "collision/assert.hpp"
 
+#if defined(__x86_64__)
+#include <immintrin.h>
+#endif
+
 namespace enfilade::collision {
 namespace {
 
@@ -53,6 +57,40 @@ std::size_t exponentOf(const std::array<double, 3>& extent) {
   return std::bit_cast<std::uint64_t>(largest) >> 52 & 0x7ff;
 }
 
+/// Writes (id, ids[k]) to `to` for each of `count` boxes that overlaps, which leaves no branch per
+/// candidate: whether boxes overlap is unpredictable. Returns the end of what was written.
+using AppendOverlaps = BoxTable::IdPair* (*)(const SignedBounds& minEndpoints, BoxTable::Id id,
+                                             const SignedBounds* boxes, const BoxTable::Id* ids,
+                                             std::uint32_t count, BoxTable::IdPair* to);
+
+BoxTable::IdPair* appendOverlaps(const SignedBounds& minEndpoints, BoxTable::Id id,
+                                 const SignedBounds* boxes, const BoxTable::Id* ids,
+                                 std::uint32_t count, BoxTable::IdPair* to) {
+  for (std::uint32_t k = 0; k < count; ++k) {
+    *to = {id, ids[k]};
+    to += noneGreater(minEndpoints, boxes[k]) ? 1 : 0;
+  }
+  return to;
+}
+
+#if defined(__x86_64__)
+__attribute__((target("avx"))) BoxTable::IdPair* appendOverlapsAvx(
+    const SignedBounds& minEndpoints, BoxTable::Id id, const SignedBounds* boxes,
+    const BoxTable::Id* ids, std::uint32_t count, BoxTable::IdPair* to) {
+  const __m256d first = _mm256_loadu_pd(&minEndpoints[0]);
+  const __m128d last = _mm_loadu_pd(&minEndpoints[4]);
+  for (std::uint32_t k = 0; k < count; ++k) {
+    *to = {id, ids[k]};
+    const __m256d greater = _mm256_cmp_pd(first, _mm256_loadu_pd(&boxes[k][0]), _CMP_GT_OQ);
+    const __m128d greaterLast = _mm_cmpgt_pd(last, _mm_loadu_pd(&boxes[k][4]));
+    to += (_mm256_movemask_pd(greater) | _mm_movemask_pd(greaterLast)) == 0 ? 1 : 0;
+  }
+  return to;
+}
+#else
+constexpr AppendOverlaps appendOverlapsAvx = appendOverlaps;
+#endif
+
 }  // namespace
 
 /// Up to ten runs that are not empty: of a cell's own row and the four rows after it, each in two
@@ -67,7 +105,6 @@ struct BoxTable::RunList {
   std::span<const Run> span() const { return std::span(all).first(count); }
 };
 
-/// Appends pairs without a branch per candidate: whether boxes overlap is unpredictable.
 class BoxTable::PairWriter {
  public:
   explicit PairWriter(std::vector<IdPair>& pairs) : pairs_(pairs), count_(pairs.size()) {}
@@ -82,12 +119,10 @@ class BoxTable::PairWriter {
     if (pairs_.size() < count_ + candidates) pairs_.resize(2 * (count_ + candidates));
     const SignedBounds minEndpoints = minEndpointsOf(box);
     IdPair* to = pairs_.data() + count_;
-    for (const Run& run : runs) {
-      for (std::uint32_t k = run.begin; k < run.end; ++k) {
-        *to = {id, table.ids_[k]};
-        to += noneGreater(minEndpoints, table.boxes_[k]) ? 1 : 0;
-      }
-    }
+    const AppendOverlaps append = table.useAvx ? appendOverlapsAvx : appendOverlaps;
+    for (const Run& run : runs)
+      to = append(minEndpoints, id, table.boxes_.data() + run.begin, table.ids_.data() + run.begin,
+                  run.end - run.begin, to);
     count_ = static_cast<std::size_t>(to - pairs_.data());
   }
 

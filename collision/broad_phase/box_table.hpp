@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "collision/broad_phase/signed_bounds.hpp"
+#include "collision/processor.hpp"
 
 namespace enfilade::collision {
 
@@ -33,6 +34,8 @@ class BoxTable {
   void findOverlaps(const SignedBounds& maxEndpoints, Id id, std::vector<IdPair>& pairs) const;
 
   std::span<const Id> ids() const { return ids_; }  ///< of all boxes, by cell
+
+  bool useAvx = hasAvx();  ///< the result does not depend on it
 
  private:
   /// Boxes of similar size.

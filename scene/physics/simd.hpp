@@ -114,16 +114,10 @@ template <class Item, class Each>
 __attribute__((target("avx"))) void avxLoop(std::span<Item> items, const Each& each) {
   for (Item& item : items) each(item);
 }
-inline bool hasAvx() {
-  return __builtin_cpu_supports("avx") != 0;
-}
 #else
 template <class Item, class Each>
 void avxLoop(std::span<Item> items, const Each& each) {
   for (Item& item : items) each(item);
-}
-inline bool hasAvx() {
-  return false;
 }
 #endif
 

@@ -28,6 +28,7 @@
 #include <cmath>
 
 #include "collision/assert.hpp"
+#include "collision/processor.hpp"
 #include "scene/physics/solver_rows.hpp"
 
 namespace enfilade::scene {
@@ -367,7 +368,7 @@ void solveConstraints(std::span<BodyMotion> motions, std::span<ContactConstraint
   SolverContext& context = threadContext;  // a reference that worker threads can see
   context.seconds = settings.seconds / settings.substeps;
   context.contactOffset = settings.contactOffset;
-  context.useAvx = settings.useAvx && hasAvx();
+  context.useAvx = settings.useAvx && collision::hasAvx();
   prepareConstraints(motions, constraints, context, pool);
   for (std::size_t i = 0; i < static_cast<std::size_t>(settings.substeps); ++i) {
     for (const KinematicBody& body : kinematicBodies) {

@@ -29,19 +29,23 @@ std::size_t checkPairs(const std::vector<Aabb>& boxes, const Aabb& query) {
   for (const Aabb& box : boxes) maxEndpoints.push_back(toMaxEndpoints(box));
   std::vector<Id> ids(boxes.size());
   std::iota(ids.begin(), ids.end(), Id{0});
-  BoxTable table;
-  table.build(maxEndpoints, ids);
-  IdPairs found, expected, foundByQuery, expectedByQuery;
-  table.findPairs(found);
   constexpr Id kQuery = 1u << 30;
-  table.findOverlaps(toMaxEndpoints(query), kQuery, foundByQuery);
+  IdPairs expected, expectedByQuery;
   for (Id a = 0; a < boxes.size(); ++a) {
     for (Id b = a + 1; b < boxes.size(); ++b)
       if (overlaps(boxes[a], boxes[b])) expected.emplace_back(a, b);
     if (overlaps(boxes[a], query)) expectedByQuery.emplace_back(a, kQuery);
   }
-  EXPECT_EQ(sorted(found), expected);
-  EXPECT_EQ(sorted(foundByQuery), expectedByQuery);
+  for (const bool useAvx : {false, hasAvx()}) {
+    BoxTable table;
+    table.useAvx = useAvx;
+    table.build(maxEndpoints, ids);
+    IdPairs found, foundByQuery;
+    table.findPairs(found);
+    table.findOverlaps(toMaxEndpoints(query), kQuery, foundByQuery);
+    EXPECT_EQ(sorted(found), expected) << useAvx;
+    EXPECT_EQ(sorted(foundByQuery), expectedByQuery) << useAvx;
+  }
   return expected.size();
 }
 
