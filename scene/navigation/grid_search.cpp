@@ -13,7 +13,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kLayerHeight = 1;   // metres: places of a cell closer than this are one place
+constexpr double kLayerHeight = 1;    // metres: places of a cell closer than this are one place
 constexpr double kSameHeight = 0.05;  // metres: of feet that come to the same place on two ways
 
 struct Cell {

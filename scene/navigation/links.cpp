@@ -13,12 +13,12 @@ namespace enfilade::scene {
 namespace {
 
 constexpr double kEdgeSpacing = 0.75;  // metres between places along an edge
-/// Metres of the landing beyond a place at the edge of a mesh, in addition to twice the radius: the mesh
-/// ends up to two cells further from the drop than the radius.
+/// Metres of the landing beyond a place at the edge of a mesh, in addition to twice the radius: the
+/// mesh ends up to two cells further from the drop than the radius.
 constexpr std::array<double, 2> kLandings{0.25, 0.6};
 constexpr int kPhases = 3;             // starts of a drop within the way of a tick
 constexpr double kSameLanding = 0.01;  // metres, height
-constexpr int kDropDirections = 16;        // out of a lift
+constexpr int kExitDirections = 16;    // out of a lift
 constexpr std::size_t kMaxExits = 4;   // of a lift at a stop
 constexpr std::size_t kMaxStops = 64;  // a lift with more is not used
 constexpr double kExitRoom = 0.1;      // metres between a waiting agent and a lift
@@ -61,9 +61,9 @@ double computeWayOut(const Aabb& box, const Vec3& place, const Vec3& direction, 
 std::vector<Vec3> findExits(const Body& lift, const Vec3& inside, Walker& walker) {
   std::vector<Vec3> exits;
   const double room = walker.agent().radius + kExitRoom;
-  for (int i = 0; i < kDropDirections && exits.size() < kMaxExits; ++i) {
-    const int turn = (i * 4) % kDropDirections + i / 4;  // the four sides first
-    const double angle = 2 * std::numbers::pi / kDropDirections * turn;
+  for (int i = 0; i < kExitDirections && exits.size() < kMaxExits; ++i) {
+    const int turn = (i * 4) % kExitDirections + i / 4;  // the four sides first
+    const double angle = 2 * std::numbers::pi / kExitDirections * turn;
     const Vec3 direction(std::cos(angle), 0, std::sin(angle));
     walker.returnTo(inside);
     const WalkOutcome out = walker.walkTo(

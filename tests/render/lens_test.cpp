@@ -225,7 +225,8 @@ TEST(DepthNoise, ADistortionTableDividesDepths) {
     EXPECT_EQ(pixels[4], pixels[7]);
     return std::pair(static_cast<double>(pixels[0]), static_cast<double>(pixels[4]));
   };
-  for (const auto& [depth, factor] : {std::pair(1.0, 1.02), {2.0, 1.03}, {0.6, 1.02}, {4.0, 1.04}}) {
+  for (const auto& [depth, factor] :
+       {std::pair(1.0, 1.02), {2.0, 1.03}, {0.6, 1.02}, {4.0, 1.04}}) {
     const auto [left, right] = measure(static_cast<float>(depth));
     EXPECT_NEAR(35.13 / left, 35.13 / depth, 1.0 / 16);
     EXPECT_NEAR(35.13 / right, 35.13 / (depth / factor), 1.0 / 16);

@@ -460,7 +460,8 @@ TEST(SolverReference, FourParallelPatchesEqualSequentialOnes) {
 }
 
 TEST(SolverReference, FourPatchesInWideRegistersEqualSequentialOnes) {
-  if (!collision::hasAvx()) GTEST_SKIP() << "this processor has no AVX: only the scalar path was compared";
+  if (!collision::hasAvx())
+    GTEST_SKIP() << "this processor has no AVX: only the scalar path was compared";
   compareWithReference(true);
 }
 

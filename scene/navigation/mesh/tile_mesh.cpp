@@ -21,7 +21,7 @@ namespace {
 constexpr int kCellsPerTile = 192;
 constexpr double kMaxCell = 0.1, kMinCell = 0.02, kCellHeight = 0.05;  // metres
 constexpr int kCellsPerRadius = 6;
-constexpr double kMaxColumns = 1e8;  // of cells: a quarter of a square kilometre of 0.05 m cells
+constexpr double kMaxColumns = 1e8;     // of cells: a quarter of a square kilometre of 0.05 m cells
 constexpr double kCellRounding = 1e-6;  // of a number of cells
 constexpr float kMaxContourError = 1.0f;  // cells
 constexpr int kMinRegionCells = 8, kMergeRegionCells = 400;

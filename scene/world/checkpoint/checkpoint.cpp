@@ -104,12 +104,14 @@ void archivePhysicsBody(A& a, MaybeConst<A, WorldData>& world, EntityId entity, 
 }
 
 /// Members that are not written follow from the scene and the written ones: `bodyIndices`,
-/// `entities`, `sceneBodyOf`, `physicsBodyOf`. `partFronts` are not part of the state. `activeBodies` are found before use, and `lastReport` is reported only in the tick
-/// that produced it.
+/// `entities`, `sceneBodyOf`, `physicsBodyOf`. `partFronts` are not part of the state.
+/// `activeBodies` are found before use, and `lastReport` is reported only in the tick that produced
+/// it.
 template <class A>
 void archiveDynamicBodies(A& a, MaybeConst<A, WorldData>& world) {
   auto& [physicsWorld, bodyIndices, physicsBodyByPart, entities, freeSlots, sceneBodyOf,
-         physicsBodyOf, activeBodies, partFronts, lastReport, avatarBodyPairs] = world.dynamicBodies;
+         physicsBodyOf, activeBodies, partFronts, lastReport, avatarBodyPairs] =
+      world.dynamicBodies;
   auto& [physicsBodies, pairs] = physicsWorld;
   a(physicsBodyByPart, freeSlots);
   if constexpr (!A::kWrites) restorePhysicsBodies(a, world);
