@@ -8,6 +8,7 @@
 #include <cmath>
 #include <random>
 
+#include "collision/processor.hpp"
 #include "scene/physics/graph_coloring.hpp"
 #include "scene/physics/solver.hpp"
 #include "scene/physics/solver_rows.hpp"
