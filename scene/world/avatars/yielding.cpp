@@ -18,7 +18,7 @@ constexpr double kFollowDistance = 0.1;       // metres: farther, it walks at fu
 constexpr double kMinSpeedFactor = 0.05;      // slower, it stands
 constexpr double kMaxRetreat = -0.5;          // of the speed
 constexpr double kAheadCosine = 0.7071;       // walks in one direction: within 45 degrees of it
-constexpr double kBesideCosine = -0.1;        // walks to one place: ahead or beside
+constexpr double kAbreastCosine = -0.1;       // walks to one place: ahead or abreast
 constexpr double kSameDirectionCosine = 0.7;  // of two walks
 constexpr double kSamePlace = 0.5;            // metres between two way points
 constexpr std::uint64_t kMaxQueueTicks = 600;
@@ -53,7 +53,7 @@ std::vector<Walker> findWalkers(const WorldData& world) {
 
 /// Minimum cosine between the walk's direction and that to another walker to yield to it; 2: never.
 double computeMinCosine(const Walker& walker, const Walker& other) {
-  if (computeGroundDistance(*walker.goal, *other.goal) <= kSamePlace) return kBesideCosine;
+  if (computeGroundDistance(*walker.goal, *other.goal) <= kSamePlace) return kAbreastCosine;
   return walker.heading.dot(other.heading) > kSameDirectionCosine ? kAheadCosine : 2;
 }
 

@@ -1,4 +1,4 @@
-// Walkers that follow one another: who is farther from a way point waits for whoever is before it,
+// Walkers that follow one another: the one farther from a way point waits for the one before it,
 // so that a crowd passes a door one by one instead of wedging itself in.
 #pragma once
 
