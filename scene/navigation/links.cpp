@@ -21,6 +21,7 @@ constexpr double kSameLanding = 0.01;  // metres, height
 constexpr int kExitDirections = 16;    // out of a lift
 constexpr std::size_t kMaxExits = 4;   // of a lift at a stop
 constexpr std::size_t kMaxStops = 64;  // a lift with more is not used
+constexpr double kStandRoom = 1e-3;    // metres above the floor: where a place is put to the test
 constexpr double kExitRoom = 0.1;      // metres between a waiting agent and a lift
 constexpr double kPlatformStep = 0.2;  // metres between heights at which a platform is looked for
 constexpr double kPlatformRoom = 0.5;  // of half its size: how far from its middle
@@ -57,6 +58,12 @@ double computeWayOut(const Aabb& box, const Vec3& place, const Vec3& direction, 
   return way;
 }
 
+/// Whether an agent that stands at a place stands on this body. After a walk over even floor the
+/// walker does not know.
+bool isStandingOn(const Body& body, const Vec3& place, Walker& walker) {
+  return standAt(walker, place + Vec3(0, kStandRoom, 0)) && walker.groundEntity() == body.id;
+}
+
 /// Places before a lift from which the agent walks in, and to which it walks out.
 std::vector<Vec3> findExits(const Body& lift, const Vec3& inside, Walker& walker) {
   std::vector<Vec3> exits;
@@ -68,9 +75,11 @@ std::vector<Vec3> findExits(const Body& lift, const Vec3& inside, Walker& walker
     walker.returnTo(inside);
     const WalkOutcome out = walker.walkTo(
         inside + computeWayOut(lift.boxes.whole, inside, direction, room) * direction);
-    if (out.kind != WalkOutcome::Kind::arrived || walker.groundEntity() == lift.id) continue;
+    if (out.kind != WalkOutcome::Kind::arrived || isStandingOn(lift, out.footPosition, walker))
+      continue;
+    walker.returnTo(out.footPosition);
     const WalkOutcome back = walker.walkTo(inside);
-    if (back.kind == WalkOutcome::Kind::arrived && walker.groundEntity() == lift.id)
+    if (back.kind == WalkOutcome::Kind::arrived && isStandingOn(lift, back.footPosition, walker))
       exits.push_back(out.footPosition);
   }
   return exits;
@@ -91,7 +100,7 @@ std::vector<Stop> findStops(WorldData& world, Body& lift, const NavigationAgent&
     std::optional<Vec3> inside;
     if (first) {
       const double way = lift.spec->stops[i] - lift.spec->stops[first->first];
-      inside = standAt(walker, first->second + way * lift.spec->axis + Vec3(0, 1e-3, 0));
+      inside = standAt(walker, first->second + way * lift.spec->axis + Vec3(0, kStandRoom, 0));
       if (inside && walker.groundEntity() != lift.id) inside.reset();
     } else if ((inside = findPlatform(lift, walker))) {
       first = {i, *inside};

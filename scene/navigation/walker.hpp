@@ -62,7 +62,7 @@ class Walker {
   bool takeMetSteps() { return std::exchange(metSteps_, false); }
 
   const Vec3& footPosition() const { return avatar_.footPosition; }
-  EntityId groundEntity() const { return avatar_.groundEntity; }  ///< after a walk or place()
+  EntityId groundEntity() const { return avatar_.groundEntity; }  ///< after place()
   const NavigationAgent& agent() const { return agent_; }
 
  private:

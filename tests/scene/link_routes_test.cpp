@@ -19,9 +19,9 @@ std::vector<NamedBox> gallery() {
 
 /// A shaft between two floors with a lift that is open towards +x.
 Model towerModel() {
-  Model model = boxModel({{"ground", {0, -0.2, -3}, {10, 0, 3}},
-                          {"upper", {4.05, 2.8, -3}, {10, 3, 3}},
-                          {"platform", {2, -0.1, -1}, {4, 0.002, 1}}});
+  Model model = boxModel({{"ground", {4, -0.2, -3}, {10, 0, 3}},
+                          {"upper", {4.01, 2.8, -3}, {10, 3, 3}},
+                          {"platform", {2, -0.1, -1}, {4, 0, 1}}});
   BodySpec lift = bodySpec("lift", BodyKind::lift, {2});
   lift.axis = Vec3::UnitY();
   lift.low = 0;
