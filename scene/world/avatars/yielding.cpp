@@ -13,7 +13,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kMinGap = 0.02;              // metres between the shapes' boxes: closer, it stands
+constexpr double kMinGap = 0.02;  // metres between the boxes of the shapes: closer, it steps back
 constexpr double kFollowDistance = 0.1;       // metres: farther, it walks at full speed
 constexpr double kMinSpeedFactor = 0.05;      // slower, it stands
 constexpr double kMaxRetreat = -0.5;          // of the speed
