@@ -58,7 +58,7 @@ std::vector<Damage> damagedFiles() {
       {"BufferViewBeyondItsBuffer",
        "a.gltf",
        replaced(box, R"("byteOffset":0,"byteLength":96)", R"("byteOffset":0,"byteLength":96000)"),
-       {"view"}},
+       {"bufferViews[0]"}},
       {"BufferViewThatIsNotThere",
        "a.gltf",
        replaced(box, R"("bufferView":0)", R"("bufferView":17)"),

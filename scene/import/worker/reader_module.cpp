@@ -27,7 +27,7 @@ void* openModule(const std::filesystem::path& module, const char* symbol) {
   const char* reason = dlerror();
   throw ImportError("the reader " + module.string() + " cannot be opened (" +
                     (reason ? reason : "?") +
-                    "): install what it needs, or raise the memory limit");
+                    "): install it and what it needs, or raise the memory limit");
 }
 
 }  // namespace enfilade::scene
