@@ -4,8 +4,9 @@
 # neighbouring files. So do most tests, and a new one may use any name; those with messages take too
 # long.
 
-# enfilade_unity_build(TARGET SIZE): groups the sources of each folder of TARGET, at most SIZE in
-# one group. An edit of a source then compiles at most SIZE of them.
+# enfilade_unity_build(TARGET SIZE [FOLDER..]): groups the sources of each folder of TARGET, at most
+# SIZE in one group. The folders listed last are small and share a group. An edit of a source then
+# compiles at most SIZE of them.
 function(enfilade_unity_build target size)
   if(NOT ENFILADE_UNITY STREQUAL "ON" AND NOT target IN_LIST ENFILADE_UNITY)
     return()
@@ -15,6 +16,9 @@ function(enfilade_unity_build target size)
   set(rooms "")
   foreach(source ${sources})
     get_filename_component(folder ${source} DIRECTORY)
+    if(folder IN_LIST ARGN)
+      set(folder small)
+    endif()
     string(MAKE_C_IDENTIFIER "room_${folder}" room)
     list(APPEND ${room} ${source})
     list(APPEND rooms ${room})
