@@ -17,7 +17,7 @@ struct ServerLimits {
   std::uint32_t scanRays = 1'000'000;           ///< per RangeScan
   std::uint32_t pairs = 1000;                   ///< per DistanceQuery
   std::uint32_t describedIds = 65'536;          ///< per DescribeEntities
-  std::size_t uploadBytes = 256u << 20;         ///< of all parts of a client
+  std::size_t uploadBytes = 64u << 20;          ///< of all parts of a client
   std::size_t replyBytes = 8u << 20;            ///< of EntityNames; half of protocol::kClientLimits
   std::size_t connections = 256;                ///< open at the same time
   std::size_t reservedConnections = 32;         ///< more, for health checks and refusals
