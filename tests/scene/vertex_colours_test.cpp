@@ -104,6 +104,19 @@ TEST(VertexColours, ThatAreNotOnePerVertexAreReported) {
             "meshes[0].primitives[0]: of a type that glTF does not allow");
 }
 
+TEST(VertexColours, ThatCannotBeReadLeaveTheMeshAsItIs) {
+  const TemporaryFolder folder;
+  GltfWriter file = plainTriangle();
+  const unsigned colours = addColours<std::uint8_t>(file, 5121, 4, 255);
+  file.json["accessors"][colours]["byteOffset"] = 1 << 20;
+  file.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours;
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_EQ(model.meshes.at(0).triangleCount(), 1u);
+  EXPECT_TRUE(model.meshes[0].colours.empty());
+  EXPECT_EQ(countOf(model, "vertex_colours_ignored"), 1u);
+  EXPECT_EQ(countOf(model, "solid_mesh"), 0u);
+}
+
 TEST(VertexColours, ThatAreAllWhiteTakeNoMemory) {
   GltfWriter file = plainTriangle();
   file.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] =

@@ -1,6 +1,7 @@
 #include "scene/import/gltf/plain_primitives.hpp"
 
 #include <array>
+#include <functional>
 #include <numeric>
 
 #include "scene/import/gltf/encoding/gltf_json.hpp"
@@ -180,6 +181,21 @@ void PlainPrimitives::rewriteIndices(Json& primitive, std::size_t vertices) {
   if (unroll) primitive["mode"] = kTriangleMode;
 }
 
+/// A mesh is readable without its colours. Returns whether the attribute was read.
+bool PlainPrimitives::tryAttribute(const std::string& attribute, const std::string& name,
+                                   const std::function<void()>& read) {
+  if (attribute != kColours) return read(), true;
+  try {
+    read();
+    return true;
+  } catch (const UnreadableGltf&) {
+    throw;
+  } catch (const ImportError& error) {
+    addDiagnostic(problems_, "vertex_colours_ignored", name + ": " + error.what());
+    return false;
+  }
+}
+
 void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
   const Json attributes = primitive.value("attributes", Json::object());
   const auto positions = readIndexMember(&attributes, "POSITION");
@@ -200,7 +216,10 @@ void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
     if (!written.contains(attribute)) {
       const auto accessor = readIndexMember(&attributes, attribute.c_str());
       if (!accessor) buffers_.fail(name + ": its " + attribute + " is not an accessor");
-      written[attribute] = writeAttribute(attribute, *accessor, width, mapping);
+      const auto write = [&, key = attribute, channels = width] {
+        written[key] = writeAttribute(key, *accessor, channels, mapping);
+      };
+      if (!tryAttribute(attribute, name, write)) continue;
     }
     plain[getPlainName(attribute)] = written[attribute];
   }
@@ -224,7 +243,9 @@ PrimitiveArrays PlainPrimitives::readArrays(Json& primitive, const Json& attribu
     if (arrays.contains(attribute)) continue;
     const auto accessor = readIndexMember(&attributes, attribute.c_str());
     if (!accessor) buffers_.fail(name + ": its " + attribute + " is not an accessor");
-    arrays[attribute] = buffers_.readFloats(*accessor, width, attribute == kColours);
+    tryAttribute(attribute, name, [&, key = attribute, channels = width] {
+      arrays[key] = buffers_.readFloats(*accessor, channels, key == kColours);
+    });
   }
   if (draco == nullptr) rewriteIndices(primitive, arrays.at("POSITION").size() / 3);
   return arrays;
@@ -246,9 +267,11 @@ void PlainPrimitives::rewritePosed(Json& primitive, const std::string& name, con
   applyMorphTargets(pose, primitive.value("targets", Json::array()), buffers_, name, arrays);
   if (!pose.nodeFromJoint.empty()) applySkin(pose, buffers_, name, arrays);
   Json plain = Json::object();
-  for (const auto& [attribute, width] : kept)
+  for (const auto& [attribute, width] : kept) {
+    if (!arrays.contains(attribute)) continue;  // colours that cannot be read
     plain[getPlainName(attribute)] =
         writeFloats(attribute, std::move(arrays.at(attribute)), width, mapping);
+  }
   primitive["attributes"] = std::move(plain);
   for (const char* member : {"targets", "extensions"}) primitive.erase(member);
 }

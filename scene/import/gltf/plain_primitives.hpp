@@ -2,6 +2,7 @@
 // and triangles instead of strips and fans. Private to the import.
 #pragma once
 
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string>
@@ -51,6 +52,8 @@ class PlainPrimitives {
                              const TextureMapping& mapping);
   std::size_t writeFloats(const std::string& attribute, std::vector<float> values,
                           std::size_t width, const TextureMapping& mapping);
+  bool tryAttribute(const std::string& attribute, const std::string& name,
+                    const std::function<void()>& read);
   void rewriteIndices(nlohmann::json& primitive, std::size_t vertices);
   bool isNormalised(const nlohmann::json& accessor) const;
   std::size_t countElements(std::size_t accessor) const;
