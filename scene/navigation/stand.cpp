@@ -13,7 +13,7 @@ std::optional<Vec3> standAt(Walker& walker, const Vec3& point, double maxDrop) {
 
 std::optional<Vec3> standNear(Walker& walker, const Vec3& point) {
   constexpr std::array<double, 5> kRings{0.05, 0.1, 0.2, 0.3, 0.4};  // metres
-  constexpr int kDirections = 8;
+  constexpr int kPlacesOfRing = 8;
   const auto place = [&](const Vec3& aside) {
     const Vec3 above = point + aside + Vec3(0, kHeightError, 0);
     auto found = standAt(walker, above, 2 * kHeightError);
@@ -22,8 +22,8 @@ std::optional<Vec3> standNear(Walker& walker, const Vec3& point) {
   };
   if (const auto found = place(Vec3::Zero())) return found;
   for (const double ring : kRings) {
-    for (int i = 0; i < kDirections; ++i) {
-      const double angle = 2 * std::numbers::pi / kDirections * i;
+    for (int i = 0; i < kPlacesOfRing; ++i) {
+      const double angle = 2 * std::numbers::pi / kPlacesOfRing * i;
       if (const auto found = place(ring * Vec3(std::cos(angle), 0, std::sin(angle)))) return found;
     }
   }

@@ -93,14 +93,14 @@ void ProtocolDetector::read() {
 }
 
 ProtocolDetector::Protocol ProtocolDetector::detect() const {
-  constexpr std::string_view kMethods[] = {"GET ", "HEAD", "POST", "PUT ",
-                                           "DELE", "OPTI", "PATC", "CONN"};
+  constexpr std::string_view kHttpMethods[] = {"GET ", "HEAD", "POST", "PUT ",
+                                               "DELE", "OPTI", "PATC", "CONN"};
   constexpr std::size_t kMinBytes = 4;
   const std::string_view received(reinterpret_cast<const char*>(in_.data()),
                                   std::min(receivedBytes_, kMinBytes));
   const std::string_view magic(reinterpret_cast<const char*>(protocol::kMagic.data()), kMinBytes);
   const auto mayBe = [&](std::string_view word) { return word.starts_with(received); };
-  const bool http = std::any_of(std::begin(kMethods), std::end(kMethods), mayBe);
+  const bool http = std::any_of(std::begin(kHttpMethods), std::end(kHttpMethods), mayBe);
   if (!http && !mayBe(magic)) return Protocol::enfilade;
   if (received.size() < kMinBytes) return Protocol::unknown;
   return http ? Protocol::http : Protocol::enfilade;
