@@ -68,8 +68,6 @@ std::size_t findFirstAfter(const std::vector<WalkEvent>& list, double time) {
 }  // namespace
 
 IndexPairs alignEvents(const std::vector<WalkEvent>& before, const std::vector<WalkEvent>& after) {
-  ENFILADE_ASSERT(std::ranges::is_sorted(before, {}, &WalkEvent::time) &&
-                  std::ranges::is_sorted(after, {}, &WalkEvent::time));
   IndexPairs pairs;
   Range b{0, 0}, a{0, 0};
   while (b.first < before.size() || a.first < after.size()) {
