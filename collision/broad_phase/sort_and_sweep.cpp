@@ -297,6 +297,13 @@ std::span<const SortAndSweep::Overlap> SortAndSweep::overlapsOf(ProxyId proxy) c
   return state_->proxies[proxy].overlaps;
 }
 
+std::span<const SortAndSweep::Overlap> SortAndSweep::dynamicOverlapsOf(ProxyId proxy) const {
+  const std::span<const Overlap> all = overlapsOf(proxy);
+  std::size_t first = all.size();
+  while (first > 0 && all[first - 1].isDynamic) --first;
+  return all.subspan(first);
+}
+
 std::vector<StaticId> SortAndSweep::overlapStatic(const Aabb& box) const {
   requireValidAabb(box, "query box", 0);
   const StaticGrid& staticGrid = state_->staticGrid;

@@ -48,6 +48,7 @@ void makeBodies(WorldData& world) {
       world.bodyIndexByProxy.resize(body.proxy + 1, kNoBody);
     world.bodyIndexByProxy[body.proxy] = i;
     world.bodyIndexById[body.id] = i;
+    world.bodyIndexByName.emplace(body.spec->name, i);
   }
 }
 
@@ -65,9 +66,8 @@ std::unique_ptr<WorldData> makeWorldData(std::shared_ptr<const Scene> scene,
 }
 
 std::optional<std::string> validateBodyCommand(const World& world, const BodyCommand& command) {
-  for (const Body& body : world.data().bodies)
-    if (body.spec->name == command.body)
-      return validateBodyCommandFields(body, command, world.settings());
+  if (const Body* body = world.data().findBodyByName(command.body))
+    return validateBodyCommandFields(*body, command, world.settings());
   return "body: no body named '" + command.body + "'";
 }
 

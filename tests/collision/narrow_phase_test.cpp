@@ -151,6 +151,35 @@ TEST(NarrowPhase, GivesUpAsSoonAsTheLimitIsProved) {
             1.5);
 }
 
+/// Also for axes of any length, for faces that lie on each other, and next to the bound itself.
+TEST(NarrowPhase, AProvedSeparationIsThatOfTheLowerBound) {
+  Random random(11);
+  int proved = 0, refused = 0;
+  for (int i = 0; i < 400; ++i) {
+    const bool flat = i % 3 == 0;
+    const Hull a = buildHull(flat ? latticePoints(random, 30, 2) : randomPoints(random, 20, 1));
+    const Hull b = buildHull(flat ? latticePoints(random, 30, 2) : randomPoints(random, 90, 1));
+    const Mat3 turned =
+        Eigen::AngleAxisd(uniform(random, 0, 3), randomPoint(random, 1).normalized()).matrix();
+    const PlacedConvex atA{a.vertices, Vec3::Zero(), nullptr, &a};
+    const PlacedConvex atB{b.vertices, Vec3(flat ? 5 : uniform(random, 0, 4), 0, 0),
+                           flat ? nullptr : &turned, &b};
+    FeatureCache cache;
+    computeSeparation(atA, atB, cache);
+    cache.axis *= i % 7 == 0 ? 1e-120 : uniform(random, 0.1, 10);
+    const double bound = computeSeparationLowerBound(atA, atB, cache);
+    for (const double distance :
+         {0.0, 0.5 * bound, bound, std::nextafter(bound, -10.0), std::nextafter(bound, 10.0),
+          bound - 1e-15, bound + 1e-15, bound - 1e-9, bound + 1e-9, bound + 1}) {
+      ASSERT_EQ(isSeparationProved(atA, atB, distance, cache), bound > distance)
+          << i << ": " << distance << " of " << bound;
+      ++(bound > distance ? proved : refused);
+    }
+  }
+  EXPECT_GT(proved, 500);
+  EXPECT_GT(refused, 500);
+}
+
 // ---- against the references --------------------------------------------------------------------
 
 TEST(NarrowPhase, HullsAndTrianglesAgreeWithBruteForceOverFeatures) {

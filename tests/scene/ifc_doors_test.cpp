@@ -312,16 +312,8 @@ TEST(IfcDoors, AnAvatarWalksThroughADoorThatOpensOneWayFromEitherSide) {
 
 // ---- files --------------------------------------------------------------------------------------
 
-std::vector<IfcReader> readersHere() {
-  std::vector<IfcReader> readers{IfcReader::ifcPlusPlus};
-  if (tests::hasWebIfc()) readers.push_back(IfcReader::webIfc);
-  return readers;
-}
-
 Model imported(const std::filesystem::path& file, IfcReader reader) {
-  ImportOptions options;
-  options.ifcReader = reader;
-  Model model = importModel(file, options);
+  Model model = importModel(file, tests::by(reader));
   collectBodies(model, file);
   return model;
 }
@@ -329,7 +321,7 @@ Model imported(const std::filesystem::path& file, IfcReader reader) {
 TEST(IfcDoors, OfAFileOpenTowardsItsY) {
   const TemporaryFolder folder;
   const auto file = folder.write("house.ifc", IfcHouse().text());
-  for (const IfcReader reader : readersHere()) {
+  for (const IfcReader reader : tests::readersHere()) {
     const Model model = imported(file, reader);
     ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "still_doors");
     // A slab of 0.9 x 0.05 m from (1.5, 0.1) in the file; the file's y is the scene's -z.
@@ -364,7 +356,7 @@ TEST(IfcLifts, StopAtTheStoreysThatTheirShaftIsOpenTo) {
       houseWithLift(2.4,
                     "#570=IFCSLAB('000000000000000000Slab',$,'Slab',$,$,#552,#565,$,.FLOOR.);\n"));
   const auto tall = folder.write("tall.ifc", houseWithLift(6, ""));
-  for (const IfcReader reader : readersHere()) {
+  for (const IfcReader reader : tests::readersHere()) {
     const Model lift = imported(open, reader);
     ASSERT_EQ(lift.bodies.size(), 2u) << diagnosticText(lift, "still_lifts");
     const BodySpec& body = lift.bodies[1].kind == BodyKind::lift ? lift.bodies[1] : lift.bodies[0];

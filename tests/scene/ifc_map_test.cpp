@@ -4,33 +4,17 @@
 #include "scene/import/import_model.hpp"
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
+#include "tests/scene/import_outcome.hpp"
 #include "tests/support/temporary_folder.hpp"
 #include "tests/support/web_ifc_here.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-using tests::hasWebIfc;
+using tests::by;
 using tests::IfcHouse;
+using tests::readersHere;
 using tests::TemporaryFolder;
-
-ImportOptions by(IfcReader reader) {
-  ImportOptions options;
-  options.ifcReader = reader;
-  return options;
-}
-
-std::vector<IfcReader> readersHere() {
-  std::vector<IfcReader> readers{IfcReader::ifcPlusPlus};
-  if (hasWebIfc()) readers.push_back(IfcReader::webIfc);
-  return readers;
-}
-
-const Object& objectOf(const Model& model, const std::string& ifcClass) {
-  for (const Object& object : model.objects)
-    if (object.ifcClass == ifcClass) return object;
-  throw std::runtime_error("no " + ifcClass);
-}
 
 // ---- the map ------------------------------------------------------------------------------------
 
@@ -50,7 +34,8 @@ TEST(IfcMap, OnRequestCoordinatesAreThoseOfTheMap) {
     SCOPED_TRACE(model.reader);
     EXPECT_EQ(model.map, "EPSG:25832");
     // A corner of the file's (1.5, 0.1) is 0.1 m west and 1.5 m north of the origin; -z is north.
-    const Vec3 door = objectOf(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
+    const Vec3 door =
+        objectOfClass(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
     EXPECT_LT((door - Vec3(456789 - 0.1, 110, -(5428000 + 1.5))).norm(), 1e-6) << door.transpose();
     EXPECT_LT(Scene(Model(model)).bounds().size().z(), 4.01);
     EXPECT_GT(Scene(Model(model)).bounds().size().z(), 3.99) << "the wall runs north";
@@ -70,7 +55,7 @@ Vec3 findOriginOnMap(const std::string& more, const std::string& schema,
   const Model model = importModel(folder.write("house.ifc", house.text()), options);
   if (crs != nullptr) *crs = model.map;
   // The door stands at (1.5, 0.1) of the file.
-  return objectOf(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
+  return objectOfClass(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
 }
 
 TEST(IfcMap, AMapConversionWithAxisFactorsIsApplied) {

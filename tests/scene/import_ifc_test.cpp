@@ -18,34 +18,17 @@
 namespace enfilade::scene {
 namespace {
 
+using tests::by;
 using tests::hasWebIfc;
 using tests::IfcHouse;
+using tests::readersHere;
 using tests::TemporaryFolder;
-
-ImportOptions by(IfcReader reader) {
-  ImportOptions options;
-  options.ifcReader = reader;
-  return options;
-}
-
-std::vector<IfcReader> readersHere() {
-  std::vector<IfcReader> readers{IfcReader::ifcPlusPlus};
-  if (hasWebIfc()) readers.push_back(IfcReader::webIfc);
-  return readers;
-}
 
 const Diagnostic* problemOf(const Model& model, const std::string& kind) {
   for (const Diagnostic& problem : model.diagnostics) {
     if (problem.kind == kind) return &problem;
   }
   return nullptr;
-}
-
-const Object& objectOf(const Model& model, const std::string& ifcClass) {
-  for (const Object& object : model.objects) {
-    if (object.ifcClass == ifcClass) return object;
-  }
-  throw std::runtime_error("no " + ifcClass);
 }
 
 /// Sets an environment variable for the lifetime of the object.
@@ -73,7 +56,7 @@ TEST(ImportIfc, EachReaderGivesTheSameHouse) {
     expectSize(model, {4, 3, 0.3});
     EXPECT_EQ(model.metresPerUnit, 0.001);
     EXPECT_EQ(model.upAxis, 'z');
-    const Object& door = objectOf(model, "IfcDoor");
+    const Object& door = objectOfClass(model, "IfcDoor");
     EXPECT_EQ(door.path, "Test house/House/Ground%2Ffloor/Front door");
     EXPECT_EQ(door.globalId, "000000000000000000Door");
     EXPECT_EQ(door.operationType, "SINGLE_SWING_LEFT");
@@ -157,7 +140,7 @@ TEST(ImportIfc, UnitAndUpAxisOfTheUserWin) {
   options.up = 'y';
   const Model model = importModel(file, options);
   expectSize(model, {8, 0.6, 6});
-  EXPECT_NEAR(objectOf(model, "IfcDoor").overallWidth, 1.8, 1e-9);
+  EXPECT_NEAR(objectOfClass(model, "IfcDoor").overallWidth, 1.8, 1e-9);
   EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
 }
 
@@ -180,7 +163,8 @@ TEST(ImportIfc, AMapPositionIsReportedAndMovesNothing) {
         << place->example;
     EXPECT_TRUE(model.offset.isZero(0));
     EXPECT_LT(
-        (objectOf(model, "IfcDoor").worldFromPlacement->translation() - Vec3(1.5, 0, -0.1)).norm(),
+        (objectOfClass(model, "IfcDoor").worldFromPlacement->translation() - Vec3(1.5, 0, -0.1))
+            .norm(),
         1e-9);
   }
 }
@@ -194,7 +178,7 @@ TEST(ImportIfc, ATechnicalCorrigendumOfAReleaseIsReadAsTheRelease) {
   text.replace(text.find("'IFC4'"), 6, "'IFC4X3_TC1'");
   const Model model = importModel(folder.write("house.ifc", text), by(IfcReader::webIfc));
   EXPECT_EQ(model.reader, "web-ifc");
-  EXPECT_TRUE(objectOf(model, "IfcDoor").worldFromPlacement);
+  EXPECT_TRUE(objectOfClass(model, "IfcDoor").worldFromPlacement);
 }
 
 TEST(ImportIfc, StoreysAndSpacesAreKept) {
@@ -222,9 +206,9 @@ TEST(ImportIfc, StoreysAndSpacesAreKept) {
     EXPECT_EQ(model.storeys[1].name, "Upper floor");
     EXPECT_EQ(model.storeys[1].globalId, "0000000000000000000511");
     EXPECT_NEAR(model.storeys[1].elevation, 3.2, 1e-9);
-    EXPECT_EQ(objectOf(model, "IfcWall").storey, 0u);
-    EXPECT_EQ(objectOf(model, "IfcDoor").storey, 0u);
-    EXPECT_EQ(objectOf(model, "IfcFurnishingElement").storey, 1u);
+    EXPECT_EQ(objectOfClass(model, "IfcWall").storey, 0u);
+    EXPECT_EQ(objectOfClass(model, "IfcDoor").storey, 0u);
+    EXPECT_EQ(objectOfClass(model, "IfcFurnishingElement").storey, 1u);
     ASSERT_EQ(model.spaces.size(), 1u);
     const Space& space = model.spaces[0];
     EXPECT_EQ(space.name, "201");
@@ -276,7 +260,8 @@ TEST(ImportIfc, AHouseFarFromTheOriginKeepsItsMillimetres) {
     expectSize(model, {4, 3, 0.3});
     EXPECT_NEAR(model.offset.x(), 459123.4, 10);
     EXPECT_NEAR(model.offset.z(), -5428310.7, 10);
-    const Vec3 door = objectOf(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
+    const Vec3 door =
+        objectOfClass(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
     EXPECT_LT((door - Vec3(459124.9, 112.6, -5428310.8)).norm(), 1e-6);
     EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
   }
@@ -311,7 +296,7 @@ TEST(ImportIfc, AReaderThatFailsIsFollowedByTheNext) {
   EXPECT_EQ(model.reader, "assimp");
   EXPECT_NE(problemOf(model, "ifc_reader_absent"), nullptr);
   EXPECT_NE(problemOf(model, "ifc_reader_failed"), nullptr);
-  EXPECT_EQ(objectOf(model, "IfcDoor").path, "Test house/House/Ground%2Ffloor/Front door");
+  EXPECT_EQ(objectOfClass(model, "IfcDoor").path, "Test house/House/Ground%2Ffloor/Front door");
 }
 
 TEST(ImportIfc, AMissingOrInvalidReaderModuleIsReported) {

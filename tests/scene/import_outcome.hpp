@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <stdexcept>
 #include <string>
 
 #include "scene/import/import_model.hpp"
@@ -20,6 +21,13 @@ inline std::string diagnosticText(const Model& model, const std::string& kind) {
   for (const Diagnostic& problem : model.diagnostics)
     if (problem.kind == kind) return problem.example;
   return "";
+}
+
+/// The first object of an IFC class. Throws std::runtime_error without one.
+inline const Object& objectOfClass(const Model& model, const std::string& ifcClass) {
+  for (const Object& object : model.objects)
+    if (object.ifcClass == ifcClass) return object;
+  throw std::runtime_error("no " + ifcClass);
 }
 
 /// The error message of importing `file`; "" if the import succeeds.

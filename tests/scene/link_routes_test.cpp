@@ -74,6 +74,19 @@ Notice runToNotice(BodyFixture& fixture, int maxTicks = 60 * 60) {
   return {};
 }
 
+/// An avatar walks the path unblocked, to its end, in about the time that the path states.
+void expectWalkTakesItsTime(const Model& model, const NavigationPath& path,
+                            const std::string& lift = "") {
+  BodyFixture fixture(model);
+  fixture.order("ann", spawnAt(path.points.front()));
+  fixture.order("ann", makeWalk(path, lift));
+  const Notice end = runToNotice(fixture);
+  EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
+  EXPECT_LT((end.position - path.points.back()).norm(), 0.01);
+  EXPECT_NEAR(static_cast<double>(fixture.world.snapshot()->tick) / 60, path.seconds,
+              0.05 * path.seconds);
+}
+
 TEST(LinkRoutes, ADropJoinsAGalleryWithTheFloorBelow) {
   const auto scene = boxScene(gallery());
   Navigation navigation(scene, {}, {});
@@ -96,14 +109,7 @@ TEST(LinkRoutes, ADropJoinsAGalleryWithTheFloorBelow) {
   EXPECT_GT(path.legs[1].seconds, path.legs[1].length / 1.4 - 1e-9);
   EXPECT_FALSE(navigation.findPath(to, from, {2, false}).found());  // not up
 
-  BodyFixture fixture(boxModel(gallery()));
-  fixture.order("ann", spawnAt(path.points.front()));
-  fixture.order("ann", makeWalk(path));
-  const Notice end = runToNotice(fixture);
-  EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
-  EXPECT_LT((end.position - path.points.back()).norm(), 0.01);
-  EXPECT_NEAR(static_cast<double>(fixture.world.snapshot()->tick) / 60, path.seconds,
-              0.05 * path.seconds);
+  expectWalkTakesItsTime(boxModel(gallery()), path);
 }
 
 TEST(LinkRoutes, AJumpIsChosenOverALongerWay) {
@@ -139,14 +145,7 @@ TEST(LinkRoutes, ALiftIsCalledAndRidden) {
     EXPECT_EQ(ride.length, 0);
     EXPECT_EQ(ride.fromLevel, start.y() < 1 ? 0u : 1u);
     EXPECT_NEAR(ride.seconds, start.y() < 1 ? 3 : 6, 0.1);  // it has to come up first
-    BodyFixture fixture(towerModel());
-    fixture.order("ann", spawnAt(path.points.front()));
-    fixture.order("ann", makeWalk(path, "lift"));
-    const Notice end = runToNotice(fixture);
-    EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
-    EXPECT_LT((end.position - path.points.back()).norm(), 0.01);
-    EXPECT_NEAR(static_cast<double>(fixture.world.snapshot()->tick) / 60, path.seconds,
-                0.05 * path.seconds);
+    expectWalkTakesItsTime(towerModel(), path, "lift");
   }
 }
 

@@ -4,8 +4,10 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <vector>
 
 #include "scene/import/ifc/web_ifc.hpp"
+#include "scene/import/import_model.hpp"
 
 namespace enfilade::tests {
 
@@ -16,6 +18,19 @@ inline bool hasWebIfc() {
   if (!missing.empty() && std::getenv("CI") != nullptr)
     ADD_FAILURE() << "CI tests every reader of IFC, but " << missing;
   return missing.empty();
+}
+
+/// The readers of IFC that this machine can run.
+inline std::vector<scene::IfcReader> readersHere() {
+  std::vector<scene::IfcReader> readers{scene::IfcReader::ifcPlusPlus};
+  if (hasWebIfc()) readers.push_back(scene::IfcReader::webIfc);
+  return readers;
+}
+
+inline scene::ImportOptions by(scene::IfcReader reader) {
+  scene::ImportOptions options;
+  options.ifcReader = reader;
+  return options;
 }
 
 }  // namespace enfilade::tests

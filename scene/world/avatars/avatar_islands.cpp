@@ -7,10 +7,8 @@ namespace {
 
 /// Unites the avatar with those that its motion bounds overlap.
 void uniteWithNeighbours(const WorldData& world, std::uint32_t index, DisjointSets& islands) {
-  const auto overlapping = world.broadPhase.overlapsOf(world.avatars[index].proxy);
-  for (std::size_t i = overlapping.size();
-       i-- > 0 && overlapping[i].isDynamic;)  // dynamic proxies come last
-    if (const Avatar* other = world.findAvatarByProxy(overlapping[i].id))
+  for (const auto& overlap : world.broadPhase.dynamicOverlapsOf(world.avatars[index].proxy))
+    if (const Avatar* other = world.findAvatarByProxy(overlap.id))
       islands.unite(index, static_cast<std::uint32_t>(other - world.avatars.data()));
 }
 

@@ -23,12 +23,6 @@ bool mayCall(const Walk& walk, const Avatar& avatar) {
   return avatar.walk.calls < kMaxCalls * countBodies(walk);
 }
 
-Body* findBody(WorldData& world, const std::string& name) {
-  const auto at =
-      std::ranges::find_if(world.bodies, [&](const Body& body) { return body.spec->name == name; });
-  return at == world.bodies.end() ? nullptr : &*at;
-}
-
 /// Where a door may be while it opens or closes, scene frame.
 Aabb computeSwing(const Body& door) {
   const BodySpec& spec = *door.spec;
@@ -162,10 +156,10 @@ void prepareWay(WorldData& world, const Walk& walk, Avatar& avatar) {
   if (countBodies(walk) == 0) return;
   for (const Ride& ride : walk.rides)
     if (ride.waypoint == avatar.walk.waypointIndex)
-      if (const Body* lift = findBody(world, ride.lift))
+      if (const Body* lift = world.findBodyByName(ride.lift))
         prepareLift(world, walk, avatar, *lift, ride.level);
   for (const std::string& name : walk.opens)
-    if (const Body* door = findBody(world, name)) prepareDoor(world, walk, avatar, *door);
+    if (const Body* door = world.findBodyByName(name)) prepareDoor(world, walk, avatar, *door);
   if (avatar.walk.waitsFor != before) avatar.walk.timeoutLeft = world.settings.stuckTimeout;
 }
 

@@ -81,14 +81,13 @@ struct Leader {
 Leader findLeader(const WorldData& world, const std::vector<Walker>& walkers, const Avatar& avatar,
                   const Walker& walker) {
   Leader leader;
-  const auto overlapping = world.broadPhase.overlapsOf(avatar.proxy);  // of the last tick
-  for (std::size_t i = overlapping.size();
-       i-- > 0 && overlapping[i].isDynamic;) {  // dynamic proxies come last
-    const Avatar* other = world.findAvatarByProxy(overlapping[i].id);
+  for (const auto& overlap :
+       world.broadPhase.dynamicOverlapsOf(avatar.proxy)) {  // of the last tick
+    const Avatar* other = world.findAvatarByProxy(overlap.id);
     if (!other) continue;
     const double gap = computeGapAhead(
         avatar, walker, *other, walkers[static_cast<std::size_t>(other - world.avatars.data())]);
-    if (gap < leader.gap) leader = {other, gap};
+    if (gap < kFollowDistance && gap <= leader.gap) leader = {other, gap};
   }
   return leader;
 }

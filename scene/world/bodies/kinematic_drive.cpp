@@ -192,10 +192,8 @@ void initKinematicDrive(Body& body) {
 }
 
 void applyBodyCommands(WorldData& world) {
-  for (const BodyCommand& command : world.pendingBodyCommands) {
-    for (Body& body : world.bodies)
-      if (body.spec->name == command.body) applyBodyCommand(body, command);
-  }
+  for (const BodyCommand& command : world.pendingBodyCommands)
+    if (Body* body = world.findBodyByName(command.body)) applyBodyCommand(*body, command);
   world.pendingBodyCommands.clear();
   openTouchedDoors(world);
 }

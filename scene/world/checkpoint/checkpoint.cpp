@@ -175,15 +175,15 @@ void archiveBodies(Reader& a, std::vector<Body>& bodies) {
 }
 
 /// Not written: `scene` and `settings` create the world that is read into, with
-/// `bodyIndexById`, `kinematicBodies`, `triggers` and `bodyIndexByProxy`. `excludedPairCache` and
-/// `movingBodies` are computed before use. `avatarByProxy` and `snapshot` follow from the rest;
-/// `auditCursor` and `threads` are not part of the state.
+/// `bodyIndexById`, `bodyIndexByName`, `kinematicBodies`, `triggers` and `bodyIndexByProxy`.
+/// `excludedPairCache` and `movingBodies` are computed before use. `avatarByProxy` and `snapshot`
+/// follow from the rest; `auditCursor` and `threads` are not part of the state.
 template <class A>
 void archiveWorld(A& a, MaybeConst<A, WorldData>& world) {
   auto& [scene, settings, tick, hash, pendingCommands, queuedOrderCount, queues, avatars,
-         avatarNames, avatarIndices, pendingBodyCommands, bodies, bodyIndexById, bodyContacts,
-         excludedPairCache, kinematicBodies, triggers, movingBodies, dynamicBodies, broadPhase,
-         avatarByProxy, bodyIndexByProxy, snapshot, auditCursor, threads] = world;
+         avatarNames, avatarIndices, pendingBodyCommands, bodies, bodyIndexById, bodyIndexByName,
+         bodyContacts, excludedPairCache, kinematicBodies, triggers, movingBodies, dynamicBodies,
+         broadPhase, avatarByProxy, bodyIndexByProxy, snapshot, auditCursor, threads] = world;
   a(tick, hash, queuedOrderCount, avatarNames, queues, pendingCommands, pendingBodyCommands);
   archiveBodies(a, bodies);
   a(avatars, bodyContacts);

@@ -143,11 +143,9 @@ struct CheckpointChecker {
     for (const Command& command : world.pendingCommands)
       requireValid(validateCommandFields(command, settings()), command.avatar);
     for (const BodyCommand& command : world.pendingBodyCommands) {
-      const auto at = std::find_if(world.bodies.begin(), world.bodies.end(), [&](const Body& body) {
-        return body.spec->name == command.body;
-      });
-      require(at != world.bodies.end(), "no body named '" + command.body + "'");
-      requireValid(validateBodyCommandFields(*at, command, settings()), command.body);
+      const Body* body = world.findBodyByName(command.body);
+      require(body != nullptr, "no body named '" + command.body + "'");
+      requireValid(validateBodyCommandFields(*body, command, settings()), command.body);
     }
     require(world.queuedOrderCount <= kMaxQueuedOrders, "too many orders are queued");
   }

@@ -263,11 +263,9 @@ void updateObstaclePose(const WorldData& world, Obstacle& obstacle) {
 }
 
 bool areNeighboursStationary(const WorldData& world, const Avatar& avatar) {
-  const auto overlapping = world.broadPhase.overlapsOf(avatar.proxy);
-  for (std::size_t i = overlapping.size();
-       i-- > 0 && overlapping[i].isDynamic;)  // dynamic proxies come last
-    if (mayMove(world, overlapping[i].id)) return false;
-  return true;
+  return std::ranges::none_of(
+      world.broadPhase.dynamicOverlapsOf(avatar.proxy),
+      [&](const collision::SortAndSweep::Overlap& overlap) { return mayMove(world, overlap.id); });
 }
 
 void refreshDynamicObstacles(const WorldData& world, Avatar& avatar) {
@@ -299,10 +297,8 @@ void prefetchSurroundings(const WorldData& world) {
 
 void prepareBodyObstacles(WorldData& world, const Avatar& avatar) {
   if (hasAllObstacles(avatar)) return;
-  const auto overlapping = world.broadPhase.overlapsOf(avatar.proxy);
-  for (std::size_t i = overlapping.size();
-       i-- > 0 && overlapping[i].isDynamic;)  // dynamic proxies come last
-    if (const std::uint32_t body = world.findBodyByProxy(overlapping[i].id); body != kNoBody)
+  for (const auto& overlap : world.broadPhase.dynamicOverlapsOf(avatar.proxy))
+    if (const std::uint32_t body = world.findBodyByProxy(overlap.id); body != kNoBody)
       makePartBoxes(world.bodies[body]);
 }
 

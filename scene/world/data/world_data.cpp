@@ -49,6 +49,14 @@ std::uint32_t WorldData::findBodyByProxy(collision::ProxyId proxy) const {
   return proxy < bodyIndexByProxy.size() ? bodyIndexByProxy[proxy] : kNoBody;
 }
 
+const Body* WorldData::findBodyByName(std::string_view name) const {
+  const auto at = bodyIndexByName.find(name);
+  return at == bodyIndexByName.end() ? nullptr : &bodies[at->second];
+}
+Body* WorldData::findBodyByName(std::string_view name) {
+  return const_cast<Body*>(std::as_const(*this).findBodyByName(name));
+}
+
 EntityId WorldData::insertAvatar(Avatar avatar) {
   const EntityId id = firstAvatarId() + static_cast<EntityId>(avatarNames.size());
   avatar.id = id;

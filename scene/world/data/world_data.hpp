@@ -51,8 +51,9 @@ struct WorldData {
 
   std::vector<BodyCommand> pendingBodyCommands;  ///< since the last tick
   std::vector<Body> bodies;                      ///< in the order of Model::bodies; constant size
-  std::map<EntityId, std::uint32_t> bodyIndexById;  ///< index into `bodies`
-  BodyContacts bodyContacts;                        ///< as reported: a, b
+  std::map<EntityId, std::uint32_t> bodyIndexById;            ///< index into `bodies`
+  std::map<std::string_view, std::uint32_t> bodyIndexByName;  ///< by BodySpec::name
+  BodyContacts bodyContacts;                                  ///< as reported: a, b
   /// Pairs of a kinematic body and another entity that were looked up so far. true: they touch at
   /// the start and are excluded (contacts/excluded_pairs.hpp). Determined by the scene.
   std::map<EntityPair, bool> excludedPairCache;
@@ -80,6 +81,8 @@ struct WorldData {
   const Avatar* findAvatarByProxy(collision::ProxyId proxy) const;
   Avatar* findAvatarByProxy(collision::ProxyId proxy);
   std::uint32_t findBodyByProxy(collision::ProxyId proxy) const;  ///< kNoBody: no body
+  const Body* findBodyByName(std::string_view name) const;        ///< null: no body
+  Body* findBodyByName(std::string_view name);
 
   /// Adds an avatar that has a proxy, under the next id, which it returns.
   EntityId insertAvatar(Avatar avatar);
