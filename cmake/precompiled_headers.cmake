@@ -59,8 +59,8 @@ function(enfilade_precompile_headers root)
     enfilade_precompiled(enfilade_precompiled_message_tests
       HEADERS ${ENFILADE_PRECOMPILED_MESSAGES} <gtest/gtest.h>
       LIBRARIES protobuf::libprotobuf nlohmann_json::nlohmann_json GTest::gtest)
-    target_compile_options(enfilade_precompiled_tests PRIVATE ${ENFILADE_UNHURRIED})
-    target_compile_options(enfilade_precompiled_message_tests PRIVATE ${ENFILADE_UNHURRIED})
+    target_compile_options(enfilade_precompiled_tests PRIVATE ${ENFILADE_TEST_OPTIONS})
+    target_compile_options(enfilade_precompiled_message_tests PRIVATE ${ENFILADE_TEST_OPTIONS})
   endif()
   set(with_messages enfilade_server enfilade_protocol protocol_tests server_tests replay_tests
                     difference_tests export_tests)

@@ -205,18 +205,6 @@ std::array<Plane, 6> computeFrustum(const Camera& camera) {
           Plane{-basis.forward, basis.forward.dot(camera.eye) + camera.far}};
 }
 
-bool intersectsFrustum(const std::array<Plane, 6>& frustum, const scene::Aabb& box) {
-  const Vec3 centre = box.centre();
-  const Vec3 half = 0.5 * box.size();
-  for (const Plane& plane : frustum) {
-    const double projectedRadius = plane.normal.cwiseAbs().dot(half);
-    // The slack covers the frame's single precision: a box that touches a plane is drawn.
-    const double slack = 1e-5 * (1 + std::abs(plane.offset));
-    if (plane.normal.dot(centre) + plane.offset + projectedRadius < -slack) return false;
-  }
-  return true;
-}
-
 Vec3 project(const Camera& camera, const Vec3& worldPoint) {
   const CameraBasis basis = computeCameraBasis(camera);
   const Vec3 toPoint = worldPoint - camera.eye;

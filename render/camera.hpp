@@ -50,6 +50,11 @@ struct Camera {
   int width = 640, height = 480;  ///< pixels, 1..4096
 };
 
+/// `camera` must satisfy validateCamera().
+inline std::size_t countPixels(const Camera& camera) {
+  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+}
+
 /// An error text that names an invalid field and its value; nullopt if the camera is valid.
 std::optional<std::string> validateCamera(const Camera& camera);
 

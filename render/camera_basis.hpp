@@ -28,7 +28,4 @@ CameraBasis computeCameraBasis(const Camera& camera);
 /// The four sides, near and far. A point inside all six planes may be in the image.
 std::array<Plane, 6> computeFrustum(const Camera& camera);
 
-/// False only if the whole box is outside one of the planes.
-bool intersectsFrustum(const std::array<Plane, 6>& frustum, const scene::Aabb& box);
-
 }  // namespace enfilade::render

@@ -170,18 +170,6 @@ scene::Aabb computeItemAabb(const DrawItem& item, const std::vector<BodyPlacemen
   return transformItemAabb(bodies[item.body].sceneFromAuthored, item.box);
 }
 
-std::vector<std::uint32_t> findItemsInFrustum(const std::vector<DrawItem>& items,
-                                              const std::vector<BodyPlacement>& bodies,
-                                              const Camera& camera, scene::EntityId hiddenEntity) {
-  const auto frustum = computeFrustum(camera);
-  std::vector<std::uint32_t> inside;
-  for (std::uint32_t i = 0; i < items.size(); ++i) {
-    if (items[i].object + 1 == hiddenEntity) continue;
-    if (intersectsFrustum(frustum, computeItemAabb(items[i], bodies))) inside.push_back(i);
-  }
-  return inside;
-}
-
 DrawLists buildDrawLists(const Drawable& drawable, const std::vector<BodyPlacement>& bodies,
                          const Camera& camera, const FrameOptions& options,
                          const std::vector<std::uint32_t>& items) {

@@ -105,11 +105,6 @@ struct Drawable {
 /// An item's current world box. `bodies`: one entry per body of the model.
 scene::Aabb computeItemAabb(const DrawItem& item, const std::vector<BodyPlacement>& bodies);
 
-/// Indices of the items that intersect the frustum, ascending, without `hiddenEntity`.
-std::vector<std::uint32_t> findItemsInFrustum(const std::vector<DrawItem>& items,
-                                              const std::vector<BodyPlacement>& bodies,
-                                              const Camera& camera, scene::EntityId hiddenEntity);
-
 /// The surfaces to draw first and the transparent surfaces to blend over them.
 struct DrawLists {
   DrawList surfaces, transparent;

@@ -47,13 +47,20 @@ struct FrameOptions {
   std::uint32_t samples = 1;
 };
 
+/// A frame to render.
+struct View {
+  Camera camera;
+  FrameOptions options;
+};
+
 /// Culling counts of draw items (meshes of objects) and rendering time.
 struct FrameStatistics {
   std::uint32_t drawn = 0;
   std::uint32_t frustumCulled = 0;  ///< outside the frustum
   std::uint32_t occluded = 0;       ///< in the frustum, but hidden by drawn surfaces
   std::uint32_t passes = 1;         ///< number of draw passes, including those for culling
-  double seconds = 0;               ///< wall-clock time until the pixels were read back
+  /// Wall-clock time until the pixels were read back; of views rendered together, an equal share.
+  double seconds = 0;
 };
 
 /// Row 0 is the top row; pixel (x, y) is at index y * width + x.

@@ -1,43 +1,81 @@
 #include "render/renderer.hpp"
 
+#include <algorithm>
 #include <optional>
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "render/samples.hpp"
 
 namespace enfilade::render {
+namespace {
+
+/// Samples rendered together; more would need more memory.
+constexpr std::size_t kSamplesPerPass = 4;
+
+void validateView(const View& view) {
+  if (const auto error = validateCamera(view.camera)) throw RenderError(*error);
+  if (!isSampleCount(view.options.samples))
+    throw RenderError("samples is " + std::to_string(view.options.samples) + "; it must be " +
+                      kSampleCounts);
+}
+
+bool hasSeveralSamples(const View& view) {
+  return view.options.samples > 1 && view.options.channels.rgb;
+}
+
+void describeFrame(const scene::Snapshot& snapshot, const View& view, Frame& frame) {
+  frame.camera = view.camera;
+  frame.tick = snapshot.tick;
+  frame.avatars = view.options.avatars;
+  frame.shadows = view.options.shadows && view.options.channels.rgb;
+  frame.samples = hasSeveralSamples(view) ? view.options.samples : 1;
+}
+
+}  // namespace
 
 Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                        const FrameOptions& options) {
-  if (const auto error = validateCamera(camera)) throw RenderError(*error);
-  if (!isSampleCount(options.samples))
-    throw RenderError("samples is " + std::to_string(options.samples) + "; it must be " +
-                      kSampleCounts);
-  const bool several = options.samples > 1 && options.channels.rgb;
-  Frame frame =
-      several ? renderSamples(snapshot, camera, options) : renderOnce(snapshot, camera, options);
-  frame.camera = camera;
-  frame.tick = snapshot.tick;
-  frame.avatars = options.avatars;
-  frame.shadows = options.shadows && options.channels.rgb;
-  frame.samples = several ? options.samples : 1;
-  return frame;
+  const View view{camera, options};
+  return std::move(render(snapshot, std::span(&view, 1)).front());
 }
 
-Frame Renderer::renderSamples(const scene::Snapshot& snapshot, const Camera& camera,
-                              const FrameOptions& options) {
-  FrameOptions colour = options, others = options;
-  colour.channels = {true, false, false, false};
-  others.channels.rgb = false;
+std::vector<Frame> Renderer::render(const scene::Snapshot& snapshot, std::span<const View> views) {
+  std::vector<View> single;  // with one sample
+  for (const View& view : views) {
+    validateView(view);
+    if (!hasSeveralSamples(view)) single.push_back(view);
+  }
+  std::vector<Frame> once = renderOnce(snapshot, single), frames;
+  ENFILADE_ASSERT(once.size() == single.size());
+  auto next = once.begin();
+  for (const View& view : views) {
+    frames.push_back(hasSeveralSamples(view) ? renderSamples(snapshot, view) : std::move(*next++));
+    describeFrame(snapshot, view, frames.back());
+  }
+  return frames;
+}
+
+Frame Renderer::renderSamples(const scene::Snapshot& snapshot, const View& view) {
+  View others = view;
+  others.options.channels.rgb = false;
   std::optional<Frame> frame;
-  if (others.channels.ids || others.channels.depth || others.channels.normals)
-    frame = renderOnce(snapshot, camera, others);
-  MeanColour mean(std::size_t{3} * static_cast<std::size_t>(camera.width) *
-                  static_cast<std::size_t>(camera.height));
-  for (const Eigen::Vector2d& position : getSamplePositions(static_cast<int>(options.samples))) {
-    Frame sample = renderOnce(snapshot, shiftCamera(camera, position), colour);
-    mean.add(sample.rgb);
-    if (!frame) frame = std::move(sample);
+  const Channels& channels = others.options.channels;
+  if (channels.ids || channels.depth || channels.normals)
+    frame = std::move(renderOnce(snapshot, std::span(&others, 1)).front());
+  MeanColour mean(std::size_t{3} * countPixels(view.camera));
+  std::vector<View> pass;
+  const auto positions = getSamplePositions(static_cast<int>(view.options.samples));
+  for (std::size_t from = 0; from < positions.size(); from += kSamplesPerPass) {
+    pass.assign(std::min(kSamplesPerPass, positions.size() - from), view);
+    for (std::size_t i = 0; i < pass.size(); ++i) {
+      pass[i].camera = shiftCamera(view.camera, positions[from + i]);
+      pass[i].options.channels = {true, false, false, false};
+    }
+    for (Frame& sample : renderOnce(snapshot, pass)) {
+      mean.add(sample.rgb);
+      if (!frame) frame = std::move(sample);
+    }
   }
   frame->rgb = mean.compute();
   return std::move(*frame);

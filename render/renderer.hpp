@@ -1,13 +1,18 @@
 // The interface of the renderers, implemented by GlRenderer and RayRenderer.
 #pragma once
 
+#include <span>
 #include <string>
+#include <vector>
 
 #include "render/frame.hpp"
 #include "render/render_error.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::render {
+
+/// Views with up to this many pixels in total take less time together; more need more memory.
+inline constexpr std::size_t kMaxPixelsTogether = std::size_t{1} << 21;
 
 /// Renders snapshots of one scene. Create, use and destroy it on one thread.
 class Renderer {
@@ -21,6 +26,8 @@ class Renderer {
   /// scene that is too large.
   Frame render(const scene::Snapshot& snapshot, const Camera& camera,
                const FrameOptions& options = {});
+  /// As above, of several views. The frames are the same, and they take less time together.
+  std::vector<Frame> render(const scene::Snapshot& snapshot, std::span<const View> views);
 
   virtual const std::string& deviceName() const = 0;  ///< GL_RENDERER or "Embree 3..."
   virtual bool software() const = 0;                  ///< renders on the CPU
@@ -28,12 +35,11 @@ class Renderer {
   virtual const std::string& deviceWarning() const = 0;
 
  private:
-  /// One sample a pixel, whatever `options` has. The camera is valid, except that its principal
+  /// One sample a pixel, whatever the options have. The cameras are valid, except that a principal
   /// point may be up to a pixel beyond its limits.
-  virtual Frame renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
-                           const FrameOptions& options) = 0;
-  Frame renderSamples(const scene::Snapshot& snapshot, const Camera& camera,
-                      const FrameOptions& options);
+  virtual std::vector<Frame> renderOnce(const scene::Snapshot& snapshot,
+                                        std::span<const View> views) = 0;
+  Frame renderSamples(const scene::Snapshot& snapshot, const View& view);
 };
 
 }  // namespace enfilade::render

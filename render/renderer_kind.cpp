@@ -32,8 +32,7 @@ RendererKind chooseRendererKind(bool softwareGl, const Camera& camera, const Cha
   // Measured for depth and ids in four scenes of 146 thousand to 2.4 million triangles: rays took
   // 0.3 to 0.8 of GL's time at 128 x 128, 0.7 to 1.4 at 256 x 256 and 1.2 to 2.5 at 640 x 480.
   constexpr std::size_t kSmallFrameThreshold = 256 * 256;
-  const std::size_t pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const std::size_t pixels = countPixels(camera);
   if (pixels > kSmallFrameThreshold) return RendererKind::gl;
   // A pixel's colour costs as much as some triangles of software GL: with colour, rays took 0.2 to
   // 0.8 of GL's time with at least 9 triangles a pixel, and 1.4 to 2.3 with at most 1.
@@ -53,8 +52,7 @@ bool choosesShadows(bool software, const Camera& camera, const Channels& channel
   if (triangles > kMaxTriangles) return false;
   // Small pictures are mostly those of agents that learn, where each millisecond counts.
   constexpr std::size_t kSmallFrame = 256 * 256;
-  return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height) >
-         kSmallFrame;
+  return countPixels(camera) > kSmallFrame;
 }
 
 }  // namespace enfilade::render

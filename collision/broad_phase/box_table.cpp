@@ -107,7 +107,8 @@ struct BoxTable::RunList {
 
 class BoxTable::PairWriter {
  public:
-  explicit PairWriter(std::vector<IdPair>& pairs) : pairs_(pairs), count_(pairs.size()) {}
+  explicit PairWriter(std::vector<IdPair>& pairs)
+      : pairs_(pairs), begin_(pairs.size()), count_(pairs.size()) {}
   ~PairWriter() { pairs_.resize(count_); }
   PairWriter(const PairWriter&) = delete;
   PairWriter& operator=(const PairWriter&) = delete;
@@ -116,7 +117,9 @@ class BoxTable::PairWriter {
   void compare(const BoxTable& table, const SignedBounds& box, Id id, std::span<const Run> runs) {
     std::size_t candidates = 0;
     for (const Run& run : runs) candidates += run.end - run.begin;
-    if (pairs_.size() < count_ + candidates) pairs_.resize(2 * (count_ + candidates));
+    // Room for as many pairs again as this object has appended, and not as the vector holds: a
+    // vector may get few pairs from each of many objects.
+    if (pairs_.size() < count_ + candidates) pairs_.resize(2 * count_ - begin_ + candidates);
     const SignedBounds minEndpoints = minEndpointsOf(box);
     IdPair* to = pairs_.data() + count_;
     const AppendOverlaps append = table.useAvx ? appendOverlapsAvx : appendOverlaps;
@@ -128,7 +131,7 @@ class BoxTable::PairWriter {
 
  private:
   std::vector<IdPair>& pairs_;
-  std::size_t count_;
+  std::size_t begin_, count_;
 };
 
 void BoxTable::SizeClass::add(const SignedBounds& box, const std::array<double, 3>& extent) {

@@ -10,37 +10,38 @@
 namespace enfilade::collision {
 namespace {
 
-using Endpoint = ProxyWindow::Endpoint;
+using StaticEndpoint = ProxyWindow::StaticEndpoint;
 
 constexpr std::size_t kSmallListThreshold = 24;  // list length up to which insertion sort is used
 
-bool isBefore(const Endpoint& a, const Endpoint& b) {
+bool isBefore(const StaticEndpoint& a, const StaticEndpoint& b) {
   return a.value < b.value;
 }
 
-void sortEndpoints(Endpoint* first, Endpoint* last) {
+void sortEndpoints(StaticEndpoint* first, StaticEndpoint* last) {
   if (static_cast<std::size_t>(last - first) > kSmallListThreshold) {
     std::sort(first, last, isBefore);
     return;
   }
-  for (Endpoint* end = first; end != last; ++end) {
-    const Endpoint moving = *end;
-    Endpoint* to = end;
+  for (StaticEndpoint* end = first; end != last; ++end) {
+    const StaticEndpoint moving = *end;
+    StaticEndpoint* to = end;
     for (; to != first && moving.value < to[-1].value; --to) *to = to[-1];
     *to = moving;
   }
 }
 
 /// Writes the endpoints inside the window on signed axis `k`, sorted. Returns the end of the list.
-Endpoint* collectEndpoints(const StaticGrid& staticGrid, std::span<const StaticGrid::Row> rows,
-                           std::size_t k, std::span<const ProxyWindow::StaticProxy> boxes,
-                           Endpoint* endpoints) {
-  Endpoint* picked = endpoints;
+StaticEndpoint* collectEndpoints(const StaticGrid& staticGrid,
+                                 std::span<const StaticGrid::Row> rows, std::size_t k,
+                                 std::span<const ProxyWindow::StaticProxy> boxes,
+                                 StaticEndpoint* endpoints) {
+  StaticEndpoint* picked = endpoints;
   for (std::uint32_t r = 0; r < rows.size(); ++r) {
     picked->staticIndex = r;
     picked += boxes[r].listedMask >> k & 1;
   }
-  for (Endpoint* end = endpoints; end != picked; ++end)
+  for (StaticEndpoint* end = endpoints; end != picked; ++end)
     end->value = staticGrid.minEndpoints(rows[end->staticIndex])[k];
   sortEndpoints(endpoints, picked);
   return picked;
@@ -77,11 +78,11 @@ void ProxyWindow::build(const StaticGrid& staticGrid, std::span<const StaticGrid
   }
   resizeStorage(endpoints, endpointCount);
   overlapping.resize(overlapCount);
-  Endpoint* end = endpoints.data();
+  StaticEndpoint* end = endpoints.data();
   for (std::size_t k = 0; k < 6; ++k) {
     ENFILADE_ASSERT(minBounds[k] <= maxEndpoints[k] && maxEndpoints[k] <= maxBounds[k]);
     *end++ = {minBounds[k], kSentinel};
-    Endpoint* firstGreater = end;
+    StaticEndpoint* firstGreater = end;
     if ((anyListed >> k & 1) != 0) {
       end = collectEndpoints(staticGrid, rows, k, statics, end);
       while (firstGreater != end && firstGreater->value <= maxEndpoints[k]) ++firstGreater;

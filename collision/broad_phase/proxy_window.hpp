@@ -17,7 +17,7 @@ namespace enfilade::collision {
 /// of that axis holds the minimum endpoints of static boxes in this range, between two sentinels.
 struct ProxyWindow {
   static constexpr std::uint32_t kSentinel = static_cast<std::uint32_t>(-1);
-  struct Endpoint {
+  struct StaticEndpoint {
     double value;
     std::uint32_t staticIndex;  ///< into `statics`, or kSentinel
   };
@@ -29,7 +29,7 @@ struct ProxyWindow {
 
   SignedBounds minBounds{}, maxBounds{};  ///< range of the maximum endpoints
   std::array<std::uint32_t, 6> next{};    ///< by signed axis: first endpoint above the proxy's
-  std::vector<Endpoint>
+  std::vector<StaticEndpoint>
       endpoints;  ///< six ascending lists, each with two sentinels; spare room behind
   std::vector<StaticProxy> statics;  ///< all static boxes in the window; spare room behind
 

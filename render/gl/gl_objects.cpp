@@ -76,6 +76,9 @@ unsigned createGlObject(GlKind kind) {
     case GlKind::texture:
       glCreateTextures(GL_TEXTURE_2D, 1, &name);
       break;
+    case GlKind::textureArray:
+      glCreateTextures(GL_TEXTURE_2D_ARRAY, 1, &name);
+      break;
     case GlKind::vertexArray:
       glCreateVertexArrays(1, &name);
       break;
@@ -95,6 +98,7 @@ void deleteGlObject(GlKind kind, unsigned name) noexcept {
       glDeleteBuffers(1, &name);
       break;
     case GlKind::texture:
+    case GlKind::textureArray:
       glDeleteTextures(1, &name);
       break;
     case GlKind::vertexArray:

@@ -7,7 +7,14 @@
 
 namespace enfilade::render {
 
-enum class GlKind : std::uint8_t { buffer, texture, vertexArray, framebuffer, program };
+enum class GlKind : std::uint8_t {
+  buffer,
+  texture,  ///< with two dimensions
+  textureArray,
+  vertexArray,
+  framebuffer,
+  program
+};
 
 unsigned createGlObject(GlKind kind);
 void deleteGlObject(GlKind kind, unsigned name) noexcept;
@@ -39,6 +46,7 @@ class GlObject {
 
 using GlBuffer = GlObject<GlKind::buffer>;
 using GlTexture = GlObject<GlKind::texture>;
+using GlTextureArray = GlObject<GlKind::textureArray>;
 using GlVertexArray = GlObject<GlKind::vertexArray>;
 using GlFramebuffer = GlObject<GlKind::framebuffer>;
 using GlProgram = GlObject<GlKind::program>;

@@ -15,6 +15,9 @@
 // In a small scene with little occlusion, all items in the frustum are drawn in one forward pass
 // instead.
 //
+// Views of one size are drawn together, each in a layer of the target. They share the uploads, the
+// read-back after each step, and the traversal of the items in step 2.
+//
 // With shadows, the shadow mask is computed between depth and colour. The forward pass is then
 // preceded by a depth prepass, too.
 //
@@ -26,18 +29,16 @@
 #include <epoxy/gl.h>
 
 #include <algorithm>
-#include <iterator>
+#include <deque>
 #include <optional>
 #include <utility>
 
 #include "collision/assert.hpp"
 #include "render/gl/dynamic_instances.hpp"
 #include "render/gl/egl_context.hpp"
-#include "render/gl/occlusion_culler.hpp"
-#include "render/gl/render_target.hpp"
+#include "render/gl/frame_in_progress.hpp"
 #include "render/gl/scene_buffers.hpp"
 #include "render/gl/surface_pass.hpp"
-#include "render/gl/visibility_cache.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -47,39 +48,9 @@ constexpr std::size_t kSmallDisocclusionThreshold = 256;
 constexpr std::size_t kFirstChunkItems =
     512;                        // items of the first refinement chunk; the size doubles
 constexpr int kMaxChunks = 24;  // more chunks than any scene needs
-// Frames between retests of a visible item, and until an item outside the frustum is forgotten.
-constexpr std::uint64_t kRetestPeriod = 8, kForgetCulledPeriod = 64;
 
 // Up to this many items, collecting all items in the frustum is fast.
 constexpr std::size_t kSmallSceneThreshold = 256;
-
-/// Model items and avatar items to draw.
-struct VisibleSet {
-  std::vector<std::uint32_t> items;        ///< ascending
-  std::vector<std::uint32_t> avatarItems;  ///< indices into AvatarMeshes::items, ascending
-};
-
-void mergeSorted(std::vector<std::uint32_t>& all, const std::vector<std::uint32_t>& more) {
-  ENFILADE_ASSERT(std::is_sorted(all.begin(), all.end()));
-  ENFILADE_ASSERT(std::is_sorted(more.begin(), more.end()));
-  std::vector<std::uint32_t> merged;
-  merged.reserve(all.size() + more.size());
-  std::set_union(all.begin(), all.end(), more.begin(), more.end(), std::back_inserter(merged));
-  all = std::move(merged);
-}
-
-/// State of the frame being rendered.
-struct FrameJob {
-  const scene::Snapshot& snapshot;
-  const Camera& camera;
-  const FrameOptions& options;
-  BoxVisibility visibility;
-  FrameStatistics statistics;
-  bool planeDepth;            ///< depth channel and ambient occlusion use the plane depth
-  std::vector<float> metres;  ///< depth of the depth buffer; empty: not computed yet
-
-  bool needsShadows() const { return options.shadows && options.channels.rgb; }
-};
 
 }  // namespace
 
@@ -94,33 +65,38 @@ struct GlRenderer::State {
   DynamicInstances dynamicInstances;
   RenderTarget target;
   VisibilityCache visibilityCache;
-  DepthPyramid depthPyramid;
-  bool planeDepth;              // DepthSource::plane
-  bool roundsVertices;          // see DeviceChoice
-  bool depthIsCurrent = false;  // the pyramid's base level holds the current depth buffer
+  std::deque<DepthPyramid> depthPyramids;  // one per layer
+  bool planeDepth;                         // DepthSource::plane
+  bool roundsVertices;                     // see DeviceChoice
   std::uint64_t frameNumber = 0;
 
   State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device,
         ShadowMaskFunction shadows);
   ~State();
   void prepareScene();
-  scene::Aabb itemAabb(std::uint32_t item) const;
-  bool isTransparent(const FrameJob& job, std::uint32_t item) const;
-  DrawList drawSurfaces(const FrameJob& job, const VisibleSet& visibleSet);
+  void prepareTarget(const Camera& camera, std::size_t layers);
+  std::deque<FrameInProgress> beginViews(const scene::Snapshot& snapshot,
+                                         std::span<const View* const> views);
+  SceneItems sceneItems() const {
+    return {items, dynamicInstances.bodyPlacements(), dynamicInstances.avatars().items};
+  }
+  bool isTransparent(const FrameInProgress& view, std::uint32_t item) const;
+  void select(const FrameInProgress& view);
+  DrawList drawSurfaces(const FrameInProgress& view, const VisibleSet& visibleSet);
   void drawTransparent(const DrawList& transparent);
-  void readDepth(const Camera& camera);
-  const std::vector<float>& getDepthMetres(FrameJob& job);
-  void beginShading(FrameJob& job);
+  void beginShading(FrameInProgress& view);
   std::size_t countTriangles(const std::vector<std::uint32_t>& some) const;
-  VisibleSet collectInFrustum(const FrameJob& job) const;
-  bool isMostlyVisible(const FrameJob& job, const VisibleSet& all) const;
-  DrawList drawAllInFrustum(FrameJob& job, const VisibleSet& all);
-  DrawList drawVisible(FrameJob& job);
-  VisibleSet predictVisible(const FrameJob& job, const CachedView& cached) const;
-  VisibleSet findDisoccluded(FrameJob& job, const VisibleSet& drawn);
-  VisibleSet refineFrontToBack(FrameJob& job, VisibleSet drawn, VisibleSet disoccluded);
-  VisibleSet filterVisible(const FrameJob& job, const VisibleSet& drawn) const;
-  void updateCache(const FrameJob& job, const VisibleSet& drawn, CachedView& cached) const;
+  bool isMostlyVisible(const FrameInProgress& view, const VisibleSet& all) const;
+  void drawAllInFrustum(FrameInProgress& view, const VisibleSet& all);
+  bool tryDrawAll(FrameInProgress& view);
+  void drawPredicted(FrameInProgress& view);
+  void findDisoccluded(const FramesInProgress& views);
+  void refineFrontToBack(FrameInProgress& view);
+  void drawDisoccluded(FrameInProgress& view);
+  void shadeVisible(FrameInProgress& view);
+  void drawViews(const FramesInProgress& views);
+  std::vector<Frame> renderTogether(const scene::Snapshot& snapshot,
+                                    std::span<const View* const> views);
 };
 
 GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device,
@@ -153,24 +129,53 @@ GlRenderer::State::~State() {
   }
 }
 
-scene::Aabb GlRenderer::State::itemAabb(std::uint32_t item) const {
-  return computeItemAabb(items[item], dynamicInstances.bodyPlacements());
+void GlRenderer::State::prepareTarget(const Camera& camera, std::size_t layers) {
+  if (!target.hasSize(camera.width, camera.height) ||
+      static_cast<std::size_t>(target.layers()) < layers)
+    target = RenderTarget(camera.width, camera.height, static_cast<int>(layers));
+  while (depthPyramids.size() < layers) depthPyramids.emplace_back();
 }
 
-bool GlRenderer::State::isTransparent(const FrameJob& job, std::uint32_t item) const {
+/// Gives each view a cleared layer.
+std::deque<FrameInProgress> GlRenderer::State::beginViews(const scene::Snapshot& snapshot,
+                                                          std::span<const View* const> views) {
+  prepareTarget(views.front()->camera, views.size());
+  std::deque<FrameInProgress> begun;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const View& view = *views[i];
+    FrameInProgress& frame = begun.emplace_back(
+        FrameInProgress{snapshot, view.camera, view.options, static_cast<int>(i),
+                        planeDepth && (view.options.channels.depth || view.options.channels.rgb),
+                        BoxVisibility(view.camera), depthPyramids[i]});
+    if (frame.needsShadows() && !shadowMask)
+      throw RenderError("GlRenderer: shadows need a shadow mask");
+    target.select(frame.layer);
+    target.begin(frame.options.channels, frame.planeDepth);
+  }
+  return begun;
+}
+
+bool GlRenderer::State::isTransparent(const FrameInProgress& view, std::uint32_t item) const {
   return items[item].alphaMode == AlphaMode::blend &&
-         job.options.transparency == TransparencyMode::blend;
+         view.options.transparency == TransparencyMode::blend;
+}
+
+/// The following draws are the view's.
+void GlRenderer::State::select(const FrameInProgress& view) {
+  target.select(view.layer);
+  surfacePass->begin(view.camera);
 }
 
 /// Draws the surfaces; returns the transparent items, which are drawn last.
-DrawList GlRenderer::State::drawSurfaces(const FrameJob& job, const VisibleSet& visibleSet) {
-  DrawLists lists =
-      buildDrawLists({scene->model(), items, buffers.ranges, buffers.materials},
-                     dynamicInstances.bodyPlacements(), job.camera, job.options, visibleSet.items);
+DrawList GlRenderer::State::drawSurfaces(const FrameInProgress& view,
+                                         const VisibleSet& visibleSet) {
+  DrawLists lists = buildDrawLists({scene->model(), items, buffers.ranges, buffers.materials},
+                                   dynamicInstances.bodyPlacements(), view.camera, view.options,
+                                   visibleSet.items);
   surfacePass->draw(lists.surfaces, {buffers.vertices.name(), buffers.indices.name(),
                                      buffers.colours.name(), buffers.textures});
   surfacePass->draw(
-      buildAvatarDrawList(dynamicInstances.avatars(), job.camera, visibleSet.avatarItems),
+      buildAvatarDrawList(dynamicInstances.avatars(), view.camera, visibleSet.avatarItems),
       dynamicInstances.avatarGeometry(buffers.textures));
   return std::move(lists.transparent);
 }
@@ -185,29 +190,14 @@ void GlRenderer::State::drawTransparent(const DrawList& transparent) {
                                   buffers.colours.name(), buffers.textures});
 }
 
-void GlRenderer::State::readDepth(const Camera& camera) {
-  target.readDepth(depthPyramid.baseLevel(camera.width, camera.height));
-  depthIsCurrent = true;
-}
-
-/// Depth of the current depth buffer in metres, computed once per frame.
-const std::vector<float>& GlRenderer::State::getDepthMetres(FrameJob& job) {
-  if (!depthIsCurrent) readDepth(job.camera);
-  if (job.metres.empty())
-    job.metres = convertDepthToMetres(depthPyramid.baseLevel(job.camera.width, job.camera.height),
-                                      job.camera);
-  ENFILADE_ASSERT(job.metres.size() == static_cast<std::size_t>(job.camera.width) *
-                                           static_cast<std::size_t>(job.camera.height));
-  return job.metres;
-}
-
 /// Prepares shading at equal depth; the depth buffer must be complete.
-void GlRenderer::State::beginShading(FrameJob& job) {
-  const Channels& channels = job.options.channels;
-  target.setDrawChannels(channels, job.planeDepth);
-  if (job.needsShadows())
-    target.setShadowMask(shadowMask(job.snapshot, job.camera, job.options, getDepthMetres(job)));
-  surfacePass->beginEqualDepthPass(channels.normals, job.needsShadows(), job.planeDepth);
+void GlRenderer::State::beginShading(FrameInProgress& view) {
+  const Channels& channels = view.options.channels;
+  target.setDrawChannels(channels, view.planeDepth);
+  if (view.needsShadows())
+    target.setShadowMask(
+        shadowMask(view.snapshot, view.camera, view.options, getDepthMetres(target, view)));
+  surfacePass->beginEqualDepthPass(channels.normals, view.needsShadows(), view.planeDepth);
 }
 
 std::size_t GlRenderer::State::countTriangles(const std::vector<std::uint32_t>& some) const {
@@ -217,92 +207,76 @@ std::size_t GlRenderer::State::countTriangles(const std::vector<std::uint32_t>& 
   return triangles;
 }
 
-/// All items in the frustum.
-VisibleSet GlRenderer::State::collectInFrustum(const FrameJob& job) const {
-  VisibleSet all;
-  all.items = findItemsInFrustum(items, dynamicInstances.bodyPlacements(), job.camera,
-                                 job.options.hiddenEntity);
-  const std::vector<AvatarMeshes::Item>& avatarItems = dynamicInstances.avatars().items;
-  for (std::uint32_t i = 0; i < avatarItems.size(); ++i) {
-    if (avatarItems[i].id == job.options.hiddenEntity) continue;
-    if (!job.visibility.isOutsideFrustum(job.visibility.toEyeSpace(avatarItems[i].box)))
-      all.avatarItems.push_back(i);
-  }
-  return all;
-}
-
 /// Whether an earlier frame from a similar camera showed at least half of the triangles. Drawing
 /// all items once is then faster than drawing the visible ones twice (depth and shading).
-bool GlRenderer::State::isMostlyVisible(const FrameJob& job, const VisibleSet& all) const {
-  const CachedView* cached = visibilityCache.findNearest(job.camera);
+bool GlRenderer::State::isMostlyVisible(const FrameInProgress& view, const VisibleSet& all) const {
+  const CachedView* cached = visibilityCache.findNearest(view.camera);
   return cached &&
-         countTriangles(all.items) <= 2 * countTriangles(predictVisible(job, *cached).items);
+         countTriangles(all.items) <=
+             2 * countTriangles(predictVisible(sceneItems(), view.tests(), *cached).items);
 }
 
-DrawList GlRenderer::State::drawAllInFrustum(FrameJob& job, const VisibleSet& all) {
-  job.statistics.drawn = static_cast<std::uint32_t>(all.items.size());
-  job.statistics.frustumCulled = static_cast<std::uint32_t>(items.size() - all.items.size());
-  if (job.needsShadows()) {
+void GlRenderer::State::drawAllInFrustum(FrameInProgress& view, const VisibleSet& all) {
+  view.statistics.drawn = static_cast<std::uint32_t>(all.items.size());
+  view.statistics.frustumCulled = static_cast<std::uint32_t>(items.size() - all.items.size());
+  if (view.needsShadows()) {
     target.setDrawChannels({false, false, false, false});
     surfacePass->beginDepthPrepass(false);
-    drawSurfaces(job, all);
-    beginShading(job);
+    drawSurfaces(view, all);
+    beginShading(view);
   } else {
-    surfacePass->beginForwardPass(job.options.channels.normals, job.planeDepth);
+    surfacePass->beginForwardPass(view.options.channels.normals, view.planeDepth);
   }
-  return drawSurfaces(job, all);
+  view.transparent = drawSurfaces(view, all);
 }
 
-/// Items of the cached view that are in the frustum.
-VisibleSet GlRenderer::State::predictVisible(const FrameJob& job, const CachedView& cached) const {
-  VisibleSet visibleSet;
-  for (const std::uint32_t item : cached.items) {
-    if (items[item].object + 1 == job.options.hiddenEntity) continue;
-    if (!job.visibility.isOutsideFrustum(job.visibility.toEyeSpace(itemAabb(item))))
-      visibleSet.items.push_back(item);
-  }
-  const std::vector<AvatarMeshes::Item>& avatarItems = dynamicInstances.avatars().items;
-  ENFILADE_ASSERT(std::ranges::is_sorted(cached.items) && std::ranges::is_sorted(cached.avatars));
-  for (std::uint32_t i = 0; i < avatarItems.size(); ++i) {
-    if (avatarItems[i].id == job.options.hiddenEntity) continue;
-    if (!std::binary_search(cached.avatars.begin(), cached.avatars.end(), avatarItems[i].id))
-      continue;
-    if (!job.visibility.isOutsideFrustum(job.visibility.toEyeSpace(avatarItems[i].box)))
-      visibleSet.avatarItems.push_back(i);
-  }
-  return visibleSet;
+/// Draws all items in the frustum where that is requested or faster.
+bool GlRenderer::State::tryDrawAll(FrameInProgress& view) {
+  const bool isRequested = view.options.culling != Culling::occlusion;
+  if (!isRequested && items.size() > kSmallSceneThreshold) return false;
+  const VisibleSet all = findInFrustum(sceneItems(), view.tests());
+  if (!isRequested && !isMostlyVisible(view, all)) return false;
+  drawAllInFrustum(view, all);
+  return true;
 }
 
-/// Possibly visible items other than `drawn`, whose depth is in the pyramid.
-VisibleSet GlRenderer::State::findDisoccluded(FrameJob& job, const VisibleSet& drawn) {
-  culler->markVisible(drawn.items);
-  OcclusionCuller::CullingResult found = culler->findVisible(
-      job.visibility, depthPyramid, dynamicInstances.bodyPlacements(), job.options.hiddenEntity);
-  job.statistics.frustumCulled = found.culled;
-  VisibleSet visibleSet;
-  visibleSet.items = std::move(found.items);
-  const std::vector<AvatarMeshes::Item>& avatarItems = dynamicInstances.avatars().items;
-  for (std::uint32_t i = 0; i < avatarItems.size(); ++i) {
-    if (avatarItems[i].id == job.options.hiddenEntity) continue;
-    if (std::binary_search(drawn.avatarItems.begin(), drawn.avatarItems.end(), i)) continue;
-    const EyeSpaceAabb box = job.visibility.toEyeSpace(avatarItems[i].box);
-    if (job.visibility.test(box, depthPyramid) == Visibility::visible)
-      visibleSet.avatarItems.push_back(i);
-  }
-  return visibleSet;
+/// Draws what an earlier frame showed into the depth.
+void GlRenderer::State::drawPredicted(FrameInProgress& view) {
+  view.cached = &visibilityCache.lookup(view.camera, ++frameNumber);
+  view.drawn = predictVisible(sceneItems(), view.tests(), *view.cached);
+  const Channels& channels = view.options.channels;
+  view.isComplete = !channels.rgb && !channels.normals;
+  target.setDrawChannels({false, view.isComplete && channels.ids, false, false},
+                         view.isComplete && view.planeDepth);
+  surfacePass->beginDepthPrepass(view.isComplete && view.planeDepth);
+  drawSurfaces(view, view.drawn);
 }
 
-/// Draws the disoccluded items into the depth, nearest first, until the rest is occluded. Returns
-/// the visible items among all drawn ones.
-VisibleSet GlRenderer::State::refineFrontToBack(FrameJob& job, VisibleSet drawn,
-                                                VisibleSet disoccluded) {
-  const auto mayBeVisible = [&](std::uint32_t item) {
-    return job.visibility.test(job.visibility.toEyeSpace(itemAabb(item)), depthPyramid) ==
-           Visibility::visible;
+/// Finds possibly visible items that are not drawn. The pyramids hold the depth of those drawn.
+void GlRenderer::State::findDisoccluded(const FramesInProgress& views) {
+  std::vector<OcclusionCuller::View> tested;
+  for (const FrameInProgress* view : views)
+    tested.push_back(
+        {view->visibility, view->pyramid, view->drawn.items, view->options.hiddenEntity});
+  std::vector<OcclusionCuller::CullingResult> found =
+      culler->findVisible(tested, dynamicInstances.bodyPlacements());
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    FrameInProgress& view = *views[i];
+    view.statistics.frustumCulled = found[i].culled;
+    view.disoccluded = {std::move(found[i].items),
+                        findDisoccludedAvatars(sceneItems(), view.tests(), view.drawn)};
+  }
+}
+
+/// Draws the disoccluded items into the depth, nearest first, until the rest is occluded. Of the
+/// drawn items, those that are visible remain.
+void GlRenderer::State::refineFrontToBack(FrameInProgress& view) {
+  const auto toEyeSpace = [&](std::uint32_t item) {
+    return view.visibility.toEyeSpace(sceneItems().computeAabb(item));
   };
   std::vector<std::pair<double, std::uint32_t>> remaining;  // squared distance to the nearest point
-  for (const std::uint32_t item : disoccluded.items) {
-    const EyeSpaceAabb box = job.visibility.toEyeSpace(itemAabb(item));
+  for (const std::uint32_t item : view.disoccluded.items) {
+    const EyeSpaceAabb box = toEyeSpace(item);
     remaining.emplace_back((box.centre.cwiseAbs() - box.halfExtent).cwiseMax(0.0).squaredNorm(),
                            item);
   }
@@ -315,106 +289,103 @@ VisibleSet GlRenderer::State::refineFrontToBack(FrameJob& job, VisibleSet drawn,
     for (auto entry = remaining.begin(); entry != end; ++entry)
       chunk.items.push_back(entry->second);
     std::sort(chunk.items.begin(), chunk.items.end());
-    if (i == 0) chunk.avatarItems = disoccluded.avatarItems;
+    if (i == 0) chunk.avatarItems = view.disoccluded.avatarItems;
     remaining.erase(remaining.begin(), end);
-    drawSurfaces(job, chunk);
-    mergeSorted(drawn.items, chunk.items);
-    readDepth(job.camera);
-    depthPyramid.build();
-    ++job.statistics.passes;
-    std::erase_if(remaining, [&](const auto& entry) { return !mayBeVisible(entry.second); });
+    drawSurfaces(view, chunk);
+    mergeSorted(view.drawn.items, chunk.items);
+    readDepth(target, {&view});
+    view.pyramid.build();
+    ++view.statistics.passes;
+    std::erase_if(remaining, [&](const auto& entry) {
+      return view.visibility.test(toEyeSpace(entry.second), view.pyramid) != Visibility::visible;
+    });
   }
-  mergeSorted(drawn.avatarItems, disoccluded.avatarItems);
-  return filterVisible(job, drawn);
+  mergeSorted(view.drawn.avatarItems, view.disoccluded.avatarItems);
+  view.drawn = filterVisible(sceneItems(), view.tests(), view.drawn);
 }
 
-/// Updates the cached view for the next frame: the drawn items without those now occluded, and
-/// previously visible items that are outside the frustum now.
-void GlRenderer::State::updateCache(const FrameJob& job, const VisibleSet& drawn,
-                                    CachedView& cached) const {
-  std::vector<std::uint32_t> kept;
-  for (const std::uint32_t item : drawn.items) {
-    const bool due = cached.items.empty() || (item + frameNumber) % kRetestPeriod == 0;
-    if (due && job.visibility.test(job.visibility.toEyeSpace(itemAabb(item)), depthPyramid) ==
-                   Visibility::occluded)
-      continue;
-    kept.push_back(item);
-  }
-  ENFILADE_ASSERT(std::ranges::is_sorted(drawn.items) && std::ranges::is_sorted(drawn.avatarItems));
-  for (const std::uint32_t item : cached.items) {
-    if (std::binary_search(drawn.items.begin(), drawn.items.end(), item)) continue;
-    if ((item + frameNumber) % kForgetCulledPeriod != 0) kept.push_back(item);
-  }
-  std::sort(kept.begin(), kept.end());
-  cached.items = std::move(kept);
-  cached.avatars.clear();
-  for (const std::uint32_t avatarItem : drawn.avatarItems)
-    cached.avatars.push_back(dynamicInstances.avatars().items[avatarItem].id);
-  std::sort(cached.avatars.begin(), cached.avatars.end());
-}
-
-/// The items of `drawn` that are visible against the last depth pyramid.
-VisibleSet GlRenderer::State::filterVisible(const FrameJob& job, const VisibleSet& drawn) const {
-  VisibleSet visible;
-  visible.avatarItems = drawn.avatarItems;
-  for (const std::uint32_t item : drawn.items) {
-    if (job.visibility.test(job.visibility.toEyeSpace(itemAabb(item)), depthPyramid) ==
-        Visibility::visible)
-      visible.items.push_back(item);
-  }
-  return visible;
-}
-
-/// Draws the visible items; returns the transparent ones.
-DrawList GlRenderer::State::drawVisible(FrameJob& job) {
-  if (items.size() <= kSmallSceneThreshold) {
-    const VisibleSet all = collectInFrustum(job);
-    if (isMostlyVisible(job, all)) return drawAllInFrustum(job, all);
-  }
-  CachedView& cached = visibilityCache.lookup(job.camera, ++frameNumber);
-  VisibleSet drawn = predictVisible(job, cached);
-  const Channels& channels = job.options.channels;
-  bool done = !channels.rgb && !channels.normals;
-  target.setDrawChannels({false, done && channels.ids, false, false}, done && job.planeDepth);
-  surfacePass->beginDepthPrepass(done && job.planeDepth);
-  drawSurfaces(job, drawn);
-  readDepth(job.camera);
-  depthPyramid.build();
-  VisibleSet disoccluded = findDisoccluded(job, drawn);
+/// Completes the view's depth.
+void GlRenderer::State::drawDisoccluded(FrameInProgress& view) {
+  const VisibleSet& disoccluded = view.disoccluded;
   if (disoccluded.items.size() > kSmallDisocclusionThreshold) {
-    done = false;
-    drawn = refineFrontToBack(job, std::move(drawn), std::move(disoccluded));
-  } else {
-    const bool transparentOnly =
-        disoccluded.avatarItems.empty() &&
-        std::all_of(disoccluded.items.begin(), disoccluded.items.end(),
-                    [&](std::uint32_t item) { return isTransparent(job, item); });
-    if (!transparentOnly) {
-      done = false;  // a disoccluded item may precede a drawn one in the drawing order
-      drawSurfaces(job, disoccluded);
-      // Read the depth now and not after shading, so that CPU work overlaps with shading. The
-      // pyramid is not rebuilt: it is conservative, because its depth is farther in places. Without
-      // drawn items, it is empty and must be rebuilt.
-      depthIsCurrent = false;
-      if (!job.planeDepth || drawn.items.empty()) readDepth(job.camera);
-      if (drawn.items.empty()) depthPyramid.build();
-      ++job.statistics.passes;
-    }
-    mergeSorted(drawn.items, disoccluded.items);
-    mergeSorted(drawn.avatarItems, disoccluded.avatarItems);
+    view.isComplete = false;
+    return refineFrontToBack(view);
   }
-  const VisibleSet shaded = filterVisible(job, drawn);
-  DrawList transparent;
-  if (!done) {
-    beginShading(job);
-    transparent = drawSurfaces(job, shaded);
+  const bool transparentOnly =
+      disoccluded.avatarItems.empty() &&
+      std::all_of(disoccluded.items.begin(), disoccluded.items.end(),
+                  [&](std::uint32_t item) { return isTransparent(view, item); });
+  if (!transparentOnly) {
+    view.isComplete = false;  // a disoccluded item may precede a drawn one in the drawing order
+    drawSurfaces(view, disoccluded);
+    view.depthIsRead = false;
+    // The pyramid is not built again: it is conservative, because its depth is farther in places.
+    // Without drawn items, it is empty.
+    view.depthIsOld = view.drawn.items.empty();
+    ++view.statistics.passes;
   }
-  updateCache(job, drawn, cached);
-  job.statistics.drawn = static_cast<std::uint32_t>(shaded.items.size());
-  ENFILADE_ASSERT(job.statistics.drawn + job.statistics.frustumCulled <= items.size());
-  job.statistics.occluded = static_cast<std::uint32_t>(items.size()) - job.statistics.drawn -
-                            job.statistics.frustumCulled;
-  return transparent;
+  mergeSorted(view.drawn.items, disoccluded.items);
+  mergeSorted(view.drawn.avatarItems, disoccluded.avatarItems);
+}
+
+/// Shades the visible items at their complete depth.
+void GlRenderer::State::shadeVisible(FrameInProgress& view) {
+  const VisibleSet shaded = filterVisible(sceneItems(), view.tests(), view.drawn);
+  if (!view.isComplete) {
+    beginShading(view);
+    view.transparent = drawSurfaces(view, shaded);
+  }
+  updateCachedView(sceneItems(), view.tests(), view.drawn, frameNumber, *view.cached);
+  view.statistics.drawn = static_cast<std::uint32_t>(shaded.items.size());
+  const std::size_t seen = view.statistics.drawn + view.statistics.frustumCulled;
+  ENFILADE_ASSERT(seen <= items.size());
+  view.statistics.occluded = static_cast<std::uint32_t>(items.size() - seen);
+}
+
+void GlRenderer::State::drawViews(const FramesInProgress& views) {
+  FramesInProgress culled;
+  for (FrameInProgress* view : views) {
+    select(*view);
+    if (tryDrawAll(*view)) continue;
+    drawPredicted(*view);
+    culled.push_back(view);
+  }
+  if (!culled.empty()) {
+    readDepth(target, culled);
+    for (FrameInProgress* view : culled) view->pyramid.build();
+    findDisoccluded(culled);
+  }
+  for (FrameInProgress* view : culled) {
+    select(*view);
+    drawDisoccluded(*view);
+  }
+  // Reading the depth now and not after shading lets the device shade while this thread works.
+  readDepth(target, filterViews(culled, [](const FrameInProgress& view) {
+              return !view.depthIsRead && (!view.planeDepth || view.depthIsOld);
+            }));
+  for (FrameInProgress* view : culled) {
+    if (view->depthIsOld) view->pyramid.build();
+    select(*view);
+    shadeVisible(*view);
+  }
+  for (FrameInProgress* view : views) {
+    if (!view->options.channels.rgb) continue;
+    select(*view);
+    drawTransparent(view->transparent);
+  }
+}
+
+/// `views` have one size and one form of avatars.
+std::vector<Frame> GlRenderer::State::renderTogether(const scene::Snapshot& snapshot,
+                                                     std::span<const View* const> views) {
+  dynamicInstances.update(*scene, snapshot, views.front()->options.avatars);
+  std::deque<FrameInProgress> begun = beginViews(snapshot, views);
+  FramesInProgress all;
+  for (FrameInProgress& view : begun) all.push_back(&view);
+  drawViews(all);
+  std::vector<Frame> frames = readFrames(target, all);
+  checkGl("drawing a frame");
+  return frames;
 }
 
 GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceChoice& device,
@@ -423,44 +394,36 @@ GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceCh
 
 GlRenderer::~GlRenderer() = default;
 
-Frame GlRenderer::renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
-                             const FrameOptions& options) {
-  if (camera.lens) throw RenderError("camera: lens is given; it must be absent with OpenGL");
+std::vector<Frame> GlRenderer::renderOnce(const scene::Snapshot& snapshot,
+                                          std::span<const View> views) {
   State& s = *state_;
   s.context.makeCurrent();
   s.prepareScene();
-  s.dynamicInstances.update(*s.scene, snapshot, options.avatars);
-  if (!s.target.hasSize(camera.width, camera.height)) {
-    s.target = RenderTarget(camera.width, camera.height);
+  std::vector<Frame> frames(views.size());
+  std::vector<bool> done(views.size());
+  for (std::size_t first = 0; first < views.size(); ++first) {
+    if (done[first]) continue;
+    const View& like = views[first];
+    if (like.camera.lens) throw RenderError("camera: lens is given; it must be absent with OpenGL");
+    const std::size_t pixels = countPixels(like.camera);
+    const std::size_t limit =
+        std::clamp<std::size_t>(kMaxPixelsTogether / pixels, 1, OcclusionCuller::kMaxViews);
+    std::vector<const View*> together;
+    std::vector<std::size_t> indices;
+    for (std::size_t i = first; i < views.size() && together.size() < limit; ++i) {
+      const View& view = views[i];
+      if (done[i] || view.camera.lens || view.camera.width != like.camera.width ||
+          view.camera.height != like.camera.height || view.options.avatars != like.options.avatars)
+        continue;
+      together.push_back(&view);
+      indices.push_back(i);
+      done[i] = true;
+    }
+    std::vector<Frame> rendered = s.renderTogether(snapshot, together);
+    for (std::size_t i = 0; i < rendered.size(); ++i) frames[indices[i]] = std::move(rendered[i]);
   }
-  s.surfacePass->begin(camera);
-  const bool needsDepth = options.channels.depth || options.channels.rgb;
-  const bool planeDepth = s.planeDepth && needsDepth;
-  s.target.begin(options.channels, planeDepth);
-  s.depthIsCurrent = false;
-  FrameJob job{snapshot, camera, options, BoxVisibility(camera), {}, planeDepth, {}};
-  if (job.needsShadows() && !s.shadowMask)
-    throw RenderError("GlRenderer: shadows need a shadow mask");
-  const DrawList transparent = options.culling == Culling::occlusion
-                                   ? s.drawVisible(job)
-                                   : s.drawAllInFrustum(job, s.collectInFrustum(job));
-  if (options.channels.rgb) s.drawTransparent(transparent);
-  Frame frame;
-  frame.renderer = deviceName();
-  frame.software = software();
-  frame.statistics = job.statistics;
-  if (planeDepth) {
-    s.target.readPlaneDepth(frame.depth);
-  } else if (needsDepth) {
-    glFlush();  // if the depth was already read, the device works while this thread continues
-    s.getDepthMetres(job);
-    frame.depth = std::move(job.metres);
-  }
-  if (options.channels.rgb) s.target.readColour(frame, AmbientOcclusion(frame.depth, camera));
-  s.target.readChannels(frame, options.channels);
-  if (!options.channels.depth) frame.depth = {};
-  checkGl("drawing a frame");
-  return frame;
+  for (Frame& frame : frames) frame.renderer = deviceName(), frame.software = software();
+  return frames;
 }
 
 const std::string& GlRenderer::deviceWarning() const {

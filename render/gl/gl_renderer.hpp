@@ -28,8 +28,8 @@ class GlRenderer final : public Renderer {
   const std::string& deviceWarning() const override;
 
  private:
-  Frame renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
-                   const FrameOptions& options) override;
+  std::vector<Frame> renderOnce(const scene::Snapshot& snapshot,
+                                std::span<const View> views) override;
 
   struct State;
   std::unique_ptr<State> state_;

@@ -27,45 +27,44 @@ void checkComplete(GLuint framebuffer, int width, int height) {
   }
 }
 
-void readAttachment(GLuint framebuffer, GLenum attachment, int width, int height, GLenum format,
-                    GLenum type, void* data) {
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer);
-  glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glNamedFramebufferReadBuffer(framebuffer, attachment);
-  glReadPixels(0, 0, width, height, format, type, data);
-}
-
 }  // namespace
 
-RenderTarget::RenderTarget(int width, int height)
-    : width_(width),
-      height_(height),
-      colour_(makeTexture(GL_SRGB8_ALPHA8, width, height)),
-      ids_(makeTexture(GL_R32UI, width, height)),
-      depth_(makeTexture(GL_DEPTH_COMPONENT32F, width, height)),
-      framebuffer_(GlFramebuffer::create()) {
-  const GLuint fbo = framebuffer_.name();
-  glNamedFramebufferTexture(fbo, GL_COLOR_ATTACHMENT0, colour_.name(), 0);
-  glNamedFramebufferTexture(fbo, GL_COLOR_ATTACHMENT1, ids_.name(), 0);
-  glNamedFramebufferTexture(fbo, GL_DEPTH_ATTACHMENT, depth_.name(), 0);
-  checkComplete(fbo, width, height);
+RenderTarget::RenderTarget(int width, int height, int layers)
+    : width_(width), height_(height), framebuffers_(static_cast<std::size_t>(layers)) {
+  ENFILADE_ASSERT(layers > 0);
+  for (GlFramebuffer& framebuffer : framebuffers_) framebuffer = GlFramebuffer::create();
+  attach(colour_, GL_SRGB8_ALPHA8, GL_COLOR_ATTACHMENT0);
+  attach(ids_, GL_R32UI, GL_COLOR_ATTACHMENT1);
+  attach(depth_, GL_DEPTH_COMPONENT32F, GL_DEPTH_ATTACHMENT);
+  for (const GlFramebuffer& framebuffer : framebuffers_)
+    checkComplete(framebuffer.name(), width, height);
 }
 
-/// Adds an attachment that few frames need, with the first frame that does.
-void RenderTarget::addAttachment(GlTexture& texture, unsigned format, unsigned attachment) {
-  if (texture.name() != 0) return;
-  texture = makeTexture(format, width_, height_);
-  glNamedFramebufferTexture(framebuffer_.name(), attachment, texture.name(), 0);
-  checkComplete(framebuffer_.name(), width_, height_);
+/// Creates the layers of a texture, and attaches each to its framebuffer.
+void RenderTarget::attach(GlTextureArray& texture, unsigned format, unsigned attachment) {
+  texture = GlTextureArray::create();
+  glTextureStorage3D(texture.name(), 1, format, width_, height_, layers());
+  for (int layer = 0; layer < layers(); ++layer)
+    glNamedFramebufferTextureLayer(framebuffers_[static_cast<std::size_t>(layer)].name(),
+                                   attachment, texture.name(), 0, layer);
+}
+
+void RenderTarget::select(int layer) {
+  ENFILADE_ASSERT(layer >= 0 && layer < layers());
+  layer_ = layer;
+  glBindFramebuffer(GL_FRAMEBUFFER, framebuffer());
+  glViewport(0, 0, width_, height_);
 }
 
 void RenderTarget::begin(const Channels& channels, bool planeDepth) {
-  if (channels.normals) addAttachment(normals_, GL_RGBA32F, GL_COLOR_ATTACHMENT2);
-  if (planeDepth) addAttachment(planeDepth_, GL_R32F, GL_COLOR_ATTACHMENT3);
-  const GLuint fbo = framebuffer_.name();
-  glBindFramebuffer(GL_FRAMEBUFFER, fbo);
+  // Few frames need these attachments: they are added with the first frame that does.
+  const bool addsNormals = channels.normals && normals_.name() == 0,
+             addsPlaneDepth = planeDepth && planeDepth_.name() == 0;
+  if (addsNormals) attach(normals_, GL_RGBA32F, GL_COLOR_ATTACHMENT2);
+  if (addsPlaneDepth) attach(planeDepth_, GL_R32F, GL_COLOR_ATTACHMENT3);
+  const GLuint fbo = framebuffer();
+  if (addsNormals || addsPlaneDepth) checkComplete(fbo, width_, height_);
   setDrawChannels(channels, planeDepth);
-  glViewport(0, 0, width_, height_);
   constexpr std::array<GLfloat, 4> kBlack{0, 0, 0, 1}, kNone{0, 0, 0, 0};
   constexpr GLfloat kNaN = std::numeric_limits<GLfloat>::quiet_NaN();
   constexpr std::array<GLfloat, 4> kNoDepth{kNaN, kNaN, kNaN, kNaN};
@@ -95,52 +94,47 @@ void RenderTarget::setDrawChannels(const Channels& channels, bool planeDepth) co
   const std::array<GLenum, 4> targets{
       target(channels.rgb, GL_COLOR_ATTACHMENT0), target(channels.ids, GL_COLOR_ATTACHMENT1),
       target(channels.normals, GL_COLOR_ATTACHMENT2), target(planeDepth, GL_COLOR_ATTACHMENT3)};
-  glNamedFramebufferDrawBuffers(framebuffer_.name(), 4, targets.data());
+  glNamedFramebufferDrawBuffers(framebuffer(), 4, targets.data());
 }
 
-void RenderTarget::readColour(Frame& frame, const AmbientOcclusion& ambientOcclusion) {
-  const auto width = static_cast<std::size_t>(width_), height = static_cast<std::size_t>(height_);
-  rgba_.resize(4 * width * height);
-  readAttachment(framebuffer_.name(), GL_COLOR_ATTACHMENT0, width_, height_, GL_RGBA,
-                 GL_UNSIGNED_BYTE, rgba_.data());
-  frame.rgb.resize(3 * width * height);
-  std::vector<std::uint8_t> visibility(width);
-  const std::uint8_t* from = rgba_.data();
-  std::uint8_t* to = frame.rgb.data();
-  for (int y = 0; y < height_; ++y) {
-    ambientOcclusion.computeRow(y, visibility);
-    for (std::size_t x = 0; x < width; ++x, from += 4, to += 3) {
-      applyAo(from, visibility[x], from[3], to);
-    }
-  }
-}
-
-void RenderTarget::readChannels(Frame& frame, const Channels& channels) const {
-  const std::size_t pixels = static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_);
-  const auto readInto = [&](GLenum attachment, GLenum format, GLenum type, void* data) {
-    readAttachment(framebuffer_.name(), attachment, width_, height_, format, type, data);
-  };
-  if (channels.ids) {
-    frame.ids.resize(pixels);
-    readInto(GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_INT, frame.ids.data());
-  }
-  if (channels.normals) {
-    frame.normals.resize(3 * pixels);
-    readInto(GL_COLOR_ATTACHMENT2, GL_RGB, GL_FLOAT, frame.normals.data());
-  }
-}
-
-void RenderTarget::readDepth(std::vector<float>& depth) const {
-  depth.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  glBindFramebuffer(GL_READ_FRAMEBUFFER, framebuffer_.name());
+template <class Value>
+void RenderTarget::read(const GlTextureArray& texture, Layers layers, unsigned format,
+                        unsigned type, std::span<Value> values) const {
+  ENFILADE_ASSERT(layers.first >= 0 && layers.first + layers.count <= this->layers());
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  glReadPixels(0, 0, width_, height_, GL_DEPTH_COMPONENT, GL_FLOAT, depth.data());
+  glGetTextureSubImage(texture.name(), 0, 0, 0, layers.first, width_, height_, layers.count, format,
+                       type, static_cast<GLsizei>(values.size_bytes()), values.data());
 }
 
-void RenderTarget::readPlaneDepth(std::vector<float>& metres) const {
-  metres.resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
-  readAttachment(framebuffer_.name(), GL_COLOR_ATTACHMENT3, width_, height_, GL_RED, GL_FLOAT,
-                 metres.data());
+void RenderTarget::readColour(Layers layers, std::span<std::uint8_t> rgba) const {
+  read(colour_, layers, GL_RGBA, GL_UNSIGNED_BYTE, rgba);
+}
+void RenderTarget::readIds(Layers layers, std::span<std::uint32_t> ids) const {
+  read(ids_, layers, GL_RED_INTEGER, GL_UNSIGNED_INT, ids);
+}
+void RenderTarget::readNormals(Layers layers, std::span<float> normals) const {
+  read(normals_, layers, GL_RGB, GL_FLOAT, normals);
+}
+void RenderTarget::readDepth(Layers layers, std::span<float> depth) const {
+  read(depth_, layers, GL_DEPTH_COMPONENT, GL_FLOAT, depth);
+}
+void RenderTarget::readPlaneDepth(Layers layers, std::span<float> metres) const {
+  read(planeDepth_, layers, GL_RED, GL_FLOAT, metres);
+}
+
+std::vector<std::uint8_t> applyOcclusion(std::span<const std::uint8_t> rgba, int width, int height,
+                                         const AmbientOcclusion& ambientOcclusion) {
+  const auto columns = static_cast<std::size_t>(width), rows = static_cast<std::size_t>(height);
+  ENFILADE_ASSERT(rgba.size() == 4 * columns * rows);
+  std::vector<std::uint8_t> rgb(3 * columns * rows), visibility(columns);
+  const std::uint8_t* from = rgba.data();
+  std::uint8_t* to = rgb.data();
+  for (int y = 0; y < height; ++y) {
+    ambientOcclusion.computeRow(y, visibility);
+    for (std::size_t x = 0; x < columns; ++x, from += 4, to += 3)
+      applyAo(from, visibility[x], from[3], to);
+  }
+  return rgb;
 }
 
 /// Computes in floats, which adds an error of about 2e-7 of the distance to the buffer's rounding.

@@ -209,8 +209,7 @@ Frame traceLensFrame(const Camera& camera, const FrameOptions& options,
                      const MipTextures& textures, scene::ThreadPool& workers) {
   constexpr std::size_t kRowsPerTask = 16;
   constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
-  const auto pixels =
-      static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+  const auto pixels = countPixels(camera);
   Frame frame;
   frame.camera = camera;
   if (options.channels.depth || options.channels.rgb) {

@@ -6,7 +6,9 @@
 #include "render/raytrace/ray_renderer.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <deque>
 #include <limits>
 #include <optional>
 #include <span>
@@ -70,11 +72,23 @@ std::vector<const RayTree*> collectFirstHitTrees(RayScene& scene, const FrameOpt
   return trees;
 }
 
-/// Calls `work(from, to)` for ranges of tile rows of a frame, on several threads.
+/// Calls `work(frame, from, to)` for ranges of tile rows of frames of these heights, on several
+/// threads.
 template <class Work>
-void parallelForTiles(scene::ThreadPool& workers, int height, const Work& work) {
+void parallelForTiles(scene::ThreadPool& workers, std::span<const int> heights, const Work& work) {
   constexpr std::size_t kBlock = 4;  // tile rows per task
-  workers.parallelFor(static_cast<std::size_t>((height + kTileSize - 1) / kTileSize), kBlock, work);
+  struct Task {
+    std::size_t frame, from, to;
+  };
+  std::vector<Task> tasks;
+  for (std::size_t i = 0; i < heights.size(); ++i) {
+    const auto rows = static_cast<std::size_t>((heights[i] + kTileSize - 1) / kTileSize);
+    for (std::size_t from = 0; from < rows; from += kBlock)
+      tasks.push_back({i, from, std::min(rows, from + kBlock)});
+  }
+  workers.parallelFor(tasks.size(), 1, [&](std::size_t from, std::size_t to) {
+    for (std::size_t i = from; i < to; ++i) work(tasks[i].frame, tasks[i].from, tasks[i].to);
+  });
 }
 
 /// Traces one frame.
@@ -89,29 +103,25 @@ class FrameTracer {
         origin_(scene.origin()) {
     if (options.channels.rgb && options.transparency == TransparencyMode::blend)
       transparentTrees_ = scene.transparentTrees();
-    const auto pixels =
-        static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
-    frame.camera = camera;
+    const auto pixels = countPixels(camera);
+    frame_.camera = camera;
     constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
-    if (options.channels.depth || options.channels.rgb) frame.depth.assign(pixels, kNothing);
-    if (options.channels.ids) frame.ids.assign(pixels, 0);
-    if (options.channels.normals) frame.normals.assign(3 * pixels, 0.0f);
-    if (options.channels.rgb) linearColours_.resize(pixels), frame.rgb.resize(3 * pixels);
+    if (options.channels.depth || options.channels.rgb) frame_.depth.assign(pixels, kNothing);
+    if (options.channels.ids) frame_.ids.assign(pixels, 0);
+    if (options.channels.normals) frame_.normals.assign(3 * pixels, 0.0f);
+    if (options.channels.rgb) linearColours_.resize(pixels), frame_.rgb.resize(3 * pixels);
     if (!transparentTrees_.empty()) transmittance_.assign(pixels, 1.0f);
     if (options.channels.rgb && options.shadows) shadowMask_.assign(pixels, 255);
   }
 
-  Frame frame;
+  // The steps of a frame, the last two only with colour. Ranges of tile rows are for any thread.
+  void traceOpaque(std::size_t fromTile, std::size_t toTile);
+  void prepareOcclusion() { ambientOcclusion_.emplace(frame_.depth, frame_.camera); }
+  void finishRows(std::size_t fromTile, std::size_t toTile);
 
-  void draw(scene::ThreadPool& workers) {
-    const int height = rays_.height;
-    parallelForTiles(workers, height,
-                     [&](std::size_t from, std::size_t to) { traceOpaque(from, to); });
-    if (!options_.channels.rgb) return;
-    ambientOcclusion_.emplace(frame.depth, frame.camera);
-    parallelForTiles(workers, height,
-                     [&](std::size_t from, std::size_t to) { finishRows(from, to); });
-    if (!options_.channels.depth) frame.depth = {};
+  Frame takeFrame() {
+    if (!options_.channels.depth) frame_.depth = {};
+    return std::move(frame_);
   }
 
  private:
@@ -126,16 +136,15 @@ class FrameTracer {
     return std::min(rays_.height, static_cast<int>(tile) * kTileSize + kTileSize);
   }
 
-  void traceOpaque(std::size_t fromTile, std::size_t toTile);
   void writeDepthRow(const TraceContext& trace, int y, std::span<const HitKey> keys,
                      RecentCache<CachedPlane>& recent);
   void shadeRow(const TraceContext& trace, int y, std::span<const HitKey> keys,
                 RecentCache<ShadedTriangle>& recent);
-  void finishRows(std::size_t fromTile, std::size_t toTile);
   void blendTransparent(const TraceContext& trace, int y, RecentCache<ShadedTriangle>& recent);
   void encodeRow(int y, std::span<std::uint8_t> visibility);
 
   const FrameOptions& options_;
+  Frame frame_;
   PrimaryRays rays_;
   Shading shading_;
   std::vector<const RayTree*> opaqueTrees_, transparentTrees_;
@@ -161,7 +170,7 @@ void FrameTracer::traceOpaque(std::size_t fromTile, std::size_t toTile) {
                                                    width);
     };
     for (int y = top; y < endRow(tile); ++y) writeDepthRow(trace, y, row(y), planes);
-    if (!shadowMask_.empty()) traceShadowRows(trace, top, frame.depth, shadowMask_);
+    if (!shadowMask_.empty()) traceShadowRows(trace, top, frame_.depth, shadowMask_);
     for (int y = top; shaded && y < endRow(tile); ++y) shadeRow(trace, y, row(y), triangles);
   }
 }
@@ -179,11 +188,11 @@ void FrameTracer::writeDepthRow(const TraceContext& trace, int y, std::span<cons
                            triangle.batch->id};
       });
       const std::size_t first = pixelIndex(static_cast<int>(x), y), count = end - x;
-      if (!frame.depth.empty())
+      if (!frame_.depth.empty())
         fillDepth(cached.depth, static_cast<int>(x), y,
-                  std::span(frame.depth).subspan(first, count));
-      if (!frame.ids.empty())
-        std::fill_n(frame.ids.begin() + static_cast<std::ptrdiff_t>(first), count, cached.id);
+                  std::span(frame_.depth).subspan(first, count));
+      if (!frame_.ids.empty())
+        std::fill_n(frame_.ids.begin() + static_cast<std::ptrdiff_t>(first), count, cached.id);
     }
     x = end;
   }
@@ -208,7 +217,7 @@ void FrameTracer::shadeRow(const TraceContext& trace, int y, std::span<const Hit
     if (options_.channels.normals) {
       const Vec3 normal = shading_.computeNormal(triangle, x, y);
       for (int i = 0; i < 3; ++i)
-        frame.normals[3 * pixel + static_cast<std::size_t>(i)] = static_cast<float>(normal[i]);
+        frame_.normals[3 * pixel + static_cast<std::size_t>(i)] = static_cast<float>(normal[i]);
     }
   }
 }
@@ -232,7 +241,7 @@ void FrameTracer::blendTransparent(const TraceContext& trace, int y,
     HitKey key;
   };
   std::vector<PixelHit> hits;
-  traceAllHits(trace, y, frame.depth, hits);
+  traceAllHits(trace, y, frame_.depth, hits);
   const auto triangle = [&](HitKey key) -> const ShadedTriangle& {
     return recent.getOrMake(key, [&] { return ShadedTriangle(findTriangle(trace, key), rays_); });
   };
@@ -243,7 +252,7 @@ void FrameTracer::blendTransparent(const TraceContext& trace, int y,
     const ShadedTriangle& shadedTriangle = triangle(hit.key);
     if (shadedTriangle.batch->id == options_.hiddenEntity) continue;
     const double z = shadedTriangle.depth.at(column(hit.pixel), row(hit.pixel));
-    if (z >= static_cast<double>(frame.depth[hit.pixel])) continue;  // never of a NaN
+    if (z >= static_cast<double>(frame_.depth[hit.pixel])) continue;  // never of a NaN
     layers.push_back({hit.pixel, z, hit.key});
   }
   // The key makes the order of coincident surfaces deterministic.
@@ -277,7 +286,7 @@ void FrameTracer::encodeRow(int y, std::span<std::uint8_t> visibility) {
         transmittance_.empty() ? 255.0f : 255 * transmittance_[pixel] + 0.5f);
     const std::array rgb{linearToSrgb(linear.x), linearToSrgb(linear.y), linearToSrgb(linear.z)};
     applyAo(rgb.data(), visibility[static_cast<std::size_t>(x)], transmittance,
-            &frame.rgb[3 * pixel]);
+            &frame_.rgb[3 * pixel]);
   }
 }
 
@@ -297,15 +306,37 @@ struct RayRenderer::State {
 
 namespace {
 
+/// Traces the views together, so that all threads have work until the last one.
 template <class State>
-Frame drawFrame(State& state, const Camera& camera, const FrameOptions& options) {
-  if (camera.lens)
-    return traceLensFrame(camera, options, collectFirstHitTrees(state.scene, options),
-                          state.scene.transparentTrees(), state.scene.origin(), state.textures,
-                          state.workers);
-  FrameTracer tracer(camera, options, state.scene, state.textures);
-  tracer.draw(state.workers);
-  return std::move(tracer.frame);
+std::vector<Frame> traceFrames(State& state, std::span<const View> views) {
+  std::deque<FrameTracer> tracers;
+  std::vector<int> heights, colouredHeights;
+  std::vector<FrameTracer*> coloured;
+  for (const View& view : views) {
+    FrameTracer& tracer =
+        tracers.emplace_back(view.camera, view.options, state.scene, state.textures);
+    heights.push_back(view.camera.height);
+    if (!view.options.channels.rgb) continue;
+    coloured.push_back(&tracer);
+    colouredHeights.push_back(view.camera.height);
+  }
+  parallelForTiles(state.workers, heights, [&](std::size_t i, std::size_t from, std::size_t to) {
+    tracers[i].traceOpaque(from, to);
+  });
+  for (FrameTracer* tracer : coloured) tracer->prepareOcclusion();
+  parallelForTiles(
+      state.workers, colouredHeights,
+      [&](std::size_t i, std::size_t from, std::size_t to) { coloured[i]->finishRows(from, to); });
+  std::vector<Frame> frames;
+  for (FrameTracer& tracer : tracers) frames.push_back(tracer.takeFrame());
+  return frames;
+}
+
+template <class State>
+Frame traceThroughLens(State& state, const View& view) {
+  return traceLensFrame(view.camera, view.options, collectFirstHitTrees(state.scene, view.options),
+                        state.scene.transparentTrees(), state.scene.origin(), state.textures,
+                        state.workers);
 }
 
 }  // namespace
@@ -315,13 +346,28 @@ RayRenderer::RayRenderer(std::shared_ptr<const scene::Scene> scene, const RayOpt
 
 RayRenderer::~RayRenderer() = default;
 
-Frame RayRenderer::renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
-                              const FrameOptions& options) {
-  state_->scene.update(snapshot, options.avatars);
-  Frame frame = drawFrame(*state_, camera, options);
-  frame.renderer = state_->name;
-  frame.software = true;
-  return frame;
+std::vector<Frame> RayRenderer::renderOnce(const scene::Snapshot& snapshot,
+                                           std::span<const View> views) {
+  State& s = *state_;
+  std::vector<Frame> frames;
+  for (std::size_t from = 0; from < views.size();) {
+    // The trees hold one form of the avatars.
+    std::size_t to = from + 1;
+    const auto sharesTrees = [&](const View& view) {
+      return !view.camera.lens && view.options.avatars == views[from].options.avatars;
+    };
+    s.scene.update(snapshot, views[from].options.avatars);
+    if (views[from].camera.lens) {
+      frames.push_back(traceThroughLens(s, views[from]));
+    } else {
+      while (to < views.size() && sharesTrees(views[to])) ++to;
+      for (Frame& frame : traceFrames(s, views.subspan(from, to - from)))
+        frames.push_back(std::move(frame));
+    }
+    from = to;
+  }
+  for (Frame& frame : frames) frame.renderer = s.name, frame.software = true;
+  return frames;
 }
 
 std::vector<std::uint8_t> RayRenderer::computeShadowMask(const scene::Snapshot& snapshot,
@@ -335,10 +381,11 @@ std::vector<std::uint8_t> RayRenderer::computeShadowMask(const scene::Snapshot& 
   const Shading shading(rays, s.textures);
   const TraceContext trace{trees, rays, shading, s.scene.origin(), options.hiddenEntity};
   std::vector<std::uint8_t> mask(depth.size(), 255);
-  parallelForTiles(s.workers, rays.height, [&](std::size_t from, std::size_t to) {
-    for (std::size_t tile = from; tile < to; ++tile)
-      traceShadowRows(trace, static_cast<int>(tile) * kTileSize, depth, mask);
-  });
+  parallelForTiles(s.workers, std::array{rays.height},
+                   [&](std::size_t, std::size_t from, std::size_t to) {
+                     for (std::size_t tile = from; tile < to; ++tile)
+                       traceShadowRows(trace, static_cast<int>(tile) * kTileSize, depth, mask);
+                   });
   return mask;
 }
 

@@ -36,8 +36,8 @@ class RayRenderer final : public Renderer {
                                               const std::vector<float>& depth);
 
  private:
-  Frame renderOnce(const scene::Snapshot& snapshot, const Camera& camera,
-                   const FrameOptions& options) override;
+  std::vector<Frame> renderOnce(const scene::Snapshot& snapshot,
+                                std::span<const View> views) override;
 
   struct State;
   std::unique_ptr<State> state_;

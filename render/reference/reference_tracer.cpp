@@ -59,8 +59,7 @@ class ReferenceFrameBuilder {
       const std::vector<const RayTree*> transparentTrees = scene.transparentTrees();
       trees_.insert(trees_.end(), transparentTrees.begin(), transparentTrees.end());
     }
-    const auto pixels =
-        static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
+    const auto pixels = countPixels(camera);
     frame.camera = camera;
     frame.ids.resize(pixels);
     frame.depth.assign(pixels, kNoDepth);

@@ -11,11 +11,8 @@ namespace enfilade::render {
 struct RenderThread::State {
   struct Job {
     std::shared_ptr<const scene::Snapshot> snapshot;
-    Camera camera;
-    FrameOptions options;
-    RendererKind kind;
-    std::promise<Frame> frame;
-    std::function<void(std::future<Frame>)> done;  ///< may be empty
+    std::vector<ViewRequest> views;
+    std::function<void(Frames)> done;
   };
 
   std::mutex mutex;
@@ -85,17 +82,36 @@ struct RenderThread::State {
     if (!waitForFirstRequest()) return;
     const std::unique_ptr<RendererSelector> renderer =
         createRenderer(std::move(scene), device, kind);
-    while (auto job = takeJob()) {
-      try {
-        if (!renderer) throw RendererUnavailable(unavailableReason);
-        if (!job->snapshot) throw RenderError("RenderThread::render: no snapshot");
-        job->frame.set_value(
-            renderer->render(*job->snapshot, job->camera, job->options, job->kind));
-      } catch (...) {
-        job->frame.set_exception(std::current_exception());
+    while (auto job = takeJob()) job->done(renderAll(renderer.get(), *job));
+  }
+
+  std::vector<Frame> renderTogether(RendererSelector* renderer, const Job& job,
+                                    std::span<const ViewRequest> views) const {
+    if (!renderer) throw RendererUnavailable(unavailableReason);
+    if (!job.snapshot) throw RenderError("RenderThread::render: no snapshot");
+    return renderer->render(*job.snapshot, views);
+  }
+
+  Frames renderAll(RendererSelector* renderer, const Job& job) const {
+    Frames frames;
+    try {
+      for (Frame& frame : renderTogether(renderer, job, job.views)) {
+        std::promise<Frame> promise;
+        promise.set_value(std::move(frame));
+        frames.push_back(promise.get_future());
       }
-      if (job->done) job->done(job->frame.get_future());
+    } catch (...) {
+      if (job.views.size() == 1) {
+        std::promise<Frame> promise;
+        promise.set_exception(std::current_exception());
+        frames.push_back(promise.get_future());
+        return frames;
+      }
+      // One by one, so that an error concerns only its own view.
+      for (const ViewRequest& view : job.views)
+        frames.push_back(std::move(renderAll(renderer, {job.snapshot, {view}, {}}).front()));
     }
+    return frames;
   }
 };
 
@@ -118,16 +134,20 @@ RenderThread::~RenderThread() {
 
 std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
                                         Camera camera, FrameOptions options, RendererKind kind) {
-  State::Job job{std::move(snapshot), std::move(camera), options, kind, {}, {}};
-  std::future<Frame> frame = job.frame.get_future();
-  state_->enqueue(std::move(job));
-  return frame;
+  const auto promise = std::make_shared<std::promise<Frame>>();
+  render(std::move(snapshot), {{{std::move(camera), options}, kind}}, [promise](Frames frames) {
+    try {
+      promise->set_value(frames.front().get());
+    } catch (...) {
+      promise->set_exception(std::current_exception());
+    }
+  });
+  return promise->get_future();
 }
 
-void RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
-                          FrameOptions options, RendererKind kind,
-                          std::function<void(std::future<Frame>)> done) {
-  state_->enqueue({std::move(snapshot), std::move(camera), options, kind, {}, std::move(done)});
+void RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
+                          std::vector<ViewRequest> views, std::function<void(Frames)> done) {
+  state_->enqueue({std::move(snapshot), std::move(views), std::move(done)});
 }
 
 const std::string& RenderThread::deviceName() const {

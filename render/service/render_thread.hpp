@@ -4,6 +4,7 @@
 #include <functional>
 #include <future>
 #include <memory>
+#include <vector>
 
 #include "render/service/renderer_selector.hpp"
 
@@ -24,10 +25,12 @@ class RenderThread {
   /// created. Callable from any thread.
   std::future<Frame> render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera,
                             FrameOptions options = {}, RendererKind kind = RendererKind::automatic);
-  /// As above, but calls `done` with the ready future on this object's thread, so that no thread
+  /// Ready futures, one per view.
+  using Frames = std::vector<std::future<Frame>>;
+  /// As above, of several views together. Calls `done` on this object's thread, so that no thread
   /// has to wait. `done` must not throw.
-  void render(std::shared_ptr<const scene::Snapshot> snapshot, Camera camera, FrameOptions options,
-              RendererKind kind, std::function<void(std::future<Frame>)> done);
+  void render(std::shared_ptr<const scene::Snapshot> snapshot, std::vector<ViewRequest> views,
+              std::function<void(Frames)> done);
   // As in Renderer. These functions create the renderer if necessary and wait for it.
   const std::string& deviceName() const;  ///< "" without a renderer
   bool software() const;

@@ -1,6 +1,8 @@
 #include "render/service/renderer_selector.hpp"
 
 #include <chrono>
+#include <map>
+#include <utility>
 
 #include "collision/assert.hpp"
 #include "render/gl/gl_renderer.hpp"
@@ -112,13 +114,36 @@ RendererSelector::~RendererSelector() = default;
 
 Frame RendererSelector::render(const scene::Snapshot& snapshot, const Camera& camera,
                                const FrameOptions& options, RendererKind kind) {
-  // The time excludes the creation of the renderer.
-  Renderer& renderer = state_->findOrCreate(state_->chooseKind(camera, options, kind));
-  using Clock = std::chrono::steady_clock;
-  const Clock::time_point start = Clock::now();
-  Frame frame = renderer.render(snapshot, camera, state_->decideShadows(renderer, camera, options));
-  frame.statistics.seconds = std::chrono::duration<double>(Clock::now() - start).count();
-  return frame;
+  const ViewRequest request{{camera, options}, kind};
+  return std::move(render(snapshot, std::span(&request, 1)).front());
+}
+
+std::vector<Frame> RendererSelector::render(const scene::Snapshot& snapshot,
+                                            std::span<const ViewRequest> views) {
+  std::map<RendererKind, std::vector<std::size_t>> viewsByKind;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto& [view, kind] = views[i];
+    viewsByKind[state_->chooseKind(view.camera, view.options, kind)].push_back(i);
+  }
+  std::vector<Frame> frames(views.size());
+  for (const auto& [kind, indices] : viewsByKind) {
+    Renderer& renderer = state_->findOrCreate(kind);
+    std::vector<View> together;
+    for (const std::size_t i : indices) {
+      const View& view = views[i].view;
+      together.push_back({view.camera, state_->decideShadows(renderer, view.camera, view.options)});
+    }
+    // The time excludes the creation of the renderer.
+    using Clock = std::chrono::steady_clock;
+    const Clock::time_point start = Clock::now();
+    std::vector<Frame> rendered = renderer.render(snapshot, together);
+    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    for (std::size_t i = 0; i < rendered.size(); ++i) {
+      rendered[i].statistics.seconds = seconds / static_cast<double>(rendered.size());
+      frames[indices[i]] = std::move(rendered[i]);
+    }
+  }
+  return frames;
 }
 
 const std::string& RendererSelector::deviceNameFor(const Camera& camera,

@@ -2,13 +2,21 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
+#include <vector>
 
 #include "render/device.hpp"
 #include "render/renderer.hpp"
 #include "render/renderer_kind.hpp"
 
 namespace enfilade::render {
+
+/// A frame to render, by the renderer of this kind.
+struct ViewRequest {
+  View view;
+  RendererKind kind = RendererKind::automatic;
+};
 
 /// Owns a GlRenderer, a RayRenderer or both, each created on first use. Create, use and destroy it
 /// on one thread, as RenderThread does.
@@ -27,6 +35,8 @@ class RendererSelector {
   /// renderers, and for rays if a GPU is required.
   Frame render(const scene::Snapshot& snapshot, const Camera& camera,
                const FrameOptions& options = {}, RendererKind kind = RendererKind::automatic);
+  /// As above, of several views, which take less time together.
+  std::vector<Frame> render(const scene::Snapshot& snapshot, std::span<const ViewRequest> views);
 
   /// Frame::renderer of such a frame.
   const std::string& deviceNameFor(const Camera& camera, const FrameOptions& options);

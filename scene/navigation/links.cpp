@@ -185,12 +185,18 @@ void Links::collectLifts(WorldData& world) {
     const std::vector<Stop> stops = findStops(world, lift, agent_);
     setBodyPose(lift, position, orientation);
     lift.motionBounds = lift.boxes.whole;
+    Walker rider(world, agent_);
+    const auto canRide = [&](const Stop& from, const Stop& to) {
+      return !from.outside.empty() && !to.outside.empty() &&
+             rider.isRideFree(from.inside, to.inside, lift.id);
+    };
     for (std::uint32_t a = 0; a < stops.size(); ++a)
-      for (std::uint32_t b = 0; b < stops.size(); ++b)
+      for (std::uint32_t b = 0; b < stops.size(); ++b) {
+        if (a == b || !canRide(stops[a], stops[b])) continue;
         for (const Vec3& from : stops[a].outside)
           for (const Vec3& to : stops[b].outside) {
             const auto start = findPolygon(from), end = findPolygon(to);
-            if (a == b || !start || !end) continue;
+            if (!start || !end) continue;
             PathLink link{PathLink::Kind::lift, {from, stops[a].inside, stops[b].inside, to}};
             link.to = *end;
             link.length = computeGroundDistance(from, stops[a].inside) +
@@ -202,6 +208,7 @@ void Links::collectLifts(WorldData& world) {
             link.toStop = b;
             links_[*start].push_back(std::move(link));
           }
+      }
   }
 }
 

@@ -173,6 +173,19 @@ bool Walker::isWayFree(const Vec3& goal) {
   return isFree;
 }
 
+bool Walker::isRideFree(const Vec3& from, const Vec3& to, EntityId body) {
+  Aabb swept;
+  for (const Vec3& feet : {from, to})
+    for (const Vec3& corner : {shape_->box.min, shape_->box.max}) swept.include(feet + corner);
+  ObstacleSet obstacles =
+      collectObstaclesInBox(world_, inflated(swept, 2 * world_.settings.contactOffset), 0);
+  std::erase_if(obstacles.list, [&](const Obstacle& one) { return one.entity == body; });
+  std::erase_if(obstacles.dense, [&](const DenseObject& one) { return one.entity == body; });
+  return castAvatarShape(*shape_, from, to - from, obstacles, makeContactOffset(world_.settings),
+                         count_)
+             .entity == 0;
+}
+
 /// Walks with a wider shape, in long steps where the floor is even. Ends before the first place
 /// that is too narrow for it.
 WalkOutcome Walker::walkWithMargin(const Vec3& goal) {

@@ -49,6 +49,10 @@ class Walker {
   /// even. Quick; walkTo() also arrives over steps and through narrower places.
   bool isWayFree(const Vec3& goal);
 
+  /// Whether a body that moves straight and carries the agent from `from` to `to` brings it against
+  /// nothing else.
+  bool isRideFree(const Vec3& from, const Vec3& to, EntityId body);
+
   /// As an avatar in a world walks on from where the walker stands; may slide along obstacles. Tick
   /// by tick off even floor.
   WalkOutcome walkOn(const Vec3& goal);

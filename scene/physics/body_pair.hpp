@@ -48,6 +48,7 @@ struct BodyPair {
   std::unique_ptr<PairCache> cache;                            ///< null: never queried
 
   bool hasConstraint = false;
+  bool touched = false;   ///< the bodies touched when the pair was last updated
   bool reported = false;  ///< the pair was close when contacts were last reported
   /// the pair had a contact impulse in the last step, even if it is separated now
   bool gaveImpulse = false;

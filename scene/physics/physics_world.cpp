@@ -1,6 +1,6 @@
 // Steps
-//  1. Update the pairs of awake bodies (body_pair.hpp). An awake body in contact wakes a
-//     sleeping one, whose pairs are then updated too.
+//  1. Update the pairs of awake bodies (body_pair.hpp). An awake body that hits or pushes a
+//     sleeping one, or parts from it, wakes it, and its pairs are then updated too.
 //  2. Solve the awake bodies and all that they may touch (solver.hpp).
 //  3. Prove every pair that could touch on its way clear
 //  (collision/motion/interpolated_motion.hpp). Where that fails, the
@@ -9,7 +9,8 @@
 //     and after a few passes not at all. If no part of a body's motion was certified, depenetrate
 //     it once. An island that touches one kinematic body and no other obstacle, such as parts in a
 //     tray, moves at least with it.
-//  4. Islands of touching bodies that were at rest for a while fall asleep.
+//  4. Bodies that were at rest for a while fall asleep. A body that leaves its place wakes those
+//     that touched it.
 #include "scene/physics/physics_world.hpp"
 
 #include <algorithm>
@@ -33,9 +34,18 @@ bool isRelevantPair(const SpeedBound& a, const SpeedBound& b) {
   return a.isAwake || b.isAwake || (a.isActuated && b.isDynamic) || (b.isActuated && a.isDynamic);
 }
 
-void wakeBody(PhysicsBody& body) {
+bool isAsleep(const PhysicsBody& body) {
+  return body.isDynamic() && body.asleep;
+}
+
+/// Seconds at rest until a body loses its velocity at each step, which ends the jostling of a heap.
+double computeSettledTime(const StepSettings& settings) {
+  return settings.sleep.timeToSleep / 2;
+}
+
+void wakeBody(PhysicsBody& body, double sleepTimer) {
   body.asleep = false;
-  body.sleepTimer = 0;
+  body.sleepTimer = sleepTimer;
 }
 
 // ---- step 1 ------------------------------------------------------------------------------------
@@ -58,14 +68,21 @@ double computeMaxAdvance(const PhysicsBody& body, const Vec3& arm, const Vec3& d
   return maxAdvance;
 }
 
-/// Returns whether a contact point touches, or can touch within the step. One of the bodies sleeps.
-bool willTouch(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b,
-               const PairStepSettings& step) {
+/// Whether it moves or is moved without regard to what it touches.
+bool isPushing(const PhysicsBody& body) {
+  return body.isActuated() || body.pushSpeedBound > 0;
+}
+
+/// Whether the body that sleeps must wake: the other one pushes it, or can hit it within the step.
+bool wakesSleeper(const BodyPair& pair, const PhysicsBody& a, const PhysicsBody& b,
+                  const PairStepSettings& step) {
+  constexpr double kMinHitSpeed = 0.05;  // m/s; a sleeping body stops what is slower
+  const double minAdvance = isPushing(a) || isPushing(b) ? 0 : kMinHitSpeed * step.seconds;
   const ContactConstraint& constraint = *pair.constraint();
   for (const ContactConstraintPoint& point : constraint.activePoints()) {
     const double advance = computeMaxAdvance(a, point.armA, constraint.normal, step.seconds) +
                            computeMaxAdvance(b, point.armB, -constraint.normal, step.seconds);
-    if (point.separation < 2 * step.contactOffset + advance) return true;
+    if (advance >= minAdvance && point.separation < 2 * step.contactOffset + advance) return true;
   }
   return false;
 }
@@ -96,25 +113,29 @@ std::uint8_t evaluatePair(const PhysicsWorld& world, const StepScratch& scratch,
     flags |= StepScratch::kQueried;
   }
   if (pair.penetration() > 0) flags |= StepScratch::kPenetrates;
+  const bool touched = pair.touched, sleeper = isAsleep(a) || isAsleep(b);
+  pair.touched = isTouching(pair, step.contactOffset);
+  if (sleeper && touched && !pair.touched) flags |= StepScratch::kParted;
   if (!pair.hasConstraint) return flags;
   flags |= StepScratch::kConstrained;
-  if (isTouching(pair, step.contactOffset)) flags |= StepScratch::kTouching;
-  const bool sleeper = (a.isDynamic() && a.asleep) || (b.isDynamic() && b.asleep);
-  if (sleeper && willTouch(pair, a, b, step)) flags |= StepScratch::kWakes;
+  if (pair.touched) flags |= StepScratch::kTouching;
+  if (sleeper && wakesSleeper(pair, a, b, step)) flags |= StepScratch::kWakes;
   return flags;
 }
 
 /// Accumulates the flags of an update pass. Returns whether a body woke.
 bool applyPairFlags(PhysicsWorld& world, const BodyPair& pair, std::uint8_t& flags,
-                    StepScratch& scratch) {
+                    double settledTime, StepScratch& scratch) {
   if ((flags & StepScratch::kQueried) != 0) ++scratch.report.narrowPhaseQueries;
   if ((flags & StepScratch::kPenetrates) != 0)
     scratch.report.maxPenetration = std::max(scratch.report.maxPenetration, pair.penetration());
-  const bool wakes = (flags & StepScratch::kWakes) != 0;
+  const bool wakes = (flags & StepScratch::kWakes) != 0,
+             parted = (flags & StepScratch::kParted) != 0;
   flags &= StepScratch::kActive | StepScratch::kTouching | StepScratch::kConstrained;
-  if (!wakes) return false;
   PhysicsBody &a = world.bodies[pair.key.a], &b = world.bodies[pair.key.b];
-  wakeBody(a.isDynamic() && a.asleep ? a : b);
+  PhysicsBody& sleeper = isAsleep(a) ? a : b;
+  if ((!wakes && !parted) || !isAsleep(sleeper)) return false;
+  wakeBody(sleeper, wakes ? 0 : settledTime);
   return true;
 }
 
@@ -125,7 +146,8 @@ void prefetchPair(const BodyPair& pair) {
   for (std::size_t i = 0; i < sizeof(PairCache); i += 64) __builtin_prefetch(bytes + i);
 }
 
-void findConstraints(PhysicsWorld& world, const PairStepSettings& step, StepScratch& scratch) {
+void findConstraints(PhysicsWorld& world, const PairStepSettings& step, double settledTime,
+                     StepScratch& scratch) {
   std::vector<BodyPair>& pairs = world.pairs;
   scratch.pairFlags.assign(pairs.size(), 0);
   std::vector<std::uint8_t> isNew(pairs.size(), 1);
@@ -142,7 +164,7 @@ void findConstraints(PhysicsWorld& world, const PairStepSettings& step, StepScra
     for (std::size_t i = 0; i < pairs.size(); ++i) {
       if (!isNew[i] || scratch.pairFlags[i] == 0) continue;
       isNew[i] = 0;
-      woken = applyPairFlags(world, pairs[i], scratch.pairFlags[i], scratch) || woken;
+      woken = applyPairFlags(world, pairs[i], scratch.pairFlags[i], settledTime, scratch) || woken;
     }
     if (!woken) break;
   }
@@ -364,33 +386,51 @@ void updateSleepTimer(PhysicsBody& body, const StepSettings& settings) {
   body.sleepTimer = 0;
 }
 
-/// An island sleeps when all its bodies are at rest. Those that are at rest for half that time lose
-/// their velocity at each step, which ends their jostling; otherwise few bodies would keep a whole
-/// heap awake.
-void updateSleep(PhysicsWorld& world, const StepSettings& settings, StepScratch& scratch) {
+bool isSettled(const PhysicsBody& body, const StepSettings& settings) {
+  return body.sleepTimer >= computeSettledTime(settings);
+}
+
+/// Advances the timers. The bodies of an island that is kept awake are not at rest.
+void updateSleepTimers(PhysicsWorld& world, const StepSettings& settings, StepScratch& scratch) {
   DisjointSets islands = findIslands(world, scratch);
   const std::vector<std::uint8_t> keptAwake = findBodiesKeptAwake(world, scratch);
-  std::vector<double> sleepTimers(world.bodies.size(), settings.sleep.timeToSleep);
   std::vector<std::uint8_t> driven(world.bodies.size(), 0);  // by the island's representative
   for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
-    PhysicsBody& body = world.bodies[i];
-    if (!body.isAwake()) continue;
+    if (!world.bodies[i].isAwake()) continue;
     const std::uint32_t island = islands.find(i);
-    updateSleepTimer(body, settings);
-    sleepTimers[island] = std::min(sleepTimers[island], body.sleepTimer);
     if (keptAwake[i] != 0) driven[island] = 1;
     if (island == i) ++scratch.report.islands;
   }
   for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
     PhysicsBody& body = world.bodies[i];
     if (!body.isAwake()) continue;
-    const std::uint32_t island = islands.find(i);
-    if (driven[island] != 0) {
-      body.sleepTimer = 0;
-      continue;
-    }
-    body.asleep = sleepTimers[island] >= settings.sleep.timeToSleep;
-    if (body.asleep || body.sleepTimer >= settings.sleep.timeToSleep / 2)
+    updateSleepTimer(body, settings);
+    if (driven[islands.find(i)] != 0) body.sleepTimer = 0;
+  }
+}
+
+/// A body at rest sleeps unless a body that is not settled touches it. Such a body wakes those that
+/// it touched before the step: it may have held them. They stay settled until they leave their own
+/// places, so that one moving part does not wake a heap.
+void updateSleep(PhysicsWorld& world, const StepSettings& settings, StepScratch& scratch) {
+  updateSleepTimers(world, settings, scratch);
+  std::vector<std::uint8_t> disturbed(world.bodies.size(), 0);
+  for (const std::uint32_t i : scratch.constrainedPairs) {
+    if (!scratch.isTouchingPair(i)) continue;
+    const auto [a, b] = std::pair(world.pairs[i].key.a, world.pairs[i].key.b);
+    const auto disturbs = [&](const PhysicsBody& body) {
+      return body.isAwake() && !isSettled(body, settings);
+    };
+    if (disturbs(world.bodies[a])) disturbed[b] = 1;
+    if (disturbs(world.bodies[b])) disturbed[a] = 1;
+  }
+  for (std::uint32_t i = 0; i < world.bodies.size(); ++i) {
+    PhysicsBody& body = world.bodies[i];
+    if (!body.isDynamic()) continue;
+    if (body.asleep && disturbed[i] != 0) wakeBody(body, computeSettledTime(settings));
+    if (body.asleep) continue;
+    body.asleep = disturbed[i] == 0 && body.sleepTimer >= settings.sleep.timeToSleep;
+    if (isSettled(body, settings))
       body.motion.velocity = body.motion.angularVelocity = Vec3::Zero();
   }
 }
@@ -428,7 +468,7 @@ StepReport stepPhysics(PhysicsWorld& world, const StepSettings& settings) {
   thread_local StepScratch kept;
   StepScratch& scratch = kept;  // a reference that worker threads can see
   scratch.reset(settings.pool ? *settings.pool : alone);
-  findConstraints(world, makePairStepSettings(settings), scratch);
+  findConstraints(world, makePairStepSettings(settings), computeSettledTime(settings), scratch);
   gatherBodies(world, scratch);
   gatherConstraints(world, scratch);
   findKinematicPenetrations(world, scratch);

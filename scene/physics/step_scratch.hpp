@@ -44,7 +44,7 @@ struct StepScratch {
   ThreadPool* pool = nullptr;
   StepReport report;
   static constexpr std::uint8_t kActive = 1, kQueried = 2, kWakes = 4, kTouching = 8,
-                                kConstrained = 16, kPenetrates = 32;
+                                kConstrained = 16, kPenetrates = 32, kParted = 64;
   std::vector<std::uint8_t> pairFlags;  ///< flags of each pair
   bool isTouchingPair(std::uint32_t pair) const { return (pairFlags[pair] & kTouching) != 0; }
   std::vector<std::uint32_t> activePairs;  ///< indices of pairs that were updated or may matter

@@ -8,7 +8,7 @@
 #include "scene/model/rotation.hpp"
 #include "scene/world/audit.hpp"
 #include "scene/world/data/validation.hpp"
-#include "server/base/endpoint.hpp"
+#include "server/base/host_port.hpp"
 #include "server/base/parse_number.hpp"
 #include "server/inspection/inspection.hpp"
 
@@ -20,7 +20,7 @@ std::string validateFile(const std::string& text) {
 }
 
 std::string validateEndpoint(const std::string& text) {
-  if (parseEndpoint(text)) return {};
+  if (parseHostPort(text)) return {};
   return text + ": give HOST:PORT with a port from 0 to 65535, for example 127.0.0.1:7878";
 }
 

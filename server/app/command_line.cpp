@@ -108,7 +108,7 @@ std::variant<ProgramCommand, ExitCode> makeServeCommand(const CLI::App& serve,
     return ExitCode::usageError;
   }
   ServeCommand command{makeModelOptions(read.model),
-                       *parseEndpoint(read.listen),
+                       *parseHostPort(read.listen),
                        parseAudit(read),
                        makeWorldSettings(read),
                        read.tokenFile,
@@ -252,7 +252,7 @@ const Verb kVerbs[] = {
      }},
     {"walk", "Run a walk script on a server", addWalkOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
-       return WalkCommand{read.script, read.out,   *parseEndpoint(read.connect),
+       return WalkCommand{read.script, read.out,   *parseHostPort(read.connect),
                           read.world,  read.token, read.strict};
      }},
     {"doctor", "Test all graphics devices and report missing components", addDoctorOptions,

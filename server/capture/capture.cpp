@@ -104,32 +104,56 @@ void checkFrame(const scene::Scene& scene, const CaptureFrame& captureFrame, std
   counts.framesInsideSolids.push_back(index);
 }
 
+/// The end of the frames from `from` on that show one snapshot and are rendered together.
+std::size_t findGroupEnd(const CapturePlan& plan, const std::vector<std::size_t>& missing,
+                         std::size_t from) {
+  const CaptureFrame& first = plan.frames[missing[from]];
+  std::size_t pixels = render::countPixels(first.camera), end = from + 1;
+  for (; end < missing.size(); ++end) {
+    const CaptureFrame& next = plan.frames[missing[end]];
+    pixels += render::countPixels(next.camera);
+    if (next.snapshot != first.snapshot || pixels > render::kMaxPixelsTogether) break;
+  }
+  return end;
+}
+
 /// Renders on this thread; worker threads encode and write.
 void renderFrames(const CaptureCommand& command, const scene::Scene& scene, const CapturePlan& plan,
                   const std::vector<std::size_t>& missing, render::RendererSelector& renderer,
                   DepthReports* reports, CaptureCounts& counts) {
   CaptureProgress progress(command.run.progress, missing.size());
   EncodeQueue queue(kEncoderThreads, kMaxPendingFrames);
-  for (const std::size_t index : missing) {
-    if (isInterrupted()) break;
-    const CaptureFrame& captureFrame = plan.frames[index];
-    render::FrameOptions options = makeFrameOptions(captureFrame, command.pictures);
-    options.channels.depth |= reports != nullptr;
-    auto frame = std::make_shared<const render::Frame>(
-        renderer.render(*captureFrame.snapshot, captureFrame.camera, options));
-    if (reports) reports->measure(index, *frame, *captureFrame.snapshot, options);
-    checkFrame(scene, captureFrame, index, *frame, counts);
-    queue.post([&, index, frame = std::move(frame)] {
-      const auto overlay = [&](const render::Frame& drawn) {
-        return drawOverlay(drawn, command.pictures.overlay, scene.model(), plan,
-                           plan.frames[index]);
-      };
-      counts.clampedPixels +=
-          writeFrame(command.out, command.pictures, index, *frame, scene.objectClasses(), overlay)
-              .clamped;
-      ++counts.written;
-    });
-    progress.update(counts.written);
+  for (std::size_t from = 0; from < missing.size() && !isInterrupted();) {
+    const std::size_t to = findGroupEnd(plan, missing, from);
+    std::vector<render::ViewRequest> views;
+    for (std::size_t i = from; i < to; ++i) {
+      const CaptureFrame& captureFrame = plan.frames[missing[i]];
+      render::FrameOptions options = makeFrameOptions(captureFrame, command.pictures);
+      options.channels.depth |= reports != nullptr;
+      views.push_back({{captureFrame.camera, options}});
+    }
+    std::vector<render::Frame> frames =
+        renderer.render(*plan.frames[missing[from]].snapshot, views);
+    for (std::size_t i = from; i < to; ++i) {
+      const std::size_t index = missing[i];
+      const CaptureFrame& captureFrame = plan.frames[index];
+      const auto frame = std::make_shared<const render::Frame>(std::move(frames[i - from]));
+      if (reports)
+        reports->measure(index, *frame, *captureFrame.snapshot, views[i - from].view.options);
+      checkFrame(scene, captureFrame, index, *frame, counts);
+      queue.post([&, index, frame] {
+        const auto overlay = [&](const render::Frame& drawn) {
+          return drawOverlay(drawn, command.pictures.overlay, scene.model(), plan,
+                             plan.frames[index]);
+        };
+        counts.clampedPixels +=
+            writeFrame(command.out, command.pictures, index, *frame, scene.objectClasses(), overlay)
+                .clamped;
+        ++counts.written;
+      });
+      progress.update(counts.written);
+    }
+    from = to;
   }
   queue.finish();
   progress.finish(counts.written);

@@ -8,8 +8,8 @@
 #include "scene/world/data/world_settings.hpp"
 #include "server/base/access.hpp"
 #include "server/base/drawing_options.hpp"
-#include "server/base/endpoint.hpp"
 #include "server/base/exit_code.hpp"
+#include "server/base/host_port.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/recording/recording_options.hpp"
 
@@ -17,7 +17,7 @@ namespace enfilade::server {
 
 struct ServeCommand {
   ModelOptions model;  ///< its file is empty if `recording` names the scene
-  Endpoint listen{"127.0.0.1", 7878};
+  HostPort listen{"127.0.0.1", 7878};
   std::uint32_t auditEvery = 0;  ///< ticks; 0: never
   scene::WorldSettings settings;
   std::filesystem::path tokenFile;  ///< empty: no tokens, all clients have all rights

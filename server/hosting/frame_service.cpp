@@ -6,6 +6,7 @@
 #include <condition_variable>
 #include <deque>
 #include <future>
+#include <iterator>
 #include <mutex>
 #include <optional>
 #include <utility>
@@ -43,39 +44,59 @@ EncodedMessage encodeFrameReply(PendingFrame& pending, const scene::Scene& scene
 
 namespace {
 
+/// Frames of one snapshot that are rendered together.
+using FrameGroup = std::vector<PendingFrame>;
+
 /// Frames that wait to be rendered. Owners take turns; one owner's frames keep their order.
 class FrameTurns {
  public:
   void push(PendingFrame pending) {
     const void* owner = pending.job.owner.get();
     auto turn = std::find_if(turns_.begin(), turns_.end(),
-                             [&](const Turn& one) { return one.owner == owner; });
-    if (turn == turns_.end()) turn = turns_.insert(turns_.end(), Turn{owner, {}});
+                             [&](const OwnerQueue& one) { return one.owner == owner; });
+    if (turn == turns_.end()) turn = turns_.insert(turns_.end(), OwnerQueue{owner, {}});
     turn->frames.push_back(std::move(pending));
   }
-  std::optional<PendingFrame> pop() {
-    if (turns_.empty()) return std::nullopt;
-    Turn turn = std::move(turns_.front());
-    turns_.pop_front();
-    PendingFrame next = std::move(turn.frames.front());
-    turn.frames.pop_front();
-    if (!turn.frames.empty()) turns_.push_back(std::move(turn));
-    return next;
+  /// The next frame, and those of the same snapshot that are next of their owners; empty: none
+  /// waits. Of each owner that has its turn, the other frames wait for the next turn.
+  FrameGroup pop() {
+    FrameGroup group;
+    std::deque<OwnerQueue> later;
+    std::size_t pixels = 0;
+    const auto joins = [&](const PendingFrame& frame) {
+      const bool fits =
+          pixels + render::countPixels(frame.job.view.camera) <= render::kMaxPixelsTogether;
+      return group.empty() || (fits && frame.job.snapshot == group.front().job.snapshot);
+    };
+    for (std::size_t i = turns_.size(); i > 0; --i) {
+      OwnerQueue turn = std::move(turns_.front());
+      turns_.pop_front();
+      const std::size_t before = group.size();
+      while (!turn.frames.empty() && joins(turn.frames.front())) {
+        pixels += render::countPixels(turn.frames.front().job.view.camera);
+        group.push_back(std::move(turn.frames.front()));
+        turn.frames.pop_front();
+      }
+      if (turn.frames.empty()) continue;
+      (group.size() > before ? later : turns_).push_back(std::move(turn));
+    }
+    std::ranges::move(later, std::back_inserter(turns_));
+    return group;
   }
   void cancel(const void* owner) {
-    for (Turn& turn : turns_)
+    for (OwnerQueue& turn : turns_)
       if (turn.owner == owner)
         std::erase_if(turn.frames, [](const PendingFrame& one) { return !one.job.onRendered; });
-    std::erase_if(turns_, [](const Turn& turn) { return turn.frames.empty(); });
+    std::erase_if(turns_, [](const OwnerQueue& turn) { return turn.frames.empty(); });
   }
   bool empty() const { return turns_.empty(); }
 
  private:
-  struct Turn {
+  struct OwnerQueue {
     const void* owner = nullptr;
     std::deque<PendingFrame> frames;  ///< not empty
   };
-  std::deque<Turn> turns_;
+  std::deque<OwnerQueue> turns_;
 };
 
 }  // namespace
@@ -174,22 +195,27 @@ void FrameService::State::deliver(const std::shared_ptr<PendingFrame>& pending) 
   });
 }
 
-/// Gives the next frame to the render thread, unless it has one.
+/// Gives the next frames to the render thread, unless it has some.
 void FrameService::State::startNext() {
-  std::optional<PendingFrame> next;
+  const auto group = std::make_shared<FrameGroup>();
   {
     const std::lock_guard lock(mutex);
     if (rendering) return;
-    next = waiting.pop();
-    if (!next) return idle.notify_all();
+    *group = waiting.pop();
+    if (group->empty()) return idle.notify_all();
     rendering = true;
   }
-  const auto pending = std::make_shared<PendingFrame>(std::move(*next));
-  const FrameView& view = pending->job.view;
-  renderer->render(pending->job.snapshot, view.camera, view.options, view.renderer,
-                   [this, pending](std::future<render::Frame> frame) {
-                     pending->frame = std::move(frame);
-                     deliver(pending);
+  std::vector<render::ViewRequest> views;
+  for (const PendingFrame& pending : *group) {
+    const FrameView& view = pending.job.view;
+    views.push_back({{view.camera, view.options}, view.renderer});
+  }
+  renderer->render(group->front().job.snapshot, std::move(views),
+                   [this, group](render::RenderThread::Frames frames) {
+                     for (std::size_t i = 0; i < frames.size(); ++i) {
+                       (*group)[i].frame = std::move(frames[i]);
+                       deliver(std::make_shared<PendingFrame>(std::move((*group)[i])));
+                     }
                      {
                        const std::lock_guard lock(mutex);
                        rendering = false;

@@ -16,26 +16,26 @@ using boost::system::error_code;
 
 namespace {
 
-std::string formatEndpoint(const Endpoint& where) {
+std::string formatHostPort(const HostPort& where) {
   return where.host + ":" + std::to_string(where.port);
 }
 
-tcp::endpoint resolveEndpoint(const Endpoint& where) {
+tcp::endpoint resolveHostPort(const HostPort& where) {
   error_code problem;
   const std::string host = where.host == "localhost" ? "127.0.0.1" : where.host;
   const asio::ip::address address = asio::ip::make_address(host, problem);
   if (problem) {
-    throw ServerError("cannot listen on " + formatEndpoint(where) +
+    throw ServerError("cannot listen on " + formatHostPort(where) +
                       ": give a numeric address, such as 127.0.0.1, or localhost");
   }
   return {address, where.port};
 }
 
-tcp::endpoint resolveProtected(const Endpoint& where, const Access& access) {
-  const tcp::endpoint endpoint = resolveEndpoint(where);
+tcp::endpoint resolveProtected(const HostPort& where, const Access& access) {
+  const tcp::endpoint endpoint = resolveHostPort(where);
   if (endpoint.address().is_loopback()) return endpoint;
   if (access.tokens.empty() || !access.insecure) {
-    throw ServerError("will not listen on " + formatEndpoint(where) +
+    throw ServerError("will not listen on " + formatHostPort(where) +
                       ": other machines can reach that address, and the connection is not "
                       "encrypted. Use 127.0.0.1 with a tunnel (ssh -L) or a TLS proxy, or give "
                       "--token-file and --insecure");
@@ -43,7 +43,7 @@ tcp::endpoint resolveProtected(const Endpoint& where, const Access& access) {
   return endpoint;
 }
 
-tcp::acceptor openAcceptor(asio::io_context& context, const Endpoint& where, const Access& access) {
+tcp::acceptor openAcceptor(asio::io_context& context, const HostPort& where, const Access& access) {
   const tcp::endpoint endpoint = resolveProtected(where, access);
   tcp::acceptor acceptor(context);
   try {
@@ -52,7 +52,7 @@ tcp::acceptor openAcceptor(asio::io_context& context, const Endpoint& where, con
     acceptor.bind(endpoint);
     acceptor.listen();
   } catch (const boost::system::system_error& error) {
-    throw ServerError("cannot listen on " + formatEndpoint(where) + ": " + error.code().message() +
+    throw ServerError("cannot listen on " + formatHostPort(where) + ": " + error.code().message() +
                       "; is another server running? port 0 lets the system choose");
   }
   return acceptor;
@@ -60,11 +60,11 @@ tcp::acceptor openAcceptor(asio::io_context& context, const Endpoint& where, con
 
 }  // namespace
 
-void requireListenable(const Endpoint& listen, const Access& access) {
+void requireListenable(const HostPort& listen, const Access& access) {
   resolveProtected(listen, access);
 }
 
-Listener::Listener(asio::io_context& context, const Endpoint& where, WorldRegistry& worlds,
+Listener::Listener(asio::io_context& context, const HostPort& where, WorldRegistry& worlds,
                    const ServerLimits& limits, Access access, PageFiles page)
     : acceptor_(openAcceptor(context, where, access)),
       port_(acceptor_.local_endpoint().port()),

@@ -6,7 +6,7 @@
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 
-#include "server/base/endpoint.hpp"
+#include "server/base/host_port.hpp"
 #include "server/net/server_context.hpp"
 
 namespace enfilade::server {
@@ -14,7 +14,7 @@ namespace enfilade::server {
 class Listener {
  public:
   /// Throws ServerError if it cannot listen on the address.
-  Listener(boost::asio::io_context& context, const Endpoint& where, WorldRegistry& worlds,
+  Listener(boost::asio::io_context& context, const HostPort& where, WorldRegistry& worlds,
            const ServerLimits& limits, Access access, PageFiles page = {});
 
   std::uint16_t port() const { return port_; }

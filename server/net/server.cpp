@@ -21,7 +21,7 @@ std::vector<std::shared_ptr<const scene::Scene>> prependScene(
 }  // namespace
 
 struct Server::State {
-  State(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen, ServerOptions options)
+  State(std::shared_ptr<const scene::Scene> scene, const HostPort& listen, ServerOptions options)
       : listener(context, listen, worlds, options.world.limits, std::move(options.access),
                  readPageFiles(options.pageFolder)),
         worlds(prependScene(std::move(scene), std::move(options.additionalScenes)), options.world,
@@ -33,7 +33,7 @@ struct Server::State {
   std::thread network;
 };
 
-Server::Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
+Server::Server(std::shared_ptr<const scene::Scene> scene, const HostPort& listen,
                ServerOptions options)
     : state_(std::make_unique<State>(std::move(scene), listen, std::move(options))) {
   state_->listener.start();

@@ -10,7 +10,7 @@
 #include "server/base/access.hpp"
 #include "server/base/audit_log.hpp"
 #include "server/base/drawing_options.hpp"
-#include "server/base/endpoint.hpp"
+#include "server/base/host_port.hpp"
 #include "server/hosting/world_options.hpp"
 
 namespace enfilade::server {
@@ -27,14 +27,14 @@ struct ServerOptions {
 
 /// Throws ServerError if a server would not listen on the address: it is no numeric one, or
 /// reachable from other machines without permission in `access`.
-void requireListenable(const Endpoint& listen, const Access& access);
+void requireListenable(const HostPort& listen, const Access& access);
 
 class Server {
  public:
   /// Clients may connect after construction. Throws ServerError if the address is unavailable, or
   /// reachable from other machines without permission in `access`; RenderError, like FrameService;
   /// RecordingError if the recording cannot be started.
-  Server(std::shared_ptr<const scene::Scene> scene, const Endpoint& listen,
+  Server(std::shared_ptr<const scene::Scene> scene, const HostPort& listen,
          ServerOptions options = {});
   ~Server();  ///< calls stop()
   Server(const Server&) = delete;

@@ -31,19 +31,19 @@ constexpr double kMinSupportNormalY = 0.7;        // contacts with a larger y ar
 
 constexpr Colour kContact{214, 40, 40}, kBlocked{120, 0, 120}, kCamera{20, 20, 24};
 
-struct Storey {
+struct StoreyPlan {
   double floor = 0;
   render::Camera camera;
   PlanPicture picture;
   PlanView view;  ///< once it has a place on the sheet
 };
 
-const Storey& findNearestStorey(const std::vector<Storey>& storeys, double height) {
+const StoreyPlan& findNearestStorey(const std::vector<StoreyPlan>& storeys, double height) {
   ENFILADE_ASSERT(!storeys.empty());
-  const auto distance = [&](const Storey& storey) { return std::abs(storey.floor - height); };
-  return *std::min_element(storeys.begin(), storeys.end(), [&](const Storey& a, const Storey& b) {
-    return distance(a) < distance(b);
-  });
+  const auto distance = [&](const StoreyPlan& storey) { return std::abs(storey.floor - height); };
+  return *std::min_element(
+      storeys.begin(), storeys.end(),
+      [&](const StoreyPlan& a, const StoreyPlan& b) { return distance(a) < distance(b); });
 }
 
 scene::Aabb computeWalkedBounds(const std::vector<WalkedPath>& paths) {
@@ -85,7 +85,7 @@ void drawWedge(Canvas& canvas, Point eye, double x, double y) {
 /// Draws the marks of a walk on one storey.
 class StoreyMarks {
  public:
-  StoreyMarks(Canvas& canvas, const std::vector<Storey>& storeys, const Storey& storey)
+  StoreyMarks(Canvas& canvas, const std::vector<StoreyPlan>& storeys, const StoreyPlan& storey)
       : canvas_(canvas), storeys_(storeys), storey_(storey), captions_(storey.view) {}
 
   void draw(const WalkTrace& trace) {
@@ -154,8 +154,8 @@ class StoreyMarks {
   }
 
   Canvas& canvas_;
-  const std::vector<Storey>& storeys_;
-  const Storey& storey_;
+  const std::vector<StoreyPlan>& storeys_;
+  const StoreyPlan& storey_;
   CaptionPlacer captions_;
 };
 
@@ -207,7 +207,7 @@ const StoreyFloor* findStoreyAt(const std::vector<StoreyFloor>& storeys, double 
                                                                                : nullptr;
 }
 
-std::string formatHeading(const Storey& storey, const StoreyFloor* named) {
+std::string formatHeading(const StoreyPlan& storey, const StoreyFloor* named) {
   char text[64];
   std::snprintf(text, sizeof text, "floor at %.2f m, cut %.1f m above", storey.floor,
                 kPlanCutHeight);
@@ -215,8 +215,8 @@ std::string formatHeading(const Storey& storey, const StoreyFloor* named) {
 }
 
 /// Gives the storeys their places, one below the other, and returns the height of all.
-double placeStoreys(std::vector<Storey>& storeys, double top) {
-  for (Storey& storey : storeys) {
+double placeStoreys(std::vector<StoreyPlan>& storeys, double top) {
+  for (StoreyPlan& storey : storeys) {
     storey.view = makePlanView(storey.camera, storey.floor, {kBorder, top + kLineHeight},
                                storey.camera.height / storey.camera.heightY, 1);
     top += kLineHeight + storey.camera.height + kBorder;
@@ -224,10 +224,12 @@ double placeStoreys(std::vector<Storey>& storeys, double top) {
   return top;
 }
 
-Image composeMap(const WalkTrace& trace, std::vector<Storey>& storeys, const scene::Scene* scene) {
+Image composeMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
+                 const scene::Scene* scene) {
   const std::vector<LegendEntry> legend = makeLegend(trace);
   double width = 640;
-  for (const Storey& storey : storeys) width = std::max(width, storey.camera.width + 2 * kBorder);
+  for (const StoreyPlan& storey : storeys)
+    width = std::max(width, storey.camera.width + 2 * kBorder);
   const double legendTop = placeStoreys(storeys, kBorder + 2 * kLineHeight) + 2 * kLineHeight;
   const double height =
       legendTop + static_cast<double>(countLegendRows(legend, width)) * kLineHeight + kBorder;
@@ -236,7 +238,7 @@ Image composeMap(const WalkTrace& trace, std::vector<Storey>& storeys, const sce
   Canvas canvas(static_cast<int>(width), static_cast<int>(height), kPlanPaper);
   const TextStyle title = makeStyle(18, true), heading = makeStyle(14);
   canvas.text({kBorder, kBorder}, canvas.shorten(trace.title, title, width - 2 * kBorder), title);
-  for (const Storey& storey : storeys) {
+  for (const StoreyPlan& storey : storeys) {
     const PlanView& view = storey.view;
     const StoreyFloor* const named = findStoreyAt(namedStoreys, storey.floor);
     canvas.text({kBorder, view.topLeft.y - kLineHeight + 4},
@@ -276,9 +278,9 @@ std::optional<Image> drawMap(const WalkTrace& trace, const MapBackground& backgr
     if (std::ranges::none_of(floors, [&](double one) { return std::abs(one - floor) < 1; }))
       floors.push_back(floor);
   std::ranges::sort(floors);
-  std::vector<Storey> storeys;
+  std::vector<StoreyPlan> storeys;
   for (const double floor : floors) {
-    Storey storey;
+    StoreyPlan storey;
     storey.floor = floor;
     storey.camera =
         makePlanCamera(computeWalkedBounds(trace.paths), floor, kMaxMapWidth, kMaxMapHeight);

@@ -10,8 +10,8 @@
 #include "render/service/renderer_selector.hpp"
 #include "scene/world/data/world_settings.hpp"
 #include "server/base/drawing_options.hpp"
-#include "server/base/endpoint.hpp"
 #include "server/base/exit_code.hpp"
+#include "server/base/host_port.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/recording/recording_options.hpp"
 
@@ -34,7 +34,7 @@ struct ReplayCommand {
 
 struct WalkCommand {
   std::filesystem::path script, out;
-  Endpoint connect;
+  HostPort connect;
   std::string world;  ///< empty: the main world
   std::string token;  ///< empty: none
   bool strict = false;

@@ -63,6 +63,7 @@ const std::vector<std::string> kRooms{
     "scene/navigation",
     "render",
     "render/image",
+    "render/culling",
     "render/gl",
     "render/raytrace",
     "render/reference",

@@ -89,6 +89,7 @@ BroadPhaseMethod boostRtree();
 BroadPhaseMethod cgalBoxes();
 BroadPhaseMethod embreeBvh();
 std::vector<BroadPhaseMethod> bulletBroadPhases();
+std::vector<BroadPhaseMethod> bulletFloatBroadPhases();
 std::vector<BroadPhaseMethod> fclBroadPhases();
 std::vector<BroadPhaseMethod> odeSpaces();
 

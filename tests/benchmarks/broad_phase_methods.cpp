@@ -52,6 +52,9 @@ std::vector<BroadPhaseMethod> broadPhaseMethods() {
 #ifdef BENCH_BULLET
   append(all, bulletBroadPhases());
 #endif
+#ifdef BENCH_BULLETFLOAT
+  append(all, bulletFloatBroadPhases());
+#endif
 #ifdef BENCH_EMBREE
   all.push_back(embreeBvh());
 #endif

@@ -27,6 +27,20 @@ find_library(BENCH_BULLET_COLLISION BulletCollision-float64)
 find_library(BENCH_BULLET_MATH LinearMath-float64)
 bench_peer(bullet "${BENCH_BULLET_COLLISION}" DEFINITIONS BT_USE_DOUBLE_PRECISION
   INCLUDES ${BENCH_BULLET_DIR} LIBRARIES ${BENCH_BULLET_COLLISION} ${BENCH_BULLET_MATH})
+find_library(BENCH_BULLET_FLOAT_COLLISION BulletCollision)
+find_library(BENCH_BULLET_FLOAT_MATH LinearMath)
+bench_peer(bulletfloat "${BENCH_BULLET_FLOAT_COLLISION}"
+  DEFINITIONS BENCH_BULLET_FLOAT_MODULE="$<TARGET_FILE:bullet_float_pairs>"
+  LIBRARIES ${CMAKE_DL_LIBS})
+if(TARGET bench_bulletfloat)
+  add_library(bullet_float_pairs MODULE EXCLUDE_FROM_ALL peers/bullet_pairs.cpp)
+  set_target_properties(bullet_float_pairs PROPERTIES CXX_VISIBILITY_PRESET hidden)
+  target_include_directories(bullet_float_pairs PRIVATE ${PROJECT_SOURCE_DIR})
+  target_include_directories(bullet_float_pairs SYSTEM PRIVATE ${BENCH_BULLET_DIR})
+  target_link_libraries(bullet_float_pairs PRIVATE enfilade_collision
+    ${BENCH_BULLET_FLOAT_COLLISION} ${BENCH_BULLET_FLOAT_MATH})
+  target_link_options(bullet_float_pairs PRIVATE -Wl,-Bsymbolic -Wl,--exclude-libs,ALL)
+endif()
 find_path(BENCH_FCL_DIR fcl/fcl.h)
 find_library(BENCH_CCD_LIBRARY ccd)
 find_library(BENCH_FCL_LIBRARY fcl)

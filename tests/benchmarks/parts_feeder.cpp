@@ -171,6 +171,7 @@ int main(int count, char** words) {
                  2 * kJudgeEvery);
     return 2;
   }
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);  // the peers take minutes
   const FeederPlan plan = testing::planFeeder(parts, 1);
   const FeederCheck feederCheck(plan);
   std::printf("%zu parts, %d ticks of 1/60 s in %d substeps, drive %g Hz, checked every %d ticks\n",

@@ -4,6 +4,7 @@
 // time.
 //
 //   render_bench [SCENE [FRAMES]]
+//   render_bench together SCENE    cameras of one tick: together against each alone
 //
 // SCENE is a file, or district:N for a generated district of N objects. Default: the district of
 // 1e5 objects, and the small house and the estate if the shared folder exists.
@@ -17,6 +18,7 @@
 #include "assets/building.hpp"
 #include "assets/landmarks.hpp"
 #include "render/gl/gl_renderer.hpp"
+#include "render/raytrace/ray_renderer.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/import/import_worker.hpp"
 #include "tests/support/seeded_walk.hpp"
@@ -123,6 +125,55 @@ void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string
   std::fflush(stdout);
 }
 
+/// Cameras of one tick: rendered together against each alone, by turns.
+void measureTogether(const std::shared_ptr<const scene::Scene>& scene, const std::string& name,
+                     render::Renderer& renderer, Size size, bool coloured) {
+  constexpr std::size_t kViews = 16;
+  constexpr int kRounds = 12;
+  const std::vector<tests::WalkStop> stops = walkIn(scene, name, 4 * kViews);
+  std::vector<render::View> views;
+  for (std::size_t i = 0; i < stops.size() && views.size() < kViews; i += 4) {
+    views.push_back({stops[i].camera, {.channels = {coloured, true, true, false}}});
+    views.back().camera.width = size.width;
+    views.back().camera.height = size.height;
+  }
+  if (views.empty()) return;
+  const scene::Snapshot& snapshot = *stops.front().snapshot;
+  double together = 0, alone = 0;
+  std::size_t different = 0;
+  for (int round = -2; round < kRounds; ++round) {  // the first two fill the caches
+    const auto begin = Clock::now();
+    const std::vector<render::Frame> frames = renderer.render(snapshot, views);
+    const auto middle = Clock::now();
+    std::vector<render::Frame> each;
+    for (const render::View& view : views)
+      each.push_back(renderer.render(snapshot, view.camera, view.options));
+    const auto end = Clock::now();
+    for (std::size_t i = 0; i < views.size(); ++i) different += same(frames[i], each[i]) ? 0 : 1;
+    if (round < 0) continue;
+    together += std::chrono::duration<double>(middle - begin).count();
+    alone += std::chrono::duration<double>(end - middle).count();
+  }
+  const double frames = kRounds * static_cast<double>(views.size());
+  std::printf("%-28.28s %-12.12s %-6s %4dx%-4d %2zu views: %8.3f ms alone %8.3f ratio %5.2f  %s\n",
+              std::filesystem::path(name).filename().c_str(), renderer.deviceName().c_str(),
+              coloured ? "colour" : "depth", size.width, size.height, views.size(),
+              1e3 * together / frames, 1e3 * alone / frames, alone / together,
+              different == 0 ? "same bytes" : "DIFFERENT BYTES");
+  std::fflush(stdout);
+}
+
+void benchmarkTogether(const std::string& name) {
+  const auto scene = std::make_shared<const scene::Scene>(modelOf(name));
+  render::GlRenderer gl(scene);
+  render::RayRenderer rays(scene);
+  for (render::Renderer* renderer :
+       {static_cast<render::Renderer*>(&gl), static_cast<render::Renderer*>(&rays)})
+    for (const Size size : {Size{64, 64}, Size{128, 128}, Size{256, 256}})
+      for (const bool coloured : {false, true})
+        measureTogether(scene, name, *renderer, size, coloured);
+}
+
 void benchmark(const std::string& name, int frames) {
   scene::Model model = modelOf(name);
   const bool textures = !model.textures.empty();
@@ -139,6 +190,10 @@ void benchmark(const std::string& name, int frames) {
 
 int main(int argc, char** argv) {
   if (const auto code = scene::runImportWorker(argc, argv)) return *code;
+  if (argc > 2 && std::strcmp(argv[1], "together") == 0) {
+    benchmarkTogether(argv[2]);
+    return 0;
+  }
   std::printf(
       "                                              on the clock              processor ms a "
       "frame\n"

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "render/camera_basis.hpp"
+#include "render/culling/box_visibility.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -169,7 +170,9 @@ TEST(Camera, CullingKeepsEveryBoxThatHoldsAPointOfThePicture) {
     if (i % 4 == 2) camera.pinhole = Pinhole{300, 400, 320 + 300 * unit(random), 240};
     const Vec3 centre = vector(15);
     const Vec3 half = vector(2).cwiseAbs();
-    const bool kept = intersectsFrustum(computeFrustum(camera), {centre - half, centre + half});
+    const BoxVisibility visibility(camera);
+    const bool kept =
+        !visibility.isOutsideFrustum(visibility.toEyeSpace({centre - half, centre + half}));
     bool inside = false;
     for (int sample = 0; sample < 50; ++sample) {
       const Vec3 pixel = project(camera, centre + half.cwiseProduct(vector(1)));

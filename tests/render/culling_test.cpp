@@ -5,7 +5,7 @@
 #include <cstring>
 #include <random>
 
-#include "render/gl/depth_pyramid.hpp"
+#include "render/culling/depth_pyramid.hpp"
 #include "tests/render/hand_made_scene.hpp"
 
 namespace enfilade::render {

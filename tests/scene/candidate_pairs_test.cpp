@@ -4,7 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "scene/physics/physics_world.hpp"
-#include "scene/world/bodies/dynamic_bodies.hpp"
+#include "scene/world/bodies/step_dynamic_bodies.hpp"
 #include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene {

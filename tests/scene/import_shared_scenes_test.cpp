@@ -210,7 +210,7 @@ std::string testNameOf(const ::testing::TestParamInfo<Expected>& info) {
 
 INSTANTIATE_TEST_SUITE_P(TextTable, ImportSharedScene, ::testing::ValuesIn(kScenes), testNameOf);
 
-TEST(ImportSharedScenes, TheTableNamesEveryModelThatIsThere) {
+TEST(ImportSharedScenesTogether, TheTableNamesEveryModelThatIsThere) {
   ENFILADE_NEED_SHARED(shared);
   std::set<std::string> named, there;
   for (const Expected& expected : kScenes) named.insert(expected.file);
@@ -224,7 +224,7 @@ TEST(ImportSharedScenes, TheTableNamesEveryModelThatIsThere) {
   EXPECT_EQ(named, there);
 }
 
-TEST(ImportSharedScenes, ColladaAndFbxOfTheSameOfficeAreTheSameWorld) {
+TEST(ImportSharedScenesTogether, ColladaAndFbxOfTheSameOfficeAreTheSameWorld) {
   ENFILADE_NEED_SHARED(shared);
   const Scene dae(importModel(*shared / "scenes/cpr-office/office.dae"));
   const Scene fbx(importModel(*shared / "scenes/cpr-office/cpr_office_ascii.fbx"));
@@ -242,7 +242,7 @@ TEST(ImportSharedScenes, ColladaAndFbxOfTheSameOfficeAreTheSameWorld) {
   }
 }
 
-TEST(ImportSharedScenes, ElectricalFixturesInFeetLieInsideTheirBuilding) {
+TEST(ImportSharedScenesTogether, ElectricalFixturesInFeetLieInsideTheirBuilding) {
   ENFILADE_NEED_SHARED(shared);
   const auto folder = *shared / "scenes/duplex";
   const Scene house(importShared(folder / "Duplex_A_20110907.ifc", kPlus));
@@ -252,7 +252,7 @@ TEST(ImportSharedScenes, ElectricalFixturesInFeetLieInsideTheirBuilding) {
   EXPECT_TRUE((fixtures.bounds().max.array() <= room.max.array()).all());
 }
 
-TEST(ImportSharedScenes, FarAwayBuildingKeepsTheShapesOfTheNearOne) {
+TEST(ImportSharedScenesTogether, FarAwayBuildingKeepsTheShapesOfTheNearOne) {
   ENFILADE_NEED_SHARED(shared);
   const Model far = importModel(*shared / "scenes/duplex/duplex_utm32.glb");
   EXPECT_EQ(far.offset.x(), std::round(far.offset.x()));
@@ -276,7 +276,7 @@ TEST(ImportSharedScenes, FarAwayBuildingKeepsTheShapesOfTheNearOne) {
   EXPECT_GT(compared, 100u);
 }
 
-TEST(ImportSharedScenes, IfcReadersAgreeOnEachProduct) {
+TEST(ImportSharedScenesTogether, IfcReadersAgreeOnEachProduct) {
   ENFILADE_NEED_SHARED(shared);
   const auto file = *shared / "scenes/duplex/Duplex_A_20110907.ifc";
   std::vector<IfcReader> readers{kPlus, kAssimp};
@@ -298,7 +298,7 @@ TEST(ImportSharedScenes, IfcReadersAgreeOnEachProduct) {
   }
 }
 
-TEST(ImportSharedScenes, IfcDoorsSayHowTheyOpen) {
+TEST(ImportSharedScenesTogether, IfcDoorsSayHowTheyOpen) {
   ENFILADE_NEED_SHARED(shared);
   const Model model = importShared(*shared / "scenes/duplex/Duplex_A_20110907.ifc", kPlus);
   std::map<std::string, int> operations;
@@ -313,7 +313,7 @@ TEST(ImportSharedScenes, IfcDoorsSayHowTheyOpen) {
             (std::map<std::string, int>{{"SINGLE_SWING_LEFT", 6}, {"SINGLE_SWING_RIGHT", 8}}));
 }
 
-TEST(ImportSharedScenes, WebIfcCutsEveryOpeningAndIfcPlusPlusLeavesSome) {
+TEST(ImportSharedScenesTogether, WebIfcCutsEveryOpeningAndIfcPlusPlusLeavesSome) {
   ENFILADE_NEED_SHARED(shared);
   const auto file = *shared / "scenes/duplex/Duplex_A_20110907.ifc";
   const std::size_t left = countOf(importShared(file, kPlus), "uncut_opening");
@@ -328,7 +328,7 @@ TEST(ImportSharedScenes, WebIfcCutsEveryOpeningAndIfcPlusPlusLeavesSome) {
   }
 }
 
-TEST(ImportSharedScenes, TexturesThatAreThereAreReadAndOthersCounted) {
+TEST(ImportSharedScenesTogether, TexturesThatAreThereAreReadAndOthersCounted) {
   ENFILADE_NEED_SHARED(shared);
   const Model model = importModel(*shared / "scenes/aws-small-house/small_house.gltf");
   EXPECT_EQ(model.textures.size(), 83u);
@@ -339,20 +339,20 @@ TEST(ImportSharedScenes, TexturesThatAreThereAreReadAndOthersCounted) {
   }
 }
 
-TEST(ImportSharedScenes, MirroredBlocksAreReported) {
+TEST(ImportSharedScenesTogether, MirroredBlocksAreReported) {
   ENFILADE_NEED_SHARED(shared);
   const Model model = importModel(*shared / "scenes/schependomlaan/schependomlaan_estate.glb");
   EXPECT_EQ(countOf(model, "mirrored_object"), 6558u);
 }
 
-TEST(ImportSharedScenes, TwoImportsGiveTheSameHash) {
+TEST(ImportSharedScenesTogether, TwoImportsGiveTheSameHash) {
   ENFILADE_NEED_SHARED(shared);
   const auto file = *shared / "scenes/duplex/Duplex_Electrical_20121207.ifc";
   EXPECT_EQ(Scene(importModel(file)).hash(), Scene(importModel(file)).hash());
   EXPECT_EQ(Scene(importShared(file, kAssimp)).hash(), Scene(importShared(file, kAssimp)).hash());
 }
 
-TEST(ImportSharedScenes, FilesThatAssimpAloneCannotReadFailWithErrorsThatNameThem) {
+TEST(ImportSharedScenesTogether, FilesThatAssimpAloneCannotReadFailWithErrorsThatNameThem) {
   ENFILADE_NEED_SHARED(shared);
   std::size_t tried = 0;
   for (const auto& entry : std::filesystem::directory_iterator(*shared / "scenes/hard-imports")) {
@@ -370,7 +370,7 @@ TEST(ImportSharedScenes, FilesThatAssimpAloneCannotReadFailWithErrorsThatNameThe
 }
 
 /// Real files with bytes exchanged or the end cut off, by a seed.
-TEST(ImportSharedScenes, DamagedRealFilesNeverHurtTheCaller) {
+TEST(ImportSharedScenesTogether, DamagedRealFilesNeverHurtTheCaller) {
   ENFILADE_NEED_SHARED(shared);
   std::ifstream in(*shared / "scenes/schependomlaan/ROOT-kalkzandsteen.ifczip", std::ios::binary);
   const std::string archive((std::istreambuf_iterator<char>(in)), {});

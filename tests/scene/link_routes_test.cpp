@@ -149,6 +149,20 @@ TEST(LinkRoutes, ALiftIsCalledAndRidden) {
   }
 }
 
+TEST(LinkRoutes, ALiftThatWouldCarryItsPassengerAgainstSomethingIsNotRidden) {
+  for (const double overlap : {-0.02, 0.02}) {  // metres, of a beam and the passenger's way
+    Model model = boxModel({{"ground", {4, -0.2, -3}, {10, 0, 3}},
+                            {"upper", {4.01, 2.8, -3}, {10, 3, 3}},
+                            {"platform", {2, -0.1, -1}, {4, 0, 1}},
+                            {"beam", {1, 2.2, -3}, {2.7 + overlap, 2.4, 3}}});
+    model.bodies = towerModel().bodies;
+    const auto scene = std::make_shared<const Scene>(std::move(model));
+    Navigation navigation(scene, {}, {});  // the passenger stands in the middle, 0.3 m wide
+    const NavigationPath path = navigation.findPath({9, 0.1, 2}, {9, 3.1, -2}, {0, true});
+    EXPECT_EQ(path.found(), overlap < 0) << overlap << " " << path.reason;
+  }
+}
+
 TEST(LinkRoutes, AWalkAfterTheRideDoesNotCrossWhereTheLiftWas) {
   // The only way from the exit to the goal leads over the platform when it is below.
   Model model = boxModel({{"ground", {4.01, -0.2, -3}, {10, 0, 3}},

@@ -182,6 +182,58 @@ TEST(PhysicsWorld, ASleepingBodyWakesWhenAnotherFallsOnIt) {
   EXPECT_TRUE(scene.asleep(high));
 }
 
+TEST(PhysicsWorld, ASleepingBodyFallsWhenItsSupportSinksSlowlyOrAtOnce) {
+  for (const double step : {0.6e-3, 3e-3, 20e-3}) {  // metres; at the first the support is at rest
+    RigidScene scene;
+    const auto floor = scene.addFloor();
+    const auto low = scene.addFree(boxHull({0.2, 0.2, 0.2}), {0, 0.2 + kEpsilon, 0});
+    const auto high = scene.addFree(boxHull({0.2, 0.2, 0.2}), {0, 0.6 + 2 * kEpsilon, 0});
+    scene.pairAll();
+    scene.run(90);
+    ASSERT_TRUE(scene.asleep(low) && scene.asleep(high)) << step;
+    const auto place = [&](std::uint32_t id, double height) {
+      PhysicsBody& body = scene.dynamics.bodies[id];
+      body.teleportedDistance += std::abs(height - body.motion.centre.y());
+      body.motion.centre.y() = height;
+      body.motion.velocity = Vec3::Zero();
+      updateTransform(body);
+    };
+    place(floor, scene.body(floor).centre.y() - 5);
+    double height = scene.body(low).centre.y();
+    for (int i = 0; i < 10; ++i) {
+      scene.dynamics.bodies[low].asleep = false;
+      scene.dynamics.bodies[low].sleepTimer = 0.3;  // it stays awake, and at rest
+      scene.run(1);
+      place(low, height -= step);  // as if something below held it
+    }
+    EXPECT_FALSE(scene.asleep(high)) << step;
+    scene.run(480);
+    EXPECT_LT(scene.body(high).centre.y(), -4.3) << step;
+    EXPECT_TRUE(scene.asleep(low) && scene.asleep(high)) << step;
+  }
+}
+
+TEST(PhysicsWorld, ABodyThatCreepsLeavesAHeapAsleep) {
+  RigidScene scene;
+  scene.addFloor();
+  std::vector<std::uint32_t> boxes;
+  for (int i = 0; i < 5; ++i)
+    boxes.push_back(scene.addFree(boxHull({0.2, 0.2, 0.2}), {0, 0.2 + 0.4005 * i + kEpsilon, 0}));
+  const auto top = scene.addFree(boxHull({0.05, 0.05, 0.05}), {-0.1, 2.055 + 3 * kEpsilon, 0});
+  scene.pairAll();
+  scene.run(120);
+  for (const auto box : boxes) ASSERT_TRUE(scene.asleep(box));
+  PhysicsBody& creeper = scene.dynamics.bodies[top];
+  for (int i = 0; i < 60; ++i) {
+    creeper.asleep = false;
+    creeper.motion.velocity = {0.15, 0, 0};
+    scene.run(1);
+    for (std::size_t k = 0; k + 1 < boxes.size(); ++k) ASSERT_TRUE(scene.asleep(boxes[k])) << i;
+    ASSERT_FALSE(scene.anyPenetrates());
+  }
+  EXPECT_GT(creeper.motion.centre.x(), -0.05) << "it moved";
+}
+
 TEST(PhysicsWorld, APileIsEqualInTwoRunsAndNextToSleepers) {
   const auto pile = [](int sleepers) {
     RigidScene scene;

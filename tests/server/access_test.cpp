@@ -127,7 +127,7 @@ TEST_F(Roles, PagesWantATokenTooButHealthDoesNot) {
 }
 
 TEST(Listening, APublicAddressRequiresATokenAndInsecure) {
-  const Endpoint everywhere{"0.0.0.0", 0};
+  const HostPort everywhere{"0.0.0.0", 0};
   Access access;
   EXPECT_THROW(Server(smallRoom(), everywhere), ServerError);
   access.insecure = true;

@@ -117,7 +117,7 @@ class AuditedServer : public ServedRoom {};
 TEST_F(AuditedServer, ReportsItsAuditInTheMetricsAndAtItsEnd) {
   ServerOptions options;
   options.world.auditEvery = 5;
-  server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+  server_ = std::make_unique<Server>(smallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   v1::Audit audit;
   {
     protocol::Client ann = client("ann");

@@ -30,7 +30,7 @@ class ContactHorizons : public ServedRoom {
   void SetUp() override {
     ServerOptions options;
     options.world.settings.maxSpeed = 2;  // so that horizons are far ahead
-    server_ = std::make_unique<Server>(bodyRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+    server_ = std::make_unique<Server>(bodyRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   }
 
   /// The id of an avatar that is in the world.

@@ -61,7 +61,7 @@ class Page : public ServedRoom {
     options.access = std::move(access);
     options.additionalScenes = {bodyRoom()};
     if (withPage) options.pageFolder = folder_ / "page";
-    server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+    server_ = std::make_unique<Server>(smallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   }
   Response get(const std::string& target, const std::string& headers = "") {
     RawConnection raw(server_->port());

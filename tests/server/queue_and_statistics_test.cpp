@@ -3,7 +3,7 @@
 
 #include <random>
 
-#include "server/base/endpoint.hpp"
+#include "server/base/host_port.hpp"
 #include "server/messages/outgoing_queue.hpp"
 #include "server/messages/tick_statistics.hpp"
 
@@ -122,12 +122,12 @@ TEST(DurationHistogram, AgreesWithSortingWithinABucket) {
 }
 
 TEST(CommandLine, EndpointsAreHostAndPort) {
-  EXPECT_EQ(parseEndpoint("127.0.0.1:7878")->port, 7878);
-  EXPECT_EQ(parseEndpoint("[::1]:0")->host, "::1");
-  EXPECT_EQ(parseEndpoint("localhost:65535")->host, "localhost");
+  EXPECT_EQ(parseHostPort("127.0.0.1:7878")->port, 7878);
+  EXPECT_EQ(parseHostPort("[::1]:0")->host, "::1");
+  EXPECT_EQ(parseHostPort("localhost:65535")->host, "localhost");
   for (const char* bad : {"", ":", "host", "host:", ":1", "host:x", "host:65536", "host:-1", "::1",
                           "host:1 ", "[]:1", "host:1:2"}) {
-    EXPECT_FALSE(parseEndpoint(bad)) << bad;
+    EXPECT_FALSE(parseHostPort(bad)) << bad;
   }
 }
 

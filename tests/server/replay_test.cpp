@@ -121,7 +121,7 @@ class Replays : public ServedRoom {
       options.world.record->model.file = "room.obj";
       options.world.record->overwrite = false;
     }
-    server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+    server_ = std::make_unique<Server>(smallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   }
 
   tests::TemporaryFolder folder_;
@@ -512,7 +512,7 @@ TEST_F(Replays, AnotherSceneIsNotPlayed) {
   scene::Model empty = smallRoom()->model();
   empty.objects.pop_back();
   EXPECT_THROW(Server(std::make_shared<const scene::Scene>(std::move(empty)),
-                      Endpoint{"127.0.0.1", 0}, std::move(options)),
+                      HostPort{"127.0.0.1", 0}, std::move(options)),
                Divergence);
 }
 
@@ -571,7 +571,7 @@ TEST_F(Replays, DoorsAreOpenedAgainAndTriggersPairLikeContacts) {
   ASSERT_GT(entered, 10u);
   ServerOptions options;
   options.world.replay = {file("visit"), entered + 5};
-  server_ = std::make_unique<Server>(bodyRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+  server_ = std::make_unique<Server>(bodyRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   protocol::Client driver = client("driver");
   driver.subscribe(everything());
   driver.seek(entered - 5);

@@ -21,7 +21,7 @@ class ServedRoom : public ::testing::Test {
     options.world.limits = limits;
     options.access = std::move(access);
     server_ =
-        std::make_unique<Server>(std::move(scene), Endpoint{"127.0.0.1", 0}, std::move(options));
+        std::make_unique<Server>(std::move(scene), HostPort{"127.0.0.1", 0}, std::move(options));
   }
   protocol::Client client(const std::string& name, const std::string& token = "",
                           const std::string& world = "") {

@@ -329,7 +329,7 @@ std::shared_ptr<const scene::Scene> hall(std::size_t posts) {
 TEST_F(HostedWorlds, ScenesThatAServerBeginsWithHaveAWorldEach) {
   ServerOptions options;
   options.additionalScenes = {hall(4), hall(5), smallRoom()};
-  server_ = std::make_unique<Server>(smallRoom(), Endpoint{"127.0.0.1", 0}, std::move(options));
+  server_ = std::make_unique<Server>(smallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   EXPECT_EQ(server_->worldNames(),
             (std::vector<std::string>{"main", "hall", "hall-2", "small_room-2"}));
   protocol::Client main = client("main");

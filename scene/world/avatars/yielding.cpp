@@ -1,5 +1,5 @@
-// A walker yields to another one that is ahead of it within kFollowDistance, is closer to its way
-// point, and walks to the same place or in about the same direction. Among walkers to one place
+// A walk yields to another one that is ahead of it within kFollowDistance, is closer to its way
+// point, and walks to the same place or in about the same direction. Among walks to one place
 // that is a strict order, so one of them always goes. Walks in opposite directions do not yield;
 // they slide past each other.
 #include "scene/world/avatars/yielding.hpp"
@@ -23,7 +23,7 @@ constexpr double kSameDirectionCosine = 0.7;  // of two walks
 constexpr double kSamePlace = 0.5;            // metres between two way points
 constexpr std::uint64_t kMaxQueueTicks = 600;
 
-struct Walker {
+struct GroundWalk {
   const Vec3* goal = nullptr;      ///< null: it does not walk on the ground
   Vec3 heading = Vec3::Zero();     ///< horizontal, unit
   double distance = 0, reach = 0;  ///< metres: to the goal, and half the width of the shape's box
@@ -34,8 +34,8 @@ double computeHalfWidth(const Aabb& box) {
 }
 
 /// By index into WorldData::avatars.
-std::vector<Walker> findWalkers(const WorldData& world) {
-  std::vector<Walker> walkers(world.avatars.size());
+std::vector<GroundWalk> findGroundWalks(const WorldData& world) {
+  std::vector<GroundWalk> walks(world.avatars.size());
   for (const OrderQueue& queue : world.queues) {
     const Avatar* avatar = world.findAvatar(queue.avatar);
     if (queue.orders.empty() || !avatar || avatar->flying || avatar->walk.minDistance < 0) continue;
@@ -44,32 +44,31 @@ std::vector<Walker> findWalkers(const WorldData& world) {
     const Vec3& goal = walk->waypoints[avatar->walk.waypointIndex];
     const double distance = computeGroundDistance(avatar->footPosition, goal);
     if (!(distance > 0)) continue;
-    walkers[static_cast<std::size_t>(avatar - world.avatars.data())] = {
+    walks[static_cast<std::size_t>(avatar - world.avatars.data())] = {
         &goal, projectToGround(goal - avatar->footPosition) / distance, distance,
         computeHalfWidth(avatar->shape->box)};
   }
-  return walkers;
+  return walks;
 }
 
-/// Minimum cosine between the walk's direction and that to another walker to yield to it; 2: never.
-double computeMinCosine(const Walker& walker, const Walker& other) {
-  if (computeGroundDistance(*walker.goal, *other.goal) <= kSamePlace) return kAbreastCosine;
-  return walker.heading.dot(other.heading) > kSameDirectionCosine ? kAheadCosine : 2;
+/// Minimum cosine between the walk's direction and that to another walk to yield to it; 2: never.
+double computeMinCosine(const GroundWalk& walk, const GroundWalk& other) {
+  if (computeGroundDistance(*walk.goal, *other.goal) <= kSamePlace) return kAbreastCosine;
+  return walk.heading.dot(other.heading) > kSameDirectionCosine ? kAheadCosine : 2;
 }
 
 /// Metres between the avatars if `avatar` must yield to `other`; otherwise infinite.
-double computeGapAhead(const Avatar& avatar, const Walker& walker, const Avatar& other,
-                       const Walker& otherWalker) {
+double computeGapAhead(const Avatar& avatar, const GroundWalk& walk, const Avatar& other,
+                       const GroundWalk& otherWalk) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  if (!otherWalker.goal) return kNone;
+  if (!otherWalk.goal) return kNone;
   const double between = computeGroundDistance(avatar.footPosition, other.footPosition);
   const Vec3 toOther = projectToGround(other.footPosition - avatar.footPosition);
-  if (!(toOther.dot(walker.heading) > computeMinCosine(walker, otherWalker) * between))
-    return kNone;
-  const double distanceOfOther = computeGroundDistance(other.footPosition, *walker.goal);
-  const bool isCloser = distanceOfOther < walker.distance ||
-                        (distanceOfOther == walker.distance && other.id < avatar.id);
-  return isCloser ? between - walker.reach - otherWalker.reach : kNone;
+  if (!(toOther.dot(walk.heading) > computeMinCosine(walk, otherWalk) * between)) return kNone;
+  const double distanceOfOther = computeGroundDistance(other.footPosition, *walk.goal);
+  const bool isCloser =
+      distanceOfOther < walk.distance || (distanceOfOther == walk.distance && other.id < avatar.id);
+  return isCloser ? between - walk.reach - otherWalk.reach : kNone;
 }
 
 struct Leader {
@@ -77,16 +76,16 @@ struct Leader {
   double gap = kFollowDistance;  ///< metres
 };
 
-/// The closest walker that the avatar yields to.
-Leader findLeader(const WorldData& world, const std::vector<Walker>& walkers, const Avatar& avatar,
-                  const Walker& walker) {
+/// The closest walk that the avatar yields to.
+Leader findLeader(const WorldData& world, const std::vector<GroundWalk>& walks,
+                  const Avatar& avatar, const GroundWalk& walk) {
   Leader leader;
   for (const auto& overlap :
        world.broadPhase.dynamicOverlapsOf(avatar.proxy)) {  // of the last tick
     const Avatar* other = world.findAvatarByProxy(overlap.id);
     if (!other) continue;
     const double gap = computeGapAhead(
-        avatar, walker, *other, walkers[static_cast<std::size_t>(other - world.avatars.data())]);
+        avatar, walk, *other, walks[static_cast<std::size_t>(other - world.avatars.data())]);
     if (gap < kFollowDistance && gap <= leader.gap) leader = {other, gap};
   }
   return leader;
@@ -101,11 +100,11 @@ double computeSpeedFactor(double gap) {
 }  // namespace
 
 void yieldToWalkersAhead(WorldData& world) {
-  const std::vector<Walker> walkers = findWalkers(world);
-  for (std::size_t i = 0; i < walkers.size(); ++i) {
-    if (!walkers[i].goal) continue;
+  const std::vector<GroundWalk> walks = findGroundWalks(world);
+  for (std::size_t i = 0; i < walks.size(); ++i) {
+    if (!walks[i].goal) continue;
     Avatar& avatar = world.avatars[i];
-    const Leader leader = findLeader(world, walkers, avatar, walkers[i]);
+    const Leader leader = findLeader(world, walks, avatar, walks[i]);
     avatar.walk.yields = leader.avatar != nullptr;
     avatar.walk.flowTick = leader.avatar ? leader.avatar->walk.flowTick : world.tick;
     if (!leader.avatar) continue;

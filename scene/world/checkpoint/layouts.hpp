@@ -301,8 +301,9 @@ struct Layout<BodyPair> {
   template <class A>
   static void archive(A& a, MaybeConst<A, BodyPair>& pair) {
     auto& [key, lowerBound, teleportedAtBound, separatingAxis, verdict, cache, hasConstraint,
-           reported, gaveImpulse] = pair;
-    a(key, lowerBound, teleportedAtBound, separatingAxis, verdict, cache, hasConstraint, reported);
+           touched, reported, gaveImpulse] = pair;
+    a(key, lowerBound, teleportedAtBound, separatingAxis, verdict, cache, hasConstraint, touched,
+      reported);
     if constexpr (!A::kWrites)
       if (!cache && (hasConstraint || verdict == collision::Verdict::penetrating))
         a.refuse("a pair of physics bodies lacks its contact data");

@@ -174,33 +174,34 @@ Motion computeMotion(const SceneAt& sceneAt, EntityId entity, const WorldSetting
 // ---- the gap ------------------------------------------------------------------------------------
 
 /// A gap and the bound of its closing speed.
-struct Approach {
+struct ClosingGap {
   double gap = 0;  ///< metres, certified
   collision::ClosingBounds closing;
   double timeToContact() const { return collision::computeTimeToContact(gap, closing); }
 };
 
 /// `direction` has unit length.
-Approach computeApproachAlong(const Vec3& direction, double gap, const Motion& a, const Motion& b) {
+ClosingGap computeClosingGapAlong(const Vec3& direction, double gap, const Motion& a,
+                                  const Motion& b) {
   // Angular velocities are constant, so any interval is valid.
-  Approach approach{gap - a.immediateGrowth - b.immediateGrowth,
-                    collision::computeClosingBounds(a.bounds, b.bounds, direction, 0)};
-  approach.closing.speed += a.isotropicSpeed + b.isotropicSpeed;
-  return approach;
+  ClosingGap closingGap{gap - a.immediateGrowth - b.immediateGrowth,
+                        collision::computeClosingBounds(a.bounds, b.bounds, direction, 0)};
+  closingGap.closing.speed += a.isotropicSpeed + b.isotropicSpeed;
+  return closingGap;
 }
 
-Approach computeSlowestApproach(const collision::NearestParts& parts, bool convex, const Motion& a,
-                                const Motion& b) {
+ClosingGap computeSlowestClosingGap(const collision::NearestParts& parts, bool convex,
+                                    const Motion& a, const Motion& b) {
   const collision::SeparationResult& separation = parts.separation;
   const Vec3 relative = a.bounds.velocity - b.bounds.velocity;
   const Vec3 direction = relative.norm() > 0 ? Vec3(relative.normalized()) : separation.normal;
-  const Approach alongVelocity =
-      computeApproachAlong(direction, separation.distance - separation.errorBound, a, b);
+  const ClosingGap alongVelocity =
+      computeClosingGapAlong(direction, separation.distance - separation.errorBound, a, b);
   if (!convex) return alongVelocity;
   collision::FeatureCache cache;
   cache.axis = separation.normal;
   const double gap = collision::computeSeparationLowerBound(parts.a, parts.b, cache);
-  const Approach alongNormal = computeApproachAlong(separation.normal, gap, a, b);
+  const ClosingGap alongNormal = computeClosingGapAlong(separation.normal, gap, a, b);
   return alongNormal.timeToContact() > alongVelocity.timeToContact() ? alongNormal : alongVelocity;
 }
 
@@ -228,11 +229,11 @@ std::variant<TimeToContact, QueryError> computeTimeToContact(const SceneAt& scen
     return result;
   }
   const bool convex = placedA.partCount == 1 && placedB.partCount == 1;
-  const Approach approach = computeSlowestApproach(parts, convex, motionA, motionB);
-  result.closing = approach.closing;
-  result.separatedUntil = approach.timeToContact();
+  const ClosingGap closingGap = computeSlowestClosingGap(parts, convex, motionA, motionB);
+  result.closing = closingGap.closing;
+  result.separatedUntil = closingGap.timeToContact();
   result.nextCheck =
-      collision::scheduleCheck(approach.gap, approach.closing, minWait, settings.contactOffset);
+      collision::scheduleCheck(closingGap.gap, closingGap.closing, minWait, settings.contactOffset);
   return result;
 }
 

@@ -1,10 +1,14 @@
-// Peer: Bullet in double precision, its dynamic AABB tree (Dbvt) and its 32-bit axis sweep.
+// Peer: Bullet's dynamic AABB tree (Dbvt) and its 32-bit axis sweep. In doubles, and compiled a
+// second time as a module in floats (bulletfloat_pairs.cpp), with boxes rounded outwards.
 //
 // Both cache pairs whose fattened or quantized boxes overlap; pairs with overlapping exact boxes
 // are reported. Filter groups exclude static pairs. Dbvt needs about a hundred ticks to move static
 // boxes into its fixed tree and to balance it: these run at construction and count as building.
 #include <BulletCollision/BroadphaseCollision/btAxisSweep3.h>
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
+
+#include <cmath>
+#include <limits>
 
 #include "tests/benchmarks/broad_phase_method.hpp"
 
@@ -14,8 +18,18 @@ namespace {
 constexpr int kSettlingTicks = 110;
 constexpr int kStillGroup = 1, kMoverGroup = 2;
 
-btVector3 bulletVector(const Vec3& v) {
-  return {v.x(), v.y(), v.z()};
+btVector3 roundDown(const Vec3& v) {
+  const auto down = [](double x) {
+    const auto rounded = static_cast<btScalar>(x);
+    return static_cast<double>(rounded) > x
+               ? std::nextafter(rounded, -std::numeric_limits<btScalar>::infinity())
+               : rounded;
+  };
+  return {down(v.x()), down(v.y()), down(v.z())};
+}
+
+btVector3 roundUp(const Vec3& v) {
+  return -roundDown(-v);
 }
 
 /// A proxy's user pointer holds an integer: 2 * id, plus 1 for movers.
@@ -32,7 +46,7 @@ class BulletPairs : public BroadPhase {
     const std::size_t mostMovers = still.size() < 100 ? 100'000 : 2'000;  // or everything moves
     if (axisSweep) {
       broadphase_ = std::make_unique<bt32BitAxisSweep3>(
-          bulletVector(world.min), bulletVector(world.max),
+          roundDown(world.min), roundUp(world.max),
           static_cast<unsigned>(still.size() + mostMovers), nullptr, true);
     } else {
       broadphase_ = std::make_unique<btDbvtBroadphase>();
@@ -53,8 +67,8 @@ class BulletPairs : public BroadPhase {
       }
     } else {
       for (std::size_t k = 0; k < movers.size(); ++k) {
-        broadphase_->setAabb(proxies_[still_.size() + k], bulletVector(movers[k].min),
-                             bulletVector(movers[k].max), nullptr);
+        broadphase_->setAabb(proxies_[still_.size() + k], roundDown(movers[k].min),
+                             roundUp(movers[k].max), nullptr);
       }
     }
     broadphase_->calculateOverlappingPairs(nullptr);
@@ -63,7 +77,7 @@ class BulletPairs : public BroadPhase {
 
  private:
   void add(const Aabb& box, std::uintptr_t tag, int group, int mask) {
-    proxies_.push_back(broadphase_->createProxy(bulletVector(box.min), bulletVector(box.max), 0,
+    proxies_.push_back(broadphase_->createProxy(roundDown(box.min), roundUp(box.max), 0,
                                                 reinterpret_cast<void*>(tag), group, mask,
                                                 nullptr));
   }
@@ -91,10 +105,24 @@ class BulletPairs : public BroadPhase {
 
 }  // namespace
 
+#ifdef BT_USE_DOUBLE_PRECISION
 std::vector<BroadPhaseMethod> bulletBroadPhases() {
-  return {{"Bullet Dbvt", BroadPhaseMethod::Kind::peer, SIZE_MAX, "", maker<BulletPairs>(false)},
-          {"Bullet axis sweep", BroadPhaseMethod::Kind::peer, 10000, "minutes to build",
-           maker<BulletPairs>(true), 20000}};
+  const std::string precision;
+#else
+extern "C" __attribute__((visibility("default"))) std::vector<BroadPhaseMethod>*
+makeBulletFloatBroadPhases() {
+  const std::string precision = " (float)";
+#endif
+  const std::vector<BroadPhaseMethod> methods{
+      {"Bullet Dbvt" + precision, BroadPhaseMethod::Kind::peer, SIZE_MAX, "",
+       maker<BulletPairs>(false)},
+      {"Bullet axis sweep" + precision, BroadPhaseMethod::Kind::peer, 10000, "minutes to build",
+       maker<BulletPairs>(true), 20000}};
+#ifdef BT_USE_DOUBLE_PRECISION
+  return methods;
+#else
+  return new std::vector<BroadPhaseMethod>(methods);
+#endif
 }
 
 }  // namespace enfilade::benchmarks

@@ -5,7 +5,7 @@
 //  - kinematic bodies, which have moved already, as driven from their previous pose;
 //  - avatars, which have moved already: they are fixed, and push with their desired velocity.
 // A body does not leave its motion bounds in a tick, because no obstacles are known beyond them.
-#include "scene/world/bodies/dynamic_bodies.hpp"
+#include "scene/world/bodies/step_dynamic_bodies.hpp"
 
 #include <algorithm>
 

@@ -1,4 +1,4 @@
-#include "render/gl/visibility_cache.hpp"
+#include "render/culling/visibility_cache.hpp"
 
 #include <algorithm>
 #include <limits>

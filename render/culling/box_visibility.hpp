@@ -2,7 +2,7 @@
 #pragma once
 
 #include "render/camera_basis.hpp"
-#include "render/gl/depth_pyramid.hpp"
+#include "render/culling/depth_pyramid.hpp"
 
 namespace enfilade::render {
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <deque>
 #include <vector>
 
 #include "render/camera.hpp"
@@ -20,14 +21,15 @@ struct CachedView {
 /// entry or that of a similar camera.
 class VisibilityCache {
  public:
-  /// The most similar view, to be updated for `camera`; empty if no view is similar enough. Valid
-  /// until the next call.
+  /// The most similar view, to be updated for `camera`; empty if no view is similar enough.
+  /// `frameNumber` is larger than in the calls before. The reference stays valid; the least
+  /// recently used of many views is replaced.
   CachedView& lookup(const Camera& camera, std::uint64_t frameNumber);
   /// The most similar view; null if no view is similar enough.
   const CachedView* findNearest(const Camera& camera) const;
 
  private:
-  std::vector<CachedView> entries_;
+  std::deque<CachedView> entries_;
 };
 
 }  // namespace enfilade::render

@@ -9,7 +9,7 @@
 //   slope. kRelativeSlack and kTriangleSlack are a thousand times that. They do not bound triangles
 //   thinner than 1/256 of a pixel: the grid is coarser than those, so their depth is arbitrary.
 // - A box that crosses the near plane is not tested as a whole, but subdivided.
-#include "render/gl/box_visibility.hpp"
+#include "render/culling/box_visibility.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -38,7 +38,8 @@ BoxVisibility::BoxVisibility(const Camera& camera)
       planes_(computeFrustum(camera)),
       perspective_(camera.projection == Camera::Projection::perspective) {
   for (std::size_t i = 0; i < planes_.size(); ++i) {
-    slacks_[i] = 1e-5 * (1 + std::abs(planes_[i].offset));  // as in intersectsFrustum()
+    // The slack covers the frame's single precision: a box that touches a plane is drawn.
+    slacks_[i] = 1e-5 * (1 + std::abs(planes_[i].offset));
     planes_[i].offset += planes_[i].normal.dot(eye_);
   }
 }

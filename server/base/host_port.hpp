@@ -7,12 +7,12 @@
 
 namespace enfilade::server {
 
-struct Endpoint {
+struct HostPort {
   std::string host;        ///< a name or an address; IPv6 without brackets
   std::uint16_t port = 0;  ///< 0: the system chooses (only for listening)
 };
 
 /// Parses `HOST:PORT` or `[IPV6]:PORT`; nullopt for any other text.
-std::optional<Endpoint> parseEndpoint(const std::string& text);
+std::optional<HostPort> parseHostPort(const std::string& text);
 
 }  // namespace enfilade::server

@@ -1,7 +1,7 @@
 // A hierarchical depth buffer (N. Greene, M. Kass, G. Miller 1993, "Hierarchical Z-buffer
 // visibility") built from a rendered depth buffer. Levels are four times coarser instead of twice:
 // half as many levels, and four adjacent floats are one load.
-#include "render/gl/depth_pyramid.hpp"
+#include "render/culling/depth_pyramid.hpp"
 
 #include <algorithm>
 
