@@ -22,12 +22,12 @@ void addPolygon(AvatarMeshes& meshes, const MeshRange& range, const std::vector<
   }
 }
 
-MaterialData makeAvatarMaterial(const Eigen::Vector3f& colour, float glow) {
+scene::Material makeAvatarMaterial(const Eigen::Vector3f& colour, float glow) {
   scene::Material material;
   material.baseColour.head<3>() = colour;
   material.emissive = glow * colour;
   material.roughness = 0.6f;
-  return makeMaterialData(material);
+  return material;
 }
 
 /// A range that begins at the end of the buffers.
@@ -164,8 +164,8 @@ DrawList buildAvatarDrawList(const AvatarMeshes& avatars, const Camera& camera,
     ENFILADE_ASSERT(index < avatars.items.size());
     const AvatarMeshes::Item& item = avatars.items[index];
     const auto instance = static_cast<std::uint32_t>(list.instances.size());
-    list.instances.push_back(
-        makeInstance(item.worldFromMesh, Vec3::Zero(), camera.eye, item.material, item.id));
+    list.instances.push_back(makeInstance(item.worldFromMesh, Vec3::Zero(), camera.eye,
+                                          makeMaterialData(item.material), item.id));
     list.commands.push_back(
         {item.range.indexCount, 1, item.range.firstIndex, item.range.baseVertex, instance});
     ++list.batches.back().commandCount;

@@ -17,7 +17,7 @@ struct AvatarMeshes {
     const scene::Mesh* figure = nullptr;  ///< the source of `range`; null: a hull or a visor
     Eigen::Affine3d worldFromMesh;
     scene::Aabb box;  ///< world
-    MaterialData material;
+    scene::Material material;
     scene::EntityId id;
   };
   std::vector<Vertex> vertices;

@@ -1,48 +1,12 @@
 #include "render/draw_list.hpp"
 
 #include <algorithm>
-#include <tuple>
 #include <utility>
 
 #include "collision/assert.hpp"
 
 namespace enfilade::render {
 namespace {
-
-/// The material, or a default one: meshes of hand-made models may have none.
-const scene::Material& findMaterial(const scene::Model& model, std::uint32_t index) {
-  static const scene::Material plain;
-  return index < model.materials.size() ? model.materials[index] : plain;
-}
-
-std::int32_t findTexture(const scene::Model& model, const scene::Material& material) {
-  const auto index = material.baseColourTexture;
-  return index >= 0 && static_cast<std::size_t>(index) < model.textures.size() ? index : -1;
-}
-
-AlphaMode toAlphaMode(const scene::Material& material) {
-  switch (material.alpha) {
-    case scene::Material::Alpha::mask:
-      return AlphaMode::mask;
-    case scene::Material::Alpha::blend:
-      return AlphaMode::blend;
-    case scene::Material::Alpha::opaque:
-      break;
-  }
-  return AlphaMode::opaque;
-}
-
-scene::Aabb computeMeshAabb(const scene::Mesh& mesh) {
-  scene::Aabb box;
-  for (const Eigen::Vector3f& position : mesh.positions) box.include(position.cast<double>());
-  return box;
-}
-
-scene::Aabb transformItemAabb(const Eigen::Affine3d& worldFromMesh, const scene::Aabb& box) {
-  const Vec3 centre = worldFromMesh * box.centre();
-  const Vec3 half = worldFromMesh.linear().cwiseAbs() * (0.5 * box.size());
-  return {centre - half, centre + half};
-}
 
 /// Farthest first; equal distances keep their order.
 void sortBackToFront(std::vector<std::uint32_t>& transparent, const std::vector<DrawItem>& items,
@@ -85,22 +49,8 @@ void appendCommand(DrawList& list, const DrawItem& item, AlphaMode alphaMode,
 
 }  // namespace
 
-std::vector<BodyPlacement> computeBodyPlacements(const scene::Scene& scene,
-                                                 const scene::Snapshot& snapshot) {
-  std::vector<BodyPlacement> placements(scene.model().bodies.size());
-  if (!snapshot.bodies) return placements;
-  for (const scene::BodySnapshot& body : *snapshot.bodies) {
-    if (!body.displaced) continue;
-    ENFILADE_ASSERT(body.index < placements.size());
-    BodyPlacement& placement = placements[body.index];
-    placement.displaced = true;
-    placement.sceneFromAuthored = computeWorldFromAuthored(*scene.bodyShape(body.index), body.pose);
-  }
-  return placements;
-}
-
 MaterialData makeMaterialData(const scene::Model& model, const scene::Mesh& mesh) {
-  return makeMaterialData(findMaterial(model, mesh.material));
+  return makeMaterialData(findMaterial(model, mesh));
 }
 
 MaterialData makeMaterialData(const scene::Material& material) {
@@ -112,39 +62,6 @@ MaterialData makeMaterialData(const scene::Material& material) {
   data.surface[2] = material.roughness;
   data.surface[3] = material.doubleSided ? 1.0f : 0.0f;
   return data;
-}
-
-std::vector<DrawItem> buildDrawItems(const scene::Model& model) {
-  std::vector<scene::Aabb> meshBoxes;
-  meshBoxes.reserve(model.meshes.size());
-  for (const scene::Mesh& mesh : model.meshes) meshBoxes.push_back(computeMeshAabb(mesh));
-
-  const std::vector<const scene::BodySpec*> bodyOfObject = mapObjectsToBodies(model);
-  std::vector<DrawItem> items;
-  for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
-    const scene::Object& object = model.objects[o];
-    if (bodyOfObject[o] && isTrigger(bodyOfObject[o]->kind)) continue;
-    const auto body = bodyOfObject[o]
-                          ? static_cast<std::uint32_t>(bodyOfObject[o] - model.bodies.data())
-                          : kNoBody;
-    if (object.usage == scene::Object::Usage::collisionOnly) continue;
-    for (const std::uint32_t m : object.meshes) {
-      if (model.meshes[m].indices.empty()) continue;
-      const std::uint32_t materialIndex = model.meshes[m].material;
-      const scene::Material& material = findMaterial(model, materialIndex);
-      items.push_back({transformItemAabb(object.worldFromMesh, meshBoxes[m]), o, m,
-                       findTexture(model, material), toAlphaMode(material),
-                       !model.meshes[m].colours.empty(), body});
-    }
-  }
-  const auto key = [](const DrawItem& item) {
-    // Transparent items are sorted again in every frame; here only the object counts.
-    const bool blend = item.alphaMode == AlphaMode::blend;
-    return std::tuple(item.alphaMode, blend ? -1 : item.texture, !blend && item.coloured);
-  };
-  std::stable_sort(items.begin(), items.end(),
-                   [&](const DrawItem& a, const DrawItem& b) { return key(a) < key(b); });
-  return items;
 }
 
 Instance makeInstance(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCentre, const Vec3& eye,
@@ -165,9 +82,9 @@ Instance makeInstance(const Eigen::Affine3d& worldFromMesh, const Vec3& meshCent
 }
 
 scene::Aabb computeItemAabb(const DrawItem& item, const std::vector<BodyPlacement>& bodies) {
-  ENFILADE_ASSERT(item.body == kNoBody || item.body < bodies.size());
-  if (item.body == kNoBody || !bodies[item.body].displaced) return item.box;
-  return transformItemAabb(bodies[item.body].sceneFromAuthored, item.box);
+  ENFILADE_ASSERT(item.isStatic() || item.body < bodies.size());
+  if (item.isStatic() || !bodies[item.body].displaced) return item.box;
+  return scene::transformAabb(bodies[item.body].sceneFromAuthored, item.box);
 }
 
 DrawLists buildDrawLists(const Drawable& drawable, const std::vector<BodyPlacement>& bodies,
@@ -180,7 +97,7 @@ DrawLists buildDrawLists(const Drawable& drawable, const std::vector<BodyPlaceme
   const auto draw = [&](DrawList& list, const DrawItem& item) {
     const MeshRange& range = drawable.ranges[item.mesh];
     Eigen::Affine3d worldFromMesh = drawable.model.objects[item.object].worldFromMesh;
-    if (item.body != kNoBody && bodies[item.body].displaced)
+    if (!item.isStatic() && bodies[item.body].displaced)
       worldFromMesh = bodies[item.body].sceneFromAuthored * worldFromMesh;
     list.instances.push_back(makeInstance(worldFromMesh, range.centre, camera.eye,
                                           drawable.materials[item.mesh], item.object + 1));

@@ -1,4 +1,4 @@
-// Draw items, their order and their GPU data, independent of OpenGL.
+// Draw lists of items and their GPU data, independent of OpenGL.
 #pragma once
 
 #include <cstdint>
@@ -6,13 +6,16 @@
 
 #include "render/camera_basis.hpp"
 #include "render/frame.hpp"
-#include "scene/world/data/scene.hpp"
-#include "scene/world/data/snapshot.hpp"
+#include "scene/model/draw_items.hpp"
+#include "scene/world/data/body_placement.hpp"
 
 namespace enfilade::render {
 
+using scene::BodyPlacement;
+using scene::DrawItem;
+
 /// A material's alpha mode, in drawing order.
-enum class AlphaMode : std::uint8_t { opaque, mask, blend };
+using AlphaMode = scene::Material::Alpha;
 
 /// A mesh's range in the index and vertex buffers.
 struct MeshRange {
@@ -26,29 +29,6 @@ struct MaterialData {
   float baseColour[4];
   float emissive[4];  ///< w: set per instance
   float surface[4];   ///< alpha cutoff, metallic, roughness, 1 when double-sided
-};
-
-/// Value of DrawItem::body for a static item.
-inline constexpr std::uint32_t kNoBody = 0xFFFF'FFFFu;
-
-/// One mesh of one object.
-struct DrawItem {
-  scene::Aabb box;  ///< world, as authored
-  std::uint32_t object = 0, mesh = 0;
-  std::int32_t texture = -1;
-  AlphaMode alphaMode = AlphaMode::opaque;
-  bool coloured = false;         ///< the mesh has vertex colours
-  std::uint32_t body = kNoBody;  ///< index into Model::bodies
-};
-
-/// A body's current transform: sceneFromAuthored maps a point of the model to the body's pose.
-struct BodyPlacement {
-  bool displaced = false;  ///< false: drawn as in the model
-  Eigen::Affine3d sceneFromAuthored = Eigen::Affine3d::Identity();
-  bool operator==(const BodyPlacement& other) const {
-    return displaced == other.displaced &&
-           sceneFromAuthored.matrix() == other.sceneFromAuthored.matrix();
-  }
 };
 
 /// Per-instance vertex attributes (see Attribute).
@@ -84,15 +64,6 @@ struct DrawList {
 MaterialData makeMaterialData(const scene::Material& material);
 /// The mesh's material; a default material if the mesh has none.
 MaterialData makeMaterialData(const scene::Model& model, const scene::Mesh& mesh);
-
-/// The transforms of all bodies of the scene.
-std::vector<BodyPlacement> computeBodyPlacements(const scene::Scene& scene,
-                                                 const scene::Snapshot& snapshot);
-
-/// All items of the model except triggers and collision-only objects, in drawing order: by alpha
-/// mode, texture, vertex colours, object. The order never depends on the camera, so that depth ties
-/// are resolved equally in every frame.
-std::vector<DrawItem> buildDrawItems(const scene::Model& model);
 
 /// The data to draw a scene; `ranges` and `materials` have one entry per mesh.
 struct Drawable {

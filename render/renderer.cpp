@@ -10,8 +10,10 @@
 namespace enfilade::render {
 namespace {
 
-/// Samples rendered together; more would need more memory.
-constexpr std::size_t kSamplesPerPass = 4;
+/// Samples of a picture that are rendered together.
+std::size_t countSamplesPerPass(const Camera& camera, std::size_t samples) {
+  return std::clamp<std::size_t>(kMaxPixelsTogether / countPixels(camera), 1, samples);
+}
 
 void validateView(const View& view) {
   if (const auto error = validateCamera(view.camera)) throw RenderError(*error);
@@ -66,8 +68,9 @@ Frame Renderer::renderSamples(const scene::Snapshot& snapshot, const View& view)
   MeanColour mean(std::size_t{3} * countPixels(view.camera));
   std::vector<View> pass;
   const auto positions = getSamplePositions(static_cast<int>(view.options.samples));
-  for (std::size_t from = 0; from < positions.size(); from += kSamplesPerPass) {
-    pass.assign(std::min(kSamplesPerPass, positions.size() - from), view);
+  const std::size_t perPass = countSamplesPerPass(view.camera, positions.size());
+  for (std::size_t from = 0; from < positions.size(); from += perPass) {
+    pass.assign(std::min(perPass, positions.size() - from), view);
     for (std::size_t i = 0; i < pass.size(); ++i) {
       pass[i].camera = shiftCamera(view.camera, positions[from + i]);
       pass[i].options.channels = {true, false, false, false};

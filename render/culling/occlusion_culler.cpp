@@ -40,7 +40,7 @@ OcclusionCuller::OcclusionCuller(const std::vector<DrawItem>& items) : items_(it
   std::vector<scene::Aabb> boxes;
   std::vector<std::uint32_t> staticItems;
   for (std::uint32_t i = 0; i < items.size(); ++i) {
-    if (items[i].body != kNoBody) {
+    if (!items[i].isStatic()) {
       dynamicItems_.push_back(i);
     } else if (!items[i].box.empty()) {
       staticItems.push_back(i);
@@ -91,67 +91,88 @@ void OcclusionCuller::markDrawn(const std::vector<std::uint32_t>& items, std::ui
   }
 }
 
+/// One search for all views.
+struct OcclusionCuller::Search {
+  const OcclusionCuller& culler;
+  std::span<const View> views;
+  std::vector<CullingResult> found;  ///< one per view
+  std::vector<Vec3> eyeFromTree;     ///< one per view
+
+  Search(const OcclusionCuller& one, std::span<const View> all)
+      : culler(one), views(all), found(all.size()) {
+    const Vec3& origin = culler.tree_.origin;
+    for (const View& view : views)
+      eyeFromTree.push_back(view.visibility.toEyeSpace({origin, origin}).centre);
+  }
+
+  bool count(std::size_t v, Visibility result, std::uint32_t itemCount) {
+    if (result == Visibility::culled) found[v].culled += itemCount;
+    if (result == Visibility::occluded) found[v].occluded += itemCount;
+    return result == Visibility::visible;
+  }
+
+  void testItem(std::uint32_t item, const scene::Aabb& box, std::uint64_t untested) {
+    forEachBit(untested & ~culler.getMarkedViews(culler.itemMarks_[item]), [&](std::size_t v) {
+      const View& view = views[v];
+      if (culler.items_[item].object + 1 == view.hiddenEntity) return;
+      if (count(v, view.visibility.test(view.visibility.toEyeSpace(box), view.depth), 1))
+        found[v].items.push_back(item);
+    });
+  }
+
+  /// The views that may see something below the branch.
+  std::uint64_t testBranch(const collision::BoxTree::Branch& branch, std::uint64_t untested) {
+    std::uint64_t seeing = untested & culler.getMarkedViews(culler.nodeMarks_[branch.first]);
+    forEachBit(untested & ~seeing, [&](std::size_t v) {
+      const EyeSpaceAabb box = toEyeSpaceAabb(branch.box, eyeFromTree[v]);
+      if (count(v, views[v].visibility.testWhole(box, views[v].depth),
+                culler.subtreeItemCount_[branch.first]))
+        seeing |= std::uint64_t{1} << v;
+    });
+    return seeing;
+  }
+
+  void testTree(std::uint64_t all) {
+    struct Pending {
+      collision::BoxTree::Branch branch;
+      std::uint64_t views;
+    };
+    const collision::BoxTree& tree = culler.tree_;
+    std::array<Pending, collision::kMaxTreeDepth> stack;
+    std::size_t height = 0;
+    if (!tree.empty()) stack[height++] = {tree.root, all};
+    while (height > 0) {  // each branch once
+      const auto [branch, untested] = stack[--height];
+      if (branch.isLeaf()) {
+        for (std::uint32_t i = 0; i < branch.count; ++i) {
+          const std::uint32_t item = culler.itemOfTreeEntry_[branch.first + i];
+          testItem(item, culler.items_[item].box, untested);
+        }
+        continue;
+      }
+      const std::uint64_t seeing = testBranch(branch, untested);
+      if (seeing == 0) continue;
+      ENFILADE_ASSERT(height + 2 <= stack.size());
+      for (const auto& child : tree.nodes[branch.first].children) stack[height++] = {child, seeing};
+    }
+  }
+};
+
 std::vector<OcclusionCuller::CullingResult> OcclusionCuller::findVisible(
     std::span<const View> views, const std::vector<BodyPlacement>& bodies) {
   ENFILADE_ASSERT(!views.empty() && views.size() <= kMaxViews);
   ++generation_;
-  std::vector<CullingResult> found(views.size());
-  std::vector<Vec3> eyeFromTree;
   std::uint64_t all = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
     markDrawn(views[v].drawn, std::uint64_t{1} << v);
     all |= std::uint64_t{1} << v;
-    eyeFromTree.push_back(views[v].visibility.toEyeSpace({tree_.origin, tree_.origin}).centre);
   }
-  const auto count = [&](std::size_t v, Visibility result, std::uint32_t itemCount) {
-    if (result == Visibility::culled) found[v].culled += itemCount;
-    if (result == Visibility::occluded) found[v].occluded += itemCount;
-    return result == Visibility::visible;
-  };
-  const auto testItem = [&](std::uint32_t item, const scene::Aabb& box, std::uint64_t untested) {
-    forEachBit(untested & ~getMarkedViews(itemMarks_[item]), [&](std::size_t v) {
-      const View& view = views[v];
-      if (items_[item].object + 1 == view.hiddenEntity) return;
-      if (count(v, view.visibility.test(view.visibility.toEyeSpace(box), view.depth), 1))
-        found[v].items.push_back(item);
-    });
-  };
-  /// The views that may see something below the branch.
-  const auto testBranch = [&](const collision::BoxTree::Branch& branch, std::uint64_t untested) {
-    std::uint64_t seeing = untested & getMarkedViews(nodeMarks_[branch.first]);
-    forEachBit(untested & ~seeing, [&](std::size_t v) {
-      const EyeSpaceAabb box = toEyeSpaceAabb(branch.box, eyeFromTree[v]);
-      if (count(v, views[v].visibility.testWhole(box, views[v].depth),
-                subtreeItemCount_[branch.first]))
-        seeing |= std::uint64_t{1} << v;
-    });
-    return seeing;
-  };
-  struct Pending {
-    collision::BoxTree::Branch branch;
-    std::uint64_t views;
-  };
-  std::array<Pending, collision::kMaxTreeDepth> stack;
-  std::size_t height = 0;
-  if (!tree_.empty()) stack[height++] = {tree_.root, all};
-  while (height > 0) {  // each branch once
-    const auto [branch, untested] = stack[--height];
-    if (branch.isLeaf()) {
-      for (std::uint32_t i = 0; i < branch.count; ++i) {
-        const std::uint32_t item = itemOfTreeEntry_[branch.first + i];
-        testItem(item, items_[item].box, untested);
-      }
-      continue;
-    }
-    const std::uint64_t seeing = testBranch(branch, untested);
-    if (seeing == 0) continue;
-    ENFILADE_ASSERT(height + 2 <= stack.size());
-    for (const auto& child : tree_.nodes[branch.first].children) stack[height++] = {child, seeing};
-  }
+  Search search(*this, views);
+  search.testTree(all);
   for (const std::uint32_t item : dynamicItems_)
-    testItem(item, computeItemAabb(items_[item], bodies), all);
-  for (CullingResult& result : found) std::sort(result.items.begin(), result.items.end());
-  return found;
+    search.testItem(item, computeItemAabb(items_[item], bodies), all);
+  for (CullingResult& result : search.found) std::sort(result.items.begin(), result.items.end());
+  return std::move(search.found);
 }
 
 }  // namespace enfilade::render

@@ -44,11 +44,13 @@ class OcclusionCuller {
   std::vector<std::uint32_t> subtreeItemCount_;  ///< number of items below each node
   std::vector<std::uint32_t> dynamicItems_;      ///< items of bodies, ascending
 
-  /// The views that know something visible, as bits; of an earlier generation: none.
+  /// Bit v: view v drew this item, or an item below this node. Valid in the generation that it
+  /// names.
   struct Mark {
     std::uint32_t generation = 0;
     std::uint64_t views = 0;
   };
+  struct Search;
   void markDrawn(const std::vector<std::uint32_t>& items, std::uint64_t view);
   std::uint64_t getMarkedViews(const Mark& mark) const {
     return mark.generation == generation_ ? mark.views : 0;

@@ -14,6 +14,7 @@ struct CachedView {
   Camera camera;
   std::vector<std::uint32_t> items;      ///< possibly visible; ascending
   std::vector<scene::EntityId> avatars;  ///< possibly visible; ascending
+  std::uint64_t updates = 0;             ///< so far
   std::uint64_t lastUsed = 0;            ///< frame number of the last use; 0: never
 };
 

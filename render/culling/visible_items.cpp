@@ -8,15 +8,19 @@
 namespace enfilade::render {
 namespace {
 
-// Frames between retests of a visible item, and until an item outside the frustum is forgotten.
+// Updates between retests of a visible item, and until an item outside the frustum is forgotten.
 constexpr std::uint64_t kRetestPeriod = 8, kForgetCulledPeriod = 64;
 
 bool isInFrustum(const ViewTests& view, const scene::Aabb& box) {
   return !view.visibility.isOutsideFrustum(view.visibility.toEyeSpace(box));
 }
 
+Visibility testBox(const ViewTests& view, const scene::Aabb& box) {
+  return view.visibility.test(view.visibility.toEyeSpace(box), view.depth);
+}
+
 bool mayBeVisible(const ViewTests& view, const scene::Aabb& box) {
-  return view.visibility.test(view.visibility.toEyeSpace(box), view.depth) == Visibility::visible;
+  return testBox(view, box) == Visibility::visible;
 }
 
 bool isHidden(const SceneItems& scene, const ViewTests& view, std::uint32_t item) {
@@ -76,20 +80,18 @@ VisibleSet filterVisible(const SceneItems& scene, const ViewTests& view, const V
 }
 
 void updateCachedView(const SceneItems& scene, const ViewTests& view, const VisibleSet& drawn,
-                      std::uint64_t frameNumber, CachedView& cached) {
+                      CachedView& cached) {
   ENFILADE_ASSERT(std::ranges::is_sorted(drawn.items) && std::ranges::is_sorted(drawn.avatarItems));
-  const auto isOccluded = [&](std::uint32_t item) {
-    return view.visibility.test(view.visibility.toEyeSpace(scene.computeAabb(item)), view.depth) ==
-           Visibility::occluded;
-  };
+  const std::uint64_t update = ++cached.updates;
   std::vector<std::uint32_t> kept;
   for (const std::uint32_t item : drawn.items) {
-    const bool due = cached.items.empty() || (item + frameNumber) % kRetestPeriod == 0;
-    if (!due || !isOccluded(item)) kept.push_back(item);
+    const bool due = cached.items.empty() || (item + update) % kRetestPeriod == 0;
+    if (!due || testBox(view, scene.computeAabb(item)) != Visibility::occluded)
+      kept.push_back(item);
   }
   for (const std::uint32_t item : cached.items) {
     if (std::ranges::binary_search(drawn.items, item)) continue;
-    if ((item + frameNumber) % kForgetCulledPeriod != 0) kept.push_back(item);
+    if ((item + update) % kForgetCulledPeriod != 0) kept.push_back(item);
   }
   std::ranges::sort(kept);
   cached.items = std::move(kept);

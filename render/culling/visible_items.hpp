@@ -44,10 +44,10 @@ std::vector<std::uint32_t> findDisoccludedAvatars(const SceneItems& scene, const
 VisibleSet filterVisible(const SceneItems& scene, const ViewTests& view, const VisibleSet& drawn);
 
 /// Updates the cached view for the next frame: the drawn items without those now occluded, and
-/// previously visible items that are outside the frustum now. `frameNumber` spreads the tests over
-/// frames.
+/// previously visible items that are outside the frustum now. The tests of items are spread over
+/// updates.
 void updateCachedView(const SceneItems& scene, const ViewTests& view, const VisibleSet& drawn,
-                      std::uint64_t frameNumber, CachedView& cached);
+                      CachedView& cached);
 
 /// Adds `more` to `all`; both are ascending.
 void mergeSorted(std::vector<std::uint32_t>& all, const std::vector<std::uint32_t>& more);

@@ -53,37 +53,37 @@ const std::vector<float>& getDepthMetres(const RenderTarget& target, FrameInProg
 
 std::vector<Frame> readFrames(const RenderTarget& target, const FramesInProgress& views) {
   std::vector<Frame> frames(views.size());
-  const auto frameOf = [&](const FrameInProgress& view) -> Frame& {
+  const auto getFrame = [&](const FrameInProgress& view) -> Frame& {
     return frames[static_cast<std::size_t>(view.layer)];
   };
-  const auto needing = [&](const auto& condition) { return filterViews(views, condition); };
+  const auto selectViews = [&](const auto& condition) { return filterViews(views, condition); };
   glFlush();  // if the depth was already read, the device works while this thread continues
-  readDepth(target, needing([](const FrameInProgress& view) {
+  readDepth(target, selectViews([](const FrameInProgress& view) {
               return view.needsDepth() && !view.planeDepth && !view.depthIsRead;
             }));
   for (FrameInProgress* view : views) {
     if (!view->needsDepth() || view->planeDepth) continue;
     getDepthMetres(target, *view);
-    frameOf(*view).depth = std::move(view->metres);
+    getFrame(*view).depth = std::move(view->metres);
   }
   readTogether<float>(
-      needing([](const FrameInProgress& view) { return view.planeDepth; }), 1,
+      selectViews([](const FrameInProgress& view) { return view.planeDepth; }), 1,
       [&](Layers layers, std::span<float> to) { target.readPlaneDepth(layers, to); },
-      [&](FrameInProgress& view) -> std::vector<float>& { return frameOf(view).depth; });
+      [&](FrameInProgress& view) -> std::vector<float>& { return getFrame(view).depth; });
   readTogether<std::uint8_t>(
-      needing([](const FrameInProgress& view) { return view.options.channels.rgb; }), 4,
+      selectViews([](const FrameInProgress& view) { return view.options.channels.rgb; }), 4,
       [&](Layers layers, std::span<std::uint8_t> to) { target.readColour(layers, to); },
-      [&](FrameInProgress& view) -> std::vector<std::uint8_t>& { return frameOf(view).rgb; });
+      [&](FrameInProgress& view) -> std::vector<std::uint8_t>& { return getFrame(view).rgb; });
   readTogether<std::uint32_t>(
-      needing([](const FrameInProgress& view) { return view.options.channels.ids; }), 1,
+      selectViews([](const FrameInProgress& view) { return view.options.channels.ids; }), 1,
       [&](Layers layers, std::span<std::uint32_t> to) { target.readIds(layers, to); },
-      [&](FrameInProgress& view) -> std::vector<std::uint32_t>& { return frameOf(view).ids; });
+      [&](FrameInProgress& view) -> std::vector<std::uint32_t>& { return getFrame(view).ids; });
   readTogether<float>(
-      needing([](const FrameInProgress& view) { return view.options.channels.normals; }), 3,
+      selectViews([](const FrameInProgress& view) { return view.options.channels.normals; }), 3,
       [&](Layers layers, std::span<float> to) { target.readNormals(layers, to); },
-      [&](FrameInProgress& view) -> std::vector<float>& { return frameOf(view).normals; });
+      [&](FrameInProgress& view) -> std::vector<float>& { return getFrame(view).normals; });
   for (const FrameInProgress* view : views) {
-    Frame& frame = frameOf(*view);
+    Frame& frame = getFrame(*view);
     if (view->options.channels.rgb)
       frame.rgb = applyOcclusion(frame.rgb, view->camera.width, view->camera.height,
                                  AmbientOcclusion(frame.depth, view->camera));

@@ -23,13 +23,13 @@ struct FrameInProgress {
   VisibleSet disoccluded = {};   ///< not drawn yet
   bool isComplete = false;       ///< the prepass drew ids and depth; nothing needs shading
   bool depthIsRead = false;      ///< the pyramid's base level holds the view's depth
-  bool depthIsOld = false;       ///< the pyramid lacks all items; it must be built again
+  bool needsPyramid = false;     ///< built before any item was drawn: build it again before shading
   DrawList transparent = {};
   std::vector<float> metres = {};  ///< depth of the depth buffer; empty: not computed yet
 
   bool needsShadows() const { return options.shadows && options.channels.rgb; }
   bool needsDepth() const { return options.channels.depth || options.channels.rgb; }
-  ViewTests tests() const { return {visibility, pyramid, options.hiddenEntity}; }
+  ViewTests makeTests() const { return {visibility, pyramid, options.hiddenEntity}; }
 };
 
 /// Views of one size, in ascending order of their layers.

@@ -30,7 +30,10 @@
 
 #include <algorithm>
 #include <deque>
+#include <iterator>
+#include <map>
 #include <optional>
+#include <tuple>
 #include <utility>
 
 #include "collision/assert.hpp"
@@ -49,8 +52,30 @@ constexpr std::size_t kFirstChunkItems =
     512;                        // items of the first refinement chunk; the size doubles
 constexpr int kMaxChunks = 24;  // more chunks than any scene needs
 
+constexpr std::size_t kMaxLayers = OcclusionCuller::kMaxViews;
+
 // Up to this many items, collecting all items in the frustum is fast.
 constexpr std::size_t kSmallSceneThreshold = 256;
+
+/// Indices of views that can be drawn together: of one size and one form of avatars.
+std::vector<std::vector<std::size_t>> groupViews(std::span<const View> views) {
+  using Key = std::tuple<int, int, AvatarForm>;
+  std::map<Key, std::vector<std::vector<std::size_t>>> groupsByKey;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const Camera& camera = views[i].camera;
+    if (camera.lens) throw RenderError("camera: lens is given; it must be absent with OpenGL");
+    const std::size_t limit =
+        std::clamp<std::size_t>(kMaxPixelsTogether / countPixels(camera), 1, kMaxLayers);
+    auto& groups = groupsByKey[{camera.width, camera.height, views[i].options.avatars}];
+    if (groups.empty() || groups.back().size() == limit) groups.emplace_back();
+    groups.back().push_back(i);
+  }
+  std::vector<std::vector<std::size_t>> all;
+  for (auto& [key, groups] : groupsByKey)
+    all.insert(all.end(), std::make_move_iterator(groups.begin()),
+               std::make_move_iterator(groups.end()));
+  return all;
+}
 
 }  // namespace
 
@@ -68,7 +93,7 @@ struct GlRenderer::State {
   std::deque<DepthPyramid> depthPyramids;  // one per layer
   bool planeDepth;                         // DepthSource::plane
   bool roundsVertices;                     // see DeviceChoice
-  std::uint64_t frameNumber = 0;
+  std::uint64_t frameNumber = 0;           // for the cache
 
   State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device,
         ShadowMaskFunction shadows);
@@ -213,7 +238,7 @@ bool GlRenderer::State::isMostlyVisible(const FrameInProgress& view, const Visib
   const CachedView* cached = visibilityCache.findNearest(view.camera);
   return cached &&
          countTriangles(all.items) <=
-             2 * countTriangles(predictVisible(sceneItems(), view.tests(), *cached).items);
+             2 * countTriangles(predictVisible(sceneItems(), view.makeTests(), *cached).items);
 }
 
 void GlRenderer::State::drawAllInFrustum(FrameInProgress& view, const VisibleSet& all) {
@@ -234,7 +259,7 @@ void GlRenderer::State::drawAllInFrustum(FrameInProgress& view, const VisibleSet
 bool GlRenderer::State::tryDrawAll(FrameInProgress& view) {
   const bool isRequested = view.options.culling != Culling::occlusion;
   if (!isRequested && items.size() > kSmallSceneThreshold) return false;
-  const VisibleSet all = findInFrustum(sceneItems(), view.tests());
+  const VisibleSet all = findInFrustum(sceneItems(), view.makeTests());
   if (!isRequested && !isMostlyVisible(view, all)) return false;
   drawAllInFrustum(view, all);
   return true;
@@ -243,7 +268,7 @@ bool GlRenderer::State::tryDrawAll(FrameInProgress& view) {
 /// Draws what an earlier frame showed into the depth.
 void GlRenderer::State::drawPredicted(FrameInProgress& view) {
   view.cached = &visibilityCache.lookup(view.camera, ++frameNumber);
-  view.drawn = predictVisible(sceneItems(), view.tests(), *view.cached);
+  view.drawn = predictVisible(sceneItems(), view.makeTests(), *view.cached);
   const Channels& channels = view.options.channels;
   view.isComplete = !channels.rgb && !channels.normals;
   target.setDrawChannels({false, view.isComplete && channels.ids, false, false},
@@ -264,7 +289,7 @@ void GlRenderer::State::findDisoccluded(const FramesInProgress& views) {
     FrameInProgress& view = *views[i];
     view.statistics.frustumCulled = found[i].culled;
     view.disoccluded = {std::move(found[i].items),
-                        findDisoccludedAvatars(sceneItems(), view.tests(), view.drawn)};
+                        findDisoccludedAvatars(sceneItems(), view.makeTests(), view.drawn)};
   }
 }
 
@@ -301,7 +326,7 @@ void GlRenderer::State::refineFrontToBack(FrameInProgress& view) {
     });
   }
   mergeSorted(view.drawn.avatarItems, view.disoccluded.avatarItems);
-  view.drawn = filterVisible(sceneItems(), view.tests(), view.drawn);
+  view.drawn = filterVisible(sceneItems(), view.makeTests(), view.drawn);
 }
 
 /// Completes the view's depth.
@@ -321,7 +346,7 @@ void GlRenderer::State::drawDisoccluded(FrameInProgress& view) {
     view.depthIsRead = false;
     // The pyramid is not built again: it is conservative, because its depth is farther in places.
     // Without drawn items, it is empty.
-    view.depthIsOld = view.drawn.items.empty();
+    view.needsPyramid = view.drawn.items.empty();
     ++view.statistics.passes;
   }
   mergeSorted(view.drawn.items, disoccluded.items);
@@ -330,12 +355,12 @@ void GlRenderer::State::drawDisoccluded(FrameInProgress& view) {
 
 /// Shades the visible items at their complete depth.
 void GlRenderer::State::shadeVisible(FrameInProgress& view) {
-  const VisibleSet shaded = filterVisible(sceneItems(), view.tests(), view.drawn);
+  const VisibleSet shaded = filterVisible(sceneItems(), view.makeTests(), view.drawn);
   if (!view.isComplete) {
     beginShading(view);
     view.transparent = drawSurfaces(view, shaded);
   }
-  updateCachedView(sceneItems(), view.tests(), view.drawn, frameNumber, *view.cached);
+  updateCachedView(sceneItems(), view.makeTests(), view.drawn, *view.cached);
   view.statistics.drawn = static_cast<std::uint32_t>(shaded.items.size());
   const std::size_t seen = view.statistics.drawn + view.statistics.frustumCulled;
   ENFILADE_ASSERT(seen <= items.size());
@@ -357,14 +382,15 @@ void GlRenderer::State::drawViews(const FramesInProgress& views) {
   }
   for (FrameInProgress* view : culled) {
     select(*view);
+    surfacePass->beginDepthPrepass(view->isComplete && view->planeDepth);
     drawDisoccluded(*view);
   }
   // Reading the depth now and not after shading lets the device shade while this thread works.
   readDepth(target, filterViews(culled, [](const FrameInProgress& view) {
-              return !view.depthIsRead && (!view.planeDepth || view.depthIsOld);
+              return !view.depthIsRead && (!view.planeDepth || view.needsPyramid);
             }));
   for (FrameInProgress* view : culled) {
-    if (view->depthIsOld) view->pyramid.build();
+    if (view->needsPyramid) view->pyramid.build();
     select(*view);
     shadeVisible(*view);
   }
@@ -400,27 +426,11 @@ std::vector<Frame> GlRenderer::renderOnce(const scene::Snapshot& snapshot,
   s.context.makeCurrent();
   s.prepareScene();
   std::vector<Frame> frames(views.size());
-  std::vector<bool> done(views.size());
-  for (std::size_t first = 0; first < views.size(); ++first) {
-    if (done[first]) continue;
-    const View& like = views[first];
-    if (like.camera.lens) throw RenderError("camera: lens is given; it must be absent with OpenGL");
-    const std::size_t pixels = countPixels(like.camera);
-    const std::size_t limit =
-        std::clamp<std::size_t>(kMaxPixelsTogether / pixels, 1, OcclusionCuller::kMaxViews);
+  for (const std::vector<std::size_t>& group : groupViews(views)) {
     std::vector<const View*> together;
-    std::vector<std::size_t> indices;
-    for (std::size_t i = first; i < views.size() && together.size() < limit; ++i) {
-      const View& view = views[i];
-      if (done[i] || view.camera.lens || view.camera.width != like.camera.width ||
-          view.camera.height != like.camera.height || view.options.avatars != like.options.avatars)
-        continue;
-      together.push_back(&view);
-      indices.push_back(i);
-      done[i] = true;
-    }
+    for (const std::size_t i : group) together.push_back(&views[i]);
     std::vector<Frame> rendered = s.renderTogether(snapshot, together);
-    for (std::size_t i = 0; i < rendered.size(); ++i) frames[indices[i]] = std::move(rendered[i]);
+    for (std::size_t i = 0; i < rendered.size(); ++i) frames[group[i]] = std::move(rendered[i]);
   }
   for (Frame& frame : frames) frame.renderer = deviceName(), frame.software = software();
   return frames;

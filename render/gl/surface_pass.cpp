@@ -244,7 +244,8 @@ void SurfacePass::drawSky() const {
 }
 
 void SurfacePass::beginTransparentPass() {
-  normals_ = false;
+  shaded_ = true;
+  normals_ = shadows_ = planeDepth_ = false;
   glEnable(GL_BLEND);
   glEnable(GL_FRAMEBUFFER_SRGB);  // blend linear light
   glBlendFuncSeparate(GL_SRC_ALPHA, GL_ONE_MINUS_SRC_ALPHA, GL_ZERO, GL_ONE_MINUS_SRC_ALPHA);

@@ -299,9 +299,7 @@ struct RayRenderer::State {
   std::string name = scene::embreeName();
 
   State(std::shared_ptr<const scene::Scene> shared, const RayOptions& options)
-      : scene(std::move(shared), options.robust, alphaMaskFilter()),
-        textures(scene.model()),
-        workers(options.threads) {}
+      : scene(std::move(shared)), textures(scene.model()), workers(options.threads) {}
 };
 
 namespace {
@@ -352,15 +350,17 @@ std::vector<Frame> RayRenderer::renderOnce(const scene::Snapshot& snapshot,
   std::vector<Frame> frames;
   for (std::size_t from = 0; from < views.size();) {
     // The trees hold one form of the avatars.
-    std::size_t to = from + 1;
-    const auto sharesTrees = [&](const View& view) {
-      return !view.camera.lens && view.options.avatars == views[from].options.avatars;
+    std::size_t to = from + 1, pixels = countPixels(views[from].camera);
+    const auto joins = [&](const View& view) {
+      pixels += countPixels(view.camera);
+      return pixels <= kMaxPixelsTogether && !view.camera.lens &&
+             view.options.avatars == views[from].options.avatars;
     };
     s.scene.update(snapshot, views[from].options.avatars);
     if (views[from].camera.lens) {
       frames.push_back(traceThroughLens(s, views[from]));
     } else {
-      while (to < views.size() && sharesTrees(views[to])) ++to;
+      while (to < views.size() && joins(views[to])) ++to;
       for (Frame& frame : traceFrames(s, views.subspan(from, to - from)))
         frames.push_back(std::move(frame));
     }

@@ -10,8 +10,7 @@ namespace enfilade::render {
 
 /// Options of a RayRenderer.
 struct RayOptions {
-  int threads = 2;     ///< 1..64; frames do not depend on it
-  bool robust = true;  ///< false: a fifth faster, but some rays pass between adjacent triangles
+  int threads = 2;  ///< 1..64; frames do not depend on it
 };
 
 /// Depth is exact for the ray through the pixel's centre. Transparent surfaces are sorted per

@@ -90,7 +90,7 @@ ShadedTriangle::ShadedTriangle(const BatchTriangle& source, const PrimaryRays& r
 }
 
 Texel Shading::computeAlbedo(const ShadedTriangle& triangle, double x, double y) const {
-  const float* base = triangle.batch->material->baseColour;
+  const Eigen::Vector4f& base = triangle.batch->material->baseColour;
   Texel albedo{base[0], base[1], base[2], base[3]};
   const bool coloured = !triangle.batch->mesh->colours.empty();
   if (triangle.batch->texture < 0 && !coloured) return albedo;
@@ -161,12 +161,12 @@ SurfaceColour Shading::shadeSurface(const ShadedTriangle& triangle, double x, do
   const float distance = plan ? 0.0f : static_cast<float>(z * length);
   const Vec3 n = orientNormal(triangle, computeBarycentrics(triangle.weights, x, y).weights, toEye);
   const Texel albedo = this->computeAlbedo(triangle, x, y);
-  const MaterialData& material = *triangle.batch->material;
+  const scene::Material& material = *triangle.batch->material;
   vec3 radiance =
       glsl::lit({albedo[0], albedo[1], albedo[2]}, toGlsl(n), toGlsl(toEye), distance,
-                material.surface[1], material.surface[2], sunlit) +
+                material.metallic, material.roughness, sunlit) +
       glsl::kGlow * vec3(material.emissive[0], material.emissive[1], material.emissive[2]);
-  if (plan && material.surface[3] < 0.5f) {
+  if (plan && !material.doubleSided) {
     // A plan cuts objects open; their interior is darker to emphasise cut walls.
     const bool mirrored = triangle.batch->worldFromMesh->linear().determinant() < 0;
     const bool behind = triangle.faceNormal.dot(toEye) < 0;

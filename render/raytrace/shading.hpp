@@ -4,9 +4,14 @@
 
 #include "render/raytrace/glsl_compat.hpp"
 #include "render/raytrace/mip_texture.hpp"
-#include "render/raytrace/ray_tree.hpp"
+#include "render/raytrace/projected_triangle.hpp"
+#include "scene/world/queries/ray_tree.hpp"
 
 namespace enfilade::render {
+
+using scene::BatchTriangle;
+using scene::RayTree;
+using scene::TriangleBatch;
 
 /// Direction towards the sun: unit length, world.
 Vec3 sunDirection();

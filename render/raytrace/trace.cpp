@@ -23,21 +23,13 @@ HitKey makeHitKey(std::size_t tree, unsigned instance, unsigned geometry, unsign
   return HitKey{tree} << 61 | HitKey{placed ? 0u : geometry} << 60 | instanceBits << 32 | primitive;
 }
 
-/// Context that Embree passes to the filters; Embree's own part must be first.
-struct FilterContext {
-  RTCIntersectContext embree;
+/// Context that Embree passes to the filters.
+struct FilterContext : scene::QueryContext<RTCIntersectContext> {
   const TraceContext* trace;
   std::size_t tree;             ///< index into trace->trees
   std::vector<PixelHit>* hits;  ///< collects all hits; null: only first hits are needed
   bool byBarycentrics = false;  ///< alpha at the hit itself: the ray has no pixel
 };
-
-FilterContext makeFilterContext(const TraceContext& trace, std::size_t tree) {
-  FilterContext context{{}, &trace, tree, nullptr};
-  rtcInitIntersectContext(&context.embree);
-  context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-  return context;
-}
 
 /// Calls `visitLane(lane, instance, geometry, primitive)` for the active lanes of a filter call.
 template <class VisitLane>
@@ -66,15 +58,22 @@ void rejectTransparentTexels(const RTCFilterFunctionNArguments* arguments) {
       const unsigned n = arguments->N;
       const float alpha = trace.shading.sampleAlpha(
           batchTriangle, RTCHitN_u(arguments->hit, n, lane), RTCHitN_v(arguments->hit, n, lane));
-      if (alpha < batchTriangle.batch->material->surface[0]) arguments->valid[lane] = 0;
+      if (alpha < batchTriangle.batch->material->alphaCutoff) arguments->valid[lane] = 0;
       return;
     }
     const ShadedTriangle triangle(batchTriangle, trace.rays);
     const auto pixel = static_cast<int>(RTCRayN_id(arguments->ray, arguments->N, lane));
     const int x = pixel % trace.rays.width, y = pixel / trace.rays.width;
     const float alpha = trace.shading.computeAlbedo(triangle, x, y)[3];
-    if (alpha < triangle.batch->material->surface[0]) arguments->valid[lane] = 0;
+    if (alpha < triangle.batch->material->alphaCutoff) arguments->valid[lane] = 0;
   });
+}
+
+FilterContext makeFilterContext(const TraceContext& trace, std::size_t tree) {
+  FilterContext context{{{}, rejectTransparentTexels}, &trace, tree, nullptr};
+  rtcInitIntersectContext(&context.embree);
+  context.embree.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  return context;
 }
 
 void rejectIgnoredEntity(const RTCFilterFunctionNArguments* arguments) {
@@ -163,10 +162,6 @@ void intersectPacket(RayPacket& packet, const TraceContext& trace, FilterContext
 }
 
 }  // namespace
-
-scene::EmbreeFilter alphaMaskFilter() {
-  return rejectTransparentTexels;
-}
 
 BatchTriangle findTriangle(const TraceContext& trace, HitKey key) {
   ENFILADE_ASSERT(key != kNoHit && key >> 61 < trace.trees.size());

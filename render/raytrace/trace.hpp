@@ -55,7 +55,4 @@ double traceFirstBehind(const TraceContext& trace, int x, int y, double from);
 void traceShadowRows(const TraceContext& trace, int y, const std::vector<float>& depth,
                      std::vector<std::uint8_t>& mask);
 
-/// The filter for RayScene: rejects hits on AlphaMode::mask where the texture is transparent.
-scene::EmbreeFilter alphaMaskFilter();
-
 }  // namespace enfilade::render

@@ -38,10 +38,11 @@ std::optional<Surface> intersectExactly(const TraceContext& trace, HitKey key, i
   const PlaneDepth plane = computePlaneDepth(corners, trace.rays);
   const double z = plane.numerator.at(x, y) / plane.denominator.at(x, y);
   if (!(z >= trace.rays.near && z <= trace.rays.far)) return std::nullopt;
-  if (triangle.batch->alphaMode == AlphaMode::mask) {
+  const scene::Material& material = *triangle.batch->material;
+  if (material.alpha == scene::Material::Alpha::mask) {
     const ShadedTriangle shaded(triangle, trace.rays);
     const float alpha = trace.shading.computeAlbedo(shaded, x, y)[3];
-    if (alpha < triangle.batch->material->surface[0]) return std::nullopt;
+    if (alpha < material.alphaCutoff) return std::nullopt;
   }
   return Surface{triangle.batch->id, z, plane};
 }
@@ -167,9 +168,7 @@ struct ReferenceTracer::State {
   scene::ThreadPool workers;
 
   State(std::shared_ptr<const scene::Scene> shared, int threads)
-      : scene(std::move(shared), true, alphaMaskFilter()),
-        textures(scene.model()),
-        workers(threads) {}
+      : scene(std::move(shared)), textures(scene.model()), workers(threads) {}
 };
 
 ReferenceTracer::ReferenceTracer(std::shared_ptr<const scene::Scene> scene, int threads)

@@ -77,8 +77,9 @@ constexpr std::array kCatalog{
                    "the textures are many or large; drawn at a lower resolution"},
     DiagnosticKind{"unreadable_texture", warning,
                    "not a readable PNG, JPEG or WebP; drawn without it"},
-    DiagnosticKind{"vertex_colours_ignored", warning,
-                   "vertex colours that cannot be read are not drawn"},
+    DiagnosticKind{
+        "vertex_colours_ignored", warning,
+        "colours that cannot be read, or of faces whose vertices have colours, are not drawn"},
     DiagnosticKind{"skin_ignored", error, "its node has no size: it is not posed by its skin"},
     DiagnosticKind{"instance_attributes_ignored", warning,
                    "an attribute of instances cannot be read: its objects lack it"},

@@ -110,6 +110,9 @@ struct Space {
   std::string globalId;                                ///< IFC GlobalId, or empty
   std::optional<std::uint32_t> storey = std::nullopt;  ///< an index into Model::storeys
   Aabb box;                                            ///< scene frame, metres; may be empty
+  /// Three corners per triangle of its surface, scene frame, metres; in the box. Empty: the box is
+  /// its solid.
+  std::vector<Vec3> surface = {};
 };
 
 /// A finding about the file for the user: degenerate triangles, missing textures, ...

@@ -11,6 +11,7 @@
 #include <thread>
 #include <utility>
 
+#include "scene/model/shapes/space_solid.hpp"
 #include "scene/navigation/link_routes.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
 #include "scene/navigation/stand.hpp"
@@ -26,6 +27,21 @@ constexpr int kMaxRandomTries = 200;
 void placeBody(const collision::Pose& pose, Body& own) {
   setBodyPose(own, pose.translation, pose.rotation);
   own.motionBounds = own.boxes.whole;
+}
+
+/// Points whose closest places may be in the named place: its middle on the floor, and for a room
+/// that may not fill its box the points of a grid in it.
+std::vector<Vec3> listAims(const NamedPlace& named, const Vec3& middle) {
+  constexpr int kLines = 8;
+  std::vector<Vec3> aims{middle};
+  if (named.space == nullptr) return aims;
+  const Vec3 step = named.box.size() / kLines;
+  for (int i = 0; i < kLines * kLines; ++i) {
+    const double x = named.box.min.x() + (i % kLines + 0.5) * step.x();
+    const double z = named.box.min.z() + (i / kLines + 0.5) * step.z();
+    if (isInSpace(*named.space, {x, named.middle.y(), z})) aims.emplace_back(x, middle.y(), z);
+  }
+  return aims;
 }
 
 }  // namespace
@@ -201,19 +217,25 @@ std::optional<NarrowPlace> Navigation::findNarrowest(const std::vector<Vec3>& po
   return narrowest.clearWidth < kMaxSideWidth ? std::optional(narrowest) : std::nullopt;
 }
 
-std::optional<Vec3> Navigation::findPlaceIn(const Aabb& box) {
+std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named) {
   const std::lock_guard lock(mutex_);
-  const Vec3 centre(box.centre().x(), box.min.y(), box.centre().z());
+  const Aabb& box = named.box;
+  const Vec3 centre(named.middle.x(), box.min.y(), named.middle.z());
   const auto isInside = [&](const Vec3& place) {
-    return collision::contains(inflated(box, kHeightError), {place, place});
+    return collision::contains(inflated(box, kHeightError), {place, place}) &&
+           (!named.space || isInSpace(*named.space, {place.x(), named.middle.y(), place.z()}));
   };
   if (const auto place = standAt(*walker_, centre + Vec3(0, kHeightError, 0), 2 * kHeightError);
       place && isInside(*place))
     return place;
   std::vector<std::pair<double, Vec3>> candidates;
+  const auto addCandidate = [&](const Vec3& point) {
+    candidates.emplace_back(computeGroundDistance(point, centre), point);
+  };
+  const std::vector<Vec3> aims = listAims(named, centre);
   for (const std::uint32_t polygon : ample_->findPolygons(box.centre(), 0.5 * box.size())) {
-    for (const Vec3& point : {ample_->centre(polygon), ample_->closestPoint(polygon, centre)})
-      candidates.emplace_back(computeGroundDistance(point, centre), point);
+    addCandidate(ample_->centre(polygon));
+    for (const Vec3& aim : aims) addCandidate(ample_->closestPoint(polygon, aim));
   }
   std::ranges::sort(candidates, {}, &std::pair<double, Vec3>::first);
   for (const auto& [distance, point] : candidates)

@@ -15,6 +15,7 @@
 #include "scene/navigation/links.hpp"
 #include "scene/navigation/mesh/navigation_mesh.hpp"
 #include "scene/navigation/path_finder.hpp"
+#include "scene/navigation/place_names.hpp"
 #include "scene/navigation/walker.hpp"
 #include "scene/world/world.hpp"
 
@@ -78,8 +79,8 @@ class Navigation {
   NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {});
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
   std::optional<NarrowPlace> findNarrowest(const std::vector<Vec3>& points);
-  /// The place in a box that is closest to its centre, horizontally.
-  std::optional<Vec3> findPlaceIn(const Aabb& box);
+  /// Where an agent stands in a named place, as close to its middle as it can, horizontally.
+  std::optional<Vec3> findPlaceIn(const NamedPlace& named);
   /// Where an agent at `point` stands, or else the closest place within `maxDistance` metres.
   std::optional<Vec3> snap(const Vec3& point, double maxDistance);
   /// A place that is uniform in area; nullopt: none was found.

@@ -4,31 +4,41 @@
 #include <limits>
 #include <string_view>
 
+#include "scene/model/shapes/space_solid.hpp"
+
 namespace enfilade::scene {
 namespace {
 
 constexpr double kStoreyDepth = 0.3, kStoreyHeight = 2;  // metres below and above its floor
 
-std::optional<Aabb> findRoom(const Model& model, std::string_view name) {
-  for (const Space& space : model.spaces)
-    if ((space.name == name || space.longName == name || space.globalId == name) &&
-        !space.box.empty())
-      return space.box;
+NamedPlace makePlace(const Aabb& box) {
+  return {box, box.centre(), nullptr};
+}
+
+std::optional<NamedPlace> findRoom(const Model& model, std::string_view name) {
+  for (const Space& space : model.spaces) {
+    if (space.name != name && space.longName != name && space.globalId != name) continue;
+    if (space.box.empty()) continue;
+    const Vec3 middle = findSpaceMiddle(space, space.box).point;
+    // An open surface has no inside: the box alone says where the room is.
+    const bool solid = !space.surface.empty() && isInSpace(space, middle);
+    return NamedPlace{space.box, middle, solid ? &space : nullptr};
+  }
   return std::nullopt;
 }
 
-std::optional<Aabb> findStorey(const Scene& scene, std::string_view name) {
+std::optional<NamedPlace> findStorey(const Scene& scene, std::string_view name) {
   for (const Storey& storey : scene.model().storeys) {
     if (storey.name != name && storey.globalId != name) continue;
     Aabb box = scene.bounds();
     box.min.y() = storey.elevation - kStoreyDepth;
     box.max.y() = storey.elevation + kStoreyHeight;
-    return box;
+    return makePlace(box);
   }
   return std::nullopt;
 }
 
-std::optional<Aabb> findObject(const Model& model, std::string_view name, double reach) {
+std::optional<NamedPlace> findObject(const Model& model, std::string_view name, double reach) {
   for (const Object& object : model.objects) {
     if (object.path != name && (object.globalId != name || name.empty())) continue;
     Aabb box;
@@ -38,14 +48,15 @@ std::optional<Aabb> findObject(const Model& model, std::string_view name, double
     if (box.empty()) return std::nullopt;
     box.min -= Vec3(reach, kStoreyHeight, reach);
     box.max += Vec3(reach, 0, reach);
-    return box;
+    return makePlace(box);
   }
   return std::nullopt;
 }
 
 }  // namespace
 
-std::optional<Aabb> findNamedPlace(const Scene& scene, const std::string& name, double reach) {
+std::optional<NamedPlace> findNamedPlace(const Scene& scene, const std::string& name,
+                                         double reach) {
   const auto after = [&](std::string_view prefix) -> std::optional<std::string_view> {
     if (!name.starts_with(prefix)) return std::nullopt;
     return std::string_view(name).substr(prefix.size());

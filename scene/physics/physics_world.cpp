@@ -1,6 +1,6 @@
 // Steps
-//  1. Update the pairs of awake bodies (body_pair.hpp). An awake body that hits or pushes a
-//     sleeping one, or parts from it, wakes it, and its pairs are then updated too.
+//  1. Update the pairs of awake bodies (body_pair.hpp). A body that hits or pushes a sleeping one,
+//     or parts from it, wakes it, and its pairs are then updated too.
 //  2. Solve the awake bodies and all that they may touch (solver.hpp).
 //  3. Prove every pair that could touch on its way clear
 //  (collision/motion/interpolated_motion.hpp). Where that fails, the

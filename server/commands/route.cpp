@@ -42,13 +42,13 @@ Vec3 resolvePlace(const std::string& text, const char* argument, const scene::Sc
                   scene::Navigation& navigation) {
   constexpr double kNextTo = 1;  // metres from an object
   if (const auto point = parsePoint(text)) return *point;
-  const auto box = scene::findNamedPlace(scene, text, navigation.agent().radius + kNextTo);
-  if (!box)
+  const auto named = scene::findNamedPlace(scene, text, navigation.agent().radius + kNextTo);
+  if (!named)
     throw std::runtime_error(fmt::format(
         "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey or an object; "
         "`enfilade inspect --objects` lists the names",
         argument, text));
-  const auto place = navigation.findPlaceIn(*box);
+  const auto place = navigation.findPlaceIn(*named);
   if (!place)
     throw std::runtime_error(
         fmt::format("{}: there is no free place to stand at '{}'", argument, text));

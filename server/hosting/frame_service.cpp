@@ -52,51 +52,52 @@ class FrameTurns {
  public:
   void push(PendingFrame pending) {
     const void* owner = pending.job.owner.get();
-    auto turn = std::find_if(turns_.begin(), turns_.end(),
-                             [&](const OwnerQueue& one) { return one.owner == owner; });
-    if (turn == turns_.end()) turn = turns_.insert(turns_.end(), OwnerQueue{owner, {}});
-    turn->frames.push_back(std::move(pending));
+    auto queue = std::find_if(queues_.begin(), queues_.end(),
+                              [&](const OwnerQueue& one) { return one.owner == owner; });
+    if (queue == queues_.end()) queue = queues_.insert(queues_.end(), OwnerQueue{owner, {}});
+    queue->frames.push_back(std::move(pending));
   }
-  /// The next frame, and those of the same snapshot that are next of their owners; empty: none
-  /// waits. Of each owner that has its turn, the other frames wait for the next turn.
+  /// The next frame, and the next frames of all owners as long as they show the same snapshot;
+  /// empty: none waits. The owners that had their turn go to the end.
   FrameGroup pop() {
     FrameGroup group;
-    std::deque<OwnerQueue> later;
     std::size_t pixels = 0;
     const auto joins = [&](const PendingFrame& frame) {
-      const bool fits =
-          pixels + render::countPixels(frame.job.view.camera) <= render::kMaxPixelsTogether;
-      return group.empty() || (fits && frame.job.snapshot == group.front().job.snapshot);
+      const std::size_t sum = pixels + render::countPixels(frame.job.view.camera);
+      if (!group.empty() &&
+          (sum > render::kMaxPixelsTogether || frame.job.snapshot != group.front().job.snapshot))
+        return false;
+      pixels = sum;
+      return true;
     };
-    for (std::size_t i = turns_.size(); i > 0; --i) {
-      OwnerQueue turn = std::move(turns_.front());
-      turns_.pop_front();
+    std::deque<OwnerQueue> waiting, served;
+    for (OwnerQueue& queue : queues_) {
       const std::size_t before = group.size();
-      while (!turn.frames.empty() && joins(turn.frames.front())) {
-        pixels += render::countPixels(turn.frames.front().job.view.camera);
-        group.push_back(std::move(turn.frames.front()));
-        turn.frames.pop_front();
+      while (!queue.frames.empty() && joins(queue.frames.front())) {
+        group.push_back(std::move(queue.frames.front()));
+        queue.frames.pop_front();
       }
-      if (turn.frames.empty()) continue;
-      (group.size() > before ? later : turns_).push_back(std::move(turn));
+      if (!queue.frames.empty())
+        (group.size() > before ? served : waiting).push_back(std::move(queue));
     }
-    std::ranges::move(later, std::back_inserter(turns_));
+    queues_ = std::move(waiting);
+    std::ranges::move(served, std::back_inserter(queues_));
     return group;
   }
   void cancel(const void* owner) {
-    for (OwnerQueue& turn : turns_)
-      if (turn.owner == owner)
-        std::erase_if(turn.frames, [](const PendingFrame& one) { return !one.job.onRendered; });
-    std::erase_if(turns_, [](const OwnerQueue& turn) { return turn.frames.empty(); });
+    for (OwnerQueue& queue : queues_)
+      if (queue.owner == owner)
+        std::erase_if(queue.frames, [](const PendingFrame& one) { return !one.job.onRendered; });
+    std::erase_if(queues_, [](const OwnerQueue& queue) { return queue.frames.empty(); });
   }
-  bool empty() const { return turns_.empty(); }
+  bool empty() const { return queues_.empty(); }
 
  private:
   struct OwnerQueue {
     const void* owner = nullptr;
     std::deque<PendingFrame> frames;  ///< not empty
   };
-  std::deque<OwnerQueue> turns_;
+  std::deque<OwnerQueue> queues_;
 };
 
 }  // namespace

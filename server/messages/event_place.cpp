@@ -2,6 +2,8 @@
 
 #include <optional>
 
+#include "scene/world/queries/space_query.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -11,19 +13,6 @@ constexpr double kSpaceTolerance = 0.05;
 bool hasPlace(const scene::ContactEvent& event) {
   const collision::SeparationResult& s = event.separation;
   return event.b != 0 && !(s.pointA.isZero(0) && s.pointB.isZero(0) && s.normal.isZero(0));
-}
-
-/// The smallest space around a point; null: none.
-const scene::Space* findSpace(const scene::Model& model, const scene::Vec3& point) {
-  const scene::Space* smallest = nullptr;
-  for (const scene::Space& space : model.spaces) {
-    if (space.box.empty() || (point.array() < space.box.min.array() - kSpaceTolerance).any() ||
-        (point.array() > space.box.max.array() + kSpaceTolerance).any())
-      continue;
-    if (smallest == nullptr || space.box.size().prod() < smallest->box.size().prod())
-      smallest = &space;
-  }
-  return smallest;
 }
 
 /// The storey of an object or, of a part without one, of its whole.
@@ -48,7 +37,7 @@ EventPlace findEventPlace(const scene::Model& model, const scene::ContactEvent& 
   if ((model.storeys.empty() && model.spaces.empty()) || !hasPlace(event))
     return {none, none, none};
   const scene::Vec3& point = event.separation.pointA;
-  const scene::Space* const space = findSpace(model, point);
+  const scene::Space* const space = scene::findSpace(model, point, kSpaceTolerance);
   std::optional<std::uint32_t> storey = space != nullptr ? space->storey : std::nullopt;
   if (!storey) storey = findOwnStorey(model, event.b);
   if (!storey) storey = findOwnStorey(model, event.a);

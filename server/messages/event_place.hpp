@@ -15,8 +15,8 @@ struct EventPlace {
   const std::string& roomName;  ///< IfcSpace.LongName
 };
 
-/// The room is the smallest space whose box contains the point of `a`. The storey is that of the
-/// room, else of the object b, else of the object a, else the level below the point.
+/// The room is the space whose solid contains the point of `a`, or is the nearest within 5 cm. The
+/// storey is that of the room, else of the object b, else of the object a, else the level below the point.
 EventPlace findEventPlace(const scene::Model& model, const scene::ContactEvent& event);
 
 }  // namespace enfilade::server

@@ -84,14 +84,14 @@ struct Answer {
       return avatar->footPosition;
     }
     if (place.name().empty()) return makeFieldError(field, "give a point, a name or an avatar");
-    const auto box =
+    const auto named =
         scene::findNamedPlace(scene, place.name(), navigation.agent().radius + kNextToObject);
-    if (!box)
+    if (!named)
       return makeFieldError(
           field + ".name",
           "no room, storey or object is named '" + place.name() + "', or its extent is not known",
           v1::ERROR_UNKNOWN_ENTITY);
-    const auto found = navigation.findPlaceIn(*box);
+    const auto found = navigation.findPlaceIn(*named);
     if (!found)
       return makeFieldError(field + ".name", "there is no free place at '" + place.name() + "'",
                             v1::ERROR_REFUSED_COMMAND);

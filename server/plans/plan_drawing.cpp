@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "scene/model/shapes/space_solid.hpp"
 #include "server/plans/floor_plan_section.hpp"
 
 namespace enfilade::server {
@@ -297,8 +298,9 @@ void drawSpaceNames(Canvas& canvas, const PlanView& view, const scene::Model& mo
     const Vec3 low = space.box.min.cwiseMax(view.area.min),
                high = space.box.max.cwiseMin(view.area.max);
     if (low.x() >= high.x() || low.z() >= high.z()) continue;
-    const Point centre = view.at((low + high) / 2);
-    const double width = (high.x() - low.x()) * view.unitsPerMetre;
+    const scene::SpaceMiddle middle = scene::findSpaceMiddle(space, view.area);
+    const Point centre = view.at(middle.point);
+    const double width = middle.width * view.unitsPerMetre;
     std::vector<std::string> lines;
     for (const std::string* text : {&space.longName, &space.name})
       if (!text->empty() && (lines.empty() || lines[0] != *text)) lines.push_back(*text);

@@ -85,6 +85,9 @@ bench_methods(bench_broad_phases pairs broad_phase_methods.cpp
   approaches/brute_force.cpp approaches/bsp_tree.cpp approaches/hash_grid.cpp
   approaches/interval_tree.cpp approaches/loose_octree.cpp)
 target_sources(bench_broad_phases PRIVATE broad_phase_runs.cpp)
+if(TARGET bullet_float_pairs)
+  add_dependencies(bench_broad_phases bullet_float_pairs)
+endif()
 bench_methods(bench_narrow_phases convex narrow_phase_methods.cpp our_narrow_phases.cpp)
 bench_methods(bench_mesh_queries mesh mesh_methods.cpp our_mesh_queries.cpp)
 bench_methods(bench_boxes boxes box_methods.cpp)

@@ -121,11 +121,9 @@ std::vector<Method> methodsFor(const std::shared_ptr<const scene::Scene>& scene)
   const auto gl = std::make_shared<render::GlRenderer>(scene);
   methods.push_back({"GL renderer", ignore,
                      [=](const Camera& camera) { return gl->render({}, camera, kMeasured); }});
-  for (const bool robust : {false, true}) {
-    const auto rays = std::make_shared<render::RayRenderer>(scene, render::RayOptions{2, robust});
-    methods.push_back({robust ? "rays robust (renderer)" : "rays fast", ignore,
-                       [=](const Camera& camera) { return rays->render({}, camera, kMeasured); }});
-  }
+  const auto rays = std::make_shared<render::RayRenderer>(scene);
+  methods.push_back({"rays robust (renderer)", ignore,
+                     [=](const Camera& camera) { return rays->render({}, camera, kMeasured); }});
   return methods;
 }
 

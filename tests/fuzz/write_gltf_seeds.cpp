@@ -16,6 +16,7 @@ int main(int argc, char** argv) {
       {"meshopt", tests::meshoptTerrace({})},
       {"meshopt-sequence", tests::meshoptTerrace(Options{.fallback = true, .sequence = true})},
       {"meshopt-exponential", tests::meshoptTerrace(Options{.exponential = true})},
+      {"meshopt-version1", tests::meshoptTerrace(Options{.version = 1})},
       {"draco", tests::dracoTerrace(10, false)},
       {"draco-sequential", tests::dracoTerrace(10, true)},
       {"sparse", tests::sparseTerrace(false)},

@@ -489,6 +489,25 @@ async function testSharedScenes() {
   });
 }
 
+/** A scan of a floor and one wall: the page opens with the wall in view, and not with the sky beyond the floor. */
+async function testOpenScan() {
+  const file = join(scratch, "open.ply");
+  const corners = [[-3, 0, -3], [-3, 0, 3], [3, 0, 3], [3, 0, -3], [-3, 3, -3], [-3, 3, 3]];
+  writeFileSync(file, ["ply", "format ascii 1.0", `element vertex ${corners.length}`, "property float x", "property float y", "property float z",
+    "element face 2", "property list uchar int vertex_indices", "property uchar red", "property uchar green", "property uchar blue", "end_header",
+    ...corners.map((corner) => corner.join(" ")), "4 0 1 2 3 90 90 90", "4 0 4 5 1 20 160 60", ""].join("\n"));
+  const server = await startServer(file);
+  const page = await openPage(await addressOf(server));
+  await isReady(page);
+  await run("a scan that is open to the sides is in view", async () => {
+    const forward = await page.evaluate(() => enfilade.app.view.camera.matrixWorld.elements.slice(8, 11).map((x) => -x));
+    assert.ok(forward[0] < -0.8, `the view is along ${forward}`);
+    await shoot(page, "open-scan");
+  });
+  await page.close();
+  await server.stop();
+}
+
 /** A tablet: the left half of the picture walks, the right half looks. */
 async function testTouch() {
   const server = await startServer(options.scene);
@@ -587,6 +606,7 @@ try {
   await testReplay(record);
   await testToken();
   await testSharedScenes();
+  await testOpenScan();
   await testTouch();
   await testWithoutWebGl();
 } catch (error) {

@@ -227,7 +227,7 @@ TEST(RayRenderer, PicturesDoNotDependOnTheNumberOfThreads) {
   const auto scene = sceneOf(crowd(300));
   scene::Snapshot snapshot;
   snapshot.avatars = {avatarAt(301, {1, -1, -4})};
-  RayRenderer one(scene, {1, true}), two(scene, {2, true}), five(scene, {5, true});
+  RayRenderer one(scene, {1}), two(scene, {2}), five(scene, {5});
   FrameOptions options;
   options.channels.normals = true;
   for (const Camera& camera : camerasAround(Vec3::Zero(), 6, 131, 97)) {

@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "tests/scene/hand_made_files.hpp"
+#include "tests/scene/meshopt_stream.hpp"
 
 namespace enfilade::tests {
 
@@ -223,6 +224,7 @@ inline GltfWriter quantizedTerrace(bool normalised) {
 struct MeshoptOptions {
   const char* extension = "EXT_meshopt_compression";
   bool fallback = false, sequence = false, exponential = false;
+  unsigned version = 0;  ///< of the vertex codec
 };
 
 inline GltfWriter meshoptTerrace(const MeshoptOptions& options) {
@@ -233,7 +235,9 @@ inline GltfWriter meshoptTerrace(const MeshoptOptions& options) {
   if (options.exponential)
     meshopt_encodeFilterExp(vertices.data(), count, 12, 20, terrace.positions[0].data());
   file.json["bufferViews"][0]["byteStride"] = 12;
-  file.compressView(0, options.extension, packVertices(vertices, 12), "ATTRIBUTES", 12, count,
+  const std::string packed =
+      options.version == 0 ? packVertices(vertices, 12) : packVerticesOfVersion1(vertices, 12);
+  file.compressView(0, options.extension, packed, "ATTRIBUTES", 12, count,
                     options.exponential ? "EXPONENTIAL" : "NONE", options.fallback);
   const std::string indices = options.sequence ? packSequence(terrace.indices, count)
                                                : packTriangles(terrace.indices, count);

@@ -86,6 +86,7 @@ std::vector<Encoding> listEncodings() {
       {"Meshopt", meshopt({}), 0},
       {"MeshoptWithFallback", meshopt({.fallback = true}), 0},
       {"MeshoptOfKhronos", meshopt({.extension = "KHR_meshopt_compression"}), 0},
+      {"MeshoptVersion1", meshopt({.extension = "KHR_meshopt_compression", .version = 1}), 0},
       {"MeshoptIndexSequence", meshopt({.sequence = true}), 0},
       {"MeshoptExponential", meshopt({.exponential = true}), 1e-4},
       {"Draco", [] { return tests::dracoTerrace(14, false); }, 7.0 / (1 << 14)},

@@ -193,6 +193,96 @@ TEST(GltfRestPose, AMorphTargetOfAnotherLengthIsAnError) {
   EXPECT_NE(text.find("morph target 1 has another number of vertices"), std::string::npos) << text;
 }
 
+// ---- meshes that cannot be read -----------------------------------------------------------------
+
+/// Replaces an attribute of the first primitive by one that extends beyond the file.
+void breakAttribute(GltfWriter& file, const std::string& attribute) {
+  Json& index = file.json["meshes"][0]["primitives"][0]["attributes"][attribute];
+  Json broken = file.json["accessors"][index.get<std::size_t>()];
+  broken["byteOffset"] = 1 << 24;
+  if (attribute == "POSITION") broken["min"] = {0, 0, 0}, broken["max"] = {7, 2, 7};
+  file.json["accessors"].push_back(broken);
+  index = file.json["accessors"].size() - 1;
+}
+
+/// The terrace bound to joints, and next to it an unbound one that keeps the file readable.
+GltfWriter makeBoundTerrace() {
+  GltfWriter file = tests::plainTerrace();
+  bindToJoints(file, {});
+  file.json["accessors"][0]["min"] = {0, 0, 0};
+  file.json["accessors"][0]["max"] = {7, 2, 7};
+  file.json["meshes"].push_back({{"primitives", Json::array()}});
+  file.json["meshes"][1]["primitives"].push_back(
+      {{"attributes", {{"POSITION", file.addPoints({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}})}}}});
+  file.json["nodes"].push_back({{"name", "other"}, {"mesh", 1}});
+  file.json["scenes"][0]["nodes"].push_back(3);
+  return file;
+}
+
+/// The box of the object "terrace".
+Aabb boxOfTerrace(const Model& model) {
+  Aabb box;
+  for (const Object& object : model.objects) {
+    if (!object.path.ends_with("terrace")) continue;
+    for (const Vec3& position : positionsOf(model, object)) box.include(position);
+  }
+  return box;
+}
+
+void expectBox(const Aabb& box, const Vec3& min, const Vec3& max) {
+  EXPECT_LT((box.min - min).norm(), 1e-5) << box.min.transpose();
+  EXPECT_LT((box.max - max).norm(), 1e-5) << box.max.transpose();
+}
+
+TEST(GltfRestPose, TheBoxOfAMeshThatCannotBeReadIsPosedByTheJointsThatMoveIt) {
+  const TemporaryFolder folder;
+  GltfWriter file = makeBoundTerrace();
+  breakAttribute(file, "POSITION");
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_EQ(countOf(model, "solid_mesh"), 1u);
+  EXPECT_EQ(diagnosticText(model, "solid_mesh").find("not posed"), std::string::npos);
+  // The hip raises the box of 7 x 2 x 7 m by 5 m; the knee turns it, too, with a cosine of 0.28.
+  expectBox(boxOfTerrace(model), Vec3(-0.96 * 2, 5, 0), Vec3(7, 5 + 0.96 * 7 + 0.28 * 2, 9));
+  Json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
+  std::vector<float> weights;  // of the hip alone
+  for (std::size_t v = 0; v < kVertices; ++v) weights.insert(weights.end(), {0, 1, 0, 0});
+  attributes["WEIGHTS_0"] = file.addAccessor(
+      static_cast<int>(file.addView(tests::toBytes(weights))), 5126, kVertices, "VEC4");
+  expectBox(boxOfTerrace(importModel(folder.write("hip.glb", file.glb()))), Vec3(0, 5, 0),
+            Vec3(7, 7, 7));
+}
+
+TEST(GltfRestPose, WithoutReadableJointsTheBoxStaysAndTheReportSaysSo) {
+  const TemporaryFolder folder;
+  GltfWriter file = makeBoundTerrace();
+  breakAttribute(file, "JOINTS_0");
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_EQ(countOf(model, "solid_mesh"), 1u);
+  EXPECT_NE(diagnosticText(model, "solid_mesh").find("not posed by its skin"), std::string::npos)
+      << diagnosticText(model, "solid_mesh");
+  // In the frame of its node, which doubles it and moves it by 100 m.
+  expectBox(boxOfTerrace(model), Vec3(100, 0, 0), Vec3(114, 4, 14));
+}
+
+TEST(GltfRestPose, TheBoxOfAMeshThatCannotBeReadIsMorphed) {
+  const TemporaryFolder folder;
+  GltfWriter file = makeBoundTerrace();
+  for (const char* member : {"skin", "translation", "scale"}) file.json["nodes"][0].erase(member);
+  file.json["nodes"][0]["weights"] = {0.5, -0.25};
+  addTargets(file);
+  breakAttribute(file, "POSITION");
+  const Model without = importModel(folder.write("without.glb", file.glb()));
+  EXPECT_NE(diagnosticText(without, "solid_mesh").find("without morph targets"), std::string::npos);
+  for (const auto& [target, offset] : {std::pair{0, Json{0, 2, 0}}, std::pair{1, Json{4, 0, 0}}}) {
+    const Json& targets = file.json["meshes"][0]["primitives"][0]["targets"];
+    Json& accessor = file.json["accessors"][targets[target]["POSITION"].get<std::size_t>()];
+    accessor["min"] = accessor["max"] = offset;
+  }
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_EQ(diagnosticText(model, "solid_mesh").find("without morph targets"), std::string::npos);
+  expectBox(boxOfTerrace(model), Vec3(-1, 1, 0), Vec3(6, 3, 7));
+}
+
 TEST(GltfRestPose, AMeshThatNoNodeUsesIsNoBrokenTriangle) {
   const TemporaryFolder folder;
   GltfWriter file = tests::plainTerrace();

@@ -2,7 +2,9 @@
 // and a door in the opening.
 #pragma once
 
+#include <array>
 #include <string>
+#include <vector>
 
 namespace enfilade::tests {
 
@@ -26,6 +28,25 @@ struct IfcHouse {
            "=IFCRECTANGLEPROFILEDEF(.AREA.,$," + n(1) + "," + length(width) + "," + length(depth) +
            ");\n" + n(3) + "=IFCEXTRUDEDAREASOLID(" + n(2) + ",#11,#13," + length(height) + ");\n" +
            n(4) + "=IFCSHAPEREPRESENTATION(#20,'Body','SweptSolid',(" + n(3) + "));\n" + n(5) +
+           "=IFCPRODUCTDEFINITIONSHAPE($,$,(" + n(4) + "));\n";
+  }
+  /// A prism over an outline of x and y at its placement, as box(): its product shape is id + 5.
+  /// Uses the numbers id .. id + 9 + corners.
+  std::string prism(int id, const std::vector<std::array<double, 2>>& outline,
+                    double height) const {
+    const auto n = [&](std::size_t k) {
+      return "#" + std::to_string(static_cast<std::size_t>(id) + k);
+    };
+    std::string text, corners;
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+      text += n(10 + i) + "=IFCCARTESIANPOINT((" + length(outline[i][0]) + "," +
+              length(outline[i][1]) + "));\n";
+      corners += n(10 + i) + ",";
+    }
+    return text + n(1) + "=IFCPOLYLINE((" + corners + n(10) + "));\n" + n(2) +
+           "=IFCARBITRARYCLOSEDPROFILEDEF(.AREA.,$," + n(1) + ");\n" + n(3) +
+           "=IFCEXTRUDEDAREASOLID(" + n(2) + ",#11,#13," + length(height) + ");\n" + n(4) +
+           "=IFCSHAPEREPRESENTATION(#20,'Body','SweptSolid',(" + n(3) + "));\n" + n(5) +
            "=IFCPRODUCTDEFINITIONSHAPE($,$,(" + n(4) + "));\n";
   }
   std::string placement(int id, const std::string& parent, double x, double y, double z) const {

@@ -43,6 +43,7 @@ Model smallModel() {
   model.storeys = {{"cellar", "", -2.5}, {"ground floor", "1xS3BCk291UvhgP2dvNflr", 0.25}};
   model.spaces = {{"101", "Kitchen", "0BTBFw6f90Nfh9rP1dl_3P", 1, {{0, 0.25, 0}, {3, 2.75, 4}}},
                   {"102", "", "", std::nullopt, {}}};
+  model.spaces[0].surface = {{0, 0.25, 0}, {3, 0.25, 4}, {3, 2.75, 0}};
   model.map = "EPSG:25832";
   model.north = Eigen::Vector2d(0.6, -0.8);
   model.fileScenes = {"day", "night"};
@@ -77,6 +78,7 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
   EXPECT_EQ(back.storeys[1].elevation, 0.25);
   EXPECT_EQ(back.spaces[0].longName, "Kitchen");
   EXPECT_EQ(back.spaces[0].box.max, Vec3(3, 2.75, 4));
+  EXPECT_EQ(back.spaces[0].surface, smallModel().spaces[0].surface);
   EXPECT_TRUE(back.spaces[1].box.empty());
   EXPECT_EQ(back.map, "EPSG:25832");
   EXPECT_EQ(back.north, Eigen::Vector2d(0.6, -0.8));
@@ -89,6 +91,14 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
 TEST(ModelStream, ColoursThatAreNotOnePerVertexAreRefused) {
   Model model = smallModel();
   model.meshes[0].colours.pop_back();
+  EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
+}
+
+TEST(ModelStream, ASpaceWhoseSurfaceIsCutOffOrOutsideItsBoxIsRefused) {
+  Model model = smallModel();
+  model.spaces[0].surface[1].x() = 3.5;
+  EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
+  model.spaces[0].surface = {{0, 1, 0}};
   EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
 }
 

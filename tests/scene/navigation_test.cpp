@@ -7,11 +7,13 @@
 #include <queue>
 
 #include "assets/building.hpp"
+#include "scene/model/shapes/space_solid.hpp"
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/floor_faces.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 #include "tests/scene/body_fixture.hpp"
+#include "tests/scene/prism_space.hpp"
 
 namespace enfilade::scene::testing {
 namespace {
@@ -152,15 +154,38 @@ TEST(Navigation, FindsRoomsStoreysAndObjectsByName) {
   const auto scene = std::make_shared<const Scene>(std::move(model));
   Navigation navigation(scene, {}, {});
   for (const char* name : {"A1", "Kitchen", "room:A1", "Ground", "storey:Ground", "wall/left"}) {
-    const auto box = findNamedPlace(*scene, name, 1.3);
-    ASSERT_TRUE(box) << name;
-    const auto place = navigation.findPlaceIn(*box);
+    const auto named = findNamedPlace(*scene, name, 1.3);
+    ASSERT_TRUE(named) << name;
+    const auto place = navigation.findPlaceIn(*named);
     ASSERT_TRUE(place) << name;
     EXPECT_NEAR(place->y(), 0, 0.01) << name;
   }
   EXPECT_FALSE(findNamedPlace(*scene, "storey:A1", 1));
   EXPECT_FALSE(findNamedPlace(*scene, "object:Ground", 1));
   EXPECT_FALSE(findNamedPlace(*scene, "nowhere", 1));
+}
+
+TEST(Navigation, ARoomShapedLikeAnLIsFoundInItsSolid) {
+  // The L lies along two sides of the left room; its notch contains the box's centre.
+  Model model = boxModel(twoRooms(1));
+  Space room = tests::makePrism(
+      {{1.2, -1.8}, {1.2, 2.8}, {0.2, 2.8}, {0.2, -2.8}, {3.7, -2.8}, {3.7, -1.8}}, 2.4);
+  room.name = "L";
+  model.spaces.push_back(room);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  Navigation navigation(scene, {}, {});
+  const auto named = findNamedPlace(*scene, "room:L", 1.3);
+  ASSERT_TRUE(named);
+  EXPECT_TRUE(isInSpace(room, named->middle));
+  const auto place = navigation.findPlaceIn(*named);
+  ASSERT_TRUE(place);
+  EXPECT_TRUE(isInSpace(room, *place + Vec3(0, 1, 0))) << place->transpose();
+  // Near the reflex corner the closest place is in the notch, but not in the room.
+  NamedPlace corner = *named;
+  corner.middle = Vec3(1.3, named->middle.y(), -1.7);
+  const auto inside = navigation.findPlaceIn(corner);
+  ASSERT_TRUE(inside);
+  EXPECT_TRUE(isInSpace(room, *inside + Vec3(0, 1, 0))) << inside->transpose();
 }
 
 TEST(Navigation, AStepEndsAtAWallOrSlidesAlongIt) {

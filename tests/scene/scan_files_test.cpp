@@ -307,6 +307,108 @@ TEST(ScanPly, MapCoordinatesKeepMillimetres) {
   EXPECT_NEAR(computeWorldPosition(model.objects[0], model.meshes[0], 0).x(), -0.999, 1e-6);
 }
 
+// ---- colours of faces ---------------------------------------------------------------------------
+
+struct ColouredFace {
+  std::vector<std::uint32_t> corners;
+  std::array<double, 3> colour;
+};
+
+/// A red quad, a green one and a red triangle in a row; neighbours have a common edge.
+struct ColouredStrip {
+  std::array<std::array<float, 3>, 7> positions{
+      {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {0, 1, 0}, {1, 1, 0}, {2, 1, 0}, {3, 0, 0}}};
+  std::array<ColouredFace, 3> faces{
+      {{{0, 1, 4, 3}, {1, 0, 0}}, {{1, 2, 5, 4}, {0, 0.50196, 0}}, {{2, 6, 5}, {1, 0, 0}}}};
+
+  std::string makeHeader(const std::string& format, const std::string& type,
+                         const std::string& vertexProperties = "") const {
+    std::string text = "ply\nformat " + format + " 1.0\nelement vertex 7\n";
+    for (const char* axis : {"x", "y", "z"}) text += std::string("property float ") + axis + "\n";
+    text += vertexProperties + "element face 3\nproperty list uchar int vertex_indices\n";
+    for (const char* name : {"red", "green", "blue"})
+      text += "property " + type + " " + name + "\n";
+    return text + "end_header\n";
+  }
+};
+
+template <class Channel>
+std::string makeColouredBinaryPly(const std::string& type, double full, bool bigEndian) {
+  const ColouredStrip strip;
+  NumberWriter body(bigEndian);
+  for (const auto& p : strip.positions) body.add(p[0]).add(p[1]).add(p[2]);
+  for (const ColouredFace& face : strip.faces) {
+    body.add(static_cast<std::uint8_t>(face.corners.size()));
+    for (const std::uint32_t corner : face.corners) body.add(static_cast<std::int32_t>(corner));
+    for (const double channel : face.colour)
+      body.add(static_cast<Channel>(full > 1 ? channel * full + 0.5 : channel));
+  }
+  return strip.makeHeader(bigEndian ? "binary_big_endian" : "binary_little_endian", type) +
+         body.text;
+}
+
+std::string makeColouredTextPly(const std::string& type, double full) {
+  const ColouredStrip strip;
+  std::string text = strip.makeHeader("ascii", type);
+  for (const auto& p : strip.positions)
+    for (const float v : p) text += std::to_string(v) + " ";
+  for (const ColouredFace& face : strip.faces) {
+    text += "\n" + std::to_string(face.corners.size());
+    for (const std::uint32_t corner : face.corners) text += " " + std::to_string(corner);
+    for (const double channel : face.colour)
+      text +=
+          " " + (full > 1 ? std::to_string(std::lround(channel * full)) : std::to_string(channel));
+  }
+  return text + "\n";
+}
+
+TEST(ScanColours, OfFacesSplitTheVerticesWhereTheyDiffer) {
+  const TemporaryFolder folder;
+  const VertexColour red{255, 0, 0, 255}, green{0, 128, 0, 255};
+  for (const std::string& text :
+       {makeColouredTextPly("uchar", 255), makeColouredTextPly("float", 1),
+        makeColouredBinaryPly<std::uint8_t>("uchar", 255, false),
+        makeColouredBinaryPly<std::uint8_t>("uchar", 255, true),
+        makeColouredBinaryPly<std::uint16_t>("ushort", 65535, true),
+        makeColouredBinaryPly<float>("float", 1, false),
+        makeColouredBinaryPly<float>("float", 1, true)}) {
+    SCOPED_TRACE(text.substr(0, 30));
+    const Model model = importModel(folder.write("a.ply", text));
+    EXPECT_EQ(countOf(model, "vertex_colours_ignored"), 0u);
+    EXPECT_EQ(model.materials.at(0).baseColour, Eigen::Vector4f(1, 1, 1, 1));
+    const Mesh& mesh = model.meshes.at(0);
+    ASSERT_EQ(mesh.triangleCount(), 5u);
+    EXPECT_EQ(mesh.positions.size(), 7u + 4);  // 1, 4, 2 and 5 have both colours
+    ASSERT_EQ(mesh.colours.size(), mesh.positions.size());
+    for (std::size_t i = 0; i < mesh.indices.size(); ++i) {
+      const std::size_t triangle = i / 3;
+      EXPECT_EQ(mesh.colours[mesh.indices[i]], triangle == 2 || triangle == 3 ? green : red) << i;
+    }
+    // The winding and the places are kept: 2.5 square metres, seen from +z.
+    double area = 0;
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
+      const Eigen::Vector3f& a = mesh.positions[mesh.indices[i]];
+      const Eigen::Vector3f b = mesh.positions[mesh.indices[i + 1]] - a;
+      area += static_cast<double>(b.cross(mesh.positions[mesh.indices[i + 2]] - a).z()) / 2;
+    }
+    EXPECT_DOUBLE_EQ(area, 2.5);
+  }
+}
+
+TEST(ScanColours, OfVerticesArePreferredToThoseOfFaces) {
+  const TemporaryFolder folder;
+  const ColouredStrip strip;
+  std::string text = strip.makeHeader(
+      "ascii", "uchar", "property uchar red\nproperty uchar green\nproperty uchar blue\n");
+  for (const auto& p : strip.positions)
+    text += std::to_string(p[0]) + " " + std::to_string(p[1]) + " 0 0 0 255\n";
+  text += "4 0 1 4 3 255 0 0\n4 1 2 5 4 0 128 0\n3 2 6 5 255 0 0\n";
+  const Model model = importModel(folder.write("both.ply", text));
+  EXPECT_EQ(model.meshes.at(0).colours, std::vector<VertexColour>(7, {0, 0, 255, 255}));
+  EXPECT_EQ(diagnosticText(model, "vertex_colours_ignored"),
+            "mesh: those of its faces, because its vertices have colours, too");
+}
+
 TEST(ScanSizes, ACountThatTheFileCannotHoldIsRefused) {
   const TemporaryFolder folder;
   for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {

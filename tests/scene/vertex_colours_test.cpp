@@ -3,8 +3,11 @@
 #include <gtest/gtest.h>
 
 #include <array>
+#include <cmath>
+#include <limits>
 
 #include "scene/import/cache/deduplicate_meshes.hpp"
+#include "scene/import/gltf/encoding/meshopt_view.hpp"
 #include "tests/scene/encoded_gltf.hpp"
 #include "tests/scene/import_outcome.hpp"
 
@@ -74,6 +77,80 @@ TEST(VertexColours, OfGltfAreLinearInAllEncodings) {
                                   : addColours<float>(file, 5126, channels, 1);
       expectNear(readColours(file), wantedColours(channels == 4));
     }
+  }
+}
+
+/// A colour of K bits a channel as the filter "COLOR" takes it. Green, red and alpha lose at most
+/// their last bit.
+template <class Channel>
+std::array<Channel, 4> encodeColour(const std::array<int, 4>& rgba, int bits) {
+  const auto [r, g, b, a] = rgba;
+  const int co = (r - b) >> 1, middle = b + co, cg = (g - middle) >> 1;
+  return {static_cast<Channel>(middle + cg), static_cast<Channel>(co), static_cast<Channel>(cg),
+          static_cast<Channel>(1 << (bits - 1) | a >> 1)};
+}
+
+template <class Channel>
+void expectColoursDecoded(int bits) {
+  SCOPED_TRACE(bits);
+  constexpr int kFull = std::numeric_limits<Channel>::max();
+  const int full = (1 << bits) - 1;
+  std::vector<std::array<int, 4>> colours;
+  for (int i = 0; i < 81; ++i)  // the corners, edges and faces of the colour space, and alpha
+    colours.push_back(
+        {i % 3 * full / 2, i / 3 % 3 * full / 2, i / 9 % 3 * full / 2, i / 27 * full / 2});
+  std::vector<std::array<Channel, 4>> encoded;
+  for (const auto& colour : colours) encoded.push_back(encodeColour<Channel>(colour, bits));
+  const std::size_t stride = 4 * sizeof(Channel);
+  std::string bytes;
+  const std::string packed = tests::packVertices(tests::toBytes(encoded), stride);
+  ASSERT_EQ(decodeMeshoptView({colours.size(), stride, "ATTRIBUTES", "COLOR", packed}, bytes), "");
+  ASSERT_EQ(bytes.size(), colours.size() * stride);
+  std::vector<std::array<Channel, 4>> decoded(colours.size());
+  std::memcpy(decoded.data(), bytes.data(), bytes.size());
+  for (std::size_t i = 0; i < colours.size(); ++i)
+    for (std::size_t c = 0; c < 4; ++c)
+      EXPECT_LE(std::abs(decoded[i][c] - static_cast<double>(kFull) * colours[i][c] / full),
+                static_cast<double>(kFull) / full + 0.5)
+          << i << ' ' << c;
+}
+
+TEST(VertexColours, OfMeshoptsFilterAreDecodedWithinAStepOfTheirBits) {
+  for (const int bits : {4, 6, 8}) expectColoursDecoded<std::uint8_t>(bits);
+  for (const int bits : {8, 11, 16}) expectColoursDecoded<std::uint16_t>(bits);
+  // A colour whose bits are all known: half of 6 bits, 32 of 63, is 129.5 of 255.
+  std::string bytes;
+  const std::string grey = tests::packVertices(std::string("\x20\0\0\x3f", 4), 4);
+  ASSERT_EQ(decodeMeshoptView({1, 4, "ATTRIBUTES", "COLOR", grey}, bytes), "");
+  EXPECT_EQ(bytes, "\x82\x82\x82\xff");
+  const std::string without = tests::packVertices(std::string("\x20\0\0\1", 4), 4);
+  EXPECT_EQ(decodeMeshoptView({1, 4, "ATTRIBUTES", "COLOR", without}, bytes),
+            "its compressed colours are damaged");
+  EXPECT_EQ(decodeMeshoptView({1, 12, "ATTRIBUTES", "COLOR", without}, bytes),
+            "colours of neither 4 nor 8 bytes");
+}
+
+TEST(VertexColours, OfMeshoptsFilterAreDrawn) {
+  for (const char* extension : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
+    GltfWriter file = plainTriangle();
+    std::vector<std::array<std::uint8_t, 4>> encoded;
+    for (const auto& colour : kLinear) {
+      std::array<int, 4> bytes{};
+      for (std::size_t c = 0; c < 4; ++c) bytes[c] = static_cast<int>(colour[c] * 255 + 0.5);
+      encoded.push_back(encodeColour<std::uint8_t>(bytes, 8));
+    }
+    const unsigned view = file.addView(tests::toBytes(encoded), 4);
+    file.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] =
+        file.addAccessor(static_cast<int>(view), 5121, 3, "VEC4", true);
+    file.compressView(view, extension, tests::packVertices(tests::toBytes(encoded), 4),
+                      "ATTRIBUTES", 4, 3, "COLOR", false);
+    file.use(extension);
+    const std::vector<VertexColour> read = readColours(file), wanted = wantedColours(true);
+    ASSERT_EQ(read.size(), wanted.size());
+    // A step of linear 8 bits near black is 13 of sRGB.
+    for (std::size_t i = 0; i < read.size(); ++i)
+      for (std::size_t c = 0; c < 4; ++c)
+        EXPECT_NEAR(read[i][c], wanted[i][c], 13) << i << ' ' << c;
   }
 }
 

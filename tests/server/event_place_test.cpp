@@ -48,6 +48,29 @@ TEST(EventPlace, IsTheSmallestRoomAroundThePoint) {
   expectPlace(makeContact({-0.04, 1, 1}, 2), "Ground", "1", "Hall");
 }
 
+TEST(EventPlace, IsNotTheRoomWhoseNotchContainsThePoint) {
+  scene::Model model;
+  model.spaces = {{"L", "", "", std::nullopt, {Vec3(0, 0, 0), Vec3(6, 2.5, 6)}},
+                  {"H", "", "", std::nullopt, {Vec3(2, 0, 2), Vec3(12, 2.5, 12)}}};
+  // The L's triangles: walls along its outline, floor and ceiling of three squares.
+  const std::vector<Vec3> outline{{0, 0, 0}, {0, 0, 6}, {2, 0, 6}, {2, 0, 2}, {6, 0, 2}, {6, 0, 0}};
+  const Vec3 up(0, 2.5, 0);
+  std::vector<Vec3>& surface = model.spaces[0].surface;
+  for (std::size_t i = 0; i < outline.size(); ++i) {
+    const Vec3 a = outline[i], b = outline[(i + 1) % outline.size()];
+    for (const Vec3& corner : {a, b, Vec3(b + up), a, Vec3(b + up), Vec3(a + up)})
+      surface.push_back(corner);
+  }
+  for (const auto& [i, j, k] : {std::array{0, 3, 1}, {1, 3, 2}, {0, 5, 3}, {3, 5, 4}}) {
+    const Vec3 a = outline[i], b = outline[j], c = outline[k];
+    for (const Vec3& corner : {a, b, c, Vec3(a + up), Vec3(c + up), Vec3(b + up)})
+      surface.push_back(corner);
+  }
+  EXPECT_EQ(findEventPlace(model, makeContact({4, 1, 4}, 1)).room, "H");
+  EXPECT_EQ(findEventPlace(model, makeContact({1, 1, 5}, 1)).room, "L");
+  EXPECT_EQ(findEventPlace(model, makeContact({5, 1, 1}, 1)).room, "L");
+}
+
 TEST(EventPlace, WithoutARoomTheStoreyIsThatOfTheObjectOrTheLevelBelow) {
   expectPlace(makeContact({20, 0.5, 1}, 1), "Upper", "", "");
   expectPlace(makeContact({20, 4, 1}, 2), "Upper", "", "");

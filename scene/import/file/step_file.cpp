@@ -15,6 +15,7 @@ std::string_view trim(std::string_view text) {
 
 /// Blanks out /* comments */ outside of strings; an unclosed comment is kept.
 void blankComments(std::string& text) {
+  if (text.find("/*") == std::string::npos) return;  // most files: several times as fast
   bool quoted = false;
   for (std::size_t i = 0; i + 1 < text.size(); ++i) {
     if (text[i] == '\'') quoted = !quoted;
@@ -116,6 +117,7 @@ StepFile::StepFile(std::string text) : text_(std::move(text)) {
   }
   byId_.resize(statements_.size());
   for (std::uint32_t i = 0; i < byId_.size(); ++i) byId_[i] = i;
+  if (std::ranges::is_sorted(statements_, {}, &StepStatement::id)) return;
   std::stable_sort(byId_.begin(), byId_.end(), [&](std::uint32_t a, std::uint32_t b) {
     return statements_[a].id < statements_[b].id;
   });

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 
 #include "scene/import/gltf/encoding/gltf_json.hpp"
@@ -105,6 +106,49 @@ Eigen::Vector3d transformNormal(const Eigen::Matrix3d& linear, const Eigen::Vect
   return turned.norm() > 0 ? Eigen::Vector3d(turned.normalized()) : normal;
 }
 
+using WeightVisitor = std::function<void(std::size_t vertex, std::size_t joint, double weight)>;
+
+/// Calls `visit` with each weight that is not 0. Throws ImportError.
+void visitWeights(const RestPose& pose, std::size_t vertices, GltfBuffers& buffers,
+                  const std::string& name, const PrimitiveArrays& arrays,
+                  const WeightVisitor& visit) {
+  for (int set = 0; arrays.contains("JOINTS_" + std::to_string(set)); ++set) {
+    const std::vector<float>& joints = arrays.at("JOINTS_" + std::to_string(set));
+    const auto weights = arrays.find("WEIGHTS_" + std::to_string(set));
+    if (joints.size() != kJointsOfSet * vertices || weights == arrays.end() ||
+        weights->second.size() != joints.size())
+      buffers.fail(name + ": its joints and weights do not fit its vertices");
+    for (std::size_t i = 0; i < joints.size(); ++i) {
+      const double weight = static_cast<double>(weights->second[i]);
+      if (weight == 0) continue;
+      if (!(joints[i] >= 0) || joints[i] >= static_cast<float>(pose.nodeFromJoint.size()))
+        buffers.fail(name + ": joint " + std::to_string(joints[i]) + " is not in its skin");
+      visit(i / kJointsOfSet, static_cast<std::size_t>(joints[i]), weight);
+    }
+  }
+}
+
+/// The arrays JOINTS_n and WEIGHTS_n of a primitive. Throws ImportError.
+PrimitiveArrays readInfluences(const Json& primitive, GltfBuffers& buffers,
+                               const std::string& name) {
+  const Json* draco =
+      findMember(findMember(&primitive, "extensions"), "KHR_draco_mesh_compression");
+  if (findMember(findMember(draco, "attributes"), "JOINTS_0") != nullptr)
+    buffers.fail(name + ": its joints are in its Draco data");
+  const Json* attributes = findMember(&primitive, "attributes");
+  PrimitiveArrays arrays;
+  for (const char* kind : {"JOINTS_", "WEIGHTS_"}) {
+    for (int set = 0;; ++set) {
+      const std::string attribute = kind + std::to_string(set);
+      if (findMember(attributes, attribute.c_str()) == nullptr) break;
+      const auto accessor = readIndexMember(attributes, attribute.c_str());
+      if (!accessor) buffers.fail(name + ": its " + attribute + " is not an accessor");
+      arrays[attribute] = buffers.readFloats(*accessor, kJointsOfSet);
+    }
+  }
+  return arrays;
+}
+
 }  // namespace
 
 std::map<std::size_t, RestPose> separatePosedMeshes(Json& gltf, GltfBuffers& buffers,
@@ -123,7 +167,7 @@ std::map<std::size_t, RestPose> separatePosedMeshes(Json& gltf, GltfBuffers& buf
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     const auto mesh = readIndexMember(&nodes[n], "mesh"), skin = readIndexMember(&nodes[n], "skin");
     if (!mesh || *mesh >= meshes->size()) continue;
-    RestPose pose{readMorphWeights(nodes[n], (*meshes)[*mesh]), {}};
+    RestPose pose{*mesh, readMorphWeights(nodes[n], (*meshes)[*mesh]), {}};
     if (skin) {
       const std::string name = "skins[" + std::to_string(*skin) + "]";
       if (*skin >= skins.size()) buffers.fail(name + " does not exist");
@@ -165,21 +209,10 @@ void applySkin(const RestPose& pose, GltfBuffers& buffers, const std::string& na
   std::vector<float>& positions = arrays.at("POSITION");
   const std::size_t vertices = positions.size() / 3;
   std::vector<Eigen::Matrix4d> blended(vertices, Eigen::Matrix4d::Zero());
-  for (int set = 0; arrays.contains("JOINTS_" + std::to_string(set)); ++set) {
-    const std::vector<float>& joints = arrays.at("JOINTS_" + std::to_string(set));
-    const auto weights = arrays.find("WEIGHTS_" + std::to_string(set));
-    if (joints.size() != kJointsOfSet * vertices || weights == arrays.end() ||
-        weights->second.size() != joints.size())
-      buffers.fail(name + ": its joints and weights do not fit its vertices");
-    for (std::size_t i = 0; i < joints.size(); ++i) {
-      const double weight = static_cast<double>(weights->second[i]);
-      if (weight == 0) continue;
-      if (!(joints[i] >= 0) || joints[i] >= static_cast<float>(pose.nodeFromJoint.size()))
-        buffers.fail(name + ": joint " + std::to_string(joints[i]) + " is not in its skin");
-      blended[i / kJointsOfSet] +=
-          weight * pose.nodeFromJoint[static_cast<std::size_t>(joints[i])].matrix();
-    }
-  }
+  visitWeights(pose, vertices, buffers, name, arrays,
+               [&](std::size_t vertex, std::size_t joint, double weight) {
+                 blended[vertex] += weight * pose.nodeFromJoint[joint].matrix();
+               });
   const auto normals = arrays.find("NORMAL");
   for (std::size_t v = 0; v < vertices; ++v) {
     const double sum = blended[v](3, 3);  // of the weights; rounded ones rarely add up to 1
@@ -190,6 +223,33 @@ void applySkin(const RestPose& pose, GltfBuffers& buffers, const std::string& na
       setVector(normals->second, v,
                 transformNormal(transform.linear(), vectorAt(normals->second, v)));
   }
+}
+
+Aabb computePosedBox(const RestPose& pose, const Aabb& box, const Json& primitive,
+                     GltfBuffers& buffers, const std::string& name) {
+  const PrimitiveArrays arrays = readInfluences(primitive, buffers, name);
+  const auto joints = arrays.find("JOINTS_0");
+  const std::size_t vertices = joints == arrays.end() ? 0 : joints->second.size() / kJointsOfSet;
+  std::vector<double> sums(vertices);
+  std::vector<bool> used(pose.nodeFromJoint.size());
+  visitWeights(pose, vertices, buffers, name, arrays,
+               [&](std::size_t vertex, std::size_t joint, double weight) {
+                 if (!(weight > 0)) buffers.fail(name + ": has a negative weight");
+                 sums[vertex] += weight;
+                 used[joint] = true;
+               });
+  // Vertices without weights follow the first joint.
+  used[0] = used[0] || vertices == 0 || std::ranges::count(sums, 0.0) > 0;
+  Aabb posed;
+  for (std::size_t joint = 0; joint < used.size(); ++joint) {
+    for (unsigned corner = 0; used[joint] && corner < 8; ++corner) {
+      const Vec3 point((corner & 1U) != 0 ? box.max.x() : box.min.x(),
+                       (corner & 2U) != 0 ? box.max.y() : box.min.y(),
+                       (corner & 4U) != 0 ? box.max.z() : box.min.z());
+      posed.include(pose.nodeFromJoint[joint] * point);
+    }
+  }
+  return posed;
 }
 
 }  // namespace enfilade::scene

@@ -16,6 +16,7 @@
 namespace enfilade::scene {
 
 struct RestPose {
+  std::size_t mesh = 0;                        ///< the mesh of the file that has this pose
   std::vector<double> morphWeights;            ///< by morph target
   std::vector<Eigen::Affine3d> nodeFromJoint;  ///< by joint: from the mesh as bound to the node
 };
@@ -35,5 +36,11 @@ void applyMorphTargets(const RestPose& pose, const nlohmann::json& targets, Gltf
 /// Moves positions and normals with the joints; `arrays` holds JOINTS_n and WEIGHTS_n, too.
 void applySkin(const RestPose& pose, GltfBuffers& buffers, const std::string& name,
                PrimitiveArrays& arrays);
+
+/// The box of all places where the skin can put a point of `box`: for each joint that moves a
+/// vertex of the primitive, the box of the corners after it. Needs the skin's joints and the
+/// primitive's weights, but not its positions. Throws ImportError if they cannot be read.
+Aabb computePosedBox(const RestPose& pose, const Aabb& box, const nlohmann::json& primitive,
+                     GltfBuffers& buffers, const std::string& name);
 
 }  // namespace enfilade::scene

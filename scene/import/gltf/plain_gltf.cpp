@@ -153,6 +153,7 @@ class MeshRewriter {
   MeshRewriter(const Json& original, GltfBuffers& buffers, GltfBinary& binary,
                std::vector<Diagnostic>& problems)
       : original_(original),
+        buffers_(buffers),
         binary_(binary),
         problems_(problems),
         primitives_(original, buffers, binary, problems) {}
@@ -198,10 +199,12 @@ class MeshRewriter {
     }
     if (firstError_.empty()) firstError_ = fault;
     if (fault.find(place) == std::string::npos) fault = place + ": " + fault;
-    return replaceUnreadable(original, getArray(original_, "accessors"), fault, binary_, problems_);
+    return replaceUnreadable({original, pose, fault}, getArray(original_, "accessors"), buffers_,
+                             binary_, problems_);
   }
 
   const Json& original_;
+  GltfBuffers& buffers_;
   GltfBinary& binary_;
   std::vector<Diagnostic>& problems_;
   PlainPrimitives primitives_;
@@ -231,8 +234,12 @@ void rewriteMeshes(Json& gltf, GltfBuffers& buffers, GltfBinary& binary,
   bool readAny = false;
   for (std::size_t m = 0; m < meshes->size(); ++m) {
     const auto pose = poses.find(m);
-    rewriter.rewrite((*meshes)[m], "meshes[" + std::to_string(m) + "]",
-                     pose == poses.end() ? nullptr : &pose->second);
+    const RestPose* const own = pose == poses.end() ? nullptr : &pose->second;
+    const std::size_t number = own == nullptr ? m : own->mesh;
+    std::vector<Diagnostic> before;
+    if (!used[m]) before = problems;
+    rewriter.rewrite((*meshes)[m], "meshes[" + std::to_string(number) + "]", own);
+    if (!used[m]) problems = std::move(before);  // those of a mesh that is not drawn do not count
     readAny = readAny || (rewriter.readAny() && used[m]);
   }
   if (!readAny && !rewriter.firstError().empty()) throw ImportError(rewriter.firstError());

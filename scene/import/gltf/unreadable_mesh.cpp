@@ -1,5 +1,6 @@
 #include "scene/import/gltf/unreadable_mesh.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
@@ -12,7 +13,6 @@ namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
-using Corner = std::array<float, 3>;
 
 /// The value of the largest integer of a component type (glTF 2.0, 3.6.2.2); 1 for floats.
 double getFullScale(std::size_t componentType) {
@@ -31,55 +31,86 @@ double getFullScale(std::size_t componentType) {
 }
 
 /// The member "min" or "max" of an accessor of positions.
-std::optional<Corner> readCorner(const Json& accessor, const char* key) {
+std::optional<Vec3> readCorner(const Json& accessor, const char* key) {
   const Json& numbers = getArray(accessor, key);
   if (numbers.size() != 3) return std::nullopt;
   const Json* normalised = findMember(&accessor, "normalized");
   const bool scaled = normalised != nullptr && *normalised == true;
   const double scale =
       scaled ? getFullScale(readIndexMember(&accessor, "componentType").value_or(0)) : 1;
-  Corner corner{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    if (!numbers[axis].is_number()) return std::nullopt;
-    corner[axis] = static_cast<float>(numbers[axis].get<double>() / scale);
-    if (!std::isfinite(corner[axis])) return std::nullopt;
+  Vec3 corner;
+  for (int axis = 0; axis < 3; ++axis) {
+    const Json& number = numbers[static_cast<std::size_t>(axis)];
+    if (!number.is_number()) return std::nullopt;
+    corner[axis] = number.get<double>() / scale;
+    if (!std::isfinite(static_cast<float>(corner[axis]))) return std::nullopt;
   }
   return corner;
 }
 
-struct Extent {
-  Corner min, max;
-};
-
-std::optional<Extent> readExtent(const Json& primitive, const Json& accessors) {
-  const auto index = readIndexMember(findMember(&primitive, "attributes"), "POSITION");
-  if (!index || *index >= accessors.size()) return std::nullopt;
-  const auto min = readCorner(accessors[*index], "min");
-  const auto max = readCorner(accessors[*index], "max");
+/// The extent that an accessor of positions states; nullopt without a valid one.
+std::optional<Aabb> readExtent(const std::optional<std::size_t>& accessor, const Json& accessors) {
+  if (!accessor || *accessor >= accessors.size()) return std::nullopt;
+  const auto min = readCorner(accessors[*accessor], "min");
+  const auto max = readCorner(accessors[*accessor], "max");
   if (!min || !max) return std::nullopt;
-  for (std::size_t axis = 0; axis < 3; ++axis)
-    if ((*min)[axis] > (*max)[axis]) return std::nullopt;
-  return Extent{*min, *max};
+  const Aabb box{*min, *max};
+  return box.empty() ? std::nullopt : std::optional(box);
+}
+
+/// Adds the stated extents of morph targets times their weights. False if one states none.
+bool morphBox(const RestPose& pose, const Json& targets, const Json& accessors, Aabb& box) {
+  for (std::size_t t = 0; t < std::min(targets.size(), pose.morphWeights.size()); ++t) {
+    const double weight = pose.morphWeights[t];
+    if (weight == 0 || findMember(&targets[t], "POSITION") == nullptr) continue;
+    const auto offsets = readExtent(readIndexMember(&targets[t], "POSITION"), accessors);
+    if (!offsets) return false;
+    box.min += weight * (weight > 0 ? offsets->min : offsets->max);
+    box.max += weight * (weight > 0 ? offsets->max : offsets->min);
+  }
+  return true;
+}
+
+/// The box in the rest pose. Adds to `fault` what could not be applied.
+Aabb poseBox(const RestPose& pose, Aabb box, const Json& primitive, const Json& accessors,
+             GltfBuffers& buffers, std::string& fault) {
+  if (!morphBox(pose, getArray(primitive, "targets"), accessors, box))
+    fault += "; its box is without morph targets, because one states no extent";
+  if (pose.nodeFromJoint.empty()) return box;
+  try {
+    return computePosedBox(pose, box, primitive, buffers, "a primitive");
+  } catch (const UnreadableGltf&) {
+    throw;
+  } catch (const ImportError&) {
+    fault += "; its box is not posed by its skin, because its joints cannot be read either";
+  }
+  return box;
 }
 
 }  // namespace
 
-Json replaceUnreadable(const Json& primitive, const Json& accessors, const std::string& fault,
+Json replaceUnreadable(const UnreadableMesh& mesh, const Json& accessors, GltfBuffers& buffers,
                        GltfBinary& binary, std::vector<Diagnostic>& problems) {
-  const auto extent = readExtent(primitive, accessors);
-  addDiagnostic(problems, extent ? "solid_mesh" : "missing_mesh", fault);
-  if (!extent) return nullptr;
+  const Json& primitive = mesh.primitive;
+  std::optional<Aabb> box =
+      readExtent(readIndexMember(findMember(&primitive, "attributes"), "POSITION"), accessors);
+  std::string fault = mesh.fault;
+  if (box && mesh.pose != nullptr)
+    box = poseBox(*mesh.pose, *box, primitive, accessors, buffers, fault);
+  addDiagnostic(problems, box ? "solid_mesh" : "missing_mesh", fault);
+  if (!box) return nullptr;
   std::vector<float> positions;
   for (unsigned corner = 0; corner < 8; ++corner)
-    for (unsigned axis = 0; axis < 3; ++axis)
-      positions.push_back((corner >> axis & 1U) != 0 ? extent->max[axis] : extent->min[axis]);
+    for (int axis = 0; axis < 3; ++axis)
+      positions.push_back(
+          static_cast<float>((corner >> axis & 1) != 0 ? box->max[axis] : box->min[axis]));
   static constexpr std::array<std::uint32_t, 36> kFaces{0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6,
                                                         0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7,
                                                         0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};
-  Json box{{"attributes", {{"POSITION", binary.addFloats(positions, 3)}}},
-           {"indices", binary.addIndices(kFaces)}};
-  if (primitive.contains("material")) box["material"] = primitive["material"];
-  return box;
+  Json solid{{"attributes", {{"POSITION", binary.addFloats(positions, 3)}}},
+             {"indices", binary.addIndices(kFaces)}};
+  if (primitive.contains("material")) solid["material"] = primitive["material"];
+  return solid;
 }
 
 }  // namespace enfilade::scene

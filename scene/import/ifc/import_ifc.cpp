@@ -5,9 +5,11 @@
 #include <chrono>
 #include <cstdio>
 #include <set>
+#include <thread>
 
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/finish_model.hpp"
+#include "scene/import/file/ifc_parts.hpp"
 #include "scene/import/ifc/elevators.hpp"
 #include "scene/import/ifc/ifc_file.hpp"
 #include "scene/import/ifc/ifc_readers.hpp"
@@ -25,6 +27,9 @@ constexpr double kImportTimeFraction =
     0.95;  // of the time limit; the rest is for sending the result
 constexpr double kReaderTimeFraction = 0.6;  // of the remaining time, if another reader may follow
 constexpr std::size_t kTextMemoryDivisor = 8;  // the text may take 1/8 of the memory limit
+constexpr std::size_t kReaderProcesses = 2;    // of web-ifc for one large file
+/// Bytes of text from which a second process, which starts in 0.1 s, pays.
+constexpr std::size_t kMinDividedText = std::size_t{16} << 20;
 constexpr std::size_t kMaxTextBytes = std::size_t{4} << 30;  // bytes, without a memory limit
 
 std::string describeProduct(const IfcProduct& product) {
@@ -200,7 +205,24 @@ class IfcImport {
     std::vector<std::uint32_t> read = wanted_;
     for (const IfcProduct& product : metadata_.products)
       if (product.hasBody && product.role == IfcProduct::Role::space) read.push_back(product.id);
-    input_.emplace(request_, file.text(), std::move(read));
+    const std::vector<IfcPart> parts = divideForProcesses(file, read);
+    input_.emplace(request_, file.text(), std::move(read), parts);
+  }
+
+  /// The parts that processes of web-ifc read at the same time; empty: one process reads all. A
+  /// damaged file is read whole, because its readers may find other statements than the index.
+  std::vector<IfcPart> divideForProcesses(const StepFile& file,
+                                          const std::vector<std::uint32_t>& products) const {
+    const bool pays = file.text().size() >= kMinDividedText &&
+                      products.size() >= kReaderProcesses &&
+                      std::thread::hardware_concurrency() >= kReaderProcesses;
+    if (!pays || !isReaderAllowed(IfcReader::webIfc) || !metadata_.complete ||
+        file.damagedCount() > 0)
+      return {};
+    std::vector<IfcPart> parts = divideIfc(file, products, kReaderProcesses);
+    const bool divided =
+        std::ranges::none_of(parts, [](const IfcPart& part) { return part.products.empty(); });
+    return divided ? parts : std::vector<IfcPart>();
   }
 
   void reportProgress(const char* stage, double fraction) const {

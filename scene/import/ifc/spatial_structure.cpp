@@ -15,18 +15,19 @@ bool isStorey(const IfcProduct& product) {
   return product.ifcClass == "IfcBuildingStorey";
 }
 
-/// In the scene's axes, before the offset is subtracted; empty without geometry.
-Aabb computeSpaceBox(const IfcMeshes& meshes, std::uint32_t space,
-                     const Eigen::Affine3d& worldFromReader) {
-  Aabb box;
+/// The corners of the triangles, relative to `offset` in the scene's axes; empty without geometry.
+std::vector<Vec3> collectSpaceSurface(const IfcMeshes& meshes, std::uint32_t space,
+                                      const Eigen::Affine3d& worldFromReader, const Vec3& offset) {
+  std::vector<Vec3> corners;
   const auto found = meshes.products.find(space);
-  if (found == meshes.products.end()) return box;
+  if (found == meshes.products.end()) return corners;
   for (const IfcPlacedGeometry& placed : found->second) {
     const Eigen::Affine3d transform = worldFromReader * placed.worldFromGeometry;
-    for (const Eigen::Vector3f& position : meshes.geometries.at(placed.geometry).positions)
-      box.include(transform * position.cast<double>());
+    const IfcGeometry& geometry = meshes.geometries.at(placed.geometry);
+    for (const std::uint32_t index : geometry.indices)
+      corners.push_back(transform * geometry.positions[index].cast<double>() - offset);
   }
-  return box;
+  return corners;
 }
 
 /// North in the scene's horizontal plane; nullopt if the file states none, or an --up axis turned
@@ -70,6 +71,19 @@ class PathBuilder {
   std::map<std::uint32_t, std::string> paths_;
   std::map<std::uint32_t, SiblingNames> siblings_;
 };
+
+/// Whether the triangles' areas cancel, as those of the surface of a solid do in each direction.
+bool isClosed(const std::vector<Vec3>& corners) {
+  constexpr double kMaxShare = 1e-6;  // of the surface
+  Vec3 sum = Vec3::Zero();
+  double total = 0;
+  for (std::size_t i = 0; i + 2 < corners.size(); i += 3) {
+    const Vec3 area = (corners[i + 1] - corners[i]).cross(corners[i + 2] - corners[i]);
+    sum += area;
+    total += area.norm();
+  }
+  return sum.norm() <= kMaxShare * total;
+}
 
 }  // namespace
 
@@ -122,11 +136,9 @@ void addSpatialStructure(const IfcMetadata& metadata, const StoreyTable& storeys
   for (const IfcProduct& product : metadata.products) {
     if (product.role != IfcProduct::Role::space) continue;
     Space space{product.name, product.longName, product.globalId, storeys.find(product), {}};
-    space.box = computeSpaceBox(meshes, product.id, worldFromReader);
-    if (!space.box.empty()) {
-      space.box.min -= model.offset;
-      space.box.max -= model.offset;
-    }
+    space.surface = collectSpaceSurface(meshes, product.id, worldFromReader, model.offset);
+    for (const Vec3& corner : space.surface) space.box.include(corner);
+    if (!isClosed(space.surface)) space.surface.clear();  // the box is the solid
     model.spaces.push_back(std::move(space));
   }
 }

@@ -2,6 +2,7 @@
 
 #include <cmath>
 #include <fstream>
+#include <unordered_map>
 #include <utility>
 
 #include "scene/import/assembly/coordinates.hpp"
@@ -57,23 +58,58 @@ bool hasUsableNormals(const ScanMesh& scan) {
 }
 
 /// Converts the vertices that triangles use: scans often have loose points around the surface.
+/// Where triangles of different colours meet, a vertex is split: each colour gets one.
+class ScanVertices {
+ public:
+  ScanVertices(const ScanMesh& scan, const Vec3& shift, Mesh& mesh)
+      : scan_(scan),
+        shift_(shift),
+        mesh_(mesh),
+        hasNormals_(hasUsableNormals(scan)),
+        first_(scan.positions.size(), kNoVertex) {}
+
+  /// The vertex of a triangle's corner.
+  std::uint32_t convert(std::uint32_t corner, std::size_t triangle) {
+    const bool byTriangle = !scan_.triangleColours.empty();
+    const VertexColour colour = byTriangle              ? scan_.triangleColours[triangle]
+                                : scan_.colours.empty() ? VertexColour{}
+                                                        : scan_.colours[corner];
+    std::uint32_t& first = first_[corner];
+    if (first == kNoVertex) return first = add(corner, colour);
+    if (!byTriangle || mesh_.colours[first] == colour) return first;
+    const std::uint64_t key = std::uint64_t{corner} << 24U | std::uint64_t{colour[0]} << 16U |
+                              std::uint64_t{colour[1]} << 8U | colour[2];
+    const auto [known, isNew] = split_.try_emplace(key, kNoVertex);
+    if (isNew) known->second = add(corner, colour);
+    return known->second;
+  }
+
+ private:
+  static constexpr std::uint32_t kNoVertex = 0xffffffff;
+
+  std::uint32_t add(std::uint32_t corner, const VertexColour& colour) {
+    mesh_.positions.push_back((scan_.positions[corner] - shift_).cast<float>());
+    if (scan_.hasColours()) mesh_.colours.push_back(colour);
+    if (hasNormals_) mesh_.normals.push_back(scan_.normals[corner].normalized());
+    return static_cast<std::uint32_t>(mesh_.positions.size() - 1);
+  }
+
+  const ScanMesh& scan_;
+  const Vec3& shift_;
+  Mesh& mesh_;
+  bool hasNormals_;
+  std::vector<std::uint32_t> first_;                        ///< by vertex of the scan
+  std::unordered_map<std::uint64_t, std::uint32_t> split_;  ///< by vertex of the scan and colour
+};
+
 Mesh convertScanMesh(const ScanMesh& scan, const Vec3& shift, const std::string& name,
                      std::vector<Diagnostic>& diagnostics) {
-  constexpr std::uint32_t kUnused = 0xffffffff;
-  std::vector<std::uint32_t> newIndex(scan.positions.size(), kUnused);
-  const bool normals = hasUsableNormals(scan);
   Mesh mesh;
   mesh.name = name;
   mesh.indices.reserve(scan.indices.size());
-  for (const std::uint32_t old : scan.indices) {
-    if (newIndex[old] == kUnused) {
-      newIndex[old] = static_cast<std::uint32_t>(mesh.positions.size());
-      mesh.positions.push_back((scan.positions[old] - shift).cast<float>());
-      if (!scan.colours.empty()) mesh.colours.push_back(scan.colours[old]);
-      if (normals) mesh.normals.push_back(scan.normals[old].normalized());
-    }
-    mesh.indices.push_back(newIndex[old]);
-  }
+  ScanVertices vertices(scan, shift, mesh);
+  for (std::size_t i = 0; i < scan.indices.size(); ++i)
+    mesh.indices.push_back(vertices.convert(scan.indices[i], i / 3));
   std::size_t flat = 0;
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
     const Vec3 a = mesh.positions[mesh.indices[i]].cast<double>();
@@ -99,9 +135,10 @@ Material makeScanMaterial(const ScanMesh& scan, const std::string& name,
   if (!scan.textureFile.empty())
     addDiagnostic(diagnostics, "missing_texture",
                   scan.textureFile + ": textures of PLY are not read");
-  if (scan.hasFaceColours)
-    addDiagnostic(diagnostics, "vertex_colours_ignored", name + ": colours of its faces");
-  if (!scan.colours.empty()) material.baseColour.setOnes();
+  if (scan.hasUnusedFaceColours)
+    addDiagnostic(diagnostics, "vertex_colours_ignored",
+                  name + ": those of its faces, because its vertices have colours, too");
+  if (scan.hasColours()) material.baseColour.setOnes();
   return material;
 }
 

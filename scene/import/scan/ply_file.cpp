@@ -1,5 +1,5 @@
 // Reads the elements in the order of the header: of "vertex" positions, normals and colours, of
-// "face" polygons, of "tristrips" strips that -1 ends. All else is skipped.
+// "face" polygons and their colours, of "tristrips" strips that -1 ends. All else is skipped.
 #include "scene/import/scan/ply_file.hpp"
 
 #include <algorithm>
@@ -66,15 +66,15 @@ class PlyValues {
   BinaryCursor binary_;
 };
 
-/// What the import takes from a vertex.
-enum class VertexField : std::uint8_t { x, y, z, nx, ny, nz, red, green, blue, count };
-constexpr std::size_t kVertexFields = static_cast<std::size_t>(VertexField::count);
-using VertexValues = std::array<double, kVertexFields>;
+/// What the import takes from a vertex, or from a face: colours only.
+enum class PlyField : std::uint8_t { x, y, z, nx, ny, nz, red, green, blue, count };
+constexpr std::size_t kPlyFields = static_cast<std::size_t>(PlyField::count);
+using PlyFieldValues = std::array<double, kPlyFields>;
 
-std::size_t findVertexField(const std::string& name) {
-  static constexpr std::array<std::string_view, kVertexFields> kNames{
+std::size_t findPlyField(const std::string& name) {
+  static constexpr std::array<std::string_view, kPlyFields> kNames{
       "x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"};
-  if (name.starts_with("diffuse_")) return findVertexField(name.substr(8));
+  if (name.starts_with("diffuse_")) return findPlyField(name.substr(8));
   return static_cast<std::size_t>(std::find(kNames.begin(), kNames.end(), name) - kNames.begin());
 }
 
@@ -83,6 +83,29 @@ double getFullColour(PlyType type) {
   if (type == PlyType::float32 || type == PlyType::float64) return 1;
   return type == PlyType::uint16 ? 65535 : 255;
 }
+
+/// The fields of an element.
+struct PlyLayout {
+  std::vector<std::size_t> fields;         ///< by property: a PlyField, otherwise kPlyFields
+  std::array<bool, kPlyFields + 1> has{};  ///< by field
+  double fullColour = 255;
+
+  explicit PlyLayout(const PlyElement& element) {
+    for (const PlyProperty& property : element.properties) {
+      fields.push_back(property.countType ? kPlyFields : findPlyField(property.name));
+      has[fields.back()] = true;
+      if (fields.back() == static_cast<std::size_t>(PlyField::red))
+        fullColour = getFullColour(property.type);
+    }
+  }
+  bool hasNormals() const { return has[3] && has[4] && has[5]; }
+  bool hasColours() const { return has[6] && has[7] && has[8]; }
+  /// Writers of PLY give sRGB. Their alpha is left out: the surface of a scan is opaque.
+  VertexColour makeColour(const PlyFieldValues& values) const {
+    const auto channel = [&](std::size_t field) { return toByte(values[field] / fullColour); };
+    return {channel(6), channel(7), channel(8), 255};
+  }
+};
 
 class PlyReader {
  public:
@@ -121,43 +144,36 @@ class PlyReader {
   }
 
   void readVertices(const PlyElement& element) {
-    std::array<bool, kVertexFields + 1> has{};
-    std::vector<std::size_t> fields;
-    for (const PlyProperty& property : element.properties) {
-      fields.push_back(property.countType ? kVertexFields : findVertexField(property.name));
-      has[fields.back()] = true;
-      if (fields.back() == static_cast<std::size_t>(VertexField::red))
-        fullColour_ = getFullColour(property.type);
-    }
-    if (!has[0] || !has[1] || !has[2]) failPly("its vertices have no x, y and z");
-    hasNormals_ = has[3] && has[4] && has[5];
-    hasColours_ = has[6] && has[7] && has[8];
+    const PlyLayout layout(element);
+    if (!layout.has[0] || !layout.has[1] || !layout.has[2])
+      failPly("its vertices have no x, y and z");
     mesh_.positions.reserve(element.count);
-    if (hasNormals_) mesh_.normals.reserve(element.count);
-    if (hasColours_) mesh_.colours.reserve(element.count);
+    if (layout.hasNormals()) mesh_.normals.reserve(element.count);
+    if (layout.hasColours()) mesh_.colours.reserve(element.count);
     for (std::size_t i = 0; i < element.count; ++i) {
-      VertexValues vertex{};
-      for (std::size_t p = 0; p < fields.size(); ++p) {
+      PlyFieldValues vertex{};
+      for (std::size_t p = 0; p < element.properties.size(); ++p) {
         const PlyProperty& property = element.properties[p];
         if (property.countType) {
           skipList(property);
         } else {
-          const double value = values_.read(property.type);
-          if (fields[p] < kVertexFields) vertex[fields[p]] = value;
+          readField(property, layout.fields[p], vertex);
         }
       }
       requireData(element, i);
-      addVertex(vertex);
+      addVertex(layout, vertex);
     }
   }
 
-  void addVertex(const VertexValues& v) {
+  void addVertex(const PlyLayout& layout, const PlyFieldValues& v) {
     mesh_.positions.emplace_back(v[0], v[1], v[2]);
-    if (hasNormals_) mesh_.normals.push_back(Vec3(v[3], v[4], v[5]).cast<float>());
-    if (!hasColours_) return;
-    // Writers of PLY give sRGB. Their alpha is left out: the surface of a scan is opaque.
-    const auto channel = [&](std::size_t field) { return toByte(v[field] / fullColour_); };
-    mesh_.colours.push_back({channel(6), channel(7), channel(8), 255});
+    if (layout.hasNormals()) mesh_.normals.push_back(Vec3(v[3], v[4], v[5]).cast<float>());
+    if (layout.hasColours()) mesh_.colours.push_back(layout.makeColour(v));
+  }
+
+  void readField(const PlyProperty& property, std::size_t field, PlyFieldValues& values) {
+    const double value = values_.read(property.type);
+    if (field < kPlyFields) values[field] = value;
   }
 
   /// Reads the length of a list; it is no longer than the bytes that follow.
@@ -176,13 +192,17 @@ class PlyReader {
 
   void readOthers(const PlyElement& element) {
     const bool face = element.name == "face", strips = element.name == "tristrips";
-    for (const PlyProperty& property : element.properties)
-      mesh_.hasFaceColours |= face && property.name == "red";
+    const PlyLayout layout(element);
+    const bool coloured = (face || strips) && layout.hasColours();
+    hasFaceColours_ |= coloured;
     for (std::size_t i = 0; i < element.count; ++i) {
-      for (const PlyProperty& property : element.properties) {
+      const std::size_t firstRun = runs_.size();
+      PlyFieldValues values{};
+      for (std::size_t p = 0; p < element.properties.size(); ++p) {
+        const PlyProperty& property = element.properties[p];
         const bool corners = property.name == "vertex_indices" || property.name == "vertex_index";
         if (!property.countType) {
-          values_.read(property.type);
+          readField(property, layout.fields[p], values);
         } else if (corners && (face || strips)) {
           readCorners(property, strips);
         } else {
@@ -190,6 +210,9 @@ class PlyReader {
         }
       }
       requireData(element, i);
+      if (!coloured) continue;
+      for (std::size_t r = firstRun; r < runs_.size(); ++r)
+        runs_[r].colour = layout.makeColour(values);
     }
   }
 
@@ -213,7 +236,7 @@ class PlyReader {
   }
 
   void addRun(const std::vector<std::int64_t>& run, bool strip) {
-    runs_.push_back({corners_.size(), strip});
+    runs_.push_back({corners_.size(), {255, 255, 255, 255}, strip});
     for (const std::int64_t corner : run) {
       const bool possible = corner >= 0 && corner < kNoVertex;
       corners_.push_back(possible ? static_cast<std::uint32_t>(corner) : kNoVertex);
@@ -227,6 +250,8 @@ class PlyReader {
   }
 
   void addFaces() {
+    mesh_.hasUnusedFaceColours = hasFaceColours_ && !mesh_.colours.empty();
+    const bool coloured = hasFaceColours_ && mesh_.colours.empty();
     for (std::size_t i = 0; i < runs_.size(); ++i) {
       const std::size_t end = i + 1 < runs_.size() ? runs_[i + 1].first : corners_.size();
       const std::span<const std::uint32_t> run(corners_.data() + runs_[i].first,
@@ -240,6 +265,7 @@ class PlyReader {
       } else {
         triangulatePolygon(run, mesh_.positions, mesh_.indices);
       }
+      if (coloured) mesh_.triangleColours.resize(mesh_.indices.size() / 3, runs_[i].colour);
     }
   }
 
@@ -255,14 +281,14 @@ class PlyReader {
   static constexpr std::uint32_t kNoVertex = 0xffffffff;
   struct Run {
     std::size_t first;  ///< index into corners_
+    VertexColour colour;
     bool strip;
   };
 
   PlyHeader header_;
   PlyValues values_;
   ScanMesh mesh_;
-  bool hasNormals_ = false, hasColours_ = false;
-  double fullColour_ = 255;
+  bool hasFaceColours_ = false;
   std::vector<std::uint32_t> corners_;
   std::vector<Run> runs_;
 };

@@ -17,9 +17,13 @@ struct ScanMesh {
   std::vector<Eigen::Vector3f> normals;  ///< empty, or one per position
   std::vector<VertexColour> colours;     ///< empty, or one per position
   std::vector<std::uint32_t> indices;    ///< three per triangle, each below positions.size()
-  std::string textureFile;               ///< not read; empty: none
-  bool hasFaceColours = false;           ///< not read
-  std::size_t brokenFaces = 0;           ///< left out: an index out of range or a vertex not finite
+  /// Empty, or one per triangle; never together with `colours`.
+  std::vector<VertexColour> triangleColours;
+  std::string textureFile;            ///< not read; empty: none
+  bool hasUnusedFaceColours = false;  ///< left out, because the vertices have colours, too
+  std::size_t brokenFaces = 0;        ///< left out: an index out of range or a vertex not finite
+
+  bool hasColours() const { return !colours.empty() || !triangleColours.empty(); }
 };
 
 }  // namespace enfilade::scene

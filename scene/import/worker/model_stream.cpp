@@ -125,6 +125,7 @@ void write(StreamWriter& out, const Space& space) {
   if (space.box.empty()) return;
   out.putMatrix(space.box.min);
   out.putMatrix(space.box.max);
+  out.putArray(space.surface);
 }
 
 Space readSpace(StreamReader& in, std::size_t storeys) {
@@ -137,6 +138,11 @@ Space readSpace(StreamReader& in, std::size_t storeys) {
   space.box.min = in.getMatrix<Vec3>("space minimum");
   space.box.max = in.getMatrix<Vec3>("space maximum");
   if (space.box.empty()) in.fail("space maximum", "below the minimum");
+  space.surface = in.getArray<Vec3>("space surface");
+  if (space.surface.size() % 3 != 0) in.fail("space surface", "not three per triangle");
+  for (const Vec3& corner : space.surface)
+    if (!contains(space.box, {corner, corner}))
+      in.fail("space surface", "a corner outside the box");
   return space;
 }
 

@@ -78,22 +78,6 @@ void addHull(collision::Hull hull, CollisionGeometry& geometry) {
   geometry.localHulls.push_back(std::move(hull));
 }
 
-/// Signed crossing of a ray from `point` with a triangle. The sum over a surface is its winding
-/// number: 1 inside a solid whose faces look outwards. Both triangles of an edge give exactly
-/// opposite areas, so a ray slips between them only if it meets the edge to the last bit.
-int computeCrossing(const collision::Triangle& t, const Vec3& point) {
-  const Vec3 ray{0.8017, 0.5345, 0.2673};  // parallel to no axis of any building
-  const std::array<Vec3, 3> p{t[0] - point, t[1] - point, t[2] - point};
-  std::array<double, 3> area;
-  for (std::size_t i = 0; i < 3; ++i) area[i] = ray.dot(p[i].cross(p[(i + 1) % 3]));
-  const bool leaves = area[0] > 0 && area[1] > 0 && area[2] > 0;
-  const bool enters = area[0] < 0 && area[1] < 0 && area[2] < 0;
-  if (!leaves && !enters) return 0;
-  const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]);
-  const bool ahead = (normal.dot(p[0]) > 0) == (normal.dot(ray) > 0);
-  return ahead ? (leaves ? 1 : -1) : 0;
-}
-
 }  // namespace
 
 bool hasNumericalArea(const collision::Triangle& t) {
@@ -197,6 +181,19 @@ std::vector<collision::CompoundView> makeCompoundViews(const CollisionGeometry& 
         {&triangles, collision::Mat3::Identity(), geometry.origin,
          [&geometry](std::uint32_t item) { return geometry.convex(geometry.hullCount() + item); }});
   return views;
+}
+
+int computeCrossing(const collision::Triangle& t, const Vec3& point) {
+  const Vec3 ray{0.8017, 0.5345, 0.2673};  // parallel to no axis of any building
+  const std::array<Vec3, 3> p{t[0] - point, t[1] - point, t[2] - point};
+  std::array<double, 3> area;
+  for (std::size_t i = 0; i < 3; ++i) area[i] = ray.dot(p[i].cross(p[(i + 1) % 3]));
+  const bool leaves = area[0] > 0 && area[1] > 0 && area[2] > 0;
+  const bool enters = area[0] < 0 && area[1] < 0 && area[2] < 0;
+  if (!leaves && !enters) return 0;
+  const Vec3 normal = (p[1] - p[0]).cross(p[2] - p[0]);
+  const bool ahead = (normal.dot(p[0]) > 0) == (normal.dot(ray) > 0);
+  return ahead ? (leaves ? 1 : -1) : 0;
 }
 
 bool isInsideTriangleShells(const CollisionGeometry& geometry, const Vec3& point) {

@@ -103,6 +103,11 @@ std::vector<collision::Triangle> collectSolidTriangles(const Model& model, std::
 /// True if collision uses the hull of this shell with this transform.
 bool isTreatedAsHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& transform);
 
+/// Signed crossing of a ray from `point` with a triangle. The sum over a surface is its winding
+/// number: 1 inside a solid whose faces look outwards. Both triangles of an edge give exactly
+/// opposite areas, so a ray slips between them only if it meets the edge to the last bit.
+int computeCrossing(const collision::Triangle& t, const Vec3& point);
+
 /// True if `point` lies inside a closed surface of the triangles (not of the hulls), by winding
 /// number. For points on the surface either result is possible.
 bool isInsideTriangleShells(const CollisionGeometry& geometry, const Vec3& point);

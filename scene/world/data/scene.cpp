@@ -317,6 +317,11 @@ const std::vector<Aabb>& Scene::objectBoxes() const {
   return objectBoxes_;
 }
 
+SceneTrees& Scene::trees(const std::function<std::shared_ptr<SceneTrees>()>& make) const {
+  std::call_once(treesMade_, [&] { trees_ = make(); });
+  return *trees_;
+}
+
 Scene::Memory Scene::memory() const {
   Memory memory;
   memory.geometry = shapes_->bytes();

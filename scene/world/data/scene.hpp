@@ -2,6 +2,7 @@
 // Immutable to its readers, thread-safe, shared by worlds.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <span>
@@ -13,6 +14,8 @@
 #include "scene/world/data/body_shape.hpp"
 
 namespace enfilade::scene {
+
+class SceneTrees;
 
 class Scene {
  public:
@@ -54,6 +57,9 @@ class Scene {
   /// call, from any thread.
   const std::vector<Aabb>& objectBoxes() const;
 
+  /// The trees for rays, made by the first call, from any thread. Use SceneTrees::of().
+  SceneTrees& trees(const std::function<std::shared_ptr<SceneTrees>()>& make) const;
+
   std::size_t shapeCount() const { return meshesOfShape_.size(); }
   /// Index of the object's shape, < shapeCount().
   std::uint32_t shapeIndex(std::uint32_t object) const { return shapeIndexOfObject_[object]; }
@@ -84,9 +90,10 @@ class Scene {
   std::unique_ptr<LazyArray<Shape>> shapes_;
   std::unique_ptr<LazyArray<CollisionGeometry>> collisionGeometries_;
   std::vector<std::uint32_t> denseIndices_;
-  mutable std::once_flag classesBuilt_, boxesBuilt_;
+  mutable std::once_flag classesBuilt_, boxesBuilt_, treesMade_;
   mutable ObjectClasses classes_;
   mutable std::vector<Aabb> objectBoxes_;
+  mutable std::shared_ptr<SceneTrees> trees_;
   std::unique_ptr<Prefetcher> prefetcher_;  ///< last: its thread uses all others
 };
 

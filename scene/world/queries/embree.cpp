@@ -19,6 +19,12 @@ void throwIfEmbreeFailed(RTCDevice device, const char* doing) {
                     doing);
 }
 
+void filterMaskedHits(const RTCFilterFunctionNArguments* arguments) {
+  const auto* context =
+      reinterpret_cast<const QueryContext<RTCIntersectContext>*>(arguments->context);
+  if (context->maskFilter) context->maskFilter(arguments);
+}
+
 }  // namespace
 
 void EmbreeRelease::operator()(RTCDeviceTy* device) const {
@@ -41,12 +47,10 @@ std::string embreeName() {
   return "Embree " RTC_VERSION_STRING;
 }
 
-EmbreeScene makeEmbreeScene(RTCDeviceTy* device, const EmbreeSceneOptions& options) {
+EmbreeScene makeEmbreeScene(RTCDeviceTy* device) {
   EmbreeScene scene(rtcNewScene(device));
-  const auto flags = RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION |
-                     (options.robust ? RTC_SCENE_FLAG_ROBUST : RTC_SCENE_FLAG_NONE) |
-                     (options.compact ? RTC_SCENE_FLAG_COMPACT : RTC_SCENE_FLAG_NONE);
-  rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(flags));
+  rtcSetSceneFlags(scene.get(), static_cast<RTCSceneFlags>(RTC_SCENE_FLAG_CONTEXT_FILTER_FUNCTION |
+                                                           RTC_SCENE_FLAG_ROBUST));
   rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_MEDIUM);
   return scene;
 }
@@ -69,26 +73,25 @@ TriangleBuffers makeTriangleBuffers(RTCDeviceTy* device, std::size_t positions,
 }
 
 void attachTriangles(const TriangleBuffers& buffers, RTCSceneTy* scene, unsigned number,
-                     EmbreeFilter filter) {
-  if (filter) {
-    rtcSetGeometryIntersectFilterFunction(buffers.geometry, filter);
-    rtcSetGeometryOccludedFilterFunction(buffers.geometry, filter);
+                     bool masked) {
+  if (masked) {
+    rtcSetGeometryIntersectFilterFunction(buffers.geometry, filterMaskedHits);
+    rtcSetGeometryOccludedFilterFunction(buffers.geometry, filterMaskedHits);
   }
   rtcCommitGeometry(buffers.geometry);
   rtcAttachGeometryByID(scene, buffers.geometry, number);
   rtcReleaseGeometry(buffers.geometry);
 }
 
-EmbreeScene buildTriangleTree(RTCDeviceTy* device, const EmbreeSceneOptions& options,
-                              std::span<const Eigen::Vector3f> positions,
-                              std::span<const std::uint32_t> corners, EmbreeFilter filter) {
+EmbreeScene buildTriangleTree(RTCDeviceTy* device, std::span<const Eigen::Vector3f> positions,
+                              std::span<const std::uint32_t> corners, bool masked) {
   ENFILADE_ASSERT(!corners.empty() && corners.size() % 3 == 0);
   const std::size_t triangles = corners.size() / 3;
   const TriangleBuffers buffers = makeTriangleBuffers(device, positions.size(), triangles);
   std::copy(positions.begin(), positions.end(), buffers.positions);
   std::copy_n(corners.begin(), 3 * triangles, buffers.corners);
-  EmbreeScene tree = makeEmbreeScene(device, options);
-  attachTriangles(buffers, tree.get(), 0, filter);
+  EmbreeScene tree = makeEmbreeScene(device);
+  attachTriangles(buffers, tree.get(), 0, masked);
   commitScene(device, tree.get());
   return tree;
 }
@@ -101,14 +104,12 @@ bool canBeInstanced(const Eigen::Affine3d& sceneFromInstance) {
 }
 
 void addInstance(RTCDeviceTy* device, RTCSceneTy* scene, unsigned number,
-                 RTCSceneTy* instancedScene, const Eigen::Affine3d& sceneFromInstance,
-                 unsigned mask) {
+                 RTCSceneTy* instancedScene, const Eigen::Affine3d& sceneFromInstance) {
   const Eigen::Matrix<float, 3, 4, Eigen::RowMajor> transform =
       sceneFromInstance.matrix().topRows<3>().cast<float>();
   const RTCGeometry instance = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE);
   rtcSetGeometryInstancedScene(instance, instancedScene);
   rtcSetGeometryTransform(instance, 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, transform.data());
-  rtcSetGeometryMask(instance, mask);
   rtcCommitGeometry(instance);
   rtcAttachGeometryByID(scene, instance, number);
   rtcReleaseGeometry(instance);
@@ -119,9 +120,10 @@ void commitScene(RTCDeviceTy* device, RTCSceneTy* scene) {
   throwIfEmbreeFailed(device, "building the tree of a scene");
 }
 
-RTCSceneTy* MeshTrees::findOrBuild(const Mesh& mesh, EmbreeFilter filter) {
+RTCSceneTy* MeshTrees::findOrBuild(const Mesh& mesh, bool masked) {
   if (const auto found = trees_.find(&mesh); found != trees_.end()) return found->second.get();
-  EmbreeScene tree = buildTriangleTree(device(), options_, mesh.positions, mesh.indices, filter);
+  EmbreeScene tree = buildTriangleTree(device(), mesh.positions, mesh.indices, masked);
+  ++built_;
   return (trees_[&mesh] = std::move(tree)).get();
 }
 

@@ -1,9 +1,8 @@
 // Owners of Embree objects, and functions that build trees. Does not include Embree's headers.
 //
-// RayCaster and the ray renderer build their trees with this file, but share no tree at run time.
-// Their trees differ in layout (compact or fast), origin and copied meshes. A ray through a common
-// edge hits two triangles at equal distance, and the layout decides between them, so that a shared
-// tree would change answers or pictures. Also, each of the two follows snapshots on its own thread.
+// All trees are robust: no ray passes between adjacent triangles. They are shared by queries with
+// different filters (QueryContext), so no tree contains a query's own filter. An object under
+// construction belongs to one thread; a committed tree may be traced by any number of threads.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -41,14 +40,18 @@ using EmbreeScene = std::unique_ptr<RTCSceneTy, EmbreeRelease>;
 EmbreeDevice makeEmbreeDevice();
 std::string embreeName();  ///< "Embree 3.13.5"
 
-struct EmbreeSceneOptions {
-  bool robust = true;    ///< no ray passes between adjacent triangles; false: a fifth faster
-  bool compact = false;  ///< uses less memory
-};
-EmbreeScene makeEmbreeScene(RTCDeviceTy* device, const EmbreeSceneOptions& options);
+EmbreeScene makeEmbreeScene(RTCDeviceTy* device);
 
 /// Accepts or rejects a hit for each ray of a packet; see RTCFilterFunctionN.
 using EmbreeFilter = void (*)(const RTCFilterFunctionNArguments*);
+
+/// The start of each query's context. `EmbreeContext` is RTCIntersectContext, whose own filter sees
+/// all hits.
+template <class EmbreeContext>
+struct QueryContext {
+  EmbreeContext embree;
+  EmbreeFilter maskFilter;  ///< sees hits on masked triangles first; null: none is cut out
+};
 
 /// Buffers of a geometry under construction, in Embree's memory to avoid a copy.
 struct TriangleBuffers {
@@ -59,26 +62,23 @@ struct TriangleBuffers {
 /// Both sizes are above 0.
 TriangleBuffers makeTriangleBuffers(RTCDeviceTy* device, std::size_t positions,
                                     std::size_t triangles);
-/// Attaches them to `scene` as geometry `number`. `filter` may be null.
+/// Attaches them to `scene` as geometry `number`. `masked`: QueryContext::maskFilter sees its hits.
 void attachTriangles(const TriangleBuffers& buffers, RTCSceneTy* scene, unsigned number,
-                     EmbreeFilter filter = nullptr);
+                     bool masked);
 
-/// The committed tree of one geometry; `corners`: three per triangle, not empty. `filter` may be
-/// null. Throws like commitScene().
-EmbreeScene buildTriangleTree(RTCDeviceTy* device, const EmbreeSceneOptions& options,
-                              std::span<const Eigen::Vector3f> positions,
-                              std::span<const std::uint32_t> corners,
-                              EmbreeFilter filter = nullptr);
+/// The committed tree of one geometry; `corners`: three per triangle, not empty. Throws like
+/// commitScene().
+EmbreeScene buildTriangleTree(RTCDeviceTy* device, std::span<const Eigen::Vector3f> positions,
+                              std::span<const std::uint32_t> corners, bool masked);
 
 /// True if Embree can hold an instance with this transform. Embree inverts it in floats, and
 /// Debian's build terminates the program if that fails, as for an object that a file flattens.
 bool canBeInstanced(const Eigen::Affine3d& sceneFromInstance);
 
-/// Adds `instancedScene` to `scene`, which shares its ownership, as instance `number`. A ray hits
-/// it if their masks have a common bit. canBeInstanced() must hold.
+/// Adds `instancedScene` to `scene`, which shares its ownership, as instance `number`.
+/// canBeInstanced() must hold.
 void addInstance(RTCDeviceTy* device, RTCSceneTy* scene, unsigned number,
-                 RTCSceneTy* instancedScene, const Eigen::Affine3d& sceneFromInstance,
-                 unsigned mask = 0xFFFF'FFFFu);
+                 RTCSceneTy* instancedScene, const Eigen::Affine3d& sceneFromInstance);
 
 /// Builds the tree. Throws EmbreeError or std::bad_alloc if any call failed since the last commit.
 void commitScene(RTCDeviceTy* device, RTCSceneTy* scene);
@@ -86,19 +86,15 @@ void commitScene(RTCDeviceTy* device, RTCSceneTy* scene);
 /// A device with one tree per mesh, for instancing. Use it on one thread at a time.
 class MeshTrees {
  public:
-  /// Throws EmbreeError if Embree is unavailable.
-  explicit MeshTrees(const EmbreeSceneOptions& options) : options_(options) {}
-
   RTCDeviceTy* device() const { return device_.get(); }
-  const EmbreeSceneOptions& options() const { return options_; }
-  /// The tree of a mesh that has triangles and outlives this cache. `filter` may be null; only the
-  /// first call for a mesh uses it.
-  RTCSceneTy* findOrBuild(const Mesh& mesh, EmbreeFilter filter = nullptr);
+  /// The tree of a mesh that has triangles and outlives this cache.
+  RTCSceneTy* findOrBuild(const Mesh& mesh, bool masked);
+  std::size_t builtCount() const { return built_; }
 
  private:
-  EmbreeSceneOptions options_;
   EmbreeDevice device_ = makeEmbreeDevice();
   std::map<const Mesh*, EmbreeScene> trees_;
+  std::size_t built_ = 0;
 };
 
 }  // namespace enfilade::scene

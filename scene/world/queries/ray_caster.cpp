@@ -10,7 +10,7 @@
 #include <string>
 
 #include "collision/shapes/triangle_tree.hpp"
-#include "scene/world/queries/embree.hpp"
+#include "scene/world/queries/scene_trees.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -18,7 +18,6 @@ namespace {
 using collision::Triangle;
 
 constexpr double kMaxCoordinate = 1e7;  // metres, as for commands
-constexpr unsigned kOpaqueMask = 1, kTransparentMask = 2;
 // Relative error of Embree's float distance. If the double-precision distance differs by more, the
 // ray meets the plane at a grazing angle, and Embree's distance is the better one.
 constexpr double kFloatError = 1e-4;
@@ -32,41 +31,46 @@ struct HullSurface {
   EmbreeScene tree;  ///< null without triangles
 };
 
-/// A placed mesh or hull: one Embree instance. Its index in the group is Embree's instance id.
-struct SurfaceInstance {
-  EntityId entity = 0;
-  const Mesh* mesh = nullptr;
-  const HullSurface* hull = nullptr;  ///< not null: instead of `mesh`
-  Eigen::Affine3d worldFromSurface = Eigen::Affine3d::Identity();
+/// The hulls of all avatars under one tree.
+struct AvatarHulls {
+  struct Instance {
+    EntityId entity = 0;
+    const HullSurface* hull = nullptr;
+    Eigen::Affine3d worldFromHull = Eigen::Affine3d::Identity();
+  };
+  std::vector<Instance> instances;  ///< by Embree's instance id
+  EmbreeScene tree;
+};
 
-  Triangle corners(std::uint32_t triangle) const {
-    Triangle t;
-    for (std::size_t i = 0; i < 3; ++i) {
-      t[i] =
-          hull ? worldFromSurface * hull->triangles[triangle][i]
-               : worldFromSurface * mesh->positions[mesh->indices[3 * triangle + i]].cast<double>();
+/// A hit triangle, world, and its entity.
+struct Surface {
+  EntityId entity = 0;
+  Triangle corners;
+};
+
+/// Placed meshes or avatars, which one query of Embree searches.
+struct RayTarget {
+  const RayTree* meshes = nullptr;
+  const AvatarHulls* avatars = nullptr;  ///< not null: instead of `meshes`
+  bool transparent = false;
+
+  RTCScene tree() const { return avatars ? avatars->tree.get() : meshes->embreeScene(); }
+  bool mayContain(EntityId entity) const { return avatars || meshes->mayContain(entity); }
+  EntityId findEntity(unsigned instance, unsigned geometry, unsigned primitive) const {
+    return avatars ? avatars->instances[instance].entity
+                   : meshes->findTriangle(instance, geometry, primitive).batch->entity;
+  }
+  Surface findSurface(const RTCHit& hit) const {
+    if (!avatars) {
+      const BatchTriangle found = meshes->findTriangle(hit.instID[0], hit.geomID, hit.primID);
+      return {found.batch->entity, found.corners(Vec3::Zero())};
     }
-    return t;
+    const AvatarHulls::Instance& instance = avatars->instances[hit.instID[0]];
+    Surface surface{instance.entity, instance.hull->triangles[hit.primID]};
+    for (Vec3& corner : surface.corners) corner = instance.worldFromHull * corner;
+    return surface;
   }
 };
-
-/// Many surface instances under one tree.
-struct InstanceGroup {
-  std::vector<SurfaceInstance> instances;
-  EmbreeScene embree;
-};
-
-constexpr EmbreeSceneOptions kSceneOptions{.robust = true, .compact = true};
-
-/// The tree of a mesh that cannot be instanced, in scene frame.
-EmbreeScene buildFlattenedTree(RTCDevice device, const Mesh& mesh,
-                               const Eigen::Affine3d& worldFromMesh) {
-  std::vector<Eigen::Vector3f> positions;
-  positions.reserve(mesh.positions.size());
-  for (const Eigen::Vector3f& position : mesh.positions)
-    positions.push_back((worldFromMesh * position.cast<double>()).cast<float>());
-  return buildTriangleTree(device, kSceneOptions, positions, mesh.indices);
-}
 
 HullSurface makeHullSurface(RTCDevice device, const std::shared_ptr<const collision::Hull>& hull) {
   HullSurface surface{hull, {}, nullptr};
@@ -80,86 +84,63 @@ HullSurface makeHullSurface(RTCDevice device, const std::shared_ptr<const collis
           {hull->vertices[face[0]], hull->vertices[face[i - 1]], hull->vertices[face[i]]});
     }
   }
-  if (!corners.empty()) surface.tree = buildTriangleTree(device, kSceneOptions, positions, corners);
+  if (!corners.empty()) surface.tree = buildTriangleTree(device, positions, corners, false);
   return surface;
 }
 
 // ---- one ray ------------------------------------------------------------------------------------
 
-/// Context of Embree's filter callback. Embree's own part must come first.
-struct FilterContext {
-  RTCIntersectContext embree;
+/// Context of Embree's filter callback. Masked triangles have no filter: rays see all of them.
+struct FilterContext : QueryContext<RTCIntersectContext> {
   EntityId ignoredEntity;
-  const InstanceGroup* group;
+  const RayTarget* target;
 };
 
 void rejectIgnoredEntity(const RTCFilterFunctionNArguments* arguments) {
   const auto* context = reinterpret_cast<const FilterContext*>(arguments->context);
-  const unsigned instance = RTCHitN_instID(arguments->hit, arguments->N, 0, 0);
-  if (context->group->instances[instance].entity == context->ignoredEntity) arguments->valid[0] = 0;
+  RTCHitN* hit = arguments->hit;
+  const unsigned n = arguments->N;
+  const EntityId entity = context->target->findEntity(
+      RTCHitN_instID(hit, n, 0, 0), RTCHitN_geomID(hit, n, 0), RTCHitN_primID(hit, n, 0));
+  if (entity == context->ignoredEntity) arguments->valid[0] = 0;
 }
 
-FilterContext makeFilterContext(const RayFilter& filter, const InstanceGroup& group) {
-  FilterContext context{{}, filter.ignoredEntity, &group};
+FilterContext makeFilterContext(const RayFilter& filter, const RayTarget& target) {
+  FilterContext context{{{}, nullptr}, filter.ignoredEntity, &target};
   rtcInitIntersectContext(&context.embree);
-  if (filter.ignoredEntity != 0) context.embree.filter = rejectIgnoredEntity;
+  if (filter.ignoredEntity != 0 && target.mayContain(filter.ignoredEntity))
+    context.embree.filter = rejectIgnoredEntity;
   return context;
 }
 
 /// Extends `maxDistance` by Embree's error, so that the double-precision test decides.
-RTCRay makeEmbreeRay(const Ray& ray, const Vec3& unit, double maxDistance,
-                     const RayFilter& filter) {
-  const Eigen::Vector3f origin = ray.origin.cast<float>(), direction = unit.cast<float>();
+RTCRay makeEmbreeRay(const Ray& ray, const Vec3& unit, const Vec3& treeOrigin) {
+  const Eigen::Vector3f origin = (ray.origin - treeOrigin).cast<float>();
+  const Eigen::Vector3f direction = unit.cast<float>();
   RTCRay embree{};
   embree.org_x = origin.x(), embree.org_y = origin.y(), embree.org_z = origin.z();
   embree.dir_x = direction.x(), embree.dir_y = direction.y(), embree.dir_z = direction.z();
-  embree.tfar =
-      static_cast<float>(maxDistance + kFloatError * (1 + std::min(maxDistance, kMaxCoordinate)));
-  embree.mask = filter.ignoreTransparent ? kOpaqueMask : kOpaqueMask | kTransparentMask;
+  embree.tfar = static_cast<float>(ray.maxDistance +
+                                   kFloatError * (1 + std::min(ray.maxDistance, kMaxCoordinate)));
+  embree.mask = 0xFFFF'FFFFu;
   return embree;
 }
 
 /// Intersects the line with the triangle's plane, close to Embree's distance.
-RayHit computeHit(const SurfaceInstance& instance, std::uint32_t triangle, const Ray& ray,
-                  const Vec3& unit, double embreeDistance) {
-  const Triangle t = instance.corners(triangle);
+RayHit computeHit(const Surface& surface, const Ray& ray, const Vec3& unit, double embreeDistance) {
+  const Triangle& t = surface.corners;
   Vec3 normal = (t[1] - t[0]).cross(t[2] - t[0]);
   const double normalProjection = normal.dot(unit);
   const double inPlane =
       normal.dot(t[0] - ray.origin) / normalProjection;  // infinite or NaN if parallel
   const bool sharp = std::abs(inPlane - embreeDistance) <= kFloatError * (1 + embreeDistance);
   RayHit hit;
-  hit.entity = instance.entity;
+  hit.entity = surface.entity;
   hit.distance = std::max(0.0, sharp ? inPlane : embreeDistance);
   hit.point = ray.origin + hit.distance * unit;
   const double length = normal.norm();
   if (length > 0) hit.normal = (normalProjection > 0 ? -1 : 1) / length * normal;
   return hit;
-}
-
-std::optional<RayHit> findFirstHitIn(const InstanceGroup& group, const Ray& ray, const Vec3& unit,
-                                     double maxDistance, const RayFilter& filter) {
-  if (group.instances.empty()) return std::nullopt;
-  FilterContext context = makeFilterContext(filter, group);
-  RTCRayHit query{makeEmbreeRay(ray, unit, maxDistance, filter), {}};
-  query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-  rtcIntersect1(group.embree.get(), &context.embree, &query);
-  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  const RayHit hit = computeHit(group.instances[query.hit.instID[0]], query.hit.primID, ray, unit,
-                                static_cast<double>(query.ray.tfar));
-  if (!(hit.distance <= maxDistance)) return std::nullopt;
-  return hit;
-}
-
-bool isOccludedBy(const InstanceGroup& group, const Ray& ray, const Vec3& unit,
-                  const RayFilter& filter) {
-  if (group.instances.empty()) return false;
-  FilterContext context = makeFilterContext(filter, group);
-  RTCRay query = makeEmbreeRay(ray, unit, ray.maxDistance, filter);
-  // Ends just before the target: a target does not occlude itself.
-  query.tfar = static_cast<float>(ray.maxDistance * (1 - 1e-6));
-  rtcOccluded1(group.embree.get(), &context.embree, &query);
-  return query.tfar < 0;  // Embree's encoding of a hit
 }
 
 std::optional<std::string> validatePosition(const char* field, const Vec3& value) {
@@ -184,92 +165,35 @@ std::optional<std::string> validateMaxDistance(double maxDistance) {
 
 struct RayCaster::State {
   std::shared_ptr<const Scene> scene;
-  MeshTrees meshes{kSceneOptions};
+  SceneTrees& trees;                                    ///< of the scene
   std::map<const collision::Hull*, HullSurface> hulls;  ///< of the avatars present now
-  InstanceGroup staticGroup, bodyGroup, avatarGroup;
-  std::shared_ptr<const std::vector<BodySnapshot>>
-      placedBodies;  ///< of which `bodyGroup` was built
+  AvatarHulls avatars;
+  std::shared_ptr<PlacedItems> bodies;  ///< null before update(), or if there are none
+  std::vector<RayTarget> targets;       ///< static meshes, bodies, avatars
 
-  InstanceGroup makeGroup() const { return {{}, makeEmbreeScene(meshes.device(), kSceneOptions)}; }
-  /// `worldFromTree` is the instance's worldFromSurface, except for a tree in scene frame.
-  void addSurface(InstanceGroup& group, const SurfaceInstance& instance, RTCScene tree,
-                  const Eigen::Affine3d& worldFromTree, unsigned mask);
-  /// Adds instances of an object's meshes; `worldFromAuthored` moves it from its authored pose.
-  void placeObject(InstanceGroup& group, std::uint32_t object, EntityId entity,
-                   const Eigen::Affine3d& worldFromAuthored);
-  /// Static objects with an area, and those that are only drawn; ascending.
-  std::vector<std::uint32_t> findStaticVisualObjects() const;
-  void placeStaticObjects();
-  void placeBodies(const std::vector<BodySnapshot>& snapshots);
+  explicit State(std::shared_ptr<const Scene> shared)
+      : scene(std::move(shared)), trees(SceneTrees::of(*scene)) {}
   void placeAvatars(const std::vector<AvatarSnapshot>& snapshots);
+  void collectTargets();
   const HullSurface& getHullSurface(const std::shared_ptr<const collision::Hull>& hull);
+  /// Calls `visit(target, context)` for all that a ray may hit, until it returns true.
+  template <class Visit>
+  bool visitTargets(const RayFilter& filter, const Visit& visit) const;
 };
 
-void RayCaster::State::addSurface(InstanceGroup& group, const SurfaceInstance& instance,
-                                  RTCScene tree, const Eigen::Affine3d& worldFromTree,
-                                  unsigned mask) {
-  addInstance(meshes.device(), group.embree.get(), static_cast<unsigned>(group.instances.size()),
-              tree, worldFromTree, mask);
-  group.instances.push_back(instance);
-}
-
-void RayCaster::State::placeObject(InstanceGroup& group, std::uint32_t object, EntityId entity,
-                                   const Eigen::Affine3d& worldFromAuthored) {
-  const Model& model = scene->model();
-  if (model.objects[object].usage == Object::Usage::collisionOnly)
-    return;  // rays see drawn geometry
-  for (const std::uint32_t m : model.objects[object].meshes) {
-    const Mesh& mesh = model.meshes[m];
-    if (mesh.indices.size() < 3) continue;
-    const bool transparent = model.materials.size() > mesh.material &&
-                             model.materials[mesh.material].alpha == Material::Alpha::blend;
-    const unsigned mask = transparent ? kTransparentMask : kOpaqueMask;
-    const SurfaceInstance instance{entity, &mesh, nullptr,
-                                   worldFromAuthored * model.objects[object].worldFromMesh};
-    if (canBeInstanced(instance.worldFromSurface)) {
-      addSurface(group, instance, meshes.findOrBuild(mesh), instance.worldFromSurface, mask);
-    } else {
-      const auto tree = buildFlattenedTree(meshes.device(), mesh, instance.worldFromSurface);
-      addSurface(group, instance, tree.get(), Eigen::Affine3d::Identity(), mask);
-    }
+void RayCaster::State::collectTargets() {
+  targets.clear();
+  for (PlacedItems* placed : {trees.staticItems().get(), bodies.get()}) {
+    if (!placed) continue;
+    for (const bool transparent : {false, true})
+      if (const RayTree* tree = trees.findOrBuildTree(*placed, transparent))
+        targets.push_back({tree, nullptr, transparent});
   }
-}
-
-std::vector<std::uint32_t> RayCaster::State::findStaticVisualObjects() const {
-  const Model& model = scene->model();
-  std::vector<std::uint32_t> objects = scene->solidObjects();
-  std::vector<bool> moves(model.objects.size());
-  for (const BodySpec& body : model.bodies)
-    for (const std::uint32_t object : body.objects) moves[object] = true;
-  for (std::uint32_t i = 0; i < model.objects.size(); ++i)
-    if (model.objects[i].usage == Object::Usage::visualOnly && !moves[i]) objects.push_back(i);
-  std::sort(objects.begin(), objects.end());
-  return objects;
-}
-
-void RayCaster::State::placeStaticObjects() {
-  staticGroup = makeGroup();
-  for (const std::uint32_t object : findStaticVisualObjects())
-    placeObject(staticGroup, object, object + 1, Eigen::Affine3d::Identity());
-  commitScene(meshes.device(), staticGroup.embree.get());
-}
-
-void RayCaster::State::placeBodies(const std::vector<BodySnapshot>& snapshots) {
-  bodyGroup = makeGroup();
-  for (const BodySnapshot& body : snapshots) {
-    const BodySpec& spec = scene->model().bodies[body.index];
-    if (isTrigger(spec.kind)) continue;
-    Eigen::Affine3d worldFromAuthored = Eigen::Affine3d::Identity();
-    if (body.displaced)
-      worldFromAuthored = computeWorldFromAuthored(*scene->bodyShape(body.index), body.pose);
-    for (const std::uint32_t object : spec.objects)
-      placeObject(bodyGroup, object, body.id, worldFromAuthored);
-  }
-  commitScene(meshes.device(), bodyGroup.embree.get());
+  if (!avatars.instances.empty()) targets.push_back({nullptr, &avatars});
 }
 
 void RayCaster::State::placeAvatars(const std::vector<AvatarSnapshot>& snapshots) {
-  avatarGroup = makeGroup();
+  avatars = {{}, makeEmbreeScene(trees.device())};
   std::erase_if(hulls, [](const auto& entry) { return entry.second.hull.use_count() == 1; });
   for (const AvatarSnapshot& avatar : snapshots) {
     for (const AvatarPart& part : avatar.shape->parts) {
@@ -277,24 +201,26 @@ void RayCaster::State::placeAvatars(const std::vector<AvatarSnapshot>& snapshots
       if (!hull.tree) continue;
       Eigen::Affine3d worldFromHull = Eigen::Affine3d(Eigen::Translation3d(avatar.footPosition));
       worldFromHull.translate(part.offset).rotate(part.rotation);
-      addSurface(avatarGroup, {avatar.id, nullptr, &hull, worldFromHull}, hull.tree.get(),
-                 worldFromHull, kOpaqueMask);
+      addInstance(trees.device(), avatars.tree.get(),
+                  static_cast<unsigned>(avatars.instances.size()), hull.tree.get(),
+                  Eigen::Translation3d(-trees.origin()) * worldFromHull);
+      avatars.instances.push_back({avatar.id, &hull, worldFromHull});
     }
   }
-  commitScene(meshes.device(), avatarGroup.embree.get());
+  commitScene(trees.device(), avatars.tree.get());
 }
 
 const HullSurface& RayCaster::State::getHullSurface(
     const std::shared_ptr<const collision::Hull>& hull) {
   auto found = hulls.find(hull.get());
   if (found == hulls.end())
-    found = hulls.emplace(hull.get(), makeHullSurface(meshes.device(), hull)).first;
+    found = hulls.emplace(hull.get(), makeHullSurface(trees.device(), hull)).first;
   return found->second;
 }
 
-RayCaster::RayCaster(std::shared_ptr<const Scene> scene) : state_(std::make_unique<State>()) {
-  state_->scene = std::move(scene);
-  state_->placeStaticObjects();
+RayCaster::RayCaster(std::shared_ptr<const Scene> scene)
+    : state_(std::make_unique<State>(std::move(scene))) {
+  state_->collectTargets();
 }
 
 RayCaster::~RayCaster() = default;
@@ -302,30 +228,50 @@ RayCaster::RayCaster(RayCaster&&) noexcept = default;
 RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
 
 void RayCaster::update(const Snapshot& snapshot) {
-  if (snapshot.bodies != state_->placedBodies) {
-    state_->placedBodies.reset();  // until all bodies are placed
-    state_->placeBodies(*snapshot.bodies);
-    state_->placedBodies = snapshot.bodies;
-  }
+  state_->targets.clear();  // until all are placed
+  state_->bodies = state_->trees.placeBodies(snapshot);
   state_->placeAvatars(snapshot.avatars);
+  state_->collectTargets();
+}
+
+template <class Visit>
+bool RayCaster::State::visitTargets(const RayFilter& filter, const Visit& visit) const {
+  return std::ranges::any_of(targets, [&](const RayTarget& target) {
+    if (target.transparent && filter.ignoreTransparent) return false;
+    FilterContext context = makeFilterContext(filter, target);
+    return visit(target, context.embree);
+  });
 }
 
 std::optional<RayHit> RayCaster::firstHit(const Ray& ray, const RayFilter& filter) const {
   const Vec3 unit = ray.direction.normalized();
-  std::optional<RayHit> nearest;
-  for (const InstanceGroup* group :
-       {&state_->staticGroup, &state_->bodyGroup, &state_->avatarGroup}) {
-    const double maxDistance = nearest ? nearest->distance : ray.maxDistance;
-    if (const auto hit = findFirstHitIn(*group, ray, unit, maxDistance, filter)) nearest = hit;
-  }
-  return nearest;
+  RTCRayHit query{makeEmbreeRay(ray, unit, state_->trees.origin()), {}};
+  const RayTarget* hitTarget = nullptr;
+  RTCHit nearest{};
+  query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  state_->visitTargets(filter, [&](const RayTarget& target, RTCIntersectContext& context) {
+    rtcIntersect1(target.tree(), &context, &query);
+    if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return false;
+    hitTarget = &target;
+    nearest = query.hit;
+    query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;  // the next must be nearer
+    return false;
+  });
+  if (!hitTarget) return std::nullopt;
+  const RayHit hit =
+      computeHit(hitTarget->findSurface(nearest), ray, unit, static_cast<double>(query.ray.tfar));
+  if (!(hit.distance <= ray.maxDistance)) return std::nullopt;
+  return hit;
 }
 
 bool RayCaster::isBlocked(const Ray& ray, const RayFilter& filter) const {
-  const Vec3 unit = ray.direction.normalized();
-  return isOccludedBy(state_->avatarGroup, ray, unit, filter) ||
-         isOccludedBy(state_->bodyGroup, ray, unit, filter) ||
-         isOccludedBy(state_->staticGroup, ray, unit, filter);
+  RTCRay query = makeEmbreeRay(ray, ray.direction.normalized(), state_->trees.origin());
+  // Ends just before the target: a target does not occlude itself.
+  query.tfar = static_cast<float>(ray.maxDistance * (1 - 1e-6));
+  return state_->visitTargets(filter, [&](const RayTarget& target, RTCIntersectContext& context) {
+    rtcOccluded1(target.tree(), &context, &query);
+    return query.tfar < 0;  // Embree's encoding of a hit
+  });
 }
 
 // ---- scans --------------------------------------------------------------------------------------

@@ -56,8 +56,9 @@ std::optional<std::string> validateScan(const RangeScan& scan);
 /// Directions have unit length.
 std::vector<Ray> makeScanRays(const RangeScan& scan);
 
-/// Ray queries on a scene. Static objects are built at construction (each mesh once), others by
-/// update(). One thread at a time may call update(); between calls any number may cast rays.
+/// Ray queries on a scene. The constructor builds the trees of static objects, update() those of
+/// bodies, unless the scene has them already (SceneTrees), and of avatars. One thread at a time may
+/// call update(); between calls any number may cast rays.
 class RayCaster {
  public:
   explicit RayCaster(std::shared_ptr<const Scene> scene);

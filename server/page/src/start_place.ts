@@ -5,7 +5,7 @@ import type { SceneModel } from "./scene";
 
 export interface StartPlace {
   feet: Vector3;
-  facing: Vector3; // horizontal unit vector of the longest view
+  facing: Vector3; // horizontal unit vector of the longest view that ends at something
 }
 
 const RINGS = 9;
@@ -15,22 +15,24 @@ const HEAD_ROOM = 1.9; // metres
 const ROOM_HEIGHT = 12; // metres; below a higher ceiling counts as outdoors
 const MAX_ROOMS = 12;
 const MAX_VIEW = 15; // metres; farther views make a place no better
+const MAX_SIGHT = 60; // metres; a direction with nothing within is empty
 
 /** Places in order of preference. `around` is tried first; without it, the best of the largest rooms that the file names. */
 export function proposeStarts(model: SceneModel, around: Vector3 | null): StartPlace[] {
+  const middle = middleOf(model);
   if (!around) {
     const rooms = [...model.table.rooms].sort((a, b) => b.area - a.area).slice(0, MAX_ROOMS);
-    const judged = rooms.flatMap(({ floor }) => judge(model, new Vector3(floor.x, floor.y + 1, floor.z)) ?? []);
+    const judged = rooms.flatMap(({ floor }) => judge(model, new Vector3(floor.x, floor.y + 1, floor.z), middle) ?? []);
     if (judged.length > 0) return judged.sort((a, b) => b.score - a.score).map(({ place }) => place);
   }
-  const center = around ?? middleOf(model);
+  const center = around ?? middle;
   const scored: { place: StartPlace; score: number }[] = [];
   for (let ring = 0; ring <= RINGS; ++ring) {
     const count = ring === 0 ? 1 : 6 * ring;
     for (let i = 0; i < count; ++i) {
       const angle = (2 * Math.PI * i) / count;
       const at = center.clone().add(new Vector3(ring * SPACING * Math.cos(angle), 0, ring * SPACING * Math.sin(angle)));
-      const found = judge(model, at);
+      const found = judge(model, at, middle);
       if (found) scored.push({ place: found.place, score: found.score - (around ? 1.5 : 0.15) * ring });
     }
     if (scored.length >= 40) break;
@@ -54,7 +56,7 @@ function middleOf(model: SceneModel): Vector3 {
   return middle;
 }
 
-function judge(model: SceneModel, at: Vector3): { place: StartPlace; score: number } | null {
+function judge(model: SceneModel, at: Vector3, middle: Vector3): { place: StartPlace; score: number } | null {
   const floor = model.raycast(at, new Vector3(0, -1, 0), 4);
   if (!floor || floor.normal.y < 0.9) return null;
   const ceiling = model.raycast(at, new Vector3(0, 1, 0), ROOM_HEIGHT);
@@ -63,14 +65,17 @@ function judge(model: SceneModel, at: Vector3): { place: StartPlace; score: numb
   let longest = 0;
   let shortest = MAX_VIEW;
   let sum = 0;
-  const facing = new Vector3(1, 0, 0);
+  const facing = middle.clone().sub(eyes).setY(0); // if every direction is empty
+  if (facing.lengthSq() < 1e-6) facing.set(1, 0, 0);
+  facing.normalize();
   for (let i = 0; i < DIRECTIONS; ++i) {
     const angle = (2 * Math.PI * i) / DIRECTIONS;
     const direction = new Vector3(Math.cos(angle), 0, -Math.sin(angle));
-    const free = model.raycast(eyes, direction, MAX_VIEW)?.distance ?? MAX_VIEW;
+    const seen = model.raycast(eyes, direction, MAX_SIGHT);
+    const free = Math.min(seen?.distance ?? MAX_VIEW, MAX_VIEW);
     sum += Math.min(free, 6);
     shortest = Math.min(shortest, free);
-    if (free > longest) {
+    if (seen && free > longest) {
       longest = free;
       facing.copy(direction);
     }

@@ -2,22 +2,36 @@
 
 #include <meshoptimizer.h>
 
+#include <algorithm>
 #include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+#include <cstring>
+#include <limits>
+#include <type_traits>
 
 #include "scene/import/gltf/encoding/gltf_json.hpp"
+#include "scene/import/gltf/encoding/meshopt_vertices.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-/// Returns the library's result, 0 for success; checks what the library only asserts.
-int decodeMeshoptMode(const MeshoptView& view, std::string& bytes) {
+/// Returns "", or the reason why it failed.
+std::string decodeMeshoptMode(const MeshoptView& view, std::string& bytes) {
+  if (view.mode == "ATTRIBUTES")
+    return decodeMeshoptVertices(view.source, view.count, view.stride, bytes);
   const auto* source = reinterpret_cast<const unsigned char*>(view.source.data());
   const std::size_t size = view.source.size();
-  if (view.mode == "ATTRIBUTES")
-    return meshopt_decodeVertexBuffer(bytes.data(), view.count, view.stride, source, size);
-  if (view.mode == "TRIANGLES")
-    return meshopt_decodeIndexBuffer(bytes.data(), view.count, view.stride, source, size);
-  return meshopt_decodeIndexSequence(bytes.data(), view.count, view.stride, source, size);
+  // Each triangle takes a byte at least, as does each index of a sequence.
+  if (view.count / (view.mode == "TRIANGLES" ? 3 : 1) > size)
+    return "its compressed data ends too early";
+  bytes.assign(view.count * view.stride, '\0');
+  const int result =
+      view.mode == "TRIANGLES"
+          ? meshopt_decodeIndexBuffer(bytes.data(), view.count, view.stride, source, size)
+          : meshopt_decodeIndexSequence(bytes.data(), view.count, view.stride, source, size);
+  return result == 0 ? "" : "its compressed data is damaged";
 }
 
 /// Returns what is wrong with the sizes of the view; "" for a valid view.
@@ -34,7 +48,41 @@ std::string findMeshoptFault(const MeshoptView& view) {
     return view.stride == 4 || view.stride == 8 ? ""
                                                 : "octahedral elements of neither 4 nor 8 bytes";
   if (view.filter == "QUATERNION") return view.stride == 8 ? "" : "quaternions not of 8 bytes";
+  if (view.filter == "COLOR")
+    return view.stride == 4 || view.stride == 8 ? "" : "colours of neither 4 nor 8 bytes";
   return view.filter == "EXPONENTIAL" ? "" : "unsupported compression filter '" + view.filter + "'";
+}
+
+/// Decodes Y, Co, Cg and alpha of K bits to RGBA in place. K is the place of alpha's highest bit
+/// (KHR_meshopt_compression, appendix B, filter 4). False if a K is not valid.
+template <class Channel>
+bool decodeColourFilter(std::string& bytes) {
+  constexpr double kFull = std::numeric_limits<Channel>::max();
+  std::array<Channel, 4> element{};
+  for (std::size_t at = 0; at < bytes.size(); at += sizeof element) {
+    std::memcpy(element.data(), bytes.data() + at, sizeof element);
+    const int bits = std::bit_width(element[3]);
+    if (bits < 2) return false;
+    const int full = (1 << bits) - 1;
+    const int y = element[0], co = static_cast<std::make_signed_t<Channel>>(element[1]),
+              cg = static_cast<std::make_signed_t<Channel>>(element[2]);
+    const int alpha = element[3] & (full >> 1);  // of one bit less, whose last bit is repeated
+    const std::array<int, 4> rgba{y + co - cg, y + cg, y - co - cg, alpha << 1 | (alpha & 1)};
+    for (std::size_t i = 0; i < rgba.size(); ++i)
+      element[i] = static_cast<Channel>(std::lround(std::clamp(rgba[i], 0, full) * (kFull / full)));
+    std::memcpy(bytes.data() + at, element.data(), sizeof element);
+  }
+  return true;
+}
+
+/// Returns whether the filter's input is valid.
+bool applyMeshoptFilter(const MeshoptView& view, std::string& bytes) {
+  if (view.filter == "OCTAHEDRAL") meshopt_decodeFilterOct(bytes.data(), view.count, view.stride);
+  if (view.filter == "QUATERNION") meshopt_decodeFilterQuat(bytes.data(), view.count, view.stride);
+  if (view.filter == "EXPONENTIAL") meshopt_decodeFilterExp(bytes.data(), view.count, view.stride);
+  if (view.filter != "COLOR") return true;
+  return view.stride == 4 ? decodeColourFilter<std::uint8_t>(bytes)
+                          : decodeColourFilter<std::uint16_t>(bytes);
 }
 
 }  // namespace
@@ -50,17 +98,10 @@ const nlohmann::json* findMeshoptExtension(const nlohmann::json& view) {
 
 std::string decodeMeshoptView(const MeshoptView& view, std::string& bytes) {
   if (std::string fault = findMeshoptFault(view); !fault.empty()) return fault;
-  bytes.assign(view.count * view.stride, '\0');
+  bytes.clear();
   if (view.count == 0) return "";
-  // The high four bits of the first byte name the codec, the low ones its version.
-  if (view.mode == "ATTRIBUTES" && view.source.starts_with('\xa1'))
-    return "compressed by version 1 of the vertex codec, which is not supported; compress with "
-           "EXT_meshopt_compression";
-  if (decodeMeshoptMode(view, bytes) != 0) return "its compressed data is damaged";
-  if (view.filter == "OCTAHEDRAL") meshopt_decodeFilterOct(bytes.data(), view.count, view.stride);
-  if (view.filter == "QUATERNION") meshopt_decodeFilterQuat(bytes.data(), view.count, view.stride);
-  if (view.filter == "EXPONENTIAL") meshopt_decodeFilterExp(bytes.data(), view.count, view.stride);
-  return "";
+  if (std::string fault = decodeMeshoptMode(view, bytes); !fault.empty()) return fault;
+  return applyMeshoptFilter(view, bytes) ? "" : "its compressed colours are damaged";
 }
 
 }  // namespace enfilade::scene

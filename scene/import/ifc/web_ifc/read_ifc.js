@@ -2,8 +2,9 @@
 //
 //   node read_ifc.js FIRST
 //
-// File descriptor 3 receives the messages, 4 is the IFC file, 5 the list of requested products:
-// their express ids as 32-bit numbers. Products before index FIRST are done. A message is a kind
+// File descriptor 3 receives the messages, 4 is the IFC file, 5 the list of what to read: the number
+// of ranges of the file (64 bits), the first byte and the size of each (64 bits), and the express
+// ids of the requested products (32 bits). Products before index FIRST are done. A message is a kind
 // (one byte), a length (64 bits) and that many bytes, all little-endian. Their contents are
 // documented in scene/import/ifc/ifc_meshes.hpp.
 import fs from 'node:fs';
@@ -54,12 +55,48 @@ function readAll(descriptor) {
   return bytes;
 }
 
+function readList() {
+  const bytes = readAll(WANTED);
+  const count = Number(new BigUint64Array(bytes.buffer, 0, 1)[0]);
+  const numbers = Array.from(new BigUint64Array(bytes.buffer, 8, 2 * count), Number);
+  const ranges = [];
+  let start = 0; // where the range begins in the text of all ranges
+  for (let i = 0; i < count; ++i) {
+    ranges.push({ start, first: numbers[2 * i], size: numbers[2 * i + 1] });
+    start += numbers[2 * i + 1];
+  }
+  return { ranges, wanted: new Uint32Array(bytes.buffer.slice(8 + 16 * count)) };
+}
+
 // web-ifc knows IFC4.3 by the names of its releases; a technical corrigendum differs in no shape.
-function withKnownSchema(bytes) {
-  const head = Buffer.from(bytes.buffer, bytes.byteOffset, Math.min(bytes.length, 65536));
-  const at = head.indexOf("'IFC4X3_TC1'");
-  if (at >= 0) head.write("'IFC4X3'    ", at, 'latin1');
-  return bytes;
+function nameKnownSchema(bytes) {
+  const at = bytes.subarray(0, 65536).indexOf("'IFC4X3_TC1'");
+  if (at >= 0) bytes.write("'IFC4X3'    ", at, 'latin1');
+}
+
+// Returns a function that reads a block of the ranges' text into a buffer, which it reuses: web-ifc
+// copies each block, so that the text is never in memory twice.
+function makeReader(ranges) {
+  let buffer = Buffer.alloc(0);
+  return (offset, size) => {
+    if (buffer.length < size) buffer = Buffer.alloc(size);
+    let done = 0;
+    for (const { start, first, size: length } of ranges) {
+      if (start + length <= offset + done) continue;
+      const from = offset + done - start;
+      const wanted = Math.min(size - done, length - from);
+      for (let read = 0; read < wanted; ) {
+        const count = fs.readSync(IFC_FILE, buffer, done, wanted - read, first + from + read);
+        if (count === 0) throw new Error('the file became shorter while it was read');
+        read += count;
+        done += count;
+      }
+      if (done === size) break;
+    }
+    const block = buffer.subarray(0, done);
+    if (offset === 0) nameKnownSchema(block);
+    return block;
+  };
 }
 
 // Sends each geometry once, before the first product that uses it.
@@ -103,9 +140,8 @@ async function main() {
   const api = new IfcAPI();
   await api.Init();
   api.SetLogLevel(LogLevel.LOG_LEVEL_OFF); // it logs to stdout otherwise
-  const wantedBytes = readAll(WANTED);
-  const wanted = new Uint32Array(wantedBytes.buffer, 0, wantedBytes.length / 4);
-  const model = api.OpenModel(withKnownSchema(readAll(IFC_FILE)));
+  const { ranges, wanted } = readList();
+  const model = api.OpenModelFromCallback(makeReader(ranges));
   if (model < 0) {
     sendFrame('E', [Buffer.from('web-ifc does not know its schema')]);
     return 1;

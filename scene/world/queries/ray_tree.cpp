@@ -1,13 +1,12 @@
-#include "render/raytrace/ray_tree.hpp"
+#include "scene/world/queries/ray_tree.hpp"
 
 #include <algorithm>
 #include <limits>
 #include <string>
 
 #include "collision/assert.hpp"
-#include "render/render_error.hpp"
 
-namespace enfilade::render {
+namespace enfilade::scene {
 namespace {
 
 constexpr unsigned kOpaqueGeometry = 0, kMaskGeometry = 1, kFirstInstance = 2;
@@ -18,10 +17,10 @@ constexpr std::size_t kMaxTriangles = std::size_t{1} << 28;
 /// Writes the meshes of batches consecutively.
 class TriangleCopier {
  public:
-  explicit TriangleCopier(const scene::TriangleBuffers& buffers) : buffers_(buffers) {}
+  explicit TriangleCopier(const TriangleBuffers& buffers) : buffers_(buffers) {}
 
   void copy(const TriangleBatch& batch, const Vec3& origin) {
-    const scene::Mesh& mesh = *batch.mesh;
+    const Mesh& mesh = *batch.mesh;
     const Eigen::Affine3d originFromMesh = Eigen::Translation3d(-origin) * *batch.worldFromMesh;
     for (std::size_t i = 0; i < mesh.positions.size(); ++i) {
       buffers_.positions[firstPosition_ + i] =
@@ -37,15 +36,19 @@ class TriangleCopier {
   }
 
  private:
-  scene::TriangleBuffers buffers_;
+  TriangleBuffers buffers_;
   std::size_t firstPosition_ = 0, firstCorner_ = 0;
 };
+
+bool isMasked(const TriangleBatch& batch) {
+  return batch.material->alpha == Material::Alpha::mask;
+}
 
 }  // namespace
 
 bool haveCommonEdge(const BatchTriangle& a, const BatchTriangle& b) {
   if (a.batch != b.batch) return false;
-  const scene::Mesh& mesh = *a.batch->mesh;
+  const Mesh& mesh = *a.batch->mesh;
   const auto corner = [&](const BatchTriangle& source, std::size_t i) -> const Eigen::Vector3f& {
     return mesh.positions[mesh.indices[3 * std::size_t{source.triangle} + i]];
   };
@@ -55,26 +58,24 @@ bool haveCommonEdge(const BatchTriangle& a, const BatchTriangle& b) {
   return common >= 2;
 }
 
-RayTree::RayTree(scene::MeshTrees& meshes, std::vector<TriangleBatch> batches, const Vec3& origin,
-                 scene::EmbreeFilter maskFilter)
+RayTree::RayTree(MeshTrees& meshes, std::vector<TriangleBatch> batches, const Vec3& origin)
     : batches_(std::move(batches)),
       firstTriangle_(batches_.size(), 0),
-      scene_(scene::makeEmbreeScene(meshes.device(), meshes.options())) {
+      scene_(makeEmbreeScene(meshes.device())) {
   for (TriangleBatch& batch : batches_) {
-    batch.instanced = batch.instanced && scene::canBeInstanced(*batch.worldFromMesh);
-    firstId_ = std::min(firstId_, batch.id);
-    lastId_ = std::max(lastId_, batch.id);
+    batch.instanced = batch.instanced && canBeInstanced(*batch.worldFromMesh);
+    firstId_ = std::min({firstId_, batch.id, batch.entity});
+    lastId_ = std::max({lastId_, batch.id, batch.entity});
   }
-  copyBatches(meshes.device(), false, origin, nullptr);
-  copyBatches(meshes.device(), true, origin, maskFilter);
-  addInstances(meshes, origin, maskFilter);
-  scene::commitScene(meshes.device(), scene_.get());
+  copyBatches(meshes.device(), false, origin);
+  copyBatches(meshes.device(), true, origin);
+  addInstances(meshes, origin);
+  commitScene(meshes.device(), scene_.get());
 }
 
-void RayTree::copyBatches(RTCDeviceTy* device, bool mask, const Vec3& origin,
-                          scene::EmbreeFilter filter) {
+void RayTree::copyBatches(RTCDeviceTy* device, bool masked, const Vec3& origin) {
   const auto copied = [&](const TriangleBatch& batch) {
-    return !batch.instanced && (batch.alphaMode == AlphaMode::mask) == mask;
+    return !batch.instanced && isMasked(batch) == masked;
   };
   std::size_t positions = 0, triangles = 0;
   for (const TriangleBatch& batch : batches_) {
@@ -84,12 +85,12 @@ void RayTree::copyBatches(RTCDeviceTy* device, bool mask, const Vec3& origin,
   }
   if (triangles == 0) return;
   if (triangles > kMaxTriangles || positions > std::numeric_limits<std::uint32_t>::max()) {
-    throw RenderError("the scene has " + std::to_string(triangles) +
+    throw EmbreeError("the scene has " + std::to_string(triangles) +
                       " triangles, more than one ray tree can hold; load a part of it");
   }
-  std::vector<std::uint32_t>& batchOf = batchOfTriangle_[mask ? 1 : 0];
+  std::vector<std::uint32_t>& batchOf = batchOfTriangle_[masked ? 1 : 0];
   batchOf.reserve(triangles);
-  const scene::TriangleBuffers buffers = scene::makeTriangleBuffers(device, positions, triangles);
+  const TriangleBuffers buffers = makeTriangleBuffers(device, positions, triangles);
   TriangleCopier copier(buffers);
   for (std::uint32_t index = 0; index < batches_.size(); ++index) {
     if (!copied(batches_[index])) continue;
@@ -97,18 +98,16 @@ void RayTree::copyBatches(RTCDeviceTy* device, bool mask, const Vec3& origin,
     batchOf.insert(batchOf.end(), batches_[index].mesh->triangleCount(), index);
     copier.copy(batches_[index], origin);
   }
-  scene::attachTriangles(buffers, scene_.get(), mask ? kMaskGeometry : kOpaqueGeometry, filter);
+  attachTriangles(buffers, scene_.get(), masked ? kMaskGeometry : kOpaqueGeometry, masked);
 }
 
-void RayTree::addInstances(scene::MeshTrees& meshes, const Vec3& origin,
-                           scene::EmbreeFilter filter) {
+void RayTree::addInstances(MeshTrees& meshes, const Vec3& origin) {
   for (std::uint32_t index = 0; index < batches_.size(); ++index) {
     const TriangleBatch& batch = batches_[index];
     if (!batch.instanced) continue;
-    RTCSceneTy* tree =
-        meshes.findOrBuild(*batch.mesh, batch.alphaMode == AlphaMode::mask ? filter : nullptr);
-    scene::addInstance(meshes.device(), scene_.get(), kFirstInstance + index, tree,
-                       Eigen::Translation3d(-origin) * *batch.worldFromMesh);
+    RTCSceneTy* tree = meshes.findOrBuild(*batch.mesh, isMasked(batch));
+    addInstance(meshes.device(), scene_.get(), kFirstInstance + index, tree,
+                Eigen::Translation3d(-origin) * *batch.worldFromMesh);
   }
 }
 
@@ -124,4 +123,4 @@ BatchTriangle RayTree::findTriangle(unsigned instance, unsigned geometry,
   return {&batches_[index], primitive - firstTriangle_[index]};
 }
 
-}  // namespace enfilade::render
+}  // namespace enfilade::scene

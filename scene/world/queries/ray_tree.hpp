@@ -3,22 +3,23 @@
 // doubles.
 #pragma once
 
+#include <array>
 #include <vector>
 
-#include "render/draw_list.hpp"
-#include "render/raytrace/projected_triangle.hpp"
+#include "scene/model/model.hpp"
+#include "scene/world/data/snapshot.hpp"
 #include "scene/world/queries/embree.hpp"
 
-namespace enfilade::render {
+namespace enfilade::scene {
 
 /// One placed mesh. All pointers must outlive the tree.
 struct TriangleBatch {
-  const scene::Mesh* mesh = nullptr;
+  const Mesh* mesh = nullptr;
   const Eigen::Affine3d* worldFromMesh = nullptr;
-  const MaterialData* material = nullptr;
-  scene::EntityId id = 0;
+  const Material* material = nullptr;
+  EntityId id = 0;            ///< of the object or avatar
+  EntityId entity = 0;        ///< of the body to which the object belongs; otherwise as `id`
   std::int32_t texture = -1;  ///< index into Model::textures
-  AlphaMode alphaMode = AlphaMode::opaque;
   /// true: the mesh has its own tree, which can be shared and moved. false: it is copied into this
   /// tree, which is faster to trace.
   bool instanced = false;
@@ -29,11 +30,12 @@ struct BatchTriangle {
   const TriangleBatch* batch;
   std::uint32_t triangle;  ///< index in the batch's mesh
 
-  EyeSpaceCorners corners(const Vec3& eye) const {
-    EyeSpaceCorners result;
+  /// World axes, metres, relative to `origin`.
+  std::array<Vec3, 3> corners(const Vec3& origin) const {
+    std::array<Vec3, 3> result;
     for (std::size_t i = 0; i < 3; ++i) {
       const std::uint32_t corner = batch->mesh->indices[3 * std::size_t{triangle} + i];
-      result[i] = *batch->worldFromMesh * batch->mesh->positions[corner].cast<double>() - eye;
+      result[i] = *batch->worldFromMesh * batch->mesh->positions[corner].cast<double>() - origin;
     }
     return result;
   }
@@ -46,29 +48,25 @@ bool haveCommonEdge(const BatchTriangle& a, const BatchTriangle& b);
 class RayTree {
  public:
   /// Geometry is stored relative to `origin` (world, metres); rays must be relative to it, too.
-  /// `maskFilter` filters hits on triangles of AlphaMode::mask. Throws RenderError if there are
-  /// more triangles than a tree can hold.
-  RayTree(scene::MeshTrees& meshes, std::vector<TriangleBatch> batches, const Vec3& origin,
-          scene::EmbreeFilter maskFilter);
+  /// Throws EmbreeError if there are more triangles than a tree can hold, and as commitScene().
+  RayTree(MeshTrees& meshes, std::vector<TriangleBatch> batches, const Vec3& origin);
 
   RTCSceneTy* embreeScene() const { return scene_.get(); }
-  bool empty() const { return batches_.empty(); }
-  /// False: no batch has this id.
-  bool mayContain(scene::EntityId id) const { return id >= firstId_ && id <= lastId_; }
-  const std::vector<TriangleBatch>& batches() const { return batches_; }
+  /// False: no batch has this id, and none is part of this entity.
+  bool mayContain(EntityId id) const { return id >= firstId_ && id <= lastId_; }
 
   /// The triangle of a hit, from Embree's three ids.
   BatchTriangle findTriangle(unsigned instance, unsigned geometry, unsigned primitive) const;
 
  private:
-  void copyBatches(RTCDeviceTy* device, bool mask, const Vec3& origin, scene::EmbreeFilter filter);
-  void addInstances(scene::MeshTrees& meshes, const Vec3& origin, scene::EmbreeFilter filter);
+  void copyBatches(RTCDeviceTy* device, bool masked, const Vec3& origin);
+  void addInstances(MeshTrees& meshes, const Vec3& origin);
 
   std::vector<TriangleBatch> batches_;
-  scene::EntityId firstId_ = ~scene::EntityId{0}, lastId_ = 0;  ///< least and greatest
-  std::vector<std::uint32_t> firstTriangle_;                    ///< of each copied batch
+  EntityId firstId_ = ~EntityId{0}, lastId_ = 0;   ///< least and greatest
+  std::vector<std::uint32_t> firstTriangle_;       ///< of each copied batch
   std::vector<std::uint32_t> batchOfTriangle_[2];  ///< for geometry 0 (not masked) and 1 (masked)
-  scene::EmbreeScene scene_;
+  EmbreeScene scene_;
 };
 
-}  // namespace enfilade::render
+}  // namespace enfilade::scene

@@ -1,0 +1,36 @@
+// The drawn meshes of a model, as pictures and rays see them, in one order.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scene/model/model.hpp"
+
+namespace enfilade::scene {
+
+/// One mesh of one object.
+struct DrawItem {
+  static constexpr std::uint32_t kStatic = 0xFFFF'FFFFu;  ///< value of `body`
+
+  Aabb box;  ///< world, as authored
+  std::uint32_t object = 0, mesh = 0;
+  std::int32_t texture = -1;  ///< index into Model::textures; -1: none
+  Material::Alpha alphaMode = Material::Alpha::opaque;
+  bool coloured = false;         ///< the mesh has vertex colours
+  std::uint32_t body = kStatic;  ///< index into Model::bodies
+
+  bool isStatic() const { return body == kStatic; }
+};
+
+/// All items of the model except triggers and collision-only objects, in drawing order: by alpha
+/// mode, texture, vertex colours, object. The order never depends on the camera, so that depth ties
+/// are resolved equally in every frame.
+std::vector<DrawItem> buildDrawItems(const Model& model);
+
+/// The mesh's material; a default material if the mesh of a hand-made model has none.
+const Material& findMaterial(const Model& model, const Mesh& mesh);
+
+/// A box around the transformed box.
+Aabb transformAabb(const Eigen::Affine3d& worldFromMesh, const Aabb& box);
+
+}  // namespace enfilade::scene
