@@ -10,6 +10,13 @@ namespace enfilade::render {
 
 enum class RendererKind : std::uint8_t { automatic, gl, rays };
 
+/// A frame to render, by a renderer of this kind.
+struct ViewRequest {
+  Camera camera;
+  FrameOptions options;
+  RendererKind renderer = RendererKind::automatic;
+};
+
 /// "auto", "gl" or "rays".
 const char* toString(RendererKind kind);
 std::optional<RendererKind> parseRendererKind(const std::string& name);

@@ -90,10 +90,11 @@ struct GlRenderer::State {
   DynamicInstances dynamicInstances;
   RenderTarget target;
   VisibilityCache visibilityCache;
-  std::deque<DepthPyramid> depthPyramids;  // one per layer
-  bool planeDepth;                         // DepthSource::plane
-  bool roundsVertices;                     // see DeviceChoice
-  std::uint64_t frameNumber = 0;           // for the cache
+  std::deque<DepthPyramid> depthPyramids;     // one per layer
+  bool planeDepth;                            // DepthSource::plane
+  bool roundsVertices;                        // see DeviceChoice
+  std::uint64_t frameNumber = 0;              // for the cache
+  const FrameInProgress* selected = nullptr;  // see select()
 
   State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device,
         ShadowMaskFunction shadows);
@@ -165,6 +166,7 @@ void GlRenderer::State::prepareTarget(const Camera& camera, std::size_t layers) 
 std::deque<FrameInProgress> GlRenderer::State::beginViews(const scene::Snapshot& snapshot,
                                                           std::span<const View* const> views) {
   prepareTarget(views.front()->camera, views.size());
+  selected = nullptr;
   std::deque<FrameInProgress> begun;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const View& view = *views[i];
@@ -187,6 +189,8 @@ bool GlRenderer::State::isTransparent(const FrameInProgress& view, std::uint32_t
 
 /// The following draws are the view's.
 void GlRenderer::State::select(const FrameInProgress& view) {
+  if (selected == &view) return;
+  selected = &view;
   target.select(view.layer);
   surfacePass->begin(view.camera);
 }

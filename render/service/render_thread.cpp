@@ -135,7 +135,7 @@ RenderThread::~RenderThread() {
 std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
                                         Camera camera, FrameOptions options, RendererKind kind) {
   const auto promise = std::make_shared<std::promise<Frame>>();
-  render(std::move(snapshot), {{{std::move(camera), options}, kind}}, [promise](Frames frames) {
+  render(std::move(snapshot), {{std::move(camera), options, kind}}, [promise](Frames frames) {
     try {
       promise->set_value(frames.front().get());
     } catch (...) {

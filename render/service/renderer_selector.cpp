@@ -114,7 +114,7 @@ RendererSelector::~RendererSelector() = default;
 
 Frame RendererSelector::render(const scene::Snapshot& snapshot, const Camera& camera,
                                const FrameOptions& options, RendererKind kind) {
-  const ViewRequest request{{camera, options}, kind};
+  const ViewRequest request{camera, options, kind};
   return std::move(render(snapshot, std::span(&request, 1)).front());
 }
 
@@ -122,15 +122,15 @@ std::vector<Frame> RendererSelector::render(const scene::Snapshot& snapshot,
                                             std::span<const ViewRequest> views) {
   std::map<RendererKind, std::vector<std::size_t>> viewsByKind;
   for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto& [view, kind] = views[i];
-    viewsByKind[state_->chooseKind(view.camera, view.options, kind)].push_back(i);
+    const auto& [camera, options, kind] = views[i];
+    viewsByKind[state_->chooseKind(camera, options, kind)].push_back(i);
   }
   std::vector<Frame> frames(views.size());
   for (const auto& [kind, indices] : viewsByKind) {
     Renderer& renderer = state_->findOrCreate(kind);
     std::vector<View> together;
     for (const std::size_t i : indices) {
-      const View& view = views[i].view;
+      const ViewRequest& view = views[i];
       together.push_back({view.camera, state_->decideShadows(renderer, view.camera, view.options)});
     }
     // The time excludes the creation of the renderer.

@@ -12,12 +12,6 @@
 
 namespace enfilade::render {
 
-/// A frame to render, by the renderer of this kind.
-struct ViewRequest {
-  View view;
-  RendererKind kind = RendererKind::automatic;
-};
-
 /// Owns a GlRenderer, a RayRenderer or both, each created on first use. Create, use and destroy it
 /// on one thread, as RenderThread does.
 class RendererSelector {

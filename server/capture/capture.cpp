@@ -130,7 +130,7 @@ void renderFrames(const CaptureCommand& command, const scene::Scene& scene, cons
       const CaptureFrame& captureFrame = plan.frames[missing[i]];
       render::FrameOptions options = makeFrameOptions(captureFrame, command.pictures);
       options.channels.depth |= reports != nullptr;
-      views.push_back({{captureFrame.camera, options}});
+      views.push_back({captureFrame.camera, options});
     }
     std::vector<render::Frame> frames =
         renderer.render(*plan.frames[missing[from]].snapshot, views);
@@ -138,8 +138,7 @@ void renderFrames(const CaptureCommand& command, const scene::Scene& scene, cons
       const std::size_t index = missing[i];
       const CaptureFrame& captureFrame = plan.frames[index];
       const auto frame = std::make_shared<const render::Frame>(std::move(frames[i - from]));
-      if (reports)
-        reports->measure(index, *frame, *captureFrame.snapshot, views[i - from].view.options);
+      if (reports) reports->measure(index, *frame, *captureFrame.snapshot, views[i - from].options);
       checkFrame(scene, captureFrame, index, *frame, counts);
       queue.post([&, index, frame] {
         const auto overlay = [&](const render::Frame& drawn) {

@@ -207,10 +207,7 @@ void FrameService::State::startNext() {
     rendering = true;
   }
   std::vector<render::ViewRequest> views;
-  for (const PendingFrame& pending : *group) {
-    const FrameView& view = pending.job.view;
-    views.push_back({{view.camera, view.options}, view.renderer});
-  }
+  for (const PendingFrame& pending : *group) views.push_back(pending.job.view);
   renderer->render(group->front().job.snapshot, std::move(views),
                    [this, group](render::RenderThread::Frames frames) {
                      for (std::size_t i = 0; i < frames.size(); ++i) {

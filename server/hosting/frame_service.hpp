@@ -17,7 +17,7 @@ namespace enfilade::server {
 /// A frame to render, and the destination of its reply.
 struct FrameJob {
   std::shared_ptr<const scene::Snapshot> snapshot;
-  FrameView view;
+  render::ViewRequest view;
   v1::FrameRequest request;
   /// Owners take turns, so that one with many large frames does not delay the others. Unique per
   /// client of all worlds; null: the recordings.

@@ -70,7 +70,7 @@ void renderSubscription(HostedWorld& hosted, ClientId id, Client& client, std::u
   hosted.droppedFrames += subscription.dropped;
   subscription.rendering = true;
   FrameJob job{snapshot,
-               std::get<FrameView>(std::move(view)),
+               std::get<render::ViewRequest>(std::move(view)),
                subscription.request,
                client.out,
                0,
@@ -172,7 +172,7 @@ void renderRecorded(HostedWorld& hosted) {
     const v1::FrameRequest request = makeRecordedViewRequest(avatar.name);
     FrameJob job;
     job.snapshot = snapshot;
-    job.view = std::get<FrameView>(viewFromProto(request, *snapshot));
+    job.view = std::get<render::ViewRequest>(viewFromProto(request, *snapshot));
     job.request = request;
     job.renderedCount = hosted.renderedFrames;
     job.onRendered = makeRecordingObserver(hosted, request);

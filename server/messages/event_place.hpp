@@ -16,7 +16,8 @@ struct EventPlace {
 };
 
 /// The room is the space whose solid contains the point of `a`, or is the nearest within 5 cm. The
-/// storey is that of the room, else of the object b, else of the object a, else the level below the point.
+/// storey is that of the room, else of the object b, else of the object a, else the level below the
+/// point.
 EventPlace findEventPlace(const scene::Model& model, const scene::ContactEvent& event);
 
 }  // namespace enfilade::server

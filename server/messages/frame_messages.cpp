@@ -19,7 +19,7 @@ namespace {
 
 constexpr int kJpegQuality = 85;
 
-using ViewOrError = std::variant<FrameView, v1::Error>;
+using ViewOrError = std::variant<render::ViewRequest, v1::Error>;
 
 ViewOrError makeAvatarView(const v1::AvatarEyes& eyes, const scene::Snapshot& snapshot, int width,
                            int height) {
@@ -27,8 +27,8 @@ ViewOrError makeAvatarView(const v1::AvatarEyes& eyes, const scene::Snapshot& sn
   if (!avatar) return makeUnknownAvatarError(eyes.avatar(), "eyes.avatar");
   scene::AvatarSnapshot viewer = *avatar;
   if (eyes.has_forward()) viewer.viewDirection = vectorFromProto(eyes.forward()).stableNormalized();
-  FrameView view{render::makeFirstPersonCamera(viewer, width, height),
-                 {.hiddenEntity = avatar->id}};
+  render::ViewRequest view{render::makeFirstPersonCamera(viewer, width, height),
+                           {.hiddenEntity = avatar->id}};
   if (eyes.has_fov_y()) view.camera.fovY = eyes.fov_y();
   if (eyes.has_near()) view.camera.near = eyes.near();
   if (eyes.has_far()) view.camera.far = eyes.far();
@@ -39,7 +39,7 @@ ViewOrError makeAvatarView(const v1::AvatarEyes& eyes, const scene::Snapshot& sn
 
 ViewOrError makeFreeView(const v1::FreeCamera& free, const scene::Snapshot& snapshot, int width,
                          int height) {
-  FrameView view;
+  render::ViewRequest view;
   render::Camera& camera = view.camera;
   camera.width = width;
   camera.height = height;
@@ -306,7 +306,7 @@ ViewOrError viewFromProto(const v1::FrameRequest& request, const scene::Snapshot
   ViewOrError view = makeError(v1::ERROR_BAD_CAMERA, "view is missing: give eyes or free", "view");
   if (request.has_eyes()) view = makeAvatarView(request.eyes(), snapshot, width, height);
   if (request.has_free()) view = makeFreeView(request.free(), snapshot, width, height);
-  if (FrameView* frameView = std::get_if<FrameView>(&view)) {
+  if (render::ViewRequest* frameView = std::get_if<render::ViewRequest>(&view)) {
     frameView->options.channels = channelsFromProto(request);
     if (request.glass() == v1::GLASS_SOLID)
       frameView->options.transparency = render::TransparencyMode::opaque;
@@ -335,7 +335,7 @@ std::variant<EarlierView, v1::Error> earlierViewFromProto(
     *then.mutable_eyes()->mutable_forward() = request.flow_forward();
   auto view = viewFromProto(then, *snapshot);
   if (auto* error = std::get_if<v1::Error>(&view)) return std::move(*error);
-  const render::Camera& camera = std::get<FrameView>(view).camera;
+  const render::Camera& camera = std::get<render::ViewRequest>(view).camera;
   if (camera.lens || camera.projection != render::Camera::Projection::perspective)
     return makeError(v1::ERROR_BAD_CAMERA,
                      "channels: flow is only for perspective pictures without a lens", "channels");

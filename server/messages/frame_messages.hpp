@@ -15,13 +15,6 @@
 
 namespace enfilade::server {
 
-/// A validated camera with the options of the frame.
-struct FrameView {
-  render::Camera camera;
-  render::FrameOptions options;
-  render::RendererKind renderer = render::RendererKind::automatic;
-};
-
 /// Where a flow channel begins.
 struct EarlierView {
   std::shared_ptr<const scene::Snapshot> snapshot;
@@ -29,8 +22,8 @@ struct EarlierView {
 };
 
 /// Returns the requested view, or an error that names the field.
-std::variant<FrameView, v1::Error> viewFromProto(const v1::FrameRequest& request,
-                                                 const scene::Snapshot& snapshot);
+std::variant<render::ViewRequest, v1::Error> viewFromProto(const v1::FrameRequest& request,
+                                                           const scene::Snapshot& snapshot);
 /// Returns the same view at an earlier tick, for the flow channel.
 std::variant<EarlierView, v1::Error> earlierViewFromProto(
     const v1::FrameRequest& request, const std::shared_ptr<const scene::Snapshot>& snapshot);

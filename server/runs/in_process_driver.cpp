@@ -82,11 +82,11 @@ protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) 
   const auto snapshot = world_.snapshot();
   if (hasFlow(request))
     throw protocol::ProtocolError(v1::ERROR_UNSUPPORTED, "flow needs a server", "channels");
-  const std::variant<FrameView, v1::Error> view = viewFromProto(request, *snapshot);
+  const std::variant<render::ViewRequest, v1::Error> view = viewFromProto(request, *snapshot);
   if (const auto* error = std::get_if<v1::Error>(&view)) {
     throw protocol::ProtocolError(error->code(), error->message(), error->field());
   }
-  const FrameView& frameView = std::get<FrameView>(view);
+  const render::ViewRequest& frameView = std::get<render::ViewRequest>(view);
   try {
     const render::Frame rendered =
         renderer_->render(*snapshot, frameView.camera, frameView.options, frameView.renderer);

@@ -128,7 +128,8 @@ int main(int argc, char** argv) {
   render::RenderThread renderer(scene);
   const scene::World world(scene);
   const v1::FrameRequest request = smallPicture();
-  const auto view = std::get<server::FrameView>(server::viewFromProto(request, *world.snapshot()));
+  const auto view =
+      std::get<render::ViewRequest>(server::viewFromProto(request, *world.snapshot()));
   constexpr double kMicro = 1e6;
   Waited inProcess, overSocket, python, steps, stepsAndPictures;
   ByPython script(server.port());

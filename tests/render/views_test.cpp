@@ -148,8 +148,8 @@ TEST(Views, MoreThanATraversalTakesAreDivided) {
 
 TEST(Views, ARefusedViewFailsAndTheOthersAreRendered) {
   RenderThread renders(heap());
-  std::vector<ViewRequest> requests(3, ViewRequest{{squareCamera(16), {}}});
-  requests[1].view.camera.eye.x() = std::numeric_limits<double>::quiet_NaN();
+  std::vector<ViewRequest> requests(3, ViewRequest{squareCamera(16), {}});
+  requests[1].camera.eye.x() = std::numeric_limits<double>::quiet_NaN();
   std::promise<RenderThread::Frames> promise;
   renders.render(twoAvatars(), requests,
                  [&](RenderThread::Frames frames) { promise.set_value(std::move(frames)); });

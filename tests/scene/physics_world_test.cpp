@@ -213,6 +213,26 @@ TEST(PhysicsWorld, ASleepingBodyFallsWhenItsSupportSinksSlowlyOrAtOnce) {
   }
 }
 
+TEST(PhysicsWorld, ASleepingBodyFallsWhenItsSupportIsFarAwayAfterAStep) {
+  RigidScene scene;
+  scene.addFloor();
+  const auto low = scene.addFree(boxHull({0.2, 0.2, 0.2}), {0, 0.2 + kEpsilon, 0});
+  const auto high = scene.addFree(boxHull({0.2, 0.2, 0.2}), {0, 0.6 + 2 * kEpsilon, 0});
+  scene.pairAll();
+  scene.run(90);
+  ASSERT_TRUE(scene.asleep(low) && scene.asleep(high));
+  PhysicsBody& support = scene.dynamics.bodies[low];
+  support.asleep = false;
+  support.motion.velocity = {200, 0, 0};
+  scene.run(1);
+  ASSERT_GT(scene.body(low).centre.x(), 1);
+  std::erase_if(scene.dynamics.pairs, [&](const BodyPair& pair) {
+    return pair.key.a == low && pair.key.b == high;  // a broad phase no longer finds it
+  });
+  scene.run(120);
+  EXPECT_LT(scene.body(high).centre.y(), 0.25);
+}
+
 TEST(PhysicsWorld, ABodyThatCreepsLeavesAHeapAsleep) {
   RigidScene scene;
   scene.addFloor();

@@ -45,12 +45,18 @@ std::string makeRooms() {
   return house.text();
 }
 
-TEST(SpaceQuery, ARoomShapedLikeAnLDoesNotClaimItsNotch) {
+/// By each reader that is here.
+std::vector<Model> importRooms() {
   const TemporaryFolder folder;
   const auto file = folder.write("rooms.ifc", makeRooms());
-  for (const IfcReader reader : {IfcReader::webIfc, IfcReader::ifcPlusPlus}) {
-    if (reader == IfcReader::webIfc && !tests::hasWebIfc()) continue;
-    const Model model = importModel(file, by(reader));
+  std::vector<Model> models;
+  for (const IfcReader reader : tests::readersHere())
+    models.push_back(importModel(file, by(reader)));
+  return models;
+}
+
+TEST(SpaceQuery, ARoomShapedLikeAnLDoesNotClaimItsNotch) {
+  for (const Model& model : importRooms()) {
     SCOPED_TRACE(model.reader);
     ASSERT_EQ(model.spaces.size(), 3u);
     EXPECT_EQ(roomAt(model, 1, 5, 1), "L");
@@ -79,11 +85,7 @@ TEST(SpaceQuery, ASurfaceInsideOutIsTheSameSolid) {
 }
 
 TEST(SpaceMiddle, OfARoomShapedLikeAnLIsInItsCornerAwayFromTheWalls) {
-  const TemporaryFolder folder;
-  const auto file = folder.write("rooms.ifc", makeRooms());
-  for (const IfcReader reader : {IfcReader::webIfc, IfcReader::ifcPlusPlus}) {
-    if (reader == IfcReader::webIfc && !tests::hasWebIfc()) continue;
-    const Model model = importModel(file, by(reader));
+  for (const Model& model : importRooms()) {
     SCOPED_TRACE(model.reader);
     ASSERT_EQ(model.spaces.size(), 3u);
     for (const Space& space : model.spaces) {

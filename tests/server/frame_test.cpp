@@ -293,7 +293,7 @@ TEST(FrameOrder, RawImagesDoNotOvertakeEncodedOnes) {
     job.request.set_rgb_encoding(encoding);
     job.request.set_width(encoding == v1::ENCODING_PNG ? 1024 : 2);
     job.request.set_height(job.request.width());
-    job.view = std::get<FrameView>(viewFromProto(job.request, *job.snapshot));
+    job.view = std::get<render::ViewRequest>(viewFromProto(job.request, *job.snapshot));
     service.renderFrame(std::move(job), [&, number = ++id](const EncodedMessage& reply) {
       const std::lock_guard lock(mutex);
       EXPECT_TRUE(reply);
@@ -302,6 +302,37 @@ TEST(FrameOrder, RawImagesDoNotOvertakeEncodedOnes) {
   }
   service.finish();
   EXPECT_EQ(order, (std::vector<std::uint64_t>{1, 2, 3, 4}));
+}
+
+TEST(FrameOrder, ImagesOfOneTickThatWaitAreDrawnTogether) {
+  FrameService service(smallRoom());
+  ENFILADE_NEED_PICTURES(service.deviceName());
+  const scene::World world(smallRoom());
+  std::mutex mutex;
+  std::vector<double> seconds;  // views drawn together share their time equally
+  const auto request = [&](const std::shared_ptr<const scene::Snapshot>& snapshot, unsigned size) {
+    FrameJob job;
+    job.snapshot = snapshot;
+    job.request.mutable_free()->mutable_eye()->set_y(1);
+    job.request.set_width(size);
+    job.request.set_height(size);
+    job.view = std::get<render::ViewRequest>(viewFromProto(job.request, *job.snapshot));
+    job.onRendered = [&](const v1::Frame& frame, std::span<const std::uint8_t>) {
+      const std::lock_guard lock(mutex);
+      seconds.push_back(frame.drawing_seconds());
+    };
+    service.renderFrame(std::move(job), [](const EncodedMessage& reply) { EXPECT_TRUE(reply); });
+  };
+  const auto later = std::make_shared<const scene::Snapshot>(*world.snapshot());
+  request(world.snapshot(), 1024);  // the others wait for it
+  for (int i = 0; i < 3; ++i) request(world.snapshot(), 16);
+  for (int i = 0; i < 2; ++i) request(later, 16);
+  service.finish();
+  ASSERT_EQ(seconds.size(), 6u);
+  EXPECT_EQ(seconds[1], seconds[2]);
+  EXPECT_EQ(seconds[1], seconds[3]);
+  EXPECT_NE(seconds[3], seconds[4]);
+  EXPECT_EQ(seconds[4], seconds[5]);
 }
 
 }  // namespace

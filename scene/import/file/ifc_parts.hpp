@@ -20,9 +20,9 @@ struct IfcPart {
   std::vector<TextRange> ranges;        ///< of the text, ascending; what these products need
 };
 
-/// Divides `products` among `count` (1..8) parts of about equal bytes of geometry. Products that share a
-/// mapped geometry share a part. A part lacks only statements that shapes of products in other
-/// parts refer to, and nothing else.
+/// Divides `products` among `count` (1..8) parts of about equal bytes of geometry. Products that
+/// share a mapped geometry share a part. A part lacks only statements that shapes of products in
+/// other parts refer to, and nothing else.
 std::vector<IfcPart> divideIfc(const StepFile& file, const std::vector<std::uint32_t>& products,
                                std::size_t count);
 

@@ -6,8 +6,8 @@
 // transparent items have separate trees: pictures need the latter for colour alone, and rays may
 // ignore them. Trees are built on demand, with one thread. All functions may be called from any
 // thread: world threads answer rays while a renderer draws. One mutex guards this object; nothing
-// changes a tree afterwards, so tracing needs no lock. Other threads may build trees of their own on
-// device(): Embree's devices are thread-safe, and keep their errors per thread.
+// changes a tree afterwards, so tracing needs no lock. Other threads may build trees of their own
+// on device(): Embree's devices are thread-safe, and keep their errors per thread.
 #pragma once
 
 #include <list>

@@ -36,7 +36,8 @@ std::optional<double> computeSpaceDistance(const Space& space, const Vec3& point
   return nearest;
 }
 
-/// Square metres: half of the surface's projection to the ground, which is that of floor and ceiling.
+/// Square metres: half of the surface's projection to the ground, which is that of floor and
+/// ceiling.
 double computeFloorArea(const Space& space) {
   if (space.surface.empty()) return space.box.size().x() * space.box.size().z();
   double doubled = 0;

@@ -52,7 +52,7 @@ void handleFrame(const RequestContext& context, const v1::FrameRequest& request)
     earlier = std::get<EarlierView>(std::move(found));
   }
   FrameJob job{snapshot,
-               std::get<FrameView>(view),
+               std::get<render::ViewRequest>(view),
                request,
                context.client.out,
                context.message.request_id(),
