@@ -123,7 +123,8 @@ struct Climber {
     return top;
   }
 
-  /// The highest neighbour of `vertex`; a height of minus infinity if it has none.
+  /// The height of the highest neighbour of `vertex`, minus infinity if it has none, with the block
+  /// of its first neighbour in place of a vertex.
   Top findHighestNeighbour(std::uint32_t vertex) {
     const std::uint32_t from = table.fanOffsets[vertex], to = table.fanOffsets[vertex + 1];
     looked += 2 * (to - from);

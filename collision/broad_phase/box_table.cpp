@@ -218,8 +218,7 @@ void BoxTable::makeLevels() {
     }
     isMerged = joins;
     last = exponent;
-    levelByExponent_[exponent] =
-        static_cast<std::uint8_t>(std::min<std::size_t>(levels_.size() - 1, 255));
+    levelByExponent_[exponent] = static_cast<std::uint16_t>(levels_.size() - 1);
   }
   std::size_t firstCell = 0;
   for (Level& level : levels_) {

@@ -77,16 +77,16 @@ class BoxTable {
   void findPairsBetween(const Level& fine, const Level& coarse, PairWriter& writer) const;
   Run boxesOf(const Level& level) const;
 
-  std::vector<SizeClass> classes_;             ///< by exponent of the largest extent
-  std::vector<std::uint16_t> usedExponents_;   ///< ascending
-  std::vector<std::uint16_t> exponentOfBox_;   ///< scratch, as given
-  std::vector<std::uint8_t> levelByExponent_;  ///< index into levels_
-  std::vector<Level> levels_;                  ///< fine ones first
-  std::vector<std::uint32_t> cellOfBox_;       ///< scratch, as given
-  std::vector<std::uint32_t> cellStart_;       ///< by cell of all levels, and the end
-  std::vector<SignedBounds> boxes_;            ///< by cell
-  std::vector<Id> ids_;                        ///< of boxes_
-  std::vector<std::uint32_t> cells_;           ///< of boxes_
+  std::vector<SizeClass> classes_;              ///< by exponent of the largest extent
+  std::vector<std::uint16_t> usedExponents_;    ///< ascending
+  std::vector<std::uint16_t> exponentOfBox_;    ///< scratch, as given
+  std::vector<std::uint16_t> levelByExponent_;  ///< index into levels_
+  std::vector<Level> levels_;                   ///< fine ones first
+  std::vector<std::uint32_t> cellOfBox_;        ///< scratch, as given
+  std::vector<std::uint32_t> cellStart_;        ///< by cell of all levels, and the end
+  std::vector<SignedBounds> boxes_;             ///< by cell
+  std::vector<Id> ids_;                         ///< of boxes_
+  std::vector<std::uint32_t> cells_;            ///< of boxes_
 };
 
 }  // namespace enfilade::collision

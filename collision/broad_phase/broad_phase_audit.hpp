@@ -19,7 +19,6 @@ struct BroadPhaseAudit {
   std::size_t pairs = 0;          ///< number of overlapping pairs by brute force
   std::vector<ProxyPair> missed;  ///< overlapping pairs that the sweep lacks; sorted
   std::vector<ProxyPair> extra;   ///< pairs of the sweep that do not overlap; sorted
-  bool isCorrect() const { return missed.empty() && extra.empty(); }
 };
 
 /// Compares the pairs of `sweep` after an update() with brute force over its boxes: `staticBoxes`

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "scene/navigation/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -70,8 +70,9 @@ std::vector<Vec3> findExits(const Body& lift, const Vec3& inside, Walker& walker
   const double room = walker.agent().radius + kExitRoom;
   for (int i = 0; i < kExitDirections && exits.size() < kMaxExits; ++i) {
     const int turn = (i * 4) % kExitDirections + i / 4;  // the four sides first
-    const double angle = 2 * std::numbers::pi / kExitDirections * turn;
-    const Vec3 direction(std::cos(angle), 0, std::sin(angle));
+    const auto [sine, cosine] =
+        collision::computeSineCosineOfDegrees(360.0 / kExitDirections * turn);
+    const Vec3 direction(cosine, 0, sine);
     walker.returnTo(inside);
     const WalkOutcome out = walker.walkTo(
         inside + computeWayOut(lift.boxes.whole, inside, direction, room) * direction);

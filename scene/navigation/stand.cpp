@@ -2,7 +2,8 @@
 
 #include <array>
 #include <cmath>
-#include <numbers>
+
+#include "collision/motion/sine_cosine.hpp"
 
 namespace enfilade::scene {
 
@@ -23,8 +24,8 @@ std::optional<Vec3> standNear(Walker& walker, const Vec3& point) {
   if (const auto found = place(Vec3::Zero())) return found;
   for (const double ring : kRings) {
     for (int i = 0; i < kPlacesOfRing; ++i) {
-      const double angle = 2 * std::numbers::pi / kPlacesOfRing * i;
-      if (const auto found = place(ring * Vec3(std::cos(angle), 0, std::sin(angle)))) return found;
+      const auto [sine, cosine] = collision::computeSineCosineOfDegrees(360.0 / kPlacesOfRing * i);
+      if (const auto found = place(ring * Vec3(cosine, 0, sine))) return found;
     }
   }
   return std::nullopt;

@@ -23,16 +23,26 @@ struct Size {
 constexpr Size kSizes[] = {{1000, 301, 1}, {8000, 121, 3}, {64000, 61, 12}};
 constexpr Size kQuickSizes[] = {{1000, 121, 0.3}, {8000, 31, 0.6}};
 
-RecordedBoxes record(CubeMotion motion, const Size& size) {
-  MovingCubes cubes(motion, size.cubes);
+/// Records `ticks` frames of several sources of boxes together.
+template <typename... Source>
+RecordedBoxes record(int ticks, Source... sources) {
   MoverSweep truth;
   RecordedBoxes recorded;
-  for (int tick = 0; tick < size.ticks; ++tick) {
-    const std::span<const Aabb> boxes = cubes.next();
-    recorded.boxes.emplace_back(boxes.begin(), boxes.end());
-    truth.reportPairs(boxes, recorded.pairs.emplace_back());
+  for (int tick = 0; tick < ticks; ++tick) {
+    std::vector<Aabb>& all = recorded.boxes.emplace_back();
+    const auto append = [&](std::span<const Aabb> boxes) {
+      all.insert(all.end(), boxes.begin(), boxes.end());
+    };
+    (append(sources.next()), ...);
+    truth.reportPairs(all, recorded.pairs.emplace_back());
   }
   return recorded;
+}
+
+/// Two distant boxes, which some peers need to know the extent of the world.
+std::vector<Aabb> distantBoxes() {
+  return {{Vec3(-1e3, -1001, -1e3), Vec3(1e3, -1000, 1e3)},
+          {Vec3(-1e3, 1000, -1e3), Vec3(1e3, 1001, 1e3)}};
 }
 
 std::vector<double> timedOf(const BroadPhaseRun& run) {
@@ -43,10 +53,8 @@ std::vector<double> timedOf(const BroadPhaseRun& run) {
 
 std::size_t measure(CubeMotion motion, const Size& size, const Arguments& arguments,
                     const std::vector<BroadPhaseMethod>& methods, Results& results) {
-  const RecordedBoxes recorded = record(motion, size);
-  // Two distant boxes, which some peers need to know the extent of the world.
-  const std::vector<Aabb> distant{{Vec3(-1e3, -1001, -1e3), Vec3(1e3, -1000, 1e3)},
-                                  {Vec3(-1e3, 1000, -1e3), Vec3(1e3, 1001, 1e3)}};
+  const RecordedBoxes recorded = record(size.ticks, MovingCubes(motion, size.cubes));
+  const std::vector<Aabb> distant = distantBoxes();
   std::vector<const BroadPhaseMethod*> chosen;
   for (const BroadPhaseMethod& method : methods) {
     if (method.kind != BroadPhaseMethod::Kind::approach && arguments.wants(method.name) &&
@@ -78,6 +86,36 @@ std::size_t measure(CubeMotion motion, const Size& size, const Arguments& argume
   return wrong;
 }
 
+/// A heap whose endpoint lists would be expensive, and walkers elsewhere whose lists are cheap: the
+/// cost of both in one sweep against one sweep for each. Returns the number of wrong frames.
+std::size_t measureHeapBesideWalkers(const Size& size, const BroadPhaseMethod& ours,
+                                     Results& results) {
+  constexpr std::size_t kWalkers = 1000;
+  const MovingCubes heap(CubeMotion::turbulent, size.cubes);
+  const WalkingBoxes walkers(kWalkers, Vec3(500, 0, 0));
+  const std::vector<Aabb> distant = distantBoxes();
+  const BroadPhaseMethod* const methods[] = {&ours};
+  std::size_t wrong = 0;
+  const auto medianOf = [&](const RecordedBoxes& recorded) {
+    const auto runs = runMethods(methods, distant, recorded, size.secondsAMethod);
+    wrong += runs[0].wrong;
+    return quantile(timedOf(runs[0]), 0.5) / 1e3;
+  };
+  const double ofHeap = medianOf(record(size.ticks, heap));
+  const double ofWalkers = medianOf(record(size.ticks, walkers));
+  const double ofBoth = medianOf(record(size.ticks, heap, walkers));
+  std::printf("%zu turbulent cubes %.3f ms, %zu walkers %.3f ms, in one sweep %.3f ms\n",
+              size.cubes, ofHeap, kWalkers, ofWalkers, ofBoth);
+  results.add({{"bench", "regions"},
+               {"cubes", size.cubes},
+               {"walkers", kWalkers},
+               {"heap_ms", ofHeap},
+               {"walkers_ms", ofWalkers},
+               {"both_ms", ofBoth},
+               {"wrong", wrong}});
+  return wrong;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -90,6 +128,10 @@ int main(int argc, char** argv) {
   for (const Size& size : sizes) {
     for (const CubeMotion motion : kCubeMotions)
       wrong += measure(motion, size, arguments, methods, results);
+  }
+  for (const BroadPhaseMethod& method : methods) {
+    if (method.kind == BroadPhaseMethod::Kind::ours)
+      wrong += measureHeapBesideWalkers(sizes[1], method, results);
   }
   return wrong == 0 ? 0 : 3;
 }

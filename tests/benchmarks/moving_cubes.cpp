@@ -90,4 +90,26 @@ void MovingCubes::swirl() {
   }
 }
 
+WalkingBoxes::WalkingBoxes(std::size_t count, const Vec3& corner)
+    : corner_(corner), width_(4 * std::sqrt(static_cast<double>(count))), boxes_(count) {
+  for (std::size_t k = 0; k < count; ++k) {
+    feet_.push_back(uniform3(random_, Vec3::Zero(), Vec3(width_, 0, width_)));
+    const Vec3 towards = direction(random_);
+    velocities_.push_back(1.4 * Vec3(towards.x(), 0, towards.z()));
+  }
+}
+
+std::span<const Aabb> WalkingBoxes::next() {
+  for (std::size_t k = 0; k < feet_.size(); ++k) {
+    feet_[k] += kFrame * velocities_[k];
+    for (const int axis : {0, 2}) {
+      const bool isOutside = feet_[k][axis] < 0 || feet_[k][axis] > width_;
+      if (isOutside && (feet_[k][axis] < 0) == (velocities_[k][axis] < 0))
+        velocities_[k][axis] = -velocities_[k][axis];
+    }
+    boxes_[k] = {corner_ + feet_[k] - Vec3(0.3, 0, 0.3), corner_ + feet_[k] + Vec3(0.3, 1.75, 0.3)};
+  }
+  return boxes_;
+}
+
 }  // namespace enfilade::benchmarks

@@ -1,5 +1,5 @@
-// Workloads in which everything moves: equal cubes of edge 1 m in frames of 1/30 s that pass
-// through each other. Equal seeds give equal numbers.
+// Workloads in which everything moves. MovingCubes: equal cubes of edge 1 m in frames of 1/30 s
+// that pass through each other. Equal seeds give equal numbers.
 //
 // - brownian: a tenth of the volume is filled; each cube makes a random step of up to 0.2 m a
 // frame.
@@ -37,6 +37,22 @@ class MovingCubes {
   Random random_{4};
   double width_;  ///< metres: edge of the room, or radius of the heap
   std::vector<Vec3> centres_, velocities_;
+  std::vector<Aabb> boxes_;
+};
+
+/// People on the floor of a large hall, 4 m apart on average, who walk straight at up to 1.4 m/s
+/// and turn back at the walls. `corner`: of the hall, metres.
+class WalkingBoxes {
+ public:
+  WalkingBoxes(std::size_t count, const Vec3& corner);
+  /// Advances by one frame.
+  std::span<const Aabb> next();
+
+ private:
+  Random random_{5};
+  Vec3 corner_;
+  double width_;  ///< metres, of the hall
+  std::vector<Vec3> feet_, velocities_;
   std::vector<Aabb> boxes_;
 };
 

@@ -1,6 +1,7 @@
 """Navigation by the Python client: paths, places, maps, and habitat-sim's names."""
 
 import math
+import os
 import tempfile
 import unittest
 from pathlib import Path
@@ -281,6 +282,29 @@ class DoorsTest(unittest.TestCase):
         record = PathFinder(client.navigation()).closest_obstacle_surface_point((-1, 0, 2))
         self.assertAlmostEqual(record.hit_dist, 0.6, delta=0.01)
         self.assertAlmostEqual(record.hit_pos[0], -0.1, places=3)
+
+
+class BuildingTest(unittest.TestCase):
+    def test_go_rides_the_lift_up_and_down_through_its_doors(self):
+        server = enfilade.serve(os.environ["ENFILADE_BUILDING"])
+        self.addCleanup(server.stop)
+        client = server.connect()
+        self.addCleanup(client.close)
+        client.lockstep()
+        client.subscribe(contacts=True)
+        below, above = (41, 0, -5), (38.3, 4.2, -4.5)
+        ann = client.spawn("ann", at=below)
+        for start, goal in ((below, above), (above, below)):
+            path = client.navigation(doors="open").path(start, goal, lifts=True)
+            legs = [(leg.kind, leg.name) for leg in path.legs]
+            self.assertIn(("lift", "lift/cabin"), legs)
+            self.assertEqual(sum(kind == "door" for kind, _ in legs), 4, "both leaves of both storeys")
+            self.assertEqual(ann.go_and_wait(goal, doors="open", lifts=True), "arrived")
+            feet = client.step(1, avatars=True).avatars["ann"].feet
+            self.assertLess(np.linalg.norm(np.subtract(feet, goal)), 0.02)
+        touched = {one.b_name for one in client.contacts() if one.a_name == "ann"}
+        self.assertIn("lift/cabin", touched)
+        self.assertFalse([name for name in touched if "door" in name])
 
 
 class FollowerTest(RoomCase):

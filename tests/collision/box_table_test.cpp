@@ -142,6 +142,16 @@ TEST(BoxTable, AcceptsPointsHugeCoordinatesAndDistantClusters) {
   EXPECT_GT(checkPairs(boxes, boxAt(Vec3::Constant(1e9), Vec3::Zero())), 100u);
 }
 
+TEST(BoxTable, FindsThePairsOfBoxesOfHundredsOfSizes) {
+  std::vector<Aabb> boxes;  // no two have sizes of one level
+  for (int k = -150; k < 150; ++k)
+    boxes.push_back(boxAt(Vec3::Zero(), Vec3::Constant(std::ldexp(1.0, 2 * k))));
+  const double size = std::ldexp(1.0, 299);  // two of the largest level, side by side
+  boxes.push_back(boxAt(Vec3::Constant(0.9 * size), Vec3::Constant(size)));
+  boxes.push_back(boxAt(Vec3::Constant(1.8 * size), Vec3::Constant(size)));
+  EXPECT_GT(checkPairs(boxes, boxes[299]), 40000u);
+}
+
 TEST(BoxTable, FindsNothingInAnEmptyTable) {
   EXPECT_EQ(checkPairs({}, boxAt(Vec3::Zero(), Vec3::Ones())), 0u);
   EXPECT_EQ(checkPairs({boxAt(Vec3::Zero(), Vec3::Ones())}, boxAt(Vec3::Ones(), Vec3::Ones())), 0u);

@@ -100,7 +100,7 @@ TEST(PartsFeeder, EndsAtTheSameBitsWithAnyNumberOfThreadsAndWithoutWideRegisters
   const std::vector<double> alone = run(1);
   EXPECT_EQ(alone, run(1));
   EXPECT_EQ(alone, run(2));
-  EXPECT_EQ(alone, run(3));
+  EXPECT_EQ(alone, run(8));
   EXPECT_EQ(alone, run(1, false));
 }
 

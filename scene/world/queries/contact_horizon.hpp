@@ -73,10 +73,6 @@ class ContactHorizons {
   std::uint64_t tick() const { return state_.snapshot()->tick; }
   /// Of the selected avatars that are present, by id.
   const std::map<EntityId, ContactHorizon>& horizons() const { return horizons_; }
-  /// Of all pairs near the avatars, the one with the earliest possible contact.
-  std::optional<collision::PairSchedule::Entry> earliestPair() const {
-    return schedule_.earliest();
-  }
   const Statistics& statistics() const { return statistics_; }
   /// Checks that the schedule agrees with the avatars. Throws std::logic_error. For tests.
   void validate() const;
