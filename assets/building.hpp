@@ -19,7 +19,11 @@ struct MovingPart {
   collision::Vec3 axis;      ///< unit length, in the object's own frame
   double low = 0, high = 0;  ///< relative to the modelled pose: radians about, or metres along, the
                              ///< axis
+
+  /// Parts that slide upwards are lifts.
+  bool isLift() const { return kind == Kind::slide && axis.y() > 0; }
 };
+inline constexpr double kLiftSpeed = 1.5, kLiftAcceleration = 1;  ///< m/s, m/s^2
 
 struct BuildingOptions {
   std::uint64_t seed = 1;

@@ -182,6 +182,11 @@ void addTransform(Json& json, const Eigen::Affine3d& t) {
 
 Json motionJson(const MovingPart& part) {
   const bool turns = part.kind == MovingPart::Kind::hinge;
+  if (part.isLift())  // as in the sidecar, which has its doors, too
+    return {{"walk_kind", "lift"},
+            {"walk_stops", {part.low, part.high}},
+            {"walk_speed", kLiftSpeed},
+            {"walk_acceleration", kLiftAcceleration}};
   const double scale = turns ? 57.29577951308232 : 1;  // degrees per radian
   return {{"walk_kind", turns ? "hinged" : "sliding"},
           {"walk_axis", {part.axis.x(), part.axis.y(), part.axis.z()}},

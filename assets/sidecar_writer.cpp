@@ -46,12 +46,9 @@ Json doorOf(const scene::Object& object, const MovingPart& part) {
 }
 
 Json liftOf(const scene::Object& object, const MovingPart& part) {
-  return {{"name", nameOf(object.path)},
-          {"kind", "lift"},
-          {"objects", {object.path}},
-          {"stops", {rounded(part.low), rounded(part.high)}},
-          {"speed", 1.5},
-          {"acceleration", 1}};
+  return {{"name", nameOf(object.path)}, {"kind", "lift"},
+          {"objects", {object.path}},    {"stops", {rounded(part.low), rounded(part.high)}},
+          {"speed", kLiftSpeed},         {"acceleration", kLiftAcceleration}};
 }
 
 /// Adds a body for the object of this path, if the model has it.
@@ -70,8 +67,7 @@ std::string sidecarText(const scene::Model& model, const std::vector<MovingPart>
   Json bodies = Json::array();
   for (const MovingPart& part : movingParts) {
     const scene::Object& object = model.objects[part.object];
-    const bool upwards = part.axis.y() > 0 && part.kind == MovingPart::Kind::slide;
-    bodies.push_back(upwards ? liftOf(object, part) : doorOf(object, part));
+    bodies.push_back(part.isLift() ? liftOf(object, part) : doorOf(object, part));
   }
   const std::string study = std::string(kPrefix) + "ground/study/";
   addBodyOf(model, study + "armchair", {{"kind", "rigid"}, {"mass", 18}}, bodies);

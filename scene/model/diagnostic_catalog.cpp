@@ -43,7 +43,8 @@ constexpr std::array kCatalog{
     DiagnosticKind{"flat_object", warning, "scaled to zero along an axis: it has no inside"},
     DiagnosticKind{"mirrored_object", note, "mirrored: its faces were flipped to face outwards"},
     // surfaces
-    DiagnosticKind{"broken_triangle_dropped", error, "vertices are not finite: ignored"},
+    DiagnosticKind{"broken_triangle_dropped", error,
+                   "a triangle with a vertex that is broken or missing: ignored"},
     DiagnosticKind{
         "convexity_untried", note,
         "too large for the convexity test; it stays triangles, equally exact but slower"},
@@ -94,6 +95,8 @@ constexpr std::array kCatalog{
     DiagnosticKind{"uncut_opening", error,
                    "a door or window whose wall is closed behind it: it is impassable"},
     DiagnosticKind{"map_place", note, "where the file's own coordinates lie on a map"},
+    DiagnosticKind{"storeys_by_elevation", note,
+                   "the file places its storeys at one height: their stated elevations are used"},
     DiagnosticKind{"skipped_openings", note, "openings are air"},
     DiagnosticKind{"skipped_spaces", note, "spaces are air"},
     // bodies

@@ -238,7 +238,7 @@ void explain(const PathFinder& finder, const Vec3& from, const Vec3& to, Navigat
     const double width = measureNarrowest(finder.world, finder.agent, middles, outcome.footPosition,
                                           kMaxWidthDistance)
                              .clearWidth;
-    if (width < 2 * finder.agent.radius + 0.05) path.obstruction->clearWidth = width;
+    if (width < 2 * finder.agent.radius) path.obstruction->clearWidth = width;
     break;
   }
   if (!path.obstruction) {

@@ -142,8 +142,8 @@ void renderFrames(const CaptureCommand& command, const scene::Scene& scene, cons
       checkFrame(scene, captureFrame, index, *frame, counts);
       queue.post([&, index, frame] {
         const auto overlay = [&](const render::Frame& drawn) {
-          return drawOverlay(drawn, command.pictures.overlay, scene.model(), plan,
-                             plan.frames[index]);
+          return drawOverlay(drawn, command.pictures.overlay, scene.model(), scene.objectClasses(),
+                             plan, plan.frames[index]);
         };
         counts.clampedPixels +=
             writeFrame(command.out, command.pictures, index, *frame, scene.objectClasses(), overlay)

@@ -1,11 +1,11 @@
 #include "server/capture/overlay.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <cmath>
 #include <optional>
 
 #include "render/image/canvas.hpp"
+#include "server/plans/label_names.hpp"
 #include "server/plans/plan_image.hpp"
 
 namespace enfilade::server {
@@ -16,7 +16,7 @@ using render::Colour;
 using render::Image;
 
 constexpr double kMinBoxShare = 0.0005, kMaxBoxShare = 0.4;  // of the picture, for boxes
-constexpr std::size_t kMaxNames = 16;                        // largest objects with a label
+constexpr std::size_t kMaxNames = 16;                        // largest things with a label
 constexpr double kLabelSize = 11;                            // pixels, of letters
 constexpr int kLabelHeight = 14;                             // pixels
 constexpr int kMaxLabelLines = 4;                            // from object to its label
@@ -38,11 +38,14 @@ struct ObjectRect {
   int middleY() const { return static_cast<int>(sumY / static_cast<std::int64_t>(pixels)); }
 };
 
-std::vector<ObjectRect> findObjectRects(const render::Frame& frame) {
+/// Rectangles of the ids, one a pixel, that fill neither too little nor too much of the picture.
+/// Those of avatars come first, then the largest.
+std::vector<ObjectRect> findRects(const render::Frame& frame, const std::vector<std::uint32_t>& ids,
+                                  std::size_t objects) {
   std::map<scene::EntityId, ObjectRect> found;
   const int width = frame.camera.width;
-  for (std::size_t i = 0; i < frame.ids.size(); ++i) {
-    const scene::EntityId id = frame.ids[i];
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const scene::EntityId id = ids[i];
     if (id == 0) continue;
     const int x = static_cast<int>(i) % width, y = static_cast<int>(i) / width;
     const auto [at, isNew] = found.try_emplace(id, ObjectRect{id, x, y, x, y});
@@ -55,15 +58,17 @@ std::vector<ObjectRect> findObjectRects(const render::Frame& frame) {
     rect.sumY += y;
   }
   std::vector<ObjectRect> rects;
-  const auto all = static_cast<double>(frame.ids.size());
+  const auto all = static_cast<double>(ids.size());
   for (const auto& [id, rect] : found) {
     const double area = static_cast<double>(rect.right - rect.left + 1) *
                         static_cast<double>(rect.bottom - rect.top + 1);
     if (static_cast<double>(rect.pixels) >= kMinBoxShare * all && area <= kMaxBoxShare * all)
       rects.push_back(rect);
   }
-  std::stable_sort(rects.begin(), rects.end(),
-                   [](const ObjectRect& a, const ObjectRect& b) { return a.pixels > b.pixels; });
+  std::stable_sort(rects.begin(), rects.end(), [&](const ObjectRect& a, const ObjectRect& b) {
+    const bool isAvatarA = a.id > objects, isAvatarB = b.id > objects;
+    return isAvatarA != isAvatarB ? isAvatarA : a.pixels > b.pixels;
+  });
   return rects;
 }
 
@@ -71,33 +76,6 @@ void drawBox(Canvas& canvas, const ObjectRect& rect) {
   canvas.rectangle({static_cast<double>(rect.left), static_cast<double>(rect.top)},
                    rect.right + 1.0 - rect.left, rect.bottom + 1.0 - rect.top, 1.5,
                    computeAvatarColour(rect.id));
-}
-
-/// Where a part "_GlobalId" begins: 22 digits of base 64, the first of which is below 4; those of a
-/// word have no letters of both cases. npos: none.
-std::size_t findGlobalId(const std::string& name) {
-  constexpr std::size_t kLength = 22;
-  const auto isDigit = [](char c) {
-    return std::isalnum(static_cast<unsigned char>(c)) != 0 || c == '_' || c == '$';
-  };
-  const auto isUpper = [](char c) { return c >= 'A' && c <= 'Z'; };
-  const auto isLower = [](char c) { return c >= 'a' && c <= 'z'; };
-  for (std::size_t i = 0; i + kLength < name.size(); ++i) {
-    const auto first = name.begin() + static_cast<std::ptrdiff_t>(i) + 1, end = first + kLength;
-    if (name[i] == '_' && *first >= '0' && *first <= '3' && std::all_of(first, end, isDigit) &&
-        std::any_of(first, end, isUpper) && std::any_of(first, end, isLower) &&
-        (end == name.end() || *end == '_'))
-      return i;
-  }
-  return std::string::npos;
-}
-
-/// Removes `separator` and the number after it from the end of a name.
-void removeNumber(std::string& name, const std::string& separator) {
-  const std::size_t at = name.rfind(separator);
-  if (at == std::string::npos || at == 0) return;
-  const std::size_t digits = name.find_first_not_of("0123456789", at + separator.size());
-  if (digits == std::string::npos && at + separator.size() < name.size()) name.resize(at);
 }
 
 /// The name for people of an object, or an avatar's name.
@@ -122,9 +100,10 @@ bool isOverlapping(const Label& a, const Label& b) {
 
 /// Finds the object's pixel next to its centre, in the row of the centre. The centre itself may be
 /// a hole.
-int findLabelColumn(const render::Frame& frame, const ObjectRect& rect) {
+int findLabelColumn(const render::Frame& frame, const std::vector<std::uint32_t>& ids,
+                    const ObjectRect& rect) {
   const int width = frame.camera.width;
-  const auto row = frame.ids.begin() + static_cast<std::ptrdiff_t>(rect.middleY()) * width;
+  const auto row = ids.begin() + static_cast<std::ptrdiff_t>(rect.middleY()) * width;
   for (int away = 0; away < width; ++away) {
     for (const int x : {rect.middleX() - away, rect.middleX() + away})
       if (x >= 0 && x < width && row[x] == rect.id) return x;
@@ -135,12 +114,12 @@ int findLabelColumn(const render::Frame& frame, const ObjectRect& rect) {
 /// Places a label on the object, or as close above or below as free space allows; nullopt: no
 /// space.
 std::optional<Label> placeLabel(const Canvas& canvas, const render::Frame& frame,
-                                const ObjectRect& rect, const std::string& name,
-                                const std::vector<Label>& others) {
+                                const std::vector<std::uint32_t>& ids, const ObjectRect& rect,
+                                const std::string& name, const std::vector<Label>& others) {
   const int width = static_cast<int>(canvas.measure(name, kLabelStyle).width) + 4;
   if (name.empty() || width > frame.camera.width) return std::nullopt;
   const int left =
-      std::clamp(findLabelColumn(frame, rect) - width / 2, 1, frame.camera.width - width);
+      std::clamp(findLabelColumn(frame, ids, rect) - width / 2, 1, frame.camera.width - width);
   for (int lines = 0; lines <= kMaxLabelLines; ++lines) {
     for (const int shift : {-lines, lines}) {
       const Label label{left, rect.middleY() - kLabelHeight / 2 + shift * kLabelHeight, width};
@@ -185,46 +164,37 @@ void drawTrail(Canvas& canvas, const render::Frame& frame, const AvatarTrail& tr
   }
 }
 
+/// One label for each thing that people see.
+void drawNames(Canvas& canvas, const render::Frame& frame, const scene::Model& model,
+               const scene::ObjectClasses& classes, const CapturePlan& plan) {
+  const std::vector<std::uint32_t> things = classes.thingsOf(frame.ids);
+  const std::vector<ObjectRect> rects = findRects(frame, things, model.objects.size());
+  std::vector<Label> labels;
+  for (std::size_t i = 0; i < std::min(rects.size(), kMaxNames); ++i) {
+    const std::string name = findName(model, plan, rects[i].id);
+    const auto label = placeLabel(canvas, frame, things, rects[i], name, labels);
+    if (!label) continue;
+    canvas.text({label->left + 2.0, static_cast<double>(label->top)}, name, kLabelStyle);
+    labels.push_back(*label);
+  }
+}
+
 }  // namespace
 
 Image drawOverlay(const render::Frame& frame, const OverlayChoice& choice,
-                  const scene::Model& model, const CapturePlan& plan,
-                  const CaptureFrame& captureFrame) {
+                  const scene::Model& model, const scene::ObjectClasses& classes,
+                  const CapturePlan& plan, const CaptureFrame& captureFrame) {
   Canvas canvas(render::toImage(frame));
   if (choice.paths) {
     for (const AvatarTrail& trail : plan.trails) drawTrail(canvas, frame, trail, frame.tick);
   }
-  const std::vector<ObjectRect> rects =
-      choice.boxes || choice.names ? findObjectRects(frame) : std::vector<ObjectRect>();
   if (choice.boxes) {
-    for (const ObjectRect& rect : rects) drawBox(canvas, rect);
+    for (const ObjectRect& rect : findRects(frame, frame.ids, model.objects.size()))
+      drawBox(canvas, rect);
   }
-  if (choice.names) {
-    std::vector<Label> labels;
-    for (std::size_t i = 0; i < std::min(rects.size(), kMaxNames); ++i) {
-      const std::string name = findName(model, plan, rects[i].id);
-      const auto label = placeLabel(canvas, frame, rects[i], name, labels);
-      if (!label) continue;
-      canvas.text({label->left + 2.0, static_cast<double>(label->top)}, name, kLabelStyle);
-      labels.push_back(*label);
-    }
-  }
+  if (choice.names) drawNames(canvas, frame, model, classes, plan);
   if (choice.contacts) drawContacts(canvas, frame, captureFrame);
   return canvas.toImage();
-}
-
-std::string makeLabelName(const std::string& path) {
-  const std::string whole = path.substr(path.find_last_of('/') + 1);
-  std::string name = whole.substr(0, findGlobalId(whole));
-  removeNumber(name, "_node_");
-  removeNumber(name, ":");  // Revit's "family:type:element"
-  const std::size_t last = name.rfind(':');
-  if (last != std::string::npos && last > 0) {
-    const std::size_t before = name.rfind(':', last - 1);
-    const std::size_t start = before == std::string::npos ? 0 : before + 1;
-    if (name.compare(start, last - start, name, last + 1) == 0) name.resize(last);
-  }
-  return name.empty() ? whole : name;
 }
 
 }  // namespace enfilade::server

@@ -228,7 +228,8 @@ render::Image renderMoment(render::RendererSelector& renderer, const scene::Scen
   CaptureFrame captureFrame;
   captureFrame.camera = from.camera;
   captureFrame.contacts = {{moment.point, false}};
-  render::Canvas canvas(drawOverlay(frame, choice, scene.model(), {}, captureFrame));
+  render::Canvas canvas(
+      drawOverlay(frame, choice, scene.model(), scene.objectClasses(), {}, captureFrame));
   const Vec3 at = render::project(from.camera, moment.point);
   canvas.arc({at.x(), at.y()}, kRingRadius, 0, 2 * M_PI, 2, {214, 40, 40});
   return canvas.toImage();

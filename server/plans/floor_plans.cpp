@@ -8,6 +8,7 @@
 #include <set>
 
 #include "server/plans/floor_plan_section.hpp"
+#include "server/plans/label_names.hpp"
 #include "server/plans/plan_drawing.hpp"
 
 namespace enfilade::server {
@@ -60,15 +61,44 @@ bool hasWallsAbove(const scene::Scene& scene, double floor) {
   });
 }
 
-/// Parses the storey name from an object path: the text between `Ifc...Storey` and the next '/'.
+/// Area that the outlines of an object enclose, square metres: the largest less its holes.
+double computeSolidArea(const ObjectSection& section) {
+  double largest = 0, sum = 0;
+  for (const std::vector<Vec3>& loop : section.loops) {
+    double twice = 0;
+    for (std::size_t i = 0; i < loop.size(); ++i) {
+      const Vec3 &p = loop[i], &q = loop[(i + 1) % loop.size()];
+      twice += p.x() * q.z() - q.x() * p.z();
+    }
+    largest = std::max(largest, std::abs(twice) / 2);
+    sum += std::abs(twice) / 2;
+  }
+  return 2 * largest - sum;
+}
+
+/// Whether a cut above the floor goes through one solid that leaves no room, as a thick roof.
+bool isCutSolid(const scene::Scene& scene, double floor) {
+  constexpr double kMaxSolidShare = 0.9;
+  double solid = 0;
+  Aabb area;
+  for (const ObjectSection& section : cutStatic(scene, floor + kPlanCutHeight)) {
+    solid = std::max(solid, computeSolidArea(section));
+    for (const std::vector<Vec3>& loop : section.loops)
+      for (const Vec3& point : loop) area.include(point);
+  }
+  const Vec3 size = area.size();
+  return solid > 0 && solid > kMaxSolidShare * size.x() * size.z();
+}
+
+/// Parses the storey name from an object path: the text between `Ifc...Storey` and the next '/';
+/// empty also for the name that converters give to a storey without one.
 std::string parseStoreyName(const std::string& path) {
   const std::size_t word = path.find("IfcBuildingStorey");
   if (word == std::string::npos) return "";
   std::string name = path.substr(word + 17, path.find('/', word) - word - 17);
   while (!name.empty() && (name.front() == '_' || name.front() == ':')) name.erase(0, 1);
-  // Some IFC readers append the GlobalId.
-  if (name.size() > 23 && name[name.size() - 23] == '_') name.resize(name.size() - 23);
-  return name;
+  name = makeLabelName(name);  // without the GlobalId that some readers append
+  return name == "Undefined" ? "" : name;
 }
 
 /// Finds the storey name of most objects on this floor.
@@ -139,28 +169,29 @@ Aabb computePlanArea(const scene::Scene& scene, double height) {
 }
 
 /// Space around a plan, thin lines: title above, numbers left and below, scale bar below these.
-constexpr double kLeft = 64, kTop = 62, kRight = 24, kBottom = 74;
+constexpr double kLeft = 64, kTop = 62, kRight = 24, kBottom = 82;
 constexpr double kMinWidth = 560;  // thin lines, of a sheet
+
+/// Draws a line of text, smaller where it is too wide, and shortened where that does not suffice.
+void drawFittingLine(Canvas& canvas, render::Point at, const std::string& text, TextStyle style,
+                     double width) {
+  constexpr double kMinSizeShare = 0.6;  // legible
+  const double wanted = canvas.measure(text, style).width;
+  if (wanted > width) style.size *= std::max(kMinSizeShare, width / wanted);
+  canvas.text(at, canvas.shorten(text, style, width), style);
+}
 
 void drawTitle(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
                const StoreyFloor& storey, const std::string& scale) {
   const std::string& source = scene.model().source;
-  std::array<char, 96> text{};
-  std::snprintf(text.data(), text.size(), "floor at y = %.2f m, cut %.1f m above", storey.height,
-                kPlanCutHeight);
   const double u = view.unit, width = canvas.width() - 32 * u;
-  TextStyle title, line;
-  title.size = 18 * u, title.bold = true, title.colour = kPlanInk;
-  line.size = 12 * u, line.colour = kPlanInk;
   const std::string file = source.substr(source.find_last_of('/') + 1);
-  canvas.text({16 * u, 10 * u},
-              canvas.shorten(storey.name.empty() ? file : file + ": " + storey.name, title, width),
-              title);
-  canvas.text({16 * u, 36 * u},
-              canvas.shorten(std::string(text.data()) + (scale.empty() ? "" : ", " + scale) +
-                                 "; metres of the scene; facing 0 looks right (+x), 90 up (-z)",
-                             line, width),
-              line);
+  drawFittingLine(canvas, {16 * u, 10 * u}, storey.name.empty() ? file : file + ": " + storey.name,
+                  {.size = 18 * u, .colour = kPlanInk, .bold = true}, width);
+  drawFittingLine(canvas, {16 * u, 36 * u},
+                  formatFloorAndCut(storey.height) + (scale.empty() ? "" : ", " + scale) +
+                      "; metres of the scene; facing 0 looks right (+x), 90 up (-z)",
+                  {.size = 12 * u, .colour = kPlanInk}, width);
 }
 
 void drawSheet(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
@@ -170,7 +201,7 @@ void drawSheet(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
   drawCut(canvas, view, scene);
   if (storey.storey) drawSpaceNames(canvas, view, scene.model(), *storey.storey);
   const double below = view.topLeft.y + view.height();
-  drawScaleBar(canvas, view, {view.topLeft.x, below + 34 * view.unit}, scene.model().north);
+  drawScaleBar(canvas, view, {view.topLeft.x, below + 42 * view.unit}, scene.model().north);
   drawTitle(canvas, view, scene, storey, scale);
   reportMissingFont(canvas);
 }
@@ -182,7 +213,8 @@ std::vector<StoreyFloor> findStoreys(const scene::Scene& scene) {
   std::vector<StoreyFloor> storeys = findStatedStoreys(scene, heights);
   if (!storeys.empty()) return storeys;
   for (const double height : findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys)) {
-    if (hasWallsAbove(scene, height)) storeys.push_back({height, findStoreyName(scene, height)});
+    if (hasWallsAbove(scene, height) && !isCutSolid(scene, height))
+      storeys.push_back({height, findStoreyName(scene, height)});
   }
   if (storeys.empty() && !scene.bounds().empty()) storeys.push_back({scene.bounds().min.y(), ""});
   return storeys;

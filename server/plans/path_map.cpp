@@ -208,9 +208,7 @@ const StoreyFloor* findStoreyAt(const std::vector<StoreyFloor>& storeys, double 
 }
 
 std::string formatHeading(const StoreyPlan& storey, const StoreyFloor* named) {
-  char text[64];
-  std::snprintf(text, sizeof text, "floor at %.2f m, cut %.1f m above", storey.floor,
-                kPlanCutHeight);
+  const std::string text = formatFloorAndCut(storey.floor);
   return named != nullptr && !named->name.empty() ? named->name + ": " + text : text;
 }
 
@@ -247,9 +245,9 @@ Image composeMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
     drawPlanPicture(canvas, view, storey.picture);
     drawGrid(canvas, view);
     if (scene) drawCut(canvas, view, *scene);
-    if (named != nullptr && named->storey)
-      drawSpaceNames(canvas, view, scene->model(), *named->storey);
     StoreyMarks(canvas, storeys, storey).draw(trace);
+    if (named != nullptr && named->storey)  // above the paths, which would strike them through
+      drawSpaceNames(canvas, view, scene->model(), *named->storey);
   }
   drawScaleBar(canvas, storeys.front().view, {kBorder, legendTop - 1.6 * kLineHeight},
                scene ? scene->model().north : std::nullopt);

@@ -229,6 +229,14 @@ void drawGrid(Canvas& canvas, const PlanView& view) {
   canvas.rectangle(view.topLeft, view.width(), view.height(), 1.5 * view.unit, kPlanInk);
 }
 
+std::string formatFloorAndCut(double floor) {
+  const double rounded = std::round(100 * floor) / 100 + 0.0;  // without the sign of a zero
+  char text[64];
+  std::snprintf(text, sizeof text, "floor at y = %.2f m, cut %.1f m above", rounded,
+                kPlanCutHeight);
+  return text;
+}
+
 void reportMissingFont(const Canvas& canvas) {
   if (canvas.textWithoutFont().empty()) return;
   spdlog::warn(

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "render/image/canvas.hpp"
 #include "scene/world/data/scene.hpp"
@@ -43,6 +44,9 @@ void drawSpaceNames(render::Canvas& canvas, const PlanView& view, const scene::M
 
 /// Draws grid lines and their coordinates outside of the view, and a frame around it.
 void drawGrid(render::Canvas& canvas, const PlanView& view);
+
+/// The words for a plan's floor and cut: "floor at y = 0.00 m, cut 1.1 m above".
+std::string formatFloorAndCut(double floor);
 
 /// Draws a scale bar with its top left corner at `at`, and right of it the axes and, if it is
 /// known, north: its direction in x and z.

@@ -288,7 +288,7 @@ class BuildingTest(unittest.TestCase):
     def test_go_rides_the_lift_up_and_down_through_its_doors(self):
         server = enfilade.serve(os.environ["ENFILADE_BUILDING"])
         self.addCleanup(server.stop)
-        client = server.connect()
+        client = server.connect(timeout=120)  # building the mesh takes seconds
         self.addCleanup(client.close)
         client.lockstep()
         client.subscribe(contacts=True)

@@ -19,7 +19,10 @@ const { values: options } = parseArgs({
   options: { server: { type: "string" }, scenes: { type: "string", default: "../shared/scenes" } },
 });
 assert.ok(options.server, "--server names the program");
-const SHARED = ["duplex/duplex_utm32.glb", "schependomlaan/schependomlaan_block.glb", "single-rooms/spheres-room.glb", "single-rooms/vr-gallery.glb"];
+const SHARED = [
+  "aws-small-house/small_house.gltf", "duplex/duplex_utm32.glb", "schependomlaan/schependomlaan_block.glb",
+  "schependomlaan/schependomlaan_estate.glb", "single-rooms/spheres-room.glb", "single-rooms/vr-gallery.glb",
+];
 const scenes = ["build/assets/building.glb"];
 if (existsSync(options.scenes)) scenes.push(...SHARED.map((name) => join(options.scenes, name)));
 else if (process.env.CI) throw new Error(`${options.scenes} is missing`);

@@ -1,6 +1,10 @@
 // Which parts of a glTF file are read: one of its scenes, and the meshes that can be read.
 #include <gtest/gtest.h>
 
+#include <cstring>
+#include <functional>
+#include <limits>
+
 #include "scene/import/import_model.hpp"
 #include "scene/model/diagnostic_catalog.hpp"
 #include "scene/world/data/scene.hpp"
@@ -116,6 +120,67 @@ TEST(GltfMeshes, IfNoneCanBeReadTheFileIsRefused) {
   const std::string text = failureOf(folder.write("a.glb", file.glb()));
   EXPECT_NE(text.find("a.glb"), std::string::npos) << text;
   EXPECT_NE(text.find("extends beyond its buffer view"), std::string::npos) << text;
+}
+
+/// The second terrace of makeHalfBroken() before `damage` of its positions and primitive.
+GltfWriter makeDamaged(
+    const std::function<void(GltfWriter&, Json& accessor, Json& primitive)>& damage) {
+  GltfWriter file = makeHalfBroken(true);
+  file.json["accessors"].back()["byteOffset"] = 0;
+  damage(file, file.json["accessors"].back(), file.json["meshes"][1]["primitives"][0]);
+  return file;
+}
+
+TEST(GltfMeshes, WhatGltfDoesNotAllowIsNotReadInSilence) {
+  const TemporaryFolder folder;
+  const std::pair<const char*, GltfWriter> files[] = {
+      {"mode 99 is not 0 to 6",
+       makeDamaged([](auto&, Json&, Json& primitive) { primitive["mode"] = 99; })},
+      {"is not of type VEC3",
+       makeDamaged([](auto&, Json& accessor, Json&) { accessor["type"] = "VEC2"; })},
+      {"byteStride is smaller", makeDamaged([](GltfWriter& file, Json& accessor, Json&) {
+         file.json["bufferViews"].push_back(file.json["bufferViews"][0]);
+         file.json["bufferViews"].back()["byteStride"] = 4;
+         accessor["bufferView"] = file.json["bufferViews"].size() - 1;
+       })}};
+  for (const auto& [fault, file] : files) {
+    const Model model = importModel(folder.write("a.glb", file.glb()));
+    EXPECT_EQ(model.objects.size(), 2u) << fault;
+    EXPECT_EQ(countOf(model, "solid_mesh"), 1u) << fault;
+    EXPECT_NE(diagnosticText(model, "solid_mesh").find(fault), std::string::npos)
+        << diagnosticText(model, "solid_mesh");
+  }
+}
+
+TEST(GltfMeshes, AnIncompleteLastTriangleIsLeftOutAndReported) {
+  const TemporaryFolder folder;
+  for (const bool indexed : {false, true}) {
+    const GltfWriter file = makeDamaged([&](GltfWriter& whole, Json& accessor, Json& primitive) {
+      if (!indexed) {
+        primitive.erase("indices");
+        accessor["count"] = 5;
+        return;
+      }
+      whole.json["accessors"].push_back(whole.json["accessors"][1]);
+      whole.json["accessors"].back()["count"] = 5;
+      primitive["indices"] = whole.json["accessors"].size() - 1;
+    });
+    const Model model = importModel(folder.write("a.glb", file.glb()));
+    ASSERT_EQ(model.objects.size(), 2u);
+    EXPECT_EQ(model.meshes.at(model.objects[1].meshes.at(0)).triangleCount(), 1u);
+    EXPECT_EQ(countOf(model, "broken_triangle_dropped"), 1u);
+    EXPECT_EQ(countOf(model, "solid_mesh"), 0u);
+  }
+}
+
+TEST(GltfMeshes, OneVertexThatIsNoNumberCostsItsOwnTrianglesAlone) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  std::memcpy(file.binary.data() + 12 * tests::Terrace::at(3, 3), &none, sizeof none);
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_EQ(countOf(model, "broken_triangle_dropped"), 6u);
+  EXPECT_EQ(model.meshes.at(model.objects.at(0).meshes.at(0)).triangleCount(), kTriangles - 6);
 }
 
 }  // namespace

@@ -221,6 +221,22 @@ TEST(ImportIfc, StoreysAndSpacesAreKept) {
   }
 }
 
+TEST(ImportIfc, StoreysThatAreAllPlacedAtOneHeightLieAtTheirElevations) {
+  const TemporaryFolder folder;
+  for (const bool placed : {false, true}) {
+    IfcHouse house;
+    house.more = house.placement(500, "#15", 0, 0, placed ? 3.2 : 0) +
+                 "#510=IFCBUILDINGSTOREY('0000000000000000000511',$,'Upper "
+                 "floor',$,$,#502,$,$,.ELEMENT.,3200.);\n"
+                 "#511=IFCRELAGGREGATES('0000000000000000000512',$,$,$,#40,(#510));\n";
+    const Model model = importModel(folder.write("house.ifc", house.text()), {});
+    ASSERT_EQ(model.storeys.size(), 2u);
+    EXPECT_NEAR(model.storeys[0].elevation, 0, 1e-9);
+    EXPECT_NEAR(model.storeys[1].elevation, 3.2, 1e-9);
+    EXPECT_EQ(countOf(model, "storeys_by_elevation"), placed ? 0u : 2u);
+  }
+}
+
 TEST(ImportIfc, AWallIsLargerThanItsDoorAndAFrameIsNot) {
   const TemporaryFolder folder;
   const std::string text = IfcHouse().text();

@@ -10,6 +10,7 @@
 #include "render/image/image.hpp"
 #include "server/capture/metadata_files.hpp"
 #include "server/capture/overlay.hpp"
+#include "server/plans/label_names.hpp"
 #include "tests/server/body_room.hpp"
 #include "tests/server/program_fixture.hpp"
 
@@ -418,8 +419,15 @@ TEST(LabelName, SaysWhatAPersonWouldSay) {
       {"Level 2/Basic Wall:Exterior - Brick on Block:143478",
        "Basic Wall:Exterior - Brick on Block"},
       {"M_Single-Flush:0762 x 2032mm:0762 x 2032mm:150173", "M_Single-Flush:0762 x 2032mm"},
-      {"room/Chair#4", "Chair#4"},
-      {"hall/_node_3", "_node_3"},
+      {"Stair:Residential:151086/Stair:Residential:151086:1#2", "Stair:Residential"},
+      {"scene/aws_Bed_01_visual/aws_Bed_01_visual_node/aws_Bed_01_visual_0", "aws_Bed_01"},
+      {"hall/north_wall/piece03", "north_wall"},
+      {"hall/picture02/frame/canvas", "picture02"},
+      {"hall/window01/frame_left", "window01"},
+      {"hall/framework", "framework"},
+      {"frame", "frame"},
+      {"room/Chair#4", "Chair"},
+      {"hall/_node_3", "hall"},
       {"door_3_of_the_western_wing_1", "door_3_of_the_western_wing_1"},
       {"stair_3_of_the_western_wings", "stair_3_of_the_western_wings"},
       {"", ""}};
@@ -600,7 +608,8 @@ TEST(Overlay, LabelsOfConcentricObjectsAreSeparateAndInsideTheImage) {
     model.objects[1].path = inner;
     OverlayChoice names;
     names.names = true;
-    const render::Image image = drawOverlay(frame, names, model, {}, {});
+    const render::Image image =
+        drawOverlay(frame, names, model, scene::computeObjectClasses(model), {}, {});
     std::size_t count = 0;
     for (std::size_t i = 0; i < image.rgb.size(); i += 3) count += image.rgb[i] < 100;
     return count;

@@ -236,6 +236,12 @@ void reportUnusualTransforms(const std::vector<ImportedNode>& importedNodes,
   }
 }
 
+std::string explainMissingTriangles(const std::vector<Diagnostic>& diagnostics) {
+  const auto broken = std::ranges::find(diagnostics, "broken_triangle_dropped", &Diagnostic::kind);
+  if (broken == diagnostics.end()) return "";
+  return ": " + std::to_string(broken->count) + " are broken (" + broken->example + ")";
+}
+
 }  // namespace
 
 void finishModel(std::vector<ImportedNode> importedNodes, std::vector<Mesh> meshes,
@@ -248,8 +254,8 @@ void finishModel(std::vector<ImportedNode> importedNodes, std::vector<Mesh> mesh
     objectBoxes.push_back(computeNodeAabb(imported, meshBoxes));
   dropFarObjects(importedNodes, objectBoxes, model.diagnostics);
   if (importedNodes.empty()) {
-    throw ImportError(file.string() + ": contains no usable triangles; export it with " +
-                      "meshes (convert)");
+    throw ImportError(file.string() + ": contains no usable triangles" +
+                      explainMissingTriangles(model.diagnostics) + "; export it with meshes");
   }
   model.offset = offset.value_or(computeSceneOffset(objectBoxes));
   reportUnusualTransforms(importedNodes, model.diagnostics);

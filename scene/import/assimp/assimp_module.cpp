@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <assimp/ProgressHandler.hpp>
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 
@@ -129,6 +130,15 @@ std::string findAssimpLibrary() {
   return found && info.dli_fname ? info.dli_fname : "";
 }
 
+/// Whether assimp joins equal vertices right: it ignores colours, and one NaN makes it join others.
+bool canBeJoined(const aiMesh* mesh) {
+  return !mesh->HasVertexColors(0) &&
+         std::all_of(mesh->mVertices, mesh->mVertices + mesh->mNumVertices,
+                     [](const aiVector3D& v) {
+                       return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+                     });
+}
+
 void readFile(const AssimpInput& file, AssimpOutput& to) {
   to.library = findAssimpLibrary();
   auto* importer = new Assimp::Importer;  // never deleted: destroying a large scene takes long
@@ -142,8 +152,7 @@ void readFile(const AssimpInput& file, AssimpOutput& to) {
       file.isIfc ? importer->ReadFileFromMemory(file.text.data(), file.text.size(), kSteps, "ifc")
                  : importer->ReadFile(file.file, kSteps);
   if (scene != nullptr) {
-    to.joined = std::none_of(scene->mMeshes, scene->mMeshes + scene->mNumMeshes,
-                             [](const aiMesh* mesh) { return mesh->HasVertexColors(0); });
+    to.joined = std::all_of(scene->mMeshes, scene->mMeshes + scene->mNumMeshes, canBeJoined);
     if (to.joined) scene = importer->ApplyPostProcessing(aiProcess_JoinIdenticalVertices);
   }
   if (scene == nullptr || scene->mRootNode == nullptr) {

@@ -46,7 +46,7 @@ void reportMissingTriangles(const aiScene& scene, const ConvertInput& input,
   const std::size_t used =
       countSceneTriangles(nlohmann::json::parse(input.gltfJson, nullptr, false));
   if (read < used)
-    addDiagnostic(diagnostics, "broken_triangle_dropped", "vertex indices out of range",
+    addDiagnostic(diagnostics, "broken_triangle_dropped", "a vertex index is out of range",
                   used - read);
 }
 

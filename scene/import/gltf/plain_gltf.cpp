@@ -49,8 +49,8 @@ Json parseMeshSections(const std::string& text, bool& tooDeep, ExtensionNames& e
     extensions.seeKey(depth, value.get_ref<const std::string&>());
     if (depth != 1) return true;
     return value == "asset" || value == "extensionsRequired" || value == "extensionsUsed" ||
-           value == "meshes" || value == "accessors" || value == "buffers" || value == "scenes" ||
-           value == "scene" || value == "materials";
+           value == "meshes" || value == "accessors" || value == "bufferViews" ||
+           value == "buffers" || value == "scenes" || value == "scene" || value == "materials";
   };
   return Json::parse(text, wanted, false);
 }
@@ -73,38 +73,50 @@ void requireVersion2(const Json& gltf, const std::filesystem::path& file) {
 
 // ---- does the file need rewriting? --------------------------------------------------------------
 
-/// Whether assimp reads this attribute right: floats in a buffer view.
-bool isPlainAttribute(const Json& accessors, const Json& index) {
-  if (!index.is_number_unsigned() || index.get<std::size_t>() >= accessors.size()) return true;
-  const Json& accessor = accessors[index.get<std::size_t>()];
-  return readIndexMember(&accessor, "componentType").value_or(5126) == 5126 &&
-         readIndexMember(&accessor, "bufferView").has_value();
+/// Entry of an array; null without one.
+const Json* findEntry(const Json& array, const Json* index) {
+  const bool exists =
+      index != nullptr && index->is_number_unsigned() && index->get<std::size_t>() < array.size();
+  return exists ? &array[index->get<std::size_t>()] : nullptr;
 }
 
-/// Whether assimp reads these colours right: floats with alpha, one per position.
-bool isPlainColour(const Json& accessors, const Json& index, const Json& attributes) {
-  const auto entry = [&](const Json* number) {
-    const bool known = number != nullptr && number->is_number_unsigned() &&
-                       number->get<std::size_t>() < accessors.size();
-    return known ? &accessors[number->get<std::size_t>()] : nullptr;
-  };
-  const Json* colours = entry(&index);
-  const Json* type = findMember(colours, "type");
-  return isPlainAttribute(accessors, index) && type != nullptr && *type == "VEC4" &&
-         readIndexMember(colours, "count") ==
-             readIndexMember(entry(findMember(&attributes, "POSITION")), "count");
+/// Whether assimp reads the accessor of an attribute right: `width` floats each in a buffer view.
+/// It does not check the type and the stride.
+bool isPlainAttribute(const Json& sections, const Json* accessor, std::size_t width) {
+  static constexpr std::array<const char*, 5> kTypes{"", "SCALAR", "VEC2", "VEC3", "VEC4"};
+  const Json* type = findMember(accessor, "type");
+  const Json* view =
+      findEntry(getArray(sections, "bufferViews"), findMember(accessor, "bufferView"));
+  const std::size_t bytes = width * sizeof(float);
+  return type != nullptr && *type == kTypes.at(width) && view != nullptr &&
+         readIndexMember(accessor, "componentType") == 5126 &&
+         readIndexMember(view, "byteStride").value_or(bytes) >= bytes;
 }
 
-bool isPlainPrimitive(const Json& primitive, const Json& accessors) {
+/// Whether the corners of a primitive make whole triangles.
+bool hasWholeTriangles(const Json& primitive, const Json& accessors, const Json* positions) {
+  const Json* indices = findMember(&primitive, "indices");
+  const Json* corners = indices == nullptr ? positions : findEntry(accessors, indices);
+  return readIndexMember(corners, "count").value_or(1) % 3 == 0;
+}
+
+/// Whether assimp reads a primitive right, without a word of what it left out.
+bool isPlainPrimitive(const Json& primitive, const Json& sections) {
   const std::size_t mode = readIndexMember(&primitive, "mode").value_or(4);
-  if (mode == 5 || mode == 6) return false;  // strips and fans
+  if (mode > 4) return false;  // strips, fans and modes that glTF does not know
   const Json* attributes = findMember(&primitive, "attributes");
-  if (attributes == nullptr || !attributes->is_object()) return true;
+  if (attributes == nullptr || !attributes->is_object()) return false;
+  const Json& accessors = getArray(sections, "accessors");
+  const Json* positions = findEntry(accessors, findMember(attributes, "POSITION"));
+  if (mode == 4 && !hasWholeTriangles(primitive, accessors, positions)) return false;
   return std::all_of(attributes->items().begin(), attributes->items().end(), [&](const auto& item) {
     const std::string& name = item.key();
-    const bool used = name == "POSITION" || name == "NORMAL" || name.starts_with("TEXCOORD_");
-    if (name == "COLOR_0") return isPlainColour(accessors, item.value(), *attributes);
-    return !used || isPlainAttribute(accessors, item.value());
+    const Json* accessor = findEntry(accessors, &item.value());
+    if (name == "POSITION" || name == "NORMAL") return isPlainAttribute(sections, accessor, 3);
+    if (name.starts_with("TEXCOORD_")) return isPlainAttribute(sections, accessor, 2);
+    return name != "COLOR_0" ||
+           (isPlainAttribute(sections, accessor, 4) &&
+            readIndexMember(accessor, "count") == readIndexMember(positions, "count"));
   });
 }
 
@@ -136,11 +148,10 @@ bool needsRewriting(const std::string& text, const Json& sections,
                    [&](const Json& buffer) { return isPlainBuffer(buffer, folder); }))
     return true;
   if (!usesFirstTexCoords(sections)) return true;
-  const Json& accessors = getArray(sections, "accessors");
   for (const Json& mesh : getArray(sections, "meshes")) {
     if (!mesh.is_object()) continue;
     for (const Json& primitive : getArray(mesh, "primitives"))
-      if (!isPlainPrimitive(primitive, accessors)) return true;
+      if (!isPlainPrimitive(primitive, sections)) return true;
   }
   return false;
 }
@@ -358,10 +369,11 @@ bool chooseScene(const Json& sections, const std::string& choice, const std::fil
   to.scene =
       choice.empty() ? static_cast<std::uint32_t>(standard) : findScene(to.scenes, choice, file);
   if (to.scenes.size() > 1)
-    to.problems.push_back({"other_scenes", to.scenes.size() - 1,
-                           "scene " + std::to_string(to.scene) + " was read" +
-                               (choice.empty() ? ", which is the file's default" : "") + ", of " +
-                               listScenes(to.scenes)});
+    to.problems.push_back(
+        {"other_scenes", to.scenes.size() - 1,
+         "scene " + std::to_string(to.scene) + " was read" +
+             (choice.empty() && sections.contains("scene") ? ", which is the file's default" : "") +
+             ", of " + listScenes(to.scenes)});
   return to.scene != standard;
 }
 

@@ -14,7 +14,8 @@ using Json = nlohmann::json;
 
 constexpr const char* kColours = "COLOR_0";
 constexpr const char* kDraco = "KHR_draco_mesh_compression";
-constexpr std::size_t kTriangleMode = 4, kStripMode = 5, kFanMode = 6;  // glTF 2.0, 5.24.4
+// glTF 2.0, 5.24.4; points and lines are below.
+constexpr std::size_t kTriangleMode = 4, kStripMode = 5, kFanMode = 6;
 /// Bytes of Draco's output that count as one of those that the file must justify: Draco compresses
 /// regular grids far better than other codecs, and draco_mesh.cpp bounds its counts itself.
 constexpr std::size_t kDracoBytesPerByte = 32;
@@ -155,14 +156,21 @@ const PlainPrimitives::WrittenDraco& PlainPrimitives::writeDraco(const Json& ext
   return to;
 }
 
-void PlainPrimitives::rewriteIndices(Json& primitive, std::size_t vertices) {
+void PlainPrimitives::rewriteIndices(Json& primitive, std::size_t vertices,
+                                     const std::string& name) {
   const std::size_t mode = readIndexMember(&primitive, "mode").value_or(kTriangleMode);
+  if (mode > kFanMode) buffers_.fail(name + ": mode " + std::to_string(mode) + " is not 0 to 6");
   const bool unroll = mode == kStripMode || mode == kFanMode;
   const auto accessor = readIndexMember(&primitive, "indices");
-  if (!accessor && !unroll) return;
+  const bool isCut = mode == kTriangleMode && (accessor ? countElements(*accessor) : vertices) % 3;
+  if (isCut)
+    addDiagnostic(problems_, "broken_triangle_dropped", name + ": its last triangle is incomplete");
+  if (!accessor && !unroll && !isCut) return;
   const std::string key = (accessor ? std::to_string(*accessor) + " indices "
                                     : std::to_string(vertices) + " corners ") +
-                          (unroll ? std::to_string(mode) : "");
+                          (unroll  ? std::to_string(mode)
+                           : isCut ? "cut"
+                                   : "");
   auto known = written_.find(key);
   if (known == written_.end()) {
     std::vector<std::uint32_t> indices;
@@ -173,6 +181,7 @@ void PlainPrimitives::rewriteIndices(Json& primitive, std::size_t vertices) {
       std::iota(indices.begin(), indices.end(), 0u);
     }
     if (unroll) indices = unrollTriangles(indices, mode);
+    if (isCut) indices.resize(indices.size() - indices.size() % 3);
     // glTF forbids accessors without elements. Its one index makes no triangle.
     if (indices.empty()) indices.push_back(0);
     known = written_.emplace(key, binary_.addIndices(indices)).first;
@@ -223,7 +232,7 @@ void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
     }
     plain[getPlainName(attribute)] = written[attribute];
   }
-  if (draco == nullptr) rewriteIndices(primitive, countElements(*positions));
+  if (draco == nullptr) rewriteIndices(primitive, countElements(*positions), name);
   primitive["attributes"] = std::move(plain);
   for (const char* member : {"targets", "extensions"}) primitive.erase(member);
 }
@@ -247,7 +256,7 @@ PrimitiveArrays PlainPrimitives::readArrays(Json& primitive, const Json& attribu
       arrays[key] = buffers_.readFloats(*accessor, channels, key == kColours);
     });
   }
-  if (draco == nullptr) rewriteIndices(primitive, arrays.at("POSITION").size() / 3);
+  if (draco == nullptr) rewriteIndices(primitive, arrays.at("POSITION").size() / 3, name);
   return arrays;
 }
 

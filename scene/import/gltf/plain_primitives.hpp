@@ -54,7 +54,7 @@ class PlainPrimitives {
                           std::size_t width, const TextureMapping& mapping);
   bool tryAttribute(const std::string& attribute, const std::string& name,
                     const std::function<void()>& read);
-  void rewriteIndices(nlohmann::json& primitive, std::size_t vertices);
+  void rewriteIndices(nlohmann::json& primitive, std::size_t vertices, const std::string& name);
   bool isNormalised(const nlohmann::json& accessor) const;
   std::size_t countElements(std::size_t accessor) const;
 

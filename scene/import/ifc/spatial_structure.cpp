@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "scene/import/assembly/path_names.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -85,6 +86,22 @@ bool isClosed(const std::vector<Vec3>& corners) {
   return sum.norm() <= kMaxShare * total;
 }
 
+/// Whether all storeys are placed at one height although their elevations differ.
+bool contradictsElevations(const IfcMetadata& metadata) {
+  std::vector<double> heights, elevations;
+  for (const IfcProduct& product : metadata.products) {
+    if (!isStorey(product)) continue;
+    if (!product.fileFromPlacement) return false;
+    heights.push_back(product.fileFromPlacement->translation().z());
+    elevations.push_back(product.elevation);
+  }
+  const auto areEqual = [](const std::vector<double>& values) {
+    const auto [min, max] = std::ranges::minmax(values);
+    return max - min <= 1e-6;  // metres
+  };
+  return !heights.empty() && areEqual(heights) && !areEqual(elevations);
+}
+
 }  // namespace
 
 std::map<std::uint32_t, std::string> buildIfcPaths(const IfcMetadata& metadata) {
@@ -93,20 +110,22 @@ std::map<std::uint32_t, std::string> buildIfcPaths(const IfcMetadata& metadata) 
   return paths.takePaths();
 }
 
-Vec3 findStoreyOrigin(const IfcProduct& storey) {
-  return storey.fileFromPlacement ? Vec3(storey.fileFromPlacement->translation())
-                                  : Vec3(0, 0, storey.elevation);
-}
-
-StoreyTable::StoreyTable(const IfcMetadata& metadata) : metadata_(metadata) {
+StoreyTable::StoreyTable(const IfcMetadata& metadata)
+    : metadata_(metadata), isByElevation_(contradictsElevations(metadata)) {
   std::vector<std::pair<double, std::uint32_t>> order;
   for (const IfcProduct& product : metadata.products)
-    if (isStorey(product)) order.emplace_back(findStoreyOrigin(product).z(), product.id);
+    if (isStorey(product)) order.emplace_back(findOrigin(product).z(), product.id);
   std::sort(order.begin(), order.end());
   for (const auto& [elevation, id] : order) {
     indexById_.emplace(id, static_cast<std::uint32_t>(storeys_.size()));
     storeys_.push_back(id);
   }
+}
+
+Vec3 StoreyTable::findOrigin(const IfcProduct& storey) const {
+  const Vec3 stated(0, 0, storey.elevation);
+  if (!storey.fileFromPlacement) return stated;
+  return storey.fileFromPlacement->translation() + (isByElevation_ ? stated : Vec3::Zero());
 }
 
 std::optional<std::uint32_t> StoreyTable::find(const IfcProduct& product) const {
@@ -127,11 +146,14 @@ void addSpatialStructure(const IfcMetadata& metadata, const StoreyTable& storeys
                          const IfcMeshes& meshes, const Eigen::Affine3d& worldFromFile,
                          const Eigen::Affine3d& worldFromReader, Model& model) {
   model.north = computeSceneNorth(metadata.trueNorth, worldFromFile);
+  if (storeys.isByElevation())
+    addDiagnostic(model.diagnostics, "storeys_by_elevation", "all storeys",
+                  storeys.storeys().size());
   for (const std::uint32_t id : storeys.storeys()) {
     const IfcProduct& product = *metadata.find(id);
     model.storeys.push_back({product.name.empty() ? product.longName : product.name,
                              product.globalId,
-                             (worldFromFile * findStoreyOrigin(product)).y() - model.offset.y()});
+                             (worldFromFile * storeys.findOrigin(product)).y() - model.offset.y()});
   }
   for (const IfcProduct& product : metadata.products) {
     if (product.role != IfcProduct::Role::space) continue;

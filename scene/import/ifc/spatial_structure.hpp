@@ -22,18 +22,21 @@ class StoreyTable {
   /// The storey of a product: that of its container, of its whole or, of doors and windows, of the
   /// wall that they are in. nullopt: none.
   std::optional<std::uint32_t> find(const IfcProduct& product) const;
+  /// The origin of a storey in the file's axes, metres: of its placement, otherwise as stated.
+  Vec3 findOrigin(const IfcProduct& storey) const;
+  /// Whether all storeys are placed at one height, which their stated elevations contradict. Then
+  /// the elevations count.
+  bool isByElevation() const { return isByElevation_; }
 
  private:
   const IfcMetadata& metadata_;
   std::vector<std::uint32_t> storeys_;
   std::map<std::uint32_t, std::uint32_t> indexById_;
+  bool isByElevation_ = false;
 };
 
 /// Unique path of each product from the project down, by express id.
 std::map<std::uint32_t, std::string> buildIfcPaths(const IfcMetadata& metadata);
-
-/// The origin of a storey in the file's axes, metres: of its placement, otherwise as stated.
-Vec3 findStoreyOrigin(const IfcProduct& storey);
 
 /// Adds storeys, spaces and north to a model that is otherwise complete. `meshes` may have the
 /// spaces' geometry. The transforms lead to the scene's frame before its offset is subtracted.
