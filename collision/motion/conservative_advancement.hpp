@@ -1,13 +1,34 @@
 // Conservative advancement (Mirtich 1996, section 2.3; Lin 1993, section 5.1), for any motion:
-//  1. Query the separation at the fraction reached so far. A plane separates the bodies.
-//  2. A bound of the motion (motion_bounds.hpp) certifies that the plane separates them up to a
-//     larger fraction. Advance to it and repeat.
+//  1. Query the separation at the position reached so far: a fraction of the motion, or a time. A
+//     plane separates the bodies.
+//  2. A bound of the motion certifies that the plane separates them up to a later position. Advance
+//     to it and repeat.
+// Shape casts bound it by motion_bounds.hpp, the time of impact by time_of_impact.cpp.
 #pragma once
 
 #include "collision/assert.hpp"
 #include "collision/motion/shape_cast.hpp"
 
 namespace enfilade::collision {
+
+/// In place of a step or a position: the target is reached.
+inline constexpr double kArrived = -1;
+
+enum class AdvancementEnd : std::uint8_t { clear, arrived, iterationLimit };
+
+/// Advances `at` (>= 0) up to `end`. `certify(at)` returns the position up to which the motion from
+/// `at` is certified, which is at least `end` if its rest is clear, or kArrived.
+template <class Certify>
+AdvancementEnd advance(double& at, double end, int maxSteps, const Certify& certify) {
+  for (int i = 0; i < maxSteps; ++i) {
+    ENFILADE_ASSERT(at >= 0 && at <= end);
+    const double next = certify(at);
+    if (next == kArrived) return AdvancementEnd::arrived;
+    if (next >= end) return AdvancementEnd::clear;
+    at = next;
+  }
+  return AdvancementEnd::iterationLimit;
+}
 
 struct Advancement {
   double fraction = 0;   ///< certified
@@ -17,31 +38,27 @@ struct Advancement {
   SeparationResult separation;  ///< of the last query
 };
 
-/// In place of a step: the target is reached.
-inline constexpr double kArrived = -1;
-
-/// Advances from fraction `from`. `query(fraction)` returns the separation; nullopt if the rest of
-/// the motion is clear. `step(fraction, separation)` returns the certified advance, or kArrived.
-/// Counts the queries in `result`.
+/// Advances a motion from fraction `from`. `query(fraction)` returns the separation; nullopt if the
+/// rest of the motion is clear. `step(fraction, separation)` returns the certified advance, or
+/// kArrived. Counts the queries in `result`.
 template <class Query, class Step>
 Advancement advanceConservatively(double from, int maxSteps, ShapeCastResult& result,
                                   const Query& query, const Step& step) {
+  constexpr double kWhole = 1;
   Advancement advancement;
   advancement.fraction = from;
-  for (int i = 0; i < maxSteps; ++i) {
-    ENFILADE_ASSERT(advancement.fraction >= 0 && advancement.fraction < 1);
-    const std::optional<SeparationResult> separation = query(advancement.fraction);
+  const AdvancementEnd end = advance(advancement.fraction, kWhole, maxSteps, [&](double at) {
+    const std::optional<SeparationResult> separation = query(at);
     ++result.queries;
-    if (!separation) return advancement;
+    if (!separation) return kWhole;
     if (separation->certificate == Certificate::rational) ++result.exactQueries;
     advancement.separation = *separation;
-    advancement.queriedFraction = advancement.fraction;
-    const double certified = step(advancement.fraction, *separation);
-    advancement.arrived = certified == kArrived;
-    if (advancement.arrived || advancement.fraction + certified >= 1) return advancement;
-    advancement.fraction += certified;
-  }
-  advancement.arrived = advancement.iterationLimitReached = true;
+    advancement.queriedFraction = at;
+    const double certified = step(at, *separation);
+    return certified == kArrived ? kArrived : at + certified;
+  });
+  advancement.arrived = end != AdvancementEnd::clear;
+  advancement.iterationLimitReached = end == AdvancementEnd::iterationLimit;
   return advancement;
 }
 

@@ -41,6 +41,7 @@
 
 #include "collision/assert.hpp"
 #include "collision/floating_point.hpp"
+#include "collision/motion/conservative_advancement.hpp"
 #include "collision/motion/crossing.hpp"
 #include "collision/motion/motion_bounds.hpp"
 #include "collision/narrow_phase/refine.hpp"
@@ -314,29 +315,20 @@ double findSimplestTime(double time, double ahead) {
 }
 
 /// The advancement along the time axis.
-class ConservativeAdvancement {
+class ImpactSearch {
  public:
-  ConservativeAdvancement(const MovingBody& a, const MovingBody& b, double horizon,
-                          FeatureCache& cache)
+  ImpactSearch(const MovingBody& a, const MovingBody& b, double horizon, FeatureCache& cache)
       : a_(a), b_(b), horizon_(horizon), cache_(cache) {}
 
   TimeOfImpact run() {
-    for (int i = 0; i < kMaxSteps; ++i) {
-      const PairAtTime pair(a_, b_, time_);
-      const PairState at(pair, a_.motion, b_.motion, time_);
-      const SeparatingPlane plane = findSeparatingPlane(pair, at);
-      if (ended_) return result_;
-      if (!(plane.gap > 0)) break;
-      result_.normal = plane.normal;
-      const double before = time_;
-      advance(computeLongestStep(at, plane, cache_, horizon_ - time_));
-      if (ended_) return result_;
-      const bool stuck = !(time_ > before);
-      const bool small = time_ - before < kSmallStep * (1 + time_);
-      if (small && probes_ < kMaxProbes && findContactWithin(kNarrowWindow)) return result_;
-      if (stuck) break;
+    double reached = 0;
+    const AdvancementEnd end =
+        advance(reached, horizon_, kMaxSteps, [this](double) { return certify(); });
+    if (end == AdvancementEnd::clear) {
+      finish(Impact::none, horizon_, horizon_);
+    } else if (!ended_ && !findContactWithin(kMaxWindow)) {
+      finish(Impact::unproved, time_, horizon_);
     }
-    if (!findContactWithin(kMaxWindow)) finish(Impact::unproved, time_, horizon_);
     return result_;
   }
 
@@ -349,14 +341,31 @@ class ConservativeAdvancement {
     ended_ = true;
   }
 
-  /// Advances the time by at most `step`. Finishes at the horizon.
-  void advance(double step) {
+  /// Moves time_ to the latest time that a plane certifies, and returns it: the horizon if the rest
+  /// is clear, kArrived if the search has ended or there is no further step.
+  double certify() {
+    const PairAtTime pair(a_, b_, time_);
+    const PairState at(pair, a_.motion, b_.motion, time_);
+    const SeparatingPlane plane = findSeparatingPlane(pair, at);
+    if (ended_ || !(plane.gap > 0)) return kArrived;
+    result_.normal = plane.normal;
+    const double before = time_;
+    time_ = addStep(computeLongestStep(at, plane, cache_, horizon_ - time_));
+    if (time_ >= horizon_) return horizon_;
+    const bool stuck = !(time_ > before);
+    const bool small = time_ - before < kSmallStep * (1 + time_);
+    if (small && probes_ < kMaxProbes && findContactWithin(kNarrowWindow)) return kArrived;
+    return stuck ? kArrived : time_;
+  }
+
+  /// The latest double that is at most `step` after time_; the horizon if the step leads there.
+  double addStep(double step) const {
     ENFILADE_ASSERT(step >= 0 && time_ <= horizon_);
-    if (step >= horizon_ - time_) return finish(Impact::none, horizon_, horizon_);
+    if (step >= horizon_ - time_) return horizon_;
     double next = time_ + step;
     for (int i = 0; i < 4 && (next - time_) * (1 + 4 * kRoundoff) > step; ++i)
       next *= 1 - 2 * kRoundoff;
-    if (next > time_ && (next - time_) * (1 + 4 * kRoundoff) <= step) time_ = next;
+    return next > time_ && (next - time_) * (1 + 4 * kRoundoff) <= step ? next : time_;
   }
 
   SeparatingPlane findSeparatingPlane(const PairAtTime& pair, const PairState& at) {
@@ -444,7 +453,7 @@ class ConservativeAdvancement {
 
 TimeOfImpact computeTimeOfImpact(const MovingBody& a, const MovingBody& b, double horizon,
                                  FeatureCache& cache) {
-  return ConservativeAdvancement(a, b, horizon, cache).run();
+  return ImpactSearch(a, b, horizon, cache).run();
 }
 
 }  // namespace enfilade::collision

@@ -10,9 +10,9 @@ inline constexpr const char* kServerVersion = "0.1.0";
 
 // Defined in a source that each build checks (cmake/write_build_info.cmake).
 extern const char* const kGitCommit;  ///< ten digits; "unknown" outside of a git checkout
-extern const char* const kBuildType;  ///< for example RelWithDebInfo
+extern const char* const kBuildType;  ///< for example Release
 
-/// For example "enfilade 0.1.0 (commit 1a2b3c4d5e, RelWithDebInfo)".
+/// For example "enfilade 0.1.0 (commit 1a2b3c4d5e, Release)".
 inline std::string formatVersion() {
   return std::string("enfilade ") + kServerVersion + " (commit " + kGitCommit + ", " + kBuildType +
          ")";

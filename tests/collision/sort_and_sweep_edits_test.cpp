@@ -183,9 +183,9 @@ TEST(BroadPhaseAudit, AcceptsACorrectSweepAndFindsEachInjectedFault) {
     movers.emplace_back(sweep.insert(box), box);
   }
   sweep.update();
-  const BroadPhaseAudit before = compareWithBruteForce(sweep, staticBoxes, movers);
-  EXPECT_GT(before.pairs, 0u);
-  EXPECT_TRUE(before.missed.empty() && before.extra.empty());
+  const BroadPhaseAudit untouched = compareWithBruteForce(sweep, staticBoxes, movers);
+  EXPECT_GT(untouched.pairs, 0u);
+  EXPECT_TRUE(untouched.missed.empty() && untouched.extra.empty());
   EXPECT_EQ(compareWithBruteForce(sweep, staticBoxes, movers).pairs, sweep.pairCount());
 
   // The audit receives boxes that the sweep did not: the state of the sweep is then wrong.

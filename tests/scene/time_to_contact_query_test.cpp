@@ -151,6 +151,34 @@ TEST(TimeToContact, TipsOfRotatingBodiesCount) {
   EXPECT_LT(said.separatedUntil, said.proximity.separation.distance / 5 / radius);
 }
 
+TEST(TimeToContact, OfConvexShapesInUniformMotionItIsTheTimeOfImpact) {
+  // The leaf turns about the origin towards -z and meets one post; the other is out of its reach,
+  // though no farther from it.
+  Model model = boxModel({{"leaf", {0, 0.1, -0.02}, {1, 2, 0.02}},
+                          {"post", {-0.05, 0, -0.9}, {0.05, 2.2, -0.8}},
+                          {"pillar", {1.1, 0, -0.3}, {1.4, 2.2, 0.3}}});
+  BodySpec leaf = bodySpec("leaf", BodyKind::hinged, {0});
+  leaf.high = 3;
+  leaf.speed = 0.5;
+  model.bodies = {leaf};
+  BodyFixture t(std::move(model));
+  EntityIndex index(sharedScene(t.world));
+  t.submit({"leaf", Action::open, 0, 0, {}});
+  t.ticks(10);
+  const EntityId moving = 1, post = 2, pillar = 3;
+  const TimeToContact now = apartAt(t.world, index, moving, post, MotionAssumption::presentMotion);
+  EXPECT_GE(apartAt(t.world, index, moving, pillar, MotionAssumption::presentMotion).separatedUntil,
+            600);
+  EXPECT_LT(apartAt(t.world, index, moving, pillar, MotionAssumption::anyCommand).separatedUntil,
+            1);
+  int ticks = 0;
+  while (t.countEvents(ContactEvent::Kind::begin, "leaf", "post") == 0 && ticks < 1000)
+    t.step(), ++ticks;
+  EXPECT_NEAR(now.separatedUntil, ticks / 60.0, 2.0 / 60);
+  EXPECT_EQ(now.nextCheck.after, now.separatedUntil);
+  EXPECT_TRUE(now.nextCheck.proved);
+}
+
 TEST(TimeToContact, OfDynamicBodiesNothingIsKnownUnderAnyCommand) {
   BodyFixture t(busyRoom());
   EntityIndex index(sharedScene(t.world));

@@ -5,6 +5,8 @@
 // 3. The gap along a direction closes no faster than these bounds allow. Along the relative
 //    velocity this holds for any two entities. Two convex shapes have a second gap, along their
 //    separating normal; it closes more slowly, but may be smaller. The better of the two is used.
+// 4. Two convex shapes whose present motion is uniform, without such bounds, have a time of impact
+//    (Mirtich 1996): it is the answer, or proves that they pass each other.
 // Ticks: a fall is a parabola sampled at ticks. A tick that begins at speed s covers (s + g dt / 2)
 // dt, so a displacement of `d` in the last tick means a speed of d / dt + g dt / 2 now. Dynamic
 // bodies fall in substeps, each with its speed after the substep: they are early by at most g dt /
@@ -17,12 +19,14 @@
 #include <limits>
 
 #include "collision/compound/nearest_parts.hpp"
+#include "collision/motion/time_of_impact.hpp"
 #include "scene/world/queries/motion_limits.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr double kImpactHorizon = 600;  // seconds that the time of impact looks ahead
 
 /// Bounds of an entity's motion from now on.
 struct Motion {
@@ -30,6 +34,11 @@ struct Motion {
   double isotropicSpeed = 0;   ///< m/s, in any direction, in addition to `bounds`
   double immediateGrowth = 0;  ///< metres by which it may grow instantly
   bool bounded = true;         ///< false: no bound is known
+
+  /// Whether `bounds` are the motion itself: constant velocity and angular velocity.
+  bool isUniform() const {
+    return bounded && isotropicSpeed == 0 && immediateGrowth == 0 && bounds.acceleration == 0;
+  }
 };
 
 /// A body's snapshot with its spec: one that may carry or push, or the entity of the query.
@@ -205,6 +214,21 @@ ClosingGap computeSlowestClosingGap(const collision::NearestParts& parts, bool c
   return alongNormal.timeToContact() > alongVelocity.timeToContact() ? alongNormal : alongVelocity;
 }
 
+/// Seconds up to which two convex shapes in uniform motion are proved separated.
+double computeSeparatedUntil(const collision::NearestParts& parts, const Motion& a, const Motion& b,
+                             std::size_t& budget) {
+  const auto moving = [](const collision::PlacedConvex& part, const Motion& motion) {
+    return collision::MovingBody{
+        part, {motion.bounds.velocity, Vec3::Zero(), motion.bounds.angularVelocity}};
+  };
+  collision::FeatureCache cache;
+  cache.axis = parts.separation.normal;
+  const collision::TimeOfImpact impact =
+      collision::computeTimeOfImpact(moving(parts.a, a), moving(parts.b, b), kImpactHorizon, cache);
+  budget -= std::min<std::size_t>(budget, impact.queries);
+  return impact.lo;
+}
+
 }  // namespace
 
 std::variant<TimeToContact, QueryError> computeTimeToContact(const SceneAt& sceneAt,
@@ -234,6 +258,14 @@ std::variant<TimeToContact, QueryError> computeTimeToContact(const SceneAt& scen
   result.separatedUntil = closingGap.timeToContact();
   result.nextCheck =
       collision::scheduleCheck(closingGap.gap, closingGap.closing, minWait, settings.contactOffset);
+  const bool isUniform =
+      assumption == MotionAssumption::presentMotion && motionA.isUniform() && motionB.isUniform();
+  if (!convex || !isUniform || result.separatedUntil == kNever) return result;
+  const double until = computeSeparatedUntil(parts, motionA, motionB, budget);
+  if (until > result.separatedUntil) {
+    result.separatedUntil = until;
+    result.nextCheck = {std::max(until, minWait), result.nextCheck.proved || until >= minWait};
+  }
   return result;
 }
 
