@@ -275,7 +275,7 @@ VertexPair ExactMinkowskiDifference::findSupport(const ExactPoint& direction, Ve
     const double length = approximate.lpNorm<1>() + local.lpNorm<1>();
     const double slack = computeSupportSlack(convex.bounds, length);
     const SupportVertex support = hillClimb(convex.bounds, local, slack, startVertex);
-    forEachSupportCandidate(convex.bounds, local, slack, support, [&](std::uint32_t i) {
+    forEachSupportCandidate(convex.bounds, support, [&](std::uint32_t i) {
       const Integer projection = sign * dot(direction, convex.vertex(i, scale_));
       if (best && projection <= maxProjection) return;
       best = i;

@@ -18,17 +18,16 @@ void requireFinite(const PlacedConvex& convex, const char* name) {
 
 /// Finds the exact support vertex along a direction in the body's frame.
 std::uint32_t findFarthestVertex(const BoundedConvex& convex, const LongVec3& direction,
-                                 const Vec3& rounded, double length, const SupportVertex& support) {
+                                 const SupportVertex& support) {
   std::uint32_t vertex = support.vertex;
   LongReal maxProjection = -std::numeric_limits<LongReal>::infinity();
-  forEachSupportCandidate(
-      convex, rounded, computeSupportSlack(convex, length), support, [&](std::uint32_t i) {
-        const Vec3& p = convex.shape->vertices[i];
-        const LongReal projection =
-            direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
-        if (!(projection > maxProjection)) return;
-        vertex = i, maxProjection = projection;
-      });
+  forEachSupportCandidate(convex, support, [&](std::uint32_t i) {
+    const Vec3& p = convex.shape->vertices[i];
+    const LongReal projection =
+        direction.x() * p.x() + direction.y() * p.y() + direction.z() * p.z();
+    if (!(projection > maxProjection)) return;
+    vertex = i, maxProjection = projection;
+  });
   return vertex;
 }
 
@@ -57,20 +56,18 @@ void requireFinite(const PlacedConvex& a, const PlacedConvex& b) {
 void hillClimbPair(const MinkowskiDifference& difference, const Vec3& direction, double length,
                    VertexPair hint, double enough, SupportPair& supports) {
   const BoundedConvex &a = difference.a, &b = difference.b;
-  supports.a = hillClimb(a, a.bodyFromWorld<double>(direction), computeSupportSlack(a, length),
-                         hint.a, enough);
-  supports.b = hillClimb(b, b.bodyFromWorld<double>(-direction), computeSupportSlack(b, length),
-                         hint.b, enough);
+  supports.a.slack = computeSupportSlack(a, length);
+  supports.b.slack = computeSupportSlack(b, length);
+  supports.a.direction = a.bodyFromWorld<double>(direction);
+  supports.b.direction = b.bodyFromWorld<double>(-direction);
+  hillClimb(a, hint.a, enough, supports.a);
+  hillClimb(b, hint.b, enough, supports.b);
 }
 
 CertifiedSupport RotatedDirection::certify(const SupportPair& supports) const {
   CertifiedSupport result{supports.pair()};
-  if (!supports.a.unique)
-    result.pair.a = findFarthestVertex(
-        difference.a, inA, difference.a.bodyFromWorld<double>(rounded), length, supports.a);
-  if (!supports.b.unique)
-    result.pair.b = findFarthestVertex(
-        difference.b, -inB, difference.b.bodyFromWorld<double>(-rounded), length, supports.b);
+  if (!supports.a.unique) result.pair.a = findFarthestVertex(difference.a, inA, supports.a);
+  if (!supports.b.unique) result.pair.b = findFarthestVertex(difference.b, -inB, supports.b);
   result.projection = project(result.pair);
   result.lowerBound = result.projection - errorBound();
   return result;
@@ -90,7 +87,7 @@ CertifiedSupport findCertifiedSupport(const MinkowskiDifference& difference,
   }
   const Vec3 rounded = direction.cast<double>();
   const double lengthBound = static_cast<double>(length) * (1 + 8 * kRoundoff);
-  const RotatedDirection rotatedDirection(difference, direction, rounded, lengthBound);
+  const RotatedDirection rotatedDirection(difference, direction, lengthBound);
   const CertifiedSupport support =
       rotatedDirection.certify(hillClimbPair(difference, rounded, lengthBound, hint));
   hint = support.pair;

@@ -19,6 +19,7 @@
 #include <cmath>
 
 #include "collision/assert.hpp"
+#include "collision/double2.hpp"
 #include "collision/floating_point.hpp"
 #include "collision/minkowski/feature_cache.hpp"
 #include "collision/shapes/hull.hpp"
@@ -112,6 +113,16 @@ struct BoundedConvex {
 /// Throws std::invalid_argument that names the first value that is not finite.
 void requireFinite(const PlacedConvex& a, const PlacedConvex& b);
 
+/// a - b. Two coordinates are stored at once, because they are loaded at once: a load that spans
+/// two recent stores waits for both.
+inline Vec3 subtractAsPair(const Vec3& a, const Vec3& b) {
+  Vec3 difference;
+  const Double2 xy{a.x() - b.x(), a.y() - b.y()};
+  std::memcpy(difference.data(), &xy, sizeof(xy));
+  difference.z() = a.z() - b.z();
+  return difference;
+}
+
 /// The Minkowski difference B - A of two placed convex bodies, axes as the world's, in metres.
 /// The constructor throws std::invalid_argument if a coordinate is not finite.
 struct MinkowskiDifference {
@@ -122,7 +133,7 @@ struct MinkowskiDifference {
   MinkowskiDifference(const PlacedConvex& convexA, const PlacedConvex& convexB)
       : a(convexA),
         b(convexB),
-        roundedShift(minus(convexB.translation, convexA.translation)),
+        roundedShift(subtractAsPair(convexB.translation, convexA.translation)),
         reach((a.radius + b.radius + maxAbsCoordinate(roundedShift)) * (1 + 8 * kRoundoff)) {
     if (!(reach + 0 * (roundedShift.x() + roundedShift.y() + roundedShift.z()) <
           std::numeric_limits<double>::infinity())) [[unlikely]]
@@ -156,8 +167,10 @@ inline bool fitsDoubleRange(const MinkowskiDifference& difference) {
 /// The result of a hill climb in doubles: a local maximum, or a vertex that is far enough along.
 struct SupportVertex {
   std::uint32_t vertex = 0;
-  double projection = 0;
   bool unique = false;  ///< certified: every other vertex is less far along the direction
+  double projection = 0;
+  double slack = 0;               ///< of the direction: computeSupportSlack()
+  Vec3 direction = Vec3::Zero();  ///< in the body's frame, rounded to double
 };
 
 /// The support vertex of A along a direction and that of B against it. Up to rounding, their
@@ -206,15 +219,13 @@ struct CertifiedSupport {
 /// vertices.
 struct RotatedDirection {
   const MinkowskiDifference& difference;
-  Vec3 rounded;   ///< the direction in doubles
-  double length;  ///< upper bound on the length of both
+  double length;  ///< upper bound on the length of the direction, also as rounded to doubles
   LongVec3 inA, inB;
   LongReal shiftProjection;
 
   RotatedDirection(const MinkowskiDifference& minkowskiDifference, const LongVec3& direction,
-                   const Vec3& roundedDirection, double lengthBound)
+                   double lengthBound)
       : difference(minkowskiDifference),
-        rounded(roundedDirection),
         length(lengthBound),
         inA(minkowskiDifference.a.bodyFromWorld<LongReal>(direction)),
         inB(minkowskiDifference.b.bodyFromWorld<LongReal>(direction)),
@@ -229,7 +240,7 @@ struct RotatedDirection {
   /// direction. The dot product rounds by 3 eta |d| |w| with |w| <= sqrt(3) reach. Rotating the
   /// direction instead of the vertices loses less.
   LongReal errorBound() const { return 16 * kLongRoundoff * LongReal{length} * difference.reach; }
-  /// `supports`: the result of hillClimbPair() along `rounded`.
+  /// `supports`: the result of hillClimbPair() along the direction in doubles.
   CertifiedSupport certify(const SupportPair& supports) const;
 };
 
@@ -238,61 +249,71 @@ struct RotatedDirection {
 CertifiedSupport findCertifiedSupport(const MinkowskiDifference& difference,
                                       const LongVec3& direction, LongReal length, VertexPair& hint);
 
-/// Hill climbing over the hull's edges from `start`, or a scan of all vertices if there is no hull.
-/// `slack` as for forEachSupportCandidate(): a vertex that exceeds all its neighbours by more than
-/// `slack` is the unique maximum, because an exact ascent could continue from any other vertex.
-/// With a hull, the climb ends early at a vertex that exceeds the start by `enough` (the unit of
-/// the dot product).
-inline SupportVertex hillClimb(const BoundedConvex& convex, const Vec3& direction, double slack,
-                               std::uint32_t start,
-                               double enough = std::numeric_limits<double>::infinity()) {
+/// Hill climbing over the hull's edges from `start`, or a scan of all vertices if there is no hull,
+/// along the direction and with the slack of `support`; sets the rest of it. A vertex that exceeds
+/// all its neighbours by more than the slack is the unique maximum, because an exact ascent could
+/// continue from any other vertex (see forEachSupportCandidate). With a hull, the climb ends early
+/// at a vertex that exceeds the start by `enough` (the unit of the dot product).
+inline void hillClimb(const BoundedConvex& convex, std::uint32_t start, double enough,
+                      SupportVertex& support) {
   const std::span<const Vec3> vertices = convex.shape->vertices;
   const Hull* hull = convex.shape->hull;
+  const Vec3 d = support.direction;  // in registers
   double second = -std::numeric_limits<double>::infinity();
-  if (!hull) {
-    SupportVertex support{0, dot(direction, vertices[0])};
+  std::uint32_t vertex = hull ? start : 0;
+  ENFILADE_ASSERT(vertex < vertices.size());
+  double best = dot(d, vertices[vertex]);
+  bool complete = true;
+  if (hull) {
+    const double goal = best + enough;
+    while (true) {  // terminates: the projection grows and there are finitely many vertices
+      second = -std::numeric_limits<double>::infinity();
+      for (const std::uint32_t neighbour : hull->neighboursOf(vertex)) {
+        const double projection = dot(d, vertices[neighbour]);
+        start = projection > second ? neighbour : start;  // branchless: avoids mispredictions
+        second = std::max(second, projection);
+      }
+      if (!(second > best)) break;
+      vertex = start, best = second;
+      if (second > goal) {
+        complete = false;
+        break;
+      }
+    }
+  } else {
     for (std::uint32_t i = 1; i < vertices.size(); ++i) {
-      const double projection = dot(direction, vertices[i]);
-      second = std::max(second, std::min(projection, support.projection));
-      if (projection > support.projection) support = {i, projection};
+      const double projection = dot(d, vertices[i]);
+      second = std::max(second, std::min(projection, best));
+      if (projection > best) vertex = i, best = projection;
     }
-    support.unique = second < support.projection - slack;
-    return support;
   }
-  ENFILADE_ASSERT(start < vertices.size());
-  SupportVertex support{start, dot(direction, vertices[start])};
-  const double goal = support.projection + enough;
-  while (true) {  // terminates: the projection grows and there are finitely many vertices
-    second = -std::numeric_limits<double>::infinity();
-    for (const std::uint32_t neighbour : hull->neighboursOf(support.vertex)) {
-      const double projection = dot(direction, vertices[neighbour]);
-      start = projection > second ? neighbour : start;  // branchless: avoids mispredictions
-      second = std::max(second, projection);
-    }
-    if (!(second > support.projection)) break;
-    support.vertex = start, support.projection = second;
-    if (second > goal) return support;
-  }
-  support.unique = second < support.projection - slack;
+  support.vertex = vertex;
+  support.projection = best;
+  support.unique = complete && second < best - support.slack;
+}
+inline SupportVertex hillClimb(const BoundedConvex& convex, const Vec3& direction, double slack,
+                               std::uint32_t start) {
+  SupportVertex support{.slack = slack, .direction = direction};
+  hillClimb(convex, start, std::numeric_limits<double>::infinity(), support);
   return support;
 }
 
-/// Calls visit(i) for a set of vertices that contains the exact support vertex along a direction.
-/// `direction` is in the body's frame, rounded to double; `support` is the result of any hill climb
-/// along it.
+/// Calls visit(i) for a set of vertices that contains the exact support vertex along the direction
+/// of `support`, the result of any hill climb.
 ///
-/// Each product `direction . vertex` is off by less than slack/2 (computeSupportSlack). By
+/// Each product `direction . vertex` is off by less than half the slack (computeSupportSlack). By
 /// convexity, an exact ascent over the edges leads from the support vertex to the exact maximum.
-/// All vertices of that ascent have, in doubles, at least the support's value less `slack`.
+/// All vertices of that ascent have, in doubles, at least the support's value less the slack.
 /// Visiting all vertices that are connected to the support vertex through such vertices is
 /// therefore sufficient.
 template <class Visit>
-void forEachSupportCandidate(const BoundedConvex& convex, const Vec3& direction, double slack,
-                             const SupportVertex& support, Visit visit) {
+void forEachSupportCandidate(const BoundedConvex& convex, const SupportVertex& support,
+                             Visit visit) {
   if (support.unique) return visit(support.vertex);
 
   const std::span<const Vec3> vertices = convex.shape->vertices;
-  const double threshold = support.projection - slack;
+  const Vec3& direction = support.direction;
+  const double threshold = support.projection - support.slack;
   const auto visitAllAbove = [&] {
     for (std::uint32_t i = 0; i < vertices.size(); ++i)
       if (!(dot(direction, vertices[i]) < threshold)) visit(i);
@@ -322,19 +343,37 @@ void forEachSupportCandidate(const BoundedConvex& convex, const Vec3& direction,
 /// the bits of a word.
 inline constexpr std::size_t kMaxScannedVertices = 48;
 
+/// One bit for each vertex whose projection in doubles is at least `threshold`; at most 64
+/// vertices. Without branches: a body that rests on a face of many corners has them all as
+/// candidates.
+inline std::uint64_t findVerticesAbove(std::span<const Vec3> vertices, const Vec3& direction,
+                                       double threshold) {
+  const Double2 x = {direction.x(), direction.x()}, y = {direction.y(), direction.y()},
+                z = {direction.z(), direction.z()}, limit = {threshold, threshold};
+  std::size_t i = vertices.size();
+  std::uint64_t above = 0;
+  if (i % 2 == 1) above = dot(direction, vertices[--i]) < threshold ? 0 : 1;
+  while (i > 0) {
+    i -= 2;
+    const double* coordinates = vertices[i].data();  // of two vertices: x y z x y z
+    const Double2 xy = loadDouble2(coordinates), zx = loadDouble2(coordinates + 2),
+                  yz = loadDouble2(coordinates + 4);
+    const Double2 projection =
+        Double2{xy[0], zx[1]} * x + Double2{xy[1], yz[0]} * y + Double2{zx[0], yz[1]} * z;
+    above = above << 2 | (3 ^ toBits(projection < limit));
+  }
+  return above;
+}
+
 /// As forEachSupportCandidate(), in any order and possibly with more vertices: for a maximum of
 /// values, not for a vertex, which ties would make depend on the order.
 template <class Visit>
-void forEachSupportValue(const BoundedConvex& convex, const Vec3& direction, double slack,
-                         const SupportVertex& support, Visit visit) {
+void forEachSupportValue(const BoundedConvex& convex, const SupportVertex& support, Visit visit) {
   const std::span<const Vec3> vertices = convex.shape->vertices;
   if (support.unique || vertices.size() > kMaxScannedVertices)
-    return forEachSupportCandidate(convex, direction, slack, support, visit);
-  // Without branches: a body that rests on a face of many corners has them all as candidates.
-  const double threshold = support.projection - slack;
-  std::uint64_t above = 0;
-  for (std::uint32_t i = 0; i < vertices.size(); ++i)
-    above |= static_cast<std::uint64_t>(!(dot(direction, vertices[i]) < threshold)) << i;
+    return forEachSupportCandidate(convex, support, visit);
+  std::uint64_t above =
+      findVerticesAbove(vertices, support.direction, support.projection - support.slack);
   for (; above != 0; above &= above - 1) visit(static_cast<std::uint32_t>(std::countr_zero(above)));
 }
 

@@ -21,41 +21,47 @@ struct Face {
   Eigen::Matrix<Real, 3, 1> nearest;
 };
 
+/// Whether a face with this nearest point replaces the closest one so far.
 template <class Real>
-const Face<Real>& pickCloser(const Face<Real>& first, const Face<Real>& second) {
-  return dot(second.nearest, second.nearest) < dot(first.nearest, first.nearest) ? second : first;
+bool isCloser(const Eigen::Matrix<Real, 3, 1>& nearest, const Face<Real>& best) {
+  return best.size == 0 || dot(nearest, nearest) < dot(best.nearest, best.nearest);
 }
 
 template <class Real>
-void keepCloser(const Face<Real>& face, Face<Real>& best) {
-  if (best.size == 0 || dot(face.nearest, face.nearest) < dot(best.nearest, best.nearest))
-    best = face;
+void keepCorner(const Simplex<Real>& s, int i, Face<Real>& best) {
+  if (!isCloser(s.points[i], best)) return;
+  best.corner[0] = i;
+  best.weight[0] = 1;
+  best.size = 1;
+  best.nearest = s.points[i];
 }
 
 template <class Real>
-Face<Real> cornerFace(const Simplex<Real>& s, int i) {
-  return {{i}, {1}, 1, s.points[i]};
-}
-
-template <class Real>
-Face<Real> nearestOnSegment(const Simplex<Real>& s, int i, int j) {
+void keepSegment(const Simplex<Real>& s, int i, int j, Face<Real>& best) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec& from = s.points[i];
   const Vec edge = minus(s.points[j], from);
   const Real squared = dot(edge, edge);
   const Real t = -dot(from, edge);
-  if (!(t > 0)) return cornerFace(s, i);
-  if (t >= squared) return cornerFace(s, j);
-  if (!(squared > std::numeric_limits<Real>::min()))  // 1 / squared might be infinite
-    return pickCloser(cornerFace(s, i), cornerFace(s, j));
+  if (!(t > 0)) return keepCorner(s, i, best);
+  if (t >= squared) return keepCorner(s, j, best);
+  if (!(squared > std::numeric_limits<Real>::min())) {  // 1 / squared might be infinite
+    keepCorner(s, i, best);
+    return keepCorner(s, j, best);
+  }
   const Real inverse = 1 / squared;
   const Real w = t * inverse;
   const Vec approximate = plus(from, times(edge, w));
-  return {{i, j}, {1 - w, w}, 2, minus(approximate, times(edge, dot(approximate, edge) * inverse))};
+  const Vec nearest = minus(approximate, times(edge, dot(approximate, edge) * inverse));
+  if (!isCloser(nearest, best)) return;
+  best.corner[0] = i, best.corner[1] = j;
+  best.weight[0] = 1 - w, best.weight[1] = w;
+  best.size = 2;
+  best.nearest = nearest;
 }
 
 template <class Real>
-Face<Real> nearestOnTriangle(const Simplex<Real>& s, int i, int j, int k) {
+void keepTriangle(const Simplex<Real>& s, int i, int j, int k, Face<Real>& best) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec& a = s.points[i];
   const Vec ab = minus(s.points[j], a), ac = minus(s.points[k], a);
@@ -71,24 +77,24 @@ Face<Real> nearestOnTriangle(const Simplex<Real>& s, int i, int j, int k) {
              beyondJK = flat || !(wi > 0);
   if (!beyondIJ && !beyondIK && !beyondJK) {
     const Real inverse = 1 / squared;
-    return {{i, j, k},
-            {wi * inverse, wj * inverse, wk * inverse},
-            3,
-            times(normal, dot(a, normal) * inverse)};
+    const Vec nearest = times(normal, dot(a, normal) * inverse);
+    if (!isCloser(nearest, best)) return;
+    best.corner[0] = i, best.corner[1] = j, best.corner[2] = k;
+    best.weight[0] = wi * inverse, best.weight[1] = wj * inverse, best.weight[2] = wk * inverse;
+    best.size = 3;
+    best.nearest = nearest;
+    return;
   }
-  Face<Real> best;
-  best.size = 0;
-  if (beyondIJ) keepCloser(nearestOnSegment(s, i, j), best);
-  if (beyondIK) keepCloser(nearestOnSegment(s, i, k), best);
-  if (beyondJK) keepCloser(nearestOnSegment(s, j, k), best);
-  return best;
+  if (beyondIJ) keepSegment(s, i, j, best);
+  if (beyondIK) keepSegment(s, i, k, best);
+  if (beyondJK) keepSegment(s, j, k, best);
 }
 
 /// With u the unit roundoff of Real, the determinants are off by less than 256 u reach^3. Each of
 /// nine entries, off by at most 8 u reach, has a cofactor of at most 2 reach^2. The determinant's
 /// own five roundings of six products of at most reach^3 add 30 u reach^3.
 template <class Real>
-Face<Real> nearestOnTetrahedron(const Simplex<Real>& s, double reach, bool& inside) {
+void keepTetrahedron(const Simplex<Real>& s, double reach, bool& inside, Face<Real>& best) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec &a = s.points[0], &b = s.points[1], &c = s.points[2], &d = s.points[3];
   const Vec ab = a.cross(b), cd = c.cross(d);
@@ -102,14 +108,14 @@ Face<Real> nearestOnTetrahedron(const Simplex<Real>& s, double reach, bool& insi
   const bool sees0 = flat || !(sign * d0 > bound), sees1 = flat || !(sign * d1 > bound);
   const bool sees2 = flat || !(sign * d2 > bound), sees3 = flat || !(sign * d3 > bound);
   inside = !sees0 && !sees1 && !sees2 && !sees3;
-  if (inside) return {{0, 1, 2, 3}, {d0 / sum, d1 / sum, d2 / sum, d3 / sum}, 4, Vec::Zero()};
-  Face<Real> best;
-  best.size = 0;
-  if (sees3) keepCloser(nearestOnTriangle(s, 0, 1, 2), best);
-  if (sees2) keepCloser(nearestOnTriangle(s, 0, 1, 3), best);
-  if (sees1) keepCloser(nearestOnTriangle(s, 0, 2, 3), best);
-  if (sees0) keepCloser(nearestOnTriangle(s, 1, 2, 3), best);
-  return best;
+  if (inside) {
+    best = {{0, 1, 2, 3}, {d0 / sum, d1 / sum, d2 / sum, d3 / sum}, 4, Vec::Zero()};
+    return;
+  }
+  if (sees3) keepTriangle(s, 0, 1, 2, best);
+  if (sees2) keepTriangle(s, 0, 1, 3, best);
+  if (sees1) keepTriangle(s, 0, 2, 3, best);
+  if (sees0) keepTriangle(s, 1, 2, 3, best);
 }
 
 }  // namespace
@@ -117,9 +123,15 @@ Face<Real> nearestOnTetrahedron(const Simplex<Real>& s, double reach, bool& insi
 template <class Real>
 void Simplex<Real>::keepNearestFace(double reach) {
   containsOrigin = false;
-  const Face<Real> face = size == 2   ? nearestOnSegment(*this, 0, 1)
-                          : size == 3 ? nearestOnTriangle(*this, 0, 1, 2)
-                                      : nearestOnTetrahedron(*this, reach, containsOrigin);
+  Face<Real> face;
+  face.size = 0;
+  if (size == 2) {
+    keepSegment(*this, 0, 1, face);
+  } else if (size == 3) {
+    keepTriangle(*this, 0, 1, 2, face);
+  } else {
+    keepTetrahedron(*this, reach, containsOrigin, face);
+  }
   ENFILADE_ASSERT(face.size > 0 && face.size <= size);
   for (int i = 0; i < face.size; ++i) {  // corners ascend: reads precede overwrites
     ENFILADE_ASSERT(face.corner[i] >= i);

@@ -167,17 +167,16 @@ void refineWeights(const MinkowskiDifference&, const Simplex<LongReal>&, Witness
 /// How far a body extends beyond one of its points along a direction, times `length`. `support` is
 /// the result of a hill climb along the direction.
 double computeSupportExcess(const BodyPoint& point, const BoundedConvex& convex,
-                            const Vec3& direction, double length, const SupportVertex& support) {
+                            const Vec3& direction, const SupportVertex& support) {
   const LongVec3 rotated = convex.bodyFromWorld<LongReal>(direction.cast<LongReal>());
   const auto project = [&](const auto& p) {
     return rotated.x() * p.x() + rotated.y() * p.y() + rotated.z() * p.z();
   };
   const LongReal pointProjection = project(point.inBodyFrame(*convex.shape));
   LongReal maxProjection = pointProjection;
-  forEachSupportValue(convex, convex.bodyFromWorld<double>(direction),
-                      computeSupportSlack(convex, length), support, [&](std::uint32_t i) {
-                        maxProjection = std::max(maxProjection, project(convex.shape->vertices[i]));
-                      });
+  forEachSupportValue(convex, support, [&](std::uint32_t i) {
+    maxProjection = std::max(maxProjection, project(convex.shape->vertices[i]));
+  });
   return static_cast<double>(maxProjection - pointProjection);
 }
 
@@ -200,9 +199,9 @@ double computeCertifiedExtraDistance(const MinkowskiDifference& difference,
   double excess = 0;
   const auto& [supportA, supportB] = state.supports;
   if (!supportA.unique || supportA.vertex != witnesses.onBodyA.vertex)
-    excess += computeSupportExcess(witnesses.onBodyA, difference.a, d, state.length, supportA);
+    excess += computeSupportExcess(witnesses.onBodyA, difference.a, d, supportA);
   if (!supportB.unique || supportB.vertex != witnesses.onBodyB.vertex)
-    excess += computeSupportExcess(witnesses.onBodyB, difference.b, -d, state.length, supportB);
+    excess += computeSupportExcess(witnesses.onBodyB, difference.b, -d, supportB);
   const double rounding = error + 2 * kRoundoff * head;
   const Vec3 deviation = minus(witnesses.aToB, d);
   const double directionError = 2 * (dot(deviation, deviation) + rounding * rounding) / head;
@@ -353,14 +352,12 @@ VertexPair getSupportHint(const PlacedConvex& a, const PlacedConvex& b, const Fe
 }
 
 /// Upper bound, up to rounding, on the projection of the vertices in doubles. `support`: of a hill
-/// climb along `direction`, which is in the world's frame.
-double computeMaxProjection(const BoundedConvex& convex, const Vec3& direction, double length,
-                            const SupportVertex& support) {
-  const Vec3 local = convex.bodyFromWorld<double>(direction);
+/// climb.
+double computeMaxProjection(const BoundedConvex& convex, const SupportVertex& support) {
   double max = support.projection;
-  forEachSupportValue(
-      convex, local, computeSupportSlack(convex, length), support,
-      [&](std::uint32_t i) { max = std::max(max, dot(local, convex.shape->vertices[i])); });
+  forEachSupportValue(convex, support, [&](std::uint32_t i) {
+    max = std::max(max, dot(support.direction, convex.shape->vertices[i]));
+  });
   return max;
 }
 
@@ -375,10 +372,9 @@ std::optional<bool> isFartherAlong(const MinkowskiDifference& difference, const 
   const double value = computeSupportValue(difference, axis, length, supports).value;
   const double rounding = 48 * kRoundoff * length * (difference.reach + std::abs(distance));
   if (value + rounding < distance * length) return false;
-  const double lowest =
-      value -
-      (computeMaxProjection(difference.a, axis, length, supports.a) - supports.a.projection) -
-      (computeMaxProjection(difference.b, -axis, length, supports.b) - supports.b.projection);
+  const double lowest = value -
+                        (computeMaxProjection(difference.a, supports.a) - supports.a.projection) -
+                        (computeMaxProjection(difference.b, supports.b) - supports.b.projection);
   if (lowest - rounding > distance * length) return true;
   return std::nullopt;
 }

@@ -137,8 +137,7 @@ DepthBounds certifyBoundsAlongRounded(const Facet<double>& nearest,
                                       Polytope<double>& polytope) {
   const LongVec3 inward = facetSupport.inward.cast<LongReal>();
   const LongReal length = computeNorm(inward);
-  const RotatedDirection rotatedDirection(polytope.difference, inward, facetSupport.inward,
-                                          kMaxUnitLength);
+  const RotatedDirection rotatedDirection(polytope.difference, inward, kMaxUnitLength);
   const CertifiedSupport support = rotatedDirection.certify(facetSupport.supports);
   DepthBounds bounds;
   bounds.upper = -support.lowerBound / length * (1 + 8 * kLongRoundoff);

@@ -188,7 +188,7 @@ bool collectSupportVertices(const BoundedConvex& convex, const Vec3& direction, 
   const double slack = computeSupportSlack(convex, direction.lpNorm<1>());
   const SupportVertex support = hillClimb(convex, local, slack, start);
   std::size_t visited = 0;
-  forEachSupportCandidate(convex, local, slack, support, [&](std::uint32_t i) {
+  forEachSupportCandidate(convex, support, [&](std::uint32_t i) {
     if (++visited <= kMaxFaceVertices) found.vertices[found.count++] = rotateVertex(convex, i);
   });
   return visited <= kMaxFaceVertices;
