@@ -57,7 +57,7 @@ def main():
     asked = parser.parse_args()
     for scene in asked.scenes:
         with enfilade.WalkEnv(scene, starts="anywhere", goals="anywhere", channels=(), radius=0.2, height=1.5,
-                              goal_radius=0.2, max_steps=2000) as env:
+                              goal_radius=0.2, max_steps=500) as env:
             for name, policy in (("follower", follower), ("random", chance)):
                 episodes = asked.episodes if policy is follower else max(1, asked.episodes // 10)
                 success, spl = measure(env, policy, episodes, asked.seed)

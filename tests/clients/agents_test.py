@@ -330,6 +330,9 @@ class CamerasTest(RoomCase):
         fisheye = self.client.frame(eye=(0, 1, 0), forward=(0, -1, 0), up=(1, 0, 0), width=33,
                                     height=33, channels=("range", "depth"), lens="fisheye")
         self.assertAlmostEqual(float(fisheye.range[16, 16]), 1.0, delta=1e-3)
+        narrow = self.client.frame(eye=(0, 1, 0), forward=(0, -1, 0), up=(1, 0, 0), width=33, height=33,
+                                   channels=("range",), lens="fisheye", intrinsics=(40, 40, 16.5, 16.5))
+        self.assertAlmostEqual(float(narrow.range[16, 32]), 1 / math.cos(16 / 40), delta=1e-3)
         with self.assertRaisesRegex(enfilade.ServerError, "lens"):
             self.client.frame(eye=(0, 1, 0), forward=(1, 0, 0), width=8, height=8, lens="fisheye",
                               renderer="gl")
@@ -337,7 +340,6 @@ class CamerasTest(RoomCase):
         noisy = [self.client.frame(**view, depth_noise=seed).depth for seed in (1, 1, 2)]
         np.testing.assert_array_equal(noisy[0], noisy[1])
         self.assertFalse(np.array_equal(noisy[0], noisy[2], equal_nan=True))
-
 
     def test_a_distortion_table_is_read_from_files(self):
         view = dict(eye=(0, 1, 0), forward=(1, 0, 0), width=32, height=32, channels=("depth",))
@@ -439,6 +441,19 @@ class FlowTest(RoomCase):
                 self.client.frame(**options, **view)
         with self.assertRaisesRegex(enfilade.ServerError, "lens"):
             self.client.frame(eye=(0, 1, 0), forward=(1, 0, 0), lens="fisheye", flow_from=56, **self.VIEW)
+        with self.assertRaises(enfilade.ServerError) as raised:
+            self.client.frame(flow_from=first, **view)
+        self.assertEqual(raised.exception.remedy, "give a tick that the world has completed, one of the last 32")
+
+    def test_options_of_a_picture_that_would_have_no_effect_are_named(self):
+        view = dict(eye=(0, 1, 0), forward=(1, 0, 0), width=8, height=6)
+        for options, name in (({"depth_noise": 1}, "depth_noise"), ({"flow_from": 0}, "flow_from"),
+                              ({"flow_forward": (1, 0, 0)}, "flow_forward"),
+                              ({"channels": ("depth",), "depth_noise": -1}, "depth_noise"),
+                              ({"channels": ("flow",), "flow_from": -1}, "flow_from"),
+                              ({"width": -1}, "width"), ({"samples": 1.5}, "samples"), ({"tick": -1}, "tick")):
+            with self.assertRaisesRegex(ValueError, name):
+                self.client.frame(**{**view, **options})
 
 
 class VideoTest(unittest.TestCase):

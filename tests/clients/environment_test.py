@@ -42,9 +42,14 @@ class Environments(RoomCase):
 
     def test_observations_lie_in_their_space(self):
         self.need_pictures()
-        env = self.environment(channels=("rgb", "depth", "ids"), goal=(3, 0, 0))
-        for result in walk(env, 1, 5):
+        env = self.environment(size=None, goal=(3, 0, 0), cameras=[enfilade.Camera(
+            "", (16, 12), ("rgb", "depth", "ids", "class", "thing", "normals", "range"), pitch=0.6)])
+        results = walk(env, 1, 5)
+        for result in results:
             self.assertTrue(env.observation_space.contains(result[0]))
+        for name in ("depth", "range"):
+            self.assertTrue(np.isinf(results[0][0][name]).any())  # the sky
+            self.assertTrue(np.isfinite(results[0][0][name]).any())
         self.assertEqual(env.render().shape, (12, 16, 3))
 
     def test_who_goes_ahead_comes_to_the_goal(self):
@@ -143,10 +148,32 @@ class Environments(RoomCase):
         self.fail(f"worlds were left: {self.client.worlds()}")
 
     def test_arguments_that_are_none_are_named(self):
-        for name, value in (("size", (10,)), ("size", (12.5, 5)), ("size", (0, 0)),
-                            ("goal_radius", math.nan), ("max_steps", 0), ("ticks_per_step", 0)):
-            with self.assertRaisesRegex(ValueError, name):
+        for name, value in (("size", (10,)), ("size", (12.5, 5)), ("size", (0, 0)), ("size", (99999, 9)),
+                            ("goal_radius", math.nan), ("max_steps", 0), ("ticks_per_step", 0),
+                            ("ticks_per_step", "a"), ("radius", -1), ("radius", "a"), ("height", 11),
+                            ("eye_height", math.inf), ("speed", "a"), ("turn_speed", -1), ("fov_y", 4)):
+            with self.assertRaisesRegex(ValueError, name if name != "eye_height" else "height"):
                 enfilade.WalkEnv(address=self.server.address, starts=_STARTS, **{name: value})
+
+    def test_arguments_of_one_camera_are_refused_next_to_cameras(self):
+        camera = enfilade.Camera("a")
+        for options, name in (({"size": (8, 8)}, "size"), ({"channels": ()}, "channels"), ({"pitch": 0.0}, "pitch"),
+                              ({"fov_y": 1.0}, "fov_y"), ({"eye_height": 1.0}, "eye_height"),
+                              ({"cameras": [camera, enfilade.Camera("a", yaw=1.0)]}, "cameras: .*'a'"),
+                              ({"cameras": [5]}, r"cameras\[0\]"), ({"cameras": camera}, "cameras")):
+            with self.assertRaisesRegex(ValueError, name):
+                enfilade.WalkEnv(address=self.server.address, starts=_STARTS, **{"cameras": [camera], **options})
+        for name, value in (("name", 5), ("yaw", math.nan), ("ahead", math.inf), ("left", "a"), ("fov_y", 0)):
+            with self.assertRaisesRegex(ValueError, name):
+                enfilade.Camera(**{"name": "a", name: value})
+
+    def test_actions_that_are_no_sequence_are_named(self):
+        vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=2, starts=_STARTS, channels=())
+        self.addCleanup(vector.close)
+        vector.reset(seed=1)
+        with self.assertRaisesRegex(ValueError, "actions: give 2"):
+            vector.step(5)
+        vector.step([(0, 0)] * 2)
 
     def test_a_vector_larger_than_the_server_takes_is_refused(self):
         with self.assertRaisesRegex(ValueError, "num_envs"):

@@ -108,6 +108,13 @@ class NavigationTest(RoomCase):
         with self.assertRaises(ValueError):
             self.client.navigation(doors="ajar")
 
+    def test_options_of_random_places_that_would_have_no_effect_are_named(self):
+        for options, name in (({"max_distance": 2}, "near"), ({"near": (0, 0, 0)}, "max_distance"),
+                              ({"min_distance": 2}, "away_from"), ({"away_from": (0, 0, 0)}, "min_distance"),
+                              ({"island": -1}, "island"), ({"seed": -1}, "seed"), ({"count": -1}, "count")):
+            with self.assertRaisesRegex(ValueError, name):
+                self.navigation.random_places(**{"count": 1, "seed": 1, **options})
+
 
 class CompatTest(RoomCase):
     def setUp(self):
@@ -146,6 +153,51 @@ class CompatTest(RoomCase):
         stop = self.finder.try_step_no_sliding((3, 0, 1), (6, 0, 2))
         self.assertGreater(end[2], stop[2])
         self.assertEqual(self.finder.get_topdown_view(0.1, 0).dtype, bool)
+        np.testing.assert_array_equal(self.finder.get_topdown_view(0.1, 0, 0.5),
+                                      self.finder.get_topdown_view(0.1, 0))
+        with self.assertRaisesRegex(ValueError, "eps"):
+            self.finder.get_topdown_view(0.1, 0, 0.1)
+
+    def test_obstacles_are_searched_from_the_surface_and_capped(self):
+        for place, most, expected in (((3, 0, 0), 2.0, 1.9), ((3.05, 0, 0), 2.0, 1.85), ((0, 0, 0), 2.0, 2.0),
+                                      ((0, 0, 0), 5.0, 4.9), ((3, 0, 0), 1.9, 1.9), ((3, 0, 0), 0.05, 0.05)):
+            distance = self.finder.distance_to_closest_obstacle(place, most)
+            hit = self.finder.closest_obstacle_surface_point(place, most)
+            self.assertAlmostEqual(distance, expected, delta=1e-3)
+            self.assertEqual(hit.hit_dist, distance)
+            self.assertEqual(bool(np.isnan(hit.hit_pos).any()), distance == most)
+        hit = self.finder.closest_obstacle_surface_point((3.05, 0, 0))  # 1.95 from the axis
+        self.assertAlmostEqual(hit.hit_pos[0], 5, delta=1e-3)
+        np.testing.assert_allclose(hit.hit_normal, (-1, 0, 0), atol=1e-6)
+        self.assertEqual(self.finder.distance_to_closest_obstacle((50, 0, 0)), math.inf)
+        self.assertEqual(self.finder.closest_obstacle_surface_point((50, 0, 0)).hit_dist, math.inf)
+        with self.assertRaisesRegex(ValueError, "max_search_radius"):
+            self.finder.distance_to_closest_obstacle((0, 0, 0), 20)
+
+    def test_a_step_from_no_place_is_the_start_or_begins_at_the_closest(self):
+        for step in (self.finder.try_step, self.finder.try_step_no_sliding):
+            np.testing.assert_array_equal(step((50, 0, 0), (51, 0, 0)), (50, 0, 0))
+            np.testing.assert_allclose(step((5.0, 0, 0), (4, 0, 0)), (4, 0, 0), atol=1e-2)  # out of the wall
+
+    def test_an_island_has_one_radius(self):
+        radius = self.finder.island_radius((0, 0, 0))
+        self.assertEqual(self.finder.island_radius((9, 0, 9)), radius)
+        self.assertEqual(self.finder.island_radius(0), radius)
+        self.assertGreater(radius, 12)  # of a floor of 20 m x 20 m: up to 14.1
+        self.assertLess(radius, 15)
+        self.assertEqual(self.finder.island_radius((50, 0, 0)), 0)
+
+    def test_settings_of_the_mesh(self):
+        settings = self.finder.nav_mesh_settings
+        policies = self.client.welcome.policies
+        self.assertEqual((settings.agent_radius, settings.agent_height), (0.1, 1.5))
+        self.assertEqual(settings.agent_max_climb, policies.step_height)
+        self.assertTrue(self.finder.build_nav_mesh(settings))
+        settings = NavMeshSettings(cell_size=0.1, agent_radius=0.3, agent_max_climb=0.2)
+        settings.set_defaults()
+        self.assertEqual(settings, NavMeshSettings())
+        with self.assertRaises(TypeError):
+            NavMeshSettings(cellsize=0.1)
 
 
     def test_meshes_are_saved_and_loaded(self):
@@ -324,6 +376,23 @@ class FollowerTest(RoomCase):
         self.assertLess(math.hypot(place[0] - 8, place[2]), 0.25)
         with self.assertRaisesRegex(ValueError, "no path"):
             follower.next_action_along(place, heading, (5.1, 3.1, 0))
+
+    def test_find_path_returns_the_actions_up_to_the_stop(self):
+        follower = GreedyGeodesicFollower(PathFinder(self.client.navigation()), stop_key="stop")
+        self.assertEqual(follower.goal_radius, 0.1875)
+        actions = follower.find_path((0, 0, 0), 0.0, (1, 0, 0))
+        self.assertEqual(actions, ["move_forward"] * 4 + ["stop"])
+        actions = follower.find_path((2, 0, 0), 0.3, (8, 0, 0))
+        place, heading = (2, 0, 0), 0.3
+        for action in actions:
+            self.assertEqual(follower.next_action_along(place, heading, (8, 0, 0)), action)
+            if action == "move_forward":
+                step = 0.25 * np.array((math.cos(heading), 0, -math.sin(heading)))
+                place = follower.pathfinder.try_step(place, place + step)
+            heading += {"turn_left": 1, "turn_right": -1}.get(action, 0) * math.radians(10)
+        self.assertEqual(actions.index("stop"), len(actions) - 1)
+        with self.assertRaisesRegex(ValueError, "no path"):
+            follower.find_path((2, 0, 0), 0.3, (5.1, 3.1, 0))
 
 
 if __name__ == "__main__":

@@ -139,9 +139,88 @@ class PointNavigation(RoomCase):
         np.testing.assert_allclose(rewards, 0, atol=1e-6)
         self.assertTrue(all(distance >= 0.9 for distance in infos["geodesic_distance"]))
 
+    def test_an_episode_without_its_distance_is_measured(self):
+        for given in (math.nan, math.inf):
+            env = self.environment(goals=None, starts=(), episodes=[
+                enfilade.Episode((2, 0, 0), 0, (8, 0, 0), given)])
+            _, info = env.reset(seed=1)
+            self.assertAlmostEqual(info["geodesic_distance"],
+                                   env.navigation.geodesic_distance((2, 0, 0), (8, 0, 0)))
+            _, reward, *_, info = env.step((0, 0))
+            self.assertAlmostEqual(reward, 0, places=6)
+            self.assertEqual(reward, info["progress"])
+        env = self.environment(goals=None, starts=(), episodes=[
+            enfilade.Episode((2, 0, 0), 0, (5.1, 3.1, 0), math.nan, "to the wall")])
+        with self.assertRaisesRegex(enfilade.EnfiladeError, "'to the wall': no path leads .*: .+"):
+            env.reset(seed=1)
+
+    def test_a_file_without_the_distance_is_written_and_read(self):
+        episode = enfilade.Episode((2.0, 0.0, 0.0), 90.0, (8.0, 0.0, 0.0), math.nan, "1")
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "episodes.json"
+            enfilade.write_episodes(file, [episode], "room.obj")
+            (one,) = json.loads(file.read_text(), parse_constant=self.fail)["episodes"]
+            self.assertEqual(one["info"], {})
+            one["info"] = {"geodesic_distance": None}
+            file.write_text(json.dumps({"episodes": [one]}))
+            (read,) = enfilade.read_episodes(file)
+            self.assertTrue(math.isnan(read.geodesic_distance))
+            self.assertEqual((read.start, read.goal), (episode.start, episode.goal))
+            with self.assertRaisesRegex(ValueError, r"episodes\[0\].goal"):
+                enfilade.write_episodes(file, [enfilade.Episode((2, 0, 0), 0, (8, 0, math.nan), 6)], "room.obj")
+
+    def test_wrong_files_are_named_with_the_episode(self):
+        good = {"start_position": [0, 0, 0], "start_rotation": [0, 0, 0, 1], "goals": [{"position": [1, 0, 0]}]}
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "some.json"
+            for wrong, words in (({"start_position": [0, 0]}, "start_position"),
+                                 ({"goals": [{"position": [1, 0]}]}, "position"), ({"goals": []}, "goals"),
+                                 ({"start_rotation": [0, 0, 0, 0]}, "unit quaternion"),
+                                 ({"start_rotation": [0, 0, 1]}, "start_rotation"),
+                                 ({"start_position": [0, math.nan, 0]}, "start_position")):
+                file.write_text(json.dumps({"episodes": [good, {**good, **wrong}]}))
+                with self.assertRaisesRegex(ValueError, r"some.json: episodes\[1\]: .*" + words):
+                    enfilade.read_episodes(file)
+            del good["goals"]
+            file.write_text(json.dumps({"episodes": [good]}))
+            with self.assertRaisesRegex(ValueError, r"episodes\[0\]: 'goals' is missing"):
+                enfilade.read_episodes(file)
+            for name, text in (("no.json", "PointNav"), ("list.json", "[]"), ("no.json.gz", "{}")):
+                (Path(folder) / name).write_text(text)
+                with self.assertRaisesRegex(ValueError, name + ": not a file of PointNav"):
+                    enfilade.read_episodes(Path(folder) / name)
+
+    def test_an_impossible_episode_says_why(self):
+        env = self.environment(starts=[(0, 0, 0)], goals=[(1000, 0, 0)])
+        reason = env.navigation.path((0, 0, 0), (1000, 0, 0)).reason
+        with self.assertRaises(enfilade.EnfiladeError) as raised:
+            env.reset(seed=1)
+        self.assertIn("in 1 draw", str(raised.exception))
+        self.assertIn(reason, str(raised.exception))
+        env = self.environment(min_distance=500)
+        with self.assertRaisesRegex(enfilade.EnfiladeError, "in 64 draws.*it is .* m long"):
+            env.reset(seed=1)
+
+    def test_a_goal_that_cannot_be_reached_is_drawn_again(self):
+        env = self.environment(starts=[(0, 0, 0)], goals=[(5.1, 3.1, 0), (3, 0, 0)])
+        for seed in range(5):
+            env.reset(seed=seed)
+            self.assertEqual(env.episode.goal, (3, 0, 0))
+        env.reset(options={"goal": (-3, 0, 0)})
+        self.assertEqual((env.episode.start, env.episode.goal), ((0, 0, 0), (-3, 0, 0)))
+
     def test_wrong_arguments_are_named(self):
-        for options in ({"starts": "everywhere"}, {"starts": ()}, {"goal": (1, 0, 0)}, {"pitch": 2}):
-            with self.assertRaises(ValueError):
+        episode = enfilade.Episode((0, 0, 0), 0, (3, 0, 0), 3)
+        played = {"goals": None, "starts": ()}
+        for options, name in (({"starts": "everywhere"}, "starts"), ({"starts": ()}, "starts"),
+                              ({"starts": 5}, "starts"), ({"goal": (1, 0, 0)}, "goal"), ({"goals": []}, "goals"),
+                              ({"pitch": 2}, "pitch"), ({"min_distance": math.nan}, "min_distance"),
+                              ({"min_distance": -1}, "min_distance"), ({"episodes": [], **played}, "episodes"),
+                              ({"goals": None, "episodes": [episode]}, "starts"),
+                              ({"episodes": [(0, 0, 0)], **played}, r"episodes\[0\]"),
+                              ({"episodes": [enfilade.Episode((0, 0), 0, (1, 0, 0), 1)], **played},
+                               r"episodes\[0\].start")):
+            with self.assertRaisesRegex(ValueError, name):
                 self.environment(**options)
 
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Dict, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from . import messages, spaces
+from .arguments import number
 from .questions import frame_request
 
 _CHANNELS = ("rgb", "depth", "ids", "class", "thing", "normals", "range")
@@ -39,6 +40,8 @@ class Camera:
     samples: int = 1
 
     def __post_init__(self) -> None:
+        if not isinstance(self.name, str):
+            raise ValueError(f"name: give text, not {self.name!r}")
         if isinstance(self.channels, str) or set(self.channels) - set(_CHANNELS):
             raise ValueError(f"channels: give some of {_CHANNELS}, not {self.channels!r}")
         try:
@@ -48,12 +51,31 @@ class Camera:
             good = False
         if not good:
             raise ValueError(f"size: give two whole numbers of pixels, at least 1, not {self.size!r}")
-        if not 0 < self.fov_y < math.pi:
-            raise ValueError(f"fov_y: give radians between 0 and pi, not {self.fov_y}")
+        number(self.fov_y, "fov_y", above=0, below=math.pi)
+        number(self.pitch, "pitch", above=-math.pi / 2, below=math.pi / 2)
+        for name in ("yaw", "ahead", "left") + (() if self.height is None else ("height",)):
+            number(getattr(self, name), name)
         if self.samples not in (1, 4, 16):
             raise ValueError(f"samples: give 1, 4 or 16, not {self.samples}")
-        if not abs(self.pitch) < math.pi / 2:
-            raise ValueError(f"pitch: give radians between -pi/2 and pi/2, not {self.pitch}")
+
+
+def chosen_cameras(cameras: Sequence[Camera], **one: Any) -> List[Camera]:
+    """Returns the cameras that have channels: those given, or a single one with the options `one`, of
+    which None is the default. Raises ValueError for both, and for two cameras of one name."""
+    given = {name: value for name, value in one.items() if value is not None}
+    if isinstance(cameras, Camera):
+        raise ValueError("cameras: give a list of Cameras")
+    if not len(cameras):
+        cameras = [Camera("", **given)]
+    elif given:
+        name = {"height": "eye_height"}.get(next(iter(given)), next(iter(given)))
+        raise ValueError(f"{name}: leave it out, each of the cameras has its own")
+    for i, camera in enumerate(cameras):
+        if not isinstance(camera, Camera):
+            raise ValueError(f"cameras[{i}]: give a Camera, not {camera!r}")
+        if any(camera.name == other.name for other in cameras[:i]):
+            raise ValueError(f"cameras: two have the name {camera.name!r}")
+    return [camera for camera in cameras if camera.channels]
 
 
 class CameraRequest:

@@ -482,15 +482,15 @@ class Client:
         if given), or from `eye` towards `target` or along `forward`; `avatar` is then invisible.
         `up` (with an eye) must not be parallel to the view: straight down needs one. The lens:
         `fov_y` radians, or `intrinsics` (fx, fy, cx, cy) in pixels from the top left corner, or,
-        with an eye, `height_y` metres of an orthographic picture. `channels`: some of "rgb",
-        "depth", "ids", "normals", "range", "class", "thing". `glass`: "clear" or "solid". `renderer`: "gl" or "rays".
-        `shadows`: of the sun, in the colour; None: where they cost little. `lens`: "fisheye" (OpenCV's model; `fov_y` is then the
-        angle of the whole width, default pi; `distortion` k1 to k4) or "equirectangular".
-        `depth_noise`: the seed of a structured-light camera's noise in "depth", or {"model": "redwood",
-        "seed":, "scale":, "distortion": FILE}, see load_distortion(). `flow_from`: the earlier tick of the channel "flow", of the last 32, and
-        `flow_forward` the direction in which the avatar looked then, if `forward` is given.
-        `collision_shapes` draws avatars as the shapes that collide, not as people. `samples`: 1, 4 or
-        16 of the colour in each pixel, which smooth its edges."""
+        with an eye, `height_y` metres of an orthographic picture. `channels`: some of "rgb", "depth", "ids",
+        "normals", "range", "class", "thing", "flow". `glass`: "clear" or "solid". `renderer`: "gl" or "rays".
+        `shadows`: of the sun, in the colour; None: where they cost little. `lens`: "fisheye" (OpenCV's model;
+        `fov_y` is then the angle of the whole width, default pi, or `intrinsics` replace it; `distortion`
+        k1 to k4) or "equirectangular", which has neither. `depth_noise`: the seed of a structured-light
+        camera's noise in "depth", or {"model": "redwood", "seed":, "scale":, "distortion": FILE}, see
+        load_distortion(). `flow_from`: the earlier tick of the channel "flow", of the last 32, and
+        `flow_forward` the direction in which the avatar looked then, if `forward` is given. `collision_shapes`
+        draws avatars as these, not as people. `samples`: 1, 4 or 16 of the colour in each pixel."""
         asked = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
                               height=height, fov_y=fov_y, intrinsics=intrinsics, height_y=height_y,
                               near=near, far=far, channels=channels, glass=glass,

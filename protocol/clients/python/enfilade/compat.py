@@ -15,13 +15,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from .navigation import Navigation, Spot
 
 _NOWHERE = np.full(3, np.nan)
+_MOST_ACTIONS = 2000  # of find_path(): 500 m of steps ahead
+_FARTHEST = 20.0  # metres that the server searches for obstacles
 
 
 class ShortestPath:
@@ -47,18 +49,36 @@ class MultiGoalShortestPath:
 
 @dataclass
 class NavMeshSettings:
-    """As habitat_sim.NavMeshSettings. The server chooses cells itself; the climb and the slope are those of
+    """As habitat_sim.NavMeshSettings. The server proves paths with the agent's exact size and climb and
+    chooses the mesh itself: all fields but the first four have no effect. The climb and the slope are those of
     the world (`enfilade serve --step-height --slope`): None takes them."""
 
     agent_radius: float = 0.1
     agent_height: float = 1.5
     agent_max_climb: Optional[float] = None  # metres
     agent_max_slope: Optional[float] = None  # degrees
+    cell_size: float = 0.05
+    cell_height: float = 0.2
+    region_min_size: float = 20.0
+    region_merge_size: float = 20.0
+    edge_max_len: float = 12.0
+    edge_max_error: float = 1.3
+    verts_per_poly: float = 6.0
+    detail_sample_dist: float = 6.0
+    detail_sample_max_error: float = 1.0
+    filter_low_hanging_obstacles: bool = True
+    filter_ledge_spans: bool = True
+    filter_walkable_low_height_spans: bool = True
+    include_static_objects: bool = False
+
+    def set_defaults(self) -> None:
+        """Sets habitat's defaults, except the climb (0.2 m) and the slope (45 degrees): those of the world."""
+        self.__dict__.update(NavMeshSettings().__dict__)
 
 
 @dataclass(frozen=True)
 class HitRecord:
-    """As habitat_sim.HitRecord."""
+    """As habitat_sim.HitRecord. Position and normal are NaN if no obstacle was found."""
 
     hit_pos: np.ndarray
     hit_normal: np.ndarray
@@ -66,34 +86,57 @@ class HitRecord:
 
 
 class GreedyGeodesicFollower:
-    """Actions that lead along the path to a goal, as habitat_sim.GreedyGeodesicFollower. The agent has
-    `forward_amount` metres and `turn_amount` radians per action."""
+    """Actions that lead along the path to a goal, as habitat_sim.GreedyGeodesicFollower, for an agent with
+    `forward_amount` metres and `turn_amount` radians per action. It has no agent: the methods take the
+    position of the feet and the heading in radians (0 along +X, left positive). `goal_radius`: metres; None:
+    0.75 of a step ahead."""
 
-    def __init__(self, pathfinder: "PathFinder", goal_radius: float = 0.25, *,
+    def __init__(self, pathfinder: "PathFinder", goal_radius: Optional[float] = None, *,
                  forward_key: str = "move_forward", left_key: str = "turn_left",
                  right_key: str = "turn_right", stop_key: Optional[str] = None,
                  forward_amount: float = 0.25, turn_amount: float = math.radians(10)) -> None:
         self.pathfinder = pathfinder
-        self.goal_radius = goal_radius
+        self.goal_radius = 0.75 * forward_amount if goal_radius is None else goal_radius
         self.keys = {"forward": forward_key, "left": left_key, "right": right_key, "stop": stop_key}
         self.forward_amount, self.turn_amount = forward_amount, turn_amount
 
     def next_action_along(self, position: Sequence[float], heading: float,
                           goal: Sequence[float]) -> Optional[str]:
-        """Returns the key of the next action of an agent with a heading in radians (0 along +X, left
-        positive); the stop key at the goal. Raises ValueError if there is no path."""
+        """Returns the key of the next action; the stop key at the goal. Raises ValueError if there is no
+        path."""
+        return self.keys[self._next(position, heading, goal)]
+
+    def find_path(self, position: Sequence[float], heading: float,
+                  goal: Sequence[float]) -> List[Optional[str]]:
+        """Returns the keys of all actions to the goal, which end with the stop key. Raises ValueError if there
+        is no path, or if steps of this length do not come within `goal_radius`."""
+        taken: List[Optional[str]] = []
+        while len(taken) < _MOST_ACTIONS:
+            action = self._next(position, heading, goal)
+            taken.append(self.keys[action])
+            if action == "stop":
+                return taken
+            if action == "forward":
+                ahead = self.forward_amount * np.array((math.cos(heading), 0, -math.sin(heading)))
+                position = self.pathfinder.try_step(position, np.asarray(position, float) + ahead)
+            else:
+                heading += self.turn_amount if action == "left" else -self.turn_amount
+        raise ValueError(f"goal_radius: the goal is not within {self.goal_radius:g} m after {_MOST_ACTIONS} "
+                         f"actions; give more, or a smaller forward_amount than {self.forward_amount:g} m")
+
+    def _next(self, position: Sequence[float], heading: float, goal: Sequence[float]) -> str:
         path = self.pathfinder.navigation.path(position, goal)
         if not path.found:
             raise ValueError(f"no path: {path.reason}")
         if path.length <= self.goal_radius:
-            return self.keys["stop"]
+            return "stop"
         here = np.asarray(position, float)
         ahead = next((p for p in path.points[1:]
                       if math.hypot(p[0] - here[0], p[2] - here[2]) > 0.05), path.points[-1])
         turn = math.remainder(math.atan2(here[2] - ahead[2], ahead[0] - here[0]) - heading, math.tau)
         if abs(turn) <= self.turn_amount / 2 + 1e-9:
-            return self.keys["forward"]
-        return self.keys["left" if turn > 0 else "right"]
+            return "forward"
+        return "left" if turn > 0 else "right"
 
 
 class PathFinder:
@@ -125,6 +168,13 @@ class PathFinder:
                                  f"{option} {wanted:g}")
         self.navigation = client.navigation(settings.agent_radius, settings.agent_height)
         return self.navigation.build_seconds >= 0
+
+    @property
+    def nav_mesh_settings(self) -> NavMeshSettings:
+        """Those of the present agent and world; of the mesh itself, the defaults."""
+        policies = self.navigation._client.welcome.policies
+        return NavMeshSettings(self.navigation.radius, self.navigation.height, policies.step_height,
+                               math.degrees(policies.walkable_slope))
 
     def save_nav_mesh(self, path: str) -> bool:
         self.navigation.save(path)
@@ -167,10 +217,20 @@ class PathFinder:
         return self.navigation.is_navigable(pt, max_y_delta)
 
     def try_step(self, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
-        return _point(self.navigation.try_step(start, end))
+        """Where a straight walk ends that slides along obstacles. If no agent can stand at `start`, it begins
+        at the closest place within 2 m; without one it is `start`."""
+        return self._stepped(start, end, True)
 
     def try_step_no_sliding(self, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
-        return _point(self.navigation.try_step(start, end, slide=False))
+        """The same without sliding."""
+        return self._stepped(start, end, False)
+
+    def _stepped(self, start: Sequence[float], end: Sequence[float], slide: bool) -> np.ndarray:
+        spot = self.navigation.try_step(start, end, slide=slide)
+        if spot is None:
+            snapped = self.navigation.snap(start)
+            spot = snapped and self.navigation.try_step(snapped.at, end, slide=slide)
+        return np.array(start, float) if spot is None else spot.at
 
     def get_island(self, point: Sequence[float]) -> int:
         spot = self.navigation.snap(point)
@@ -189,33 +249,44 @@ class PathFinder:
         return self.navigation.navigable_area
 
     def distance_to_closest_obstacle(self, pt: Sequence[float], max_search_radius: float = 2.0) -> float:
-        """From the agent's surface, as in habitat-sim; NaN: no agent can stand there."""
-        obstacle = self.navigation.clearance(pt, max_search_radius)
-        return math.nan if obstacle is None else max(0.0, obstacle.distance - self.navigation.radius)
+        """From the agent's surface, at most `max_search_radius`; infinite: no agent can stand within 2 m of
+        the point."""
+        return self.closest_obstacle_surface_point(pt, max_search_radius).hit_dist
 
     def closest_obstacle_surface_point(self, pt: Sequence[float],
                                        max_search_radius: float = 2.0) -> "HitRecord":
-        """`hit_dist` as distance_to_closest_obstacle(); infinite without an obstacle."""
-        obstacle = self.navigation.clearance(pt, max_search_radius)
-        if obstacle is None or obstacle.point is None or obstacle.normal is None:
+        """`hit_dist` as distance_to_closest_obstacle(); equal to `max_search_radius` without an obstacle."""
+        radius = self.navigation.radius
+        most = _FARTHEST - radius
+        if not 0 < max_search_radius <= most:
+            raise ValueError(f"max_search_radius: give metres above 0 and up to {most:g}, not {max_search_radius}")
+        spot = self.navigation.snap(pt)
+        found = spot and self.navigation.clearance(spot.at, max(0.1, max_search_radius + radius))
+        if found is None:
             return HitRecord(_NOWHERE.copy(), _NOWHERE.copy(), math.inf)
-        distance = max(0.0, obstacle.distance - self.navigation.radius)
-        return HitRecord(np.array(obstacle.point), np.array(obstacle.normal), distance)
+        distance = max(0.0, found.distance - radius)
+        if found.point is None or found.normal is None or distance >= max_search_radius:
+            return HitRecord(_NOWHERE.copy(), _NOWHERE.copy(), float(max_search_radius))
+        return HitRecord(np.array(found.point), np.array(found.normal), distance)
 
     def get_bounds(self) -> Tuple[np.ndarray, np.ndarray]:
         """Of the scene."""
         bounds = self.navigation._client.welcome.scene.bounds
         return tuple(np.array((p.x, p.y, p.z)) for p in (bounds.min, bounds.max))  # type: ignore[return-value]
 
-    def island_radius(self, point: Sequence[float]) -> float:
-        """The distance from the point to the farthest of 1000 random places of its island; 0: none."""
-        island = self.get_island(point)
+    def island_radius(self, pt: Union[int, Sequence[float]]) -> float:
+        """The largest distance of 1000 random places of an island from their centroid: one value for all
+        points of the island, which a number may name instead; 0: no island."""
+        island = int(pt) if isinstance(pt, (int, np.integer)) else self.get_island(pt)
         if island < 0:
             return 0.0
-        spots = self.navigation.random_places(1000, 1, island=island)
-        return max(float(np.linalg.norm(spot.at - np.asarray(point))) for spot in spots if spot)
+        places = np.array([spot.at for spot in self.navigation.random_places(1000, 1, island=island) if spot])
+        return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max()) if len(places) else 0.0
 
-    def get_topdown_view(self, meters_per_pixel: float, height: float) -> np.ndarray:
+    def get_topdown_view(self, meters_per_pixel: float, height: float, eps: float = 0.5) -> np.ndarray:
+        """Floors within 0.5 m of the height, habitat's default; another `eps` raises ValueError."""
+        if eps != 0.5:
+            raise ValueError(f"eps: the server's maps have the floors within 0.5 m, not {eps}")
         return self.navigation.top_down(height, meters_per_pixel).cells
 
 

@@ -9,33 +9,25 @@ from __future__ import annotations
 
 import math
 import operator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from . import messages, results, spaces
-from .cameras import Camera, CameraRequest
+from .arguments import UINT32, number, numbers, whole
+from .cameras import Camera, CameraRequest, chosen_cameras
 from .client import Client, Reply, connect
 from .connection import raise_refusal
-from .episodes import Episode, draw_episode
-from .errors import OrderFailed
+from .episodes import Episode, check_episode, draw_episode
+from .errors import EnfiladeError, OrderFailed
 from .process import Server, serve
 
 Observation = Dict[str, np.ndarray]
 
+_RADII, _HEIGHTS = (0.05, 5), (0.2, 10)  # metres: those of Spawn
 _DISCRETE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
-
-
-def _numbers(given: Any, name: str, counts: Sequence[int]) -> Tuple[float, ...]:
-    try:
-        numbers = tuple(map(float, given))
-    except (TypeError, ValueError):
-        numbers = ()
-    if len(numbers) not in counts or not all(map(math.isfinite, numbers)):
-        raise ValueError(f"{name}: give {' or '.join(map(str, counts))} finite numbers, "
-                         f"not {given!r}")
-    return numbers
 
 
 def _places(given: Any, name: str, counts: Sequence[int]) -> List[Tuple[float, ...]]:
@@ -44,7 +36,23 @@ def _places(given: Any, name: str, counts: Sequence[int]) -> List[Tuple[float, .
         if given != "anywhere":
             raise ValueError(f"{name}: give places or \"anywhere\", not {given!r}")
         return []
-    return [_numbers(one, f"{name}[{i}]", counts) for i, one in enumerate(given)]
+    try:
+        given = list(given)
+    except TypeError:
+        raise ValueError(f"{name}: give positions or \"anywhere\", not {given!r}") from None
+    if not given:
+        raise ValueError(f"{name}: give at least one position, or \"anywhere\"")
+    return [numbers(one, f"{name}[{i}]", counts) for i, one in enumerate(given)]
+
+
+def _checked_episodes(given: Sequence[Episode]) -> List[Episode]:
+    if not len(given):
+        raise ValueError("episodes: give at least one")
+    for i, one in enumerate(given):
+        if not isinstance(one, Episode):
+            raise ValueError(f"episodes[{i}]: give an Episode, not {one!r}")
+        check_episode(one, f"episodes[{i}]")
+    return list(given)
 
 
 class WalkEnv(spaces.EnvBase):
@@ -57,16 +65,18 @@ class WalkEnv(spaces.EnvBase):
         one at random, and a facing if none is given. Or "anywhere": random places.
     goal: the walk succeeds within `goal_radius` metres of it, on the ground.
     goals: goals instead, of which each reset chooses one that can be reached, or "anywhere". Distances
-        are then geodesic, at least `min_distance` at the start. Or `episodes`, which take turns.
+        are then geodesic, at least `min_distance` at the start. Or `episodes` instead of starts and goals,
+        which take turns.
     radius, height: size of the avatar in metres. eye_height: of the camera above the feet, metres.
-    pitch: of the camera in radians, upwards positive. size: (width, height) of the pictures in pixels;
-        `channels` of "rgb", "depth", "ids", or none. Or `cameras` instead: Cameras, whose observations
-        have the names NAME_rgb, NAME_depth, ...
+    pitch, fov_y: of the camera in radians, upwards positive (default 0), and its vertical angle (1.2).
+        size: (width, height) of the pictures in pixels (128, 128); `channels` as of a Camera ("rgb",
+        "depth"), or none. Or `cameras` instead: Cameras with different names, whose observations have
+        the names NAME_rgb, NAME_depth, ...
     ticks_per_step: 1/60 s each. speed: metres per second. turn_speed: radians per second.
     discrete: actions are 0 stand, 1 walk ahead, 2 turn left, 3 turn right; else two numbers in -1..1,
         ahead and turn (left is positive).
 
-    Observations: the channels (depth in metres, inf for the background), "position" of the feet,
+    Observations: the channels (depth and range in metres, inf for the background), "position" of the feet,
     "heading" as its cosine and sine, and with a goal "to_goal" in metres and "goal_polar": the distance
     on the ground, and the angle from the heading, left positive. The reward is the progress towards the
     goal, or without a goal the distance walked, in metres; override reward() and is_over(), and
@@ -86,49 +96,46 @@ class WalkEnv(spaces.EnvBase):
                  goals: Union[None, str, Sequence[Sequence[float]]] = None,
                  episodes: Optional[Sequence[Episode]] = None, min_distance: float = 1.0,
                  radius: Optional[float] = None, height: Optional[float] = None,
-                 eye_height: Optional[float] = None, pitch: float = 0.0,
+                 eye_height: Optional[float] = None, pitch: Optional[float] = None,
                  cameras: Sequence[Camera] = (),
-                 goal_radius: float = 0.5, size: Tuple[int, int] = (128, 128),
-                 channels: Sequence[str] = ("rgb", "depth"), ticks_per_step: int = 6,
+                 goal_radius: float = 0.5, size: Optional[Tuple[int, int]] = None,
+                 channels: Optional[Sequence[str]] = None, ticks_per_step: int = 6,
                  speed: float = 1.4, turn_speed: float = math.pi / 2, max_steps: int = 1000,
-                 fov_y: float = 1.2, discrete: bool = False,
+                 fov_y: Optional[float] = None, discrete: bool = False,
                  render_mode: Optional[str] = "rgb_array", server_arguments: Sequence[str] = (),
                  client: Optional[Client] = None, world: str = "main", token: str = "") -> None:
-        if not len(starts) and not episodes:
-            raise ValueError("starts: give at least one start position, or \"anywhere\"")
         if sum(one is not None for one in (goal, goals, episodes)) > 1:
             raise ValueError("give one of goal, goals and episodes")
-        self.starts = _places(starts, "starts", (3, 4))
+        if episodes is not None and not (isinstance(starts, (tuple, list)) and not starts):
+            raise ValueError("starts: leave it out, episodes have their own")
+        self.starts = [] if episodes is not None else _places(starts, "starts", (3, 4))
         self.goals = None if goals is None else _places(goals, "goals", (3,))
-        self.episodes = None if episodes is None else list(episodes)
-        self.goal = None if goal is None else np.array(_numbers(goal, "goal", (3,)))
+        self.episodes = None if episodes is None else _checked_episodes(episodes)
+        self.goal = None if goal is None else np.array(numbers(goal, "goal", (3,)))
         self._first_goal = self.goal
+        for name, count in (("ticks_per_step", ticks_per_step), ("max_steps", max_steps)):
+            whole(count, name, 1, UINT32)
         self._name = "walker"
         self._drive = messages.ClientMessage(command=messages.Command(
             avatar=self._name, drive=messages.Drive(velocity=messages.Vec3())))
         self._velocity = self._drive.command.drive.velocity
         self._run = messages.ClientMessage(step=messages.Step(ticks=ticks_per_step, avatars=True))
-        self.min_distance = min_distance
-        self._size = {"radius": radius, "height": height}
+        self.min_distance = number(min_distance, "min_distance", 0)
+        self._size = {"radius": None if radius is None else number(radius, "radius", *_RADII),
+                      "height": None if height is None else number(height, "height", *_HEIGHTS)}
         self.is_geodesic = goals is not None or episodes is not None
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode: give None or 'rgb_array', not {render_mode!r}")
-        for name, count in (("ticks_per_step", ticks_per_step), ("max_steps", max_steps)):
-            if operator.index(count) < 1:
-                raise ValueError(f"{name}: give at least 1, not {count}")
-        if not 0 < goal_radius < math.inf:
-            raise ValueError(f"goal_radius: give metres above 0, not {goal_radius}")
-        if not (0 < speed < math.inf and 0 <= turn_speed < math.inf):
-            raise ValueError("speed, turn_speed: give a number above 0 and one not below 0, "
-                             f"not {speed}, {turn_speed}")
+        number(goal_radius, "goal_radius", above=0)
+        number(speed, "speed", above=0)
+        number(turn_speed, "turn_speed", 0)
         if isinstance(server_arguments, str):
             raise ValueError("server_arguments: give a list of strings")
         if sum(one is not None for one in (scene, address or None, client)) != 1:
             raise ValueError("give one of scene, address and client")
         self.goal_radius = goal_radius
-        self.cameras = [CameraRequest(one, self._name) for one in cameras] or \
-            [CameraRequest(Camera("", size, channels, fov_y, pitch=pitch, height=eye_height), self._name)]
-        self.cameras = [one for one in self.cameras if one.channels]
+        self.cameras = [CameraRequest(one, self._name) for one in chosen_cameras(
+            cameras, size=size, channels=channels, fov_y=fov_y, pitch=pitch, height=eye_height)]
         self._picture_key = next((one.prefix + "rgb" for one in self.cameras if "rgb" in one.channels),
                                  "rgb")
         self.ticks_per_step, self.speed, self.turn_speed = ticks_per_step, speed, turn_speed
@@ -163,14 +170,20 @@ class WalkEnv(spaces.EnvBase):
 
     def _begin(self) -> None:
         self.navigation = self.client.navigation(**self._size, speed=self.speed)
-        self.client.lockstep()
-        self.client.subscribe(contacts=True, notices=True)
         limit = self.client.welcome.policies.speed_limit
         if self.speed > limit:
             raise ValueError(f"speed: {self.speed:g} m/s exceeds the server's limit of {limit:g}")
         most = self.client.limits.max_ticks_per_step
         if self.ticks_per_step > most:
             raise ValueError(f"ticks_per_step: the server runs at most {most} at a time")
+        widest, highest = self.client.limits.max_picture_width, self.client.limits.max_picture_height
+        for one in self.cameras:
+            width, height = one.camera.size
+            if width > widest or height > highest:
+                raise ValueError(f"size: the server draws at most {widest} x {highest} pixels, "
+                                 f"not {width} x {height}")
+        self.client.lockstep()
+        self.client.subscribe(contacts=True, notices=True)
         self._seconds = self.ticks_per_step * self.client.tick_seconds
         self.metadata = {**self.metadata, "render_fps": 1 / self._seconds}
 
@@ -202,7 +215,7 @@ class WalkEnv(spaces.EnvBase):
             self._episode_number += 1
             return episode
         return draw_episode(self.navigation, self.np_random, min_distance=self.min_distance,
-                            start=self._one_of(self.starts), goal=self._one_of(self.goals))
+                            starts=self.starts, goals=self.goals or ())
 
     def _one_of(self, places: Any) -> Optional[Sequence[float]]:
         return places[int(self.np_random.integers(len(places)))] if places else None
@@ -288,11 +301,11 @@ class WalkEnv(spaces.EnvBase):
         goal = options.get("goal")
         if goal is not None and self._first_goal is None and not self.is_geodesic:
             raise ValueError("options: goal needs an environment with a goal")
-        goal = self._first_goal if goal is None else np.array(_numbers(goal, "goal", (3,)))
+        goal = self._first_goal if goal is None else np.array(numbers(goal, "goal", (3,)))
         self._walked = 0.0
         start = options.get("start")
         if start is not None:
-            start = _numbers(start, "start", (3, 4))
+            start = numbers(start, "start", (3, 4))
         if spaces.HAVE_GYMNASIUM:
             super().reset(seed=seed)
         elif seed is not None:
@@ -302,12 +315,23 @@ class WalkEnv(spaces.EnvBase):
         if not self.is_geodesic:
             return start or self._one_of(self.starts) or self._anywhere(), goal
         if start is None and goal is None:
-            self.episode = self.new_episode()
+            self.episode = self._with_distance(self.new_episode())
         else:
-            self.episode = draw_episode(self.navigation, self.np_random, min_distance=0.0, start=start,
-                                        goal=goal)
+            self.episode = draw_episode(self.navigation, self.np_random, min_distance=0.0,
+                                        start=start, goal=goal, starts=self.starts,
+                                        goals=self.goals or ())
         self._left = self.episode.geodesic_distance
         return (*self.episode.start, self.episode.facing), np.array(self.episode.goal)
+
+    def _with_distance(self, episode: Episode) -> Episode:
+        """Measures `geodesic_distance` if the episode, for example of a file, has none."""
+        if math.isfinite(episode.geodesic_distance):
+            return episode
+        path = self.navigation.path(episode.start, episode.goal)
+        if not path.found:
+            raise EnfiladeError(f"episode {episode.id!r}: no path leads from {episode.start} to "
+                                f"{episode.goal}: {path.reason}")
+        return replace(episode, geodesic_distance=path.length)
 
     def _anywhere(self) -> Sequence[float]:
         spot = self.navigation.random_place(int(self.np_random.integers(0, 2 ** 63)), island=0)
@@ -412,8 +436,6 @@ class WalkEnv(spaces.EnvBase):
         self._walked += float(np.linalg.norm(after - before))
         left = path.length if path.found else self._left
         shortest = self.episode.geodesic_distance
-        if math.isnan(shortest):  # a file without it
-            shortest = self._walked + left
         success = left <= self.goal_radius
         info.update(progress=self._left - left, geodesic_distance=left, success=success,
                     spl=shortest / max(self._walked + left, shortest) if success else 0.0,
@@ -451,9 +473,9 @@ class WalkEnv(spaces.EnvBase):
             frame = results.frame(reply.frame, attachment)
             for name in camera.channels:
                 seen[camera.prefix + name] = frame.channel(name)
-            if "depth" in camera.channels:
-                depth = seen[camera.prefix + "depth"]
-                seen[camera.prefix + "depth"] = np.where(np.isnan(depth), np.float32(np.inf), depth)
+            for name in {"depth", "range"}.intersection(camera.channels):
+                metres = seen[camera.prefix + name]
+                seen[camera.prefix + name] = np.fmin(metres, np.float32(np.inf))  # NaN: background
         if self.render_mode is not None and self._picture_key in seen:
             self._rgb = seen[self._picture_key].copy()  # the observation belongs to its reader
         seen["position"] = self._feet.copy()

@@ -5,12 +5,14 @@ from __future__ import annotations
 import gzip
 import json
 import math
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
+from .arguments import number, numbers
 from .errors import EnfiladeError
 from .navigation import Navigation
 
@@ -21,7 +23,8 @@ Point3 = Tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Episode:
-    """Where a walk starts and where it shall end. `geodesic_distance`: of the shortest path, metres."""
+    """Where a walk starts and where it shall end. `geodesic_distance`: of the shortest path, metres; NaN:
+    not known."""
     start: Point3  # the feet
     facing: float  # degrees about +Y, 0 looks along +X
     goal: Point3
@@ -29,61 +32,96 @@ class Episode:
     id: str = ""
 
 
+def check_episode(one: Episode, name: str) -> None:
+    """Raises ValueError with the name of the field if start, facing or goal are not finite numbers."""
+    numbers(one.start, f"{name}.start", (3,))
+    number(one.facing, f"{name}.facing")
+    numbers(one.goal, f"{name}.goal", (3,))
+
+
 def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_distance: float = 1.0,
                  max_distance: float = math.inf, start: Optional[Sequence[float]] = None,
-                 goal: Optional[Sequence[float]] = None) -> Episode:
-    """Draws a start and a goal on the largest island between which there is a path. Distances are geodesic.
-    Raises EnfiladeError if none is found."""
-    def place(given: Optional[Sequence[float]]) -> Optional[Point3]:
-        if given is not None:
-            return tuple(map(float, given[:3]))  # type: ignore[return-value]
-        spot = navigation.random_place(int(random.integers(0, 2 ** 63)), island=0)
-        return None if spot is None else tuple(map(float, spot.at))  # type: ignore[return-value]
+                 goal: Optional[Sequence[float]] = None, starts: Sequence[Sequence[float]] = (),
+                 goals: Sequence[Sequence[float]] = ()) -> Episode:
+    """Draws a start and a goal between which there is a path: the one given, or one of those given, or else
+    a place on the largest island. Distances are geodesic. Raises EnfiladeError with the reason of the last
+    draw if none is found."""
+    starts = starts if start is None else [start]
+    goals = goals if goal is None else [goal]
 
-    for _ in range(MAX_DRAWS):
-        first, last = place(start), place(goal)
-        if first is None or last is None:
+    def place(given: Sequence[Sequence[float]]) -> Sequence[float]:
+        if len(given):
+            return tuple(map(float, given[int(random.integers(len(given)))]))
+        spot = navigation.random_place(int(random.integers(0, 2 ** 63)), island=0)
+        if spot is None:
             raise EnfiladeError("no place to stand was found in this scene: is the unit right, and the radius?")
-        distance = navigation.geodesic_distance(first, last)
-        if min_distance <= distance <= max_distance and math.isfinite(distance):
-            facing = start[3] if start is not None and len(start) > 3 else random.uniform(0, 360)
-            return Episode(first, float(facing), last, distance)
-    raise EnfiladeError(f"no path of {min_distance:g} to {max_distance:g} m was found in {MAX_DRAWS} draws")
+        return tuple(map(float, spot.at))
+
+    draws = 1 if len(starts) == 1 and len(goals) == 1 else MAX_DRAWS
+    for _ in range(draws):
+        first, last = place(starts), place(goals)[:3]
+        path = navigation.path(first[:3], last)
+        if path.found and min_distance <= path.length <= max_distance:
+            facing = first[3] if len(first) > 3 else random.uniform(0, 360)
+            return Episode(first[:3], float(facing), last, path.length)  # type: ignore[arg-type]
+    why = path.reason if not path.found else f"it is {path.length:g} m long"
+    where = " to ".join("(" + ", ".join(f"{metres:g}" for metres in end[:3]) + ")" for end in (first, last))
+    raise EnfiladeError(f"no path of {min_distance:g} to {max_distance:g} m was found in "
+                        f"{draws} {'draws' if draws > 1 else 'draw'}; the last, from {where}: {why}")
 
 
 def read_episodes(file: Union[str, Path]) -> List[Episode]:
-    """Reads habitat-lab's PointNav JSON, also .json.gz: start_position, start_rotation, goals, info."""
+    """Reads habitat-lab's PointNav JSON, also .json.gz: start_position, start_rotation, the first of the
+    goals, info. A `geodesic_distance` that is missing is NaN: WalkEnv measures it. Raises ValueError with
+    the file and the number of the episode."""
     with (gzip.open if str(file).endswith(".gz") else open)(file, "rt", encoding="utf-8") as text:
-        data = json.load(text)
-    try:
-        return [_from_habitat(one) for one in data["episodes"]]
-    except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise ValueError(f"{file}: not a file of PointNav episodes: {error!r}") from None
+        try:
+            listed = json.load(text)["episodes"]
+            count = len(listed)
+        except (EOFError, KeyError, TypeError, ValueError, gzip.BadGzipFile, zlib.error) as error:
+            raise ValueError(f"{file}: not a file of PointNav episodes: {error!r}") from None
+    episodes = []
+    for i in range(count):
+        try:
+            episodes.append(_from_habitat(listed[i]))
+        except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
+            why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+            raise ValueError(f"{file}: episodes[{i}]: {why}") from None
+    return episodes
 
 
 def write_episodes(file: Union[str, Path], episodes: Sequence[Episode], scene: str) -> None:
-    """Writes the same format; `scene` is the scene_id of all."""
+    """Writes the same format; `scene` is the scene_id of all. A `geodesic_distance` that is not known is
+    left out."""
+    for i, one in enumerate(episodes):
+        check_episode(one, f"episodes[{i}]")
     data = {"episodes": [_to_habitat(one, i, scene) for i, one in enumerate(episodes)]}
     with (gzip.open if str(file).endswith(".gz") else open)(file, "wt", encoding="utf-8") as text:
-        json.dump(data, text)
+        json.dump(data, text, allow_nan=False)
 
 
 # habitat's agent looks along -Z; its rotation about +Y is (x, y, z, w). `facing` 90 looks along -Z.
 
 def _from_habitat(one: Dict[str, Any]) -> Episode:
-    x, y, z, w = map(float, one["start_rotation"])
+    x, y, z, w = numbers(one["start_rotation"], "start_rotation", (4,))
+    if abs(math.sqrt(x * x + y * y + z * z + w * w) - 1) > 1e-2:
+        raise ValueError(f"start_rotation {one['start_rotation']}: not a unit quaternion (x, y, z, w)")
     if abs(x) > 1e-3 or abs(z) > 1e-3:
         raise ValueError(f"start_rotation {one['start_rotation']}: only rotations about Y")
     facing = 90.0 + math.degrees(2 * math.atan2(y, w))
-    start = tuple(map(float, one["start_position"]))
-    goal = tuple(map(float, one["goals"][0]["position"]))
-    distance = float((one.get("info") or {}).get("geodesic_distance", math.nan))
+    start = numbers(one["start_position"], "start_position", (3,))
+    if not one["goals"]:
+        raise ValueError("goals: give at least one")
+    goal = numbers(one["goals"][0]["position"], "goals[0].position", (3,))
+    distance = (one.get("info") or {}).get("geodesic_distance")
+    distance = math.nan if distance is None else float(distance)
     return Episode(start, facing % 360, goal, distance, str(one.get("episode_id", "")))  # type: ignore[arg-type]
 
 
 def _to_habitat(one: Episode, number: int, scene: str) -> Dict[str, Any]:
     half = 0.5 * math.radians(one.facing - 90.0)
+    is_known = math.isfinite(one.geodesic_distance)
     return {"episode_id": one.id or str(number), "scene_id": scene, "start_position": list(one.start),
             "start_rotation": [0.0, math.sin(half), 0.0, math.cos(half)],
-            "info": {"geodesic_distance": one.geodesic_distance},
+            "info": {"geodesic_distance": one.geodesic_distance} if is_known else {},
             "goals": [{"position": list(one.goal), "radius": None}], "shortest_paths": None}

@@ -21,6 +21,10 @@ _REMEDIES = {
     "ERROR_UNKNOWN_ENTITY": "give the id, name or path of an entity that is in the world",
     "ERROR_TOO_COMPLEX": "ask for fewer pairs, or for smaller pieces",
 }
+# By code and field, where a field has a remedy of its own.
+_FIELD_REMEDIES = {
+    ("ERROR_TICK_GONE", "frame.flow_from"): "give a tick that the world has completed, one of the last 32",
+}
 # Codes whose remedy is the named field.
 _BY_FIELD = ("ERROR_BAD_MESSAGE", "ERROR_REFUSED_COMMAND", "ERROR_BAD_CAMERA", "ERROR_BAD_RAYS")
 
@@ -28,7 +32,7 @@ _BY_FIELD = ("ERROR_BAD_MESSAGE", "ERROR_REFUSED_COMMAND", "ERROR_BAD_CAMERA", "
 def _remedy(code: str, field: str) -> str:
     if code in _BY_FIELD and field:
         return "change the named field"
-    return _REMEDIES.get(code, "")
+    return _FIELD_REMEDIES.get((code, field), _REMEDIES.get(code, ""))
 
 
 class EnfiladeError(Exception):

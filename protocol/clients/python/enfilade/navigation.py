@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import messages
+from .arguments import UINT32, UINT64, whole
 from .questions import Point, doors_value, points, vec
 
 if TYPE_CHECKING:
@@ -138,7 +139,8 @@ class Navigation:
                  speed: Optional[float], doors: str) -> None:
         self._client = client
         self.radius = 0.3 if radius is None else radius  # metres
-        self._options = {"radius": radius, "height": height, "speed": speed, 
+        self.height = 1.75 if height is None else height
+        self._options = {"radius": radius, "height": height, "speed": speed,
                          "doors": doors_value(doors)}
         self._report: Any = None  # the last reply
 
@@ -183,8 +185,16 @@ class Navigation:
                       min_distance: float = 0.0, island: Optional[int] = None) -> List[Optional[Spot]]:
         """Draws places that are uniform in area; None where none was found. The same seed gives the same
         places. `near` with `max_distance`, and `away_from` with `min_distance`, are metres in space."""
-        query = messages.NavigationQuery.Random(count=count, seed=seed, max_distance=max_distance,
-                                                min_distance=min_distance, island=island)
+        for point, has_point, metres, has_metres in (
+                ("near", near is not None, "max_distance", max_distance != 0),
+                ("away_from", away_from is not None, "min_distance", min_distance != 0)):
+            if has_point != has_metres:
+                given, missing = (point, metres) if has_point else (metres, point)
+                raise ValueError(f"{given}: give {missing}, too")
+        query = messages.NavigationQuery.Random(
+            count=whole(count, "count", 1, UINT32), seed=whole(seed, "seed", 0, UINT64),
+            max_distance=max_distance, min_distance=min_distance,
+            island=None if island is None else whole(island, "island", 0, UINT32))
         if near is not None:
             query.near.CopyFrom(vec(near))
         if away_from is not None:

@@ -8,6 +8,7 @@ from typing import Any, Mapping, Optional, Sequence, Union
 import numpy as np
 
 from . import messages, results
+from .arguments import UINT32, UINT64, whole
 
 Point = Sequence[float]
 
@@ -99,13 +100,14 @@ def load_distortion(table: Any) -> np.ndarray:
 
 def _depth_noise(noise: Union[int, Mapping[str, Any]]) -> Any:
     if not isinstance(noise, Mapping):
-        return messages.DepthNoise(seed=noise)
+        return messages.DepthNoise(seed=whole(noise, "depth_noise", 0, UINT64))
     unknown = set(noise) - {"model", "seed", "scale", "distortion"}
     if unknown:
         raise ValueError(f"depth_noise: unknown {sorted(unknown)}; give model, seed, scale, distortion")
     if noise.get("model", "redwood") != "redwood":
         raise ValueError(f"depth_noise: the model is 'redwood', not {noise['model']!r}")
-    message = messages.DepthNoise(seed=noise.get("seed", 0), scale=noise.get("scale", 0.0))
+    message = messages.DepthNoise(seed=whole(noise.get("seed", 0), "depth_noise: seed", 0, UINT64),
+                                  scale=noise.get("scale", 0.0))
     if noise.get("distortion") is not None:
         table = load_distortion(noise["distortion"])
         message.distortion = table.tobytes()
@@ -133,6 +135,16 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
     if eye is None and not (target is None and up is None and height_y is None):
         raise ValueError("frame: target, up and height_y need an eye; for an avatar's eyes give "
                          "forward")
+    if depth_noise is not None and "depth" not in channels:
+        raise ValueError("depth_noise: it needs \"depth\" among the channels")
+    for name, given in (("flow_from", flow_from), ("flow_forward", flow_forward)):
+        if given is not None and "flow" not in channels:
+            raise ValueError(f"{name}: it needs \"flow\" among the channels")
+    for name, given in (("width", width), ("height", height), ("samples", samples)):
+        whole(given, name, 1, UINT32)
+    for name, given in (("flow_from", flow_from), ("tick", tick)):
+        if given is not None:
+            whole(given, name, 0, UINT64)
     asked = messages.FrameRequest(width=width, height=height, channels=results.channels(channels),
                                   shadows=shadows, collision_shapes=collision_shapes, samples=samples, tick=tick)
     if eye is None:

@@ -37,7 +37,8 @@ class _Batch:
 
 class VectorWalkEnv(spaces.VectorEnvBase):
     """Several WalkEnvs that run at the same time, in worlds of one server that share its scene: one
-    message steps all of them.
+    message steps all of them. Each picture is copied once, from the memory that the server shares into
+    the batch: observations belong to their reader. A WorldGroup gives the arrays without a copy.
     A VectorEnv of Gymnasium if that is installed, with its methods and attributes everywhere.
 
     scene or address: a model, for which a server process is started, or HOST:PORT of a running
@@ -143,7 +144,10 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         over = self._over
         if over is None:
             raise RuntimeError("call reset() first, also after a failed step()")
-        actions = list(actions)
+        try:
+            actions = list(actions)
+        except TypeError:
+            raise ValueError(f"actions: give {self.num_envs}, one per environment, not {actions!r}") from None
         if len(actions) != self.num_envs:
             raise ValueError(f"actions: give {self.num_envs}, one per environment, not {len(actions)}")
         meanings = [(0.0, 0.0) if ended else env._meaning(action)
