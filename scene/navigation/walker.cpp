@@ -113,6 +113,14 @@ void Walker::step(const Vec3& velocity) {
   moveAvatar(world_, avatar_, count_);
 }
 
+/// Whether the floor is at most a step below the feet.
+bool Walker::hasFloorBelow() {
+  const Vec3 down(0, -world_.settings.stepHeight, 0);
+  return castAvatarShape(*avatar_.shape, avatar_.footPosition, down, avatar_.obstacles,
+                         makeContactOffset(world_.settings), count_)
+             .entity != 0;
+}
+
 std::optional<std::string> Walker::place(const Vec3& footPosition, double maxDrop) {
   if (auto error = placeStanding(world_, footPosition, avatar_, count_)) return error;
   avatar_.grounded = false;
@@ -191,6 +199,7 @@ bool Walker::isRideFree(const Vec3& from, const Vec3& to, EntityId body) {
 WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
   const double tick = world_.settings.tickDuration;
   double shortDistance = 0, stepLimit = kMaxStep, lastFloor = avatar_.footPosition.y();
+  bool isOnStair = true;
   Vec3 stood = avatar_.footPosition;
   const auto end = [&](WalkOutcome::Kind kind) {
     const WalkOutcome outcome{kind, avatar_.footPosition, avatar_.blockedBy};
@@ -222,13 +231,15 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
     step(computeWalkVelocity(before, goal, false, agent_.speed, tick));
     if (!avatar_.grounded) {  // falls from tread to tread of a steep stair
       shortDistance = 2 * kLongStep;
-      if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight)
+      isOnStair = isOnStair && hasFloorBelow();
+      if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight && !isOnStair)
         return end(WalkOutcome::Kind::fell);
       if ((avatar_.footPosition - before).squaredNorm() < kMinGain * kMinGain)
         return end(WalkOutcome::Kind::blocked);
       continue;
     }
     lastFloor = avatar_.footPosition.y();
+    isOnStair = true;
     const double across = computeGroundDistance(before, avatar_.footPosition);
     if (isStep(before, avatar_.footPosition)) hasStepped_ = metSteps_ = true;
     if (avatar_.blockedBy != 0) return end(WalkOutcome::Kind::blocked);
@@ -243,6 +254,7 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
   const Vec3 start = avatar_.footPosition;
   double lastFloor = start.y(), least = computeGroundDistance(start, goal);
   int ticksWithoutGain = 0;
+  bool isOnStair = maxDrop <= world_.settings.stepHeight;
   for (int ticks = 0;; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (avatar_.grounded && (distance <= kArrivalDistance ||
@@ -256,12 +268,14 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
     step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));
     if (isStep(before, avatar_.footPosition)) hasStepped_ = metSteps_ = true;
     if (!avatar_.grounded) {
-      if (avatar_.footPosition.y() < lastFloor - maxDrop)
+      isOnStair = isOnStair && hasFloorBelow();
+      if (avatar_.footPosition.y() < lastFloor - maxDrop && !isOnStair)
         return {WalkOutcome::Kind::fell, avatar_.footPosition, 0, ticks};
       if (before.y() - avatar_.footPosition.y() > kMinStepRise) ticksWithoutGain = 0;
       continue;
     }
     lastFloor = avatar_.footPosition.y();
+    isOnStair = maxDrop <= world_.settings.stepHeight;
     if (avatar_.blockedBy != 0 && !maySlide)
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy, ticks};
   }

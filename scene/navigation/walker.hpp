@@ -72,6 +72,7 @@ class Walker {
  private:
   WalkOutcome walkWithMargin(const Vec3& goal);
   WalkOutcome walkByTicks(const Vec3& goal, double length, bool maySlide, double maxDrop);
+  bool hasFloorBelow();
   void prepareStep(const Vec3& velocity);
   void step(const Vec3& velocity);
   void collectNearObstacles();

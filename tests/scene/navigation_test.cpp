@@ -380,6 +380,38 @@ TEST(Navigation, PathsOfTheBuildingAreWalked) {
   EXPECT_GE(found, 15);
 }
 
+TEST(Walker, ASteepStairIsDescendedWhereverTheTicksBegin) {
+  // Of a few starts, an avatar passes a tread in the air and falls onto the next one.
+  constexpr int kTreads = 16;
+  constexpr double kRise = 0.19375, kRun = 0.26, kTread = 0.28, kTop = kRise * (kTreads + 1);
+  std::vector<NamedBox> boxes{{"below", {kRun * kTreads, -0.2, -1}, {kRun * kTreads + 3, 0, 1}},
+                              {"above", {-3, kTop - 0.2, -1}, {0.03, kTop, 1}}};
+  for (int k = 0; k < kTreads; ++k) {
+    const double x = kRun * k, y = kTop - kRise * (k + 1);
+    boxes.push_back({"tread" + std::to_string(k), {x, y - kRise - 0.1, -1}, {x + kTread, y, 1}});
+  }
+  const auto scene = boxScene(boxes);
+  World world(scene);
+  for (int i = 0; i < 60; ++i) {
+    Walker walker(world.data(), {});
+    ASSERT_FALSE(walker.place({-1 + 0.0004 * i, kTop + 0.01, 0}, 0.5));
+    EXPECT_EQ(walker.walkTo({kRun * kTreads + 1, 0, 0}).kind, WalkOutcome::Kind::arrived) << i;
+  }
+}
+
+TEST(Walker, AFloorThatEndsAboveAStepsHeightIsNotWalkedDown) {
+  for (const double drop : {0.28, 0.4, 1.0}) {
+    const auto scene = boxScene(
+        {{"above", {-3, -0.2, -1}, {0, 0, 1}}, {"below", {-3, -drop - 0.2, -1}, {3, -drop, 1}}});
+    World world(scene);
+    Walker walker(world.data(), {});
+    ASSERT_FALSE(walker.place({-1, 0.01, 0}, 0.5));
+    EXPECT_EQ(walker.walkTo({2, -drop, 0}).kind,
+              drop < 0.3 ? WalkOutcome::Kind::arrived : WalkOutcome::Kind::fell)
+        << drop;
+  }
+}
+
 TEST(Walker, ALongStepOfTheProofPassesNothingThatStopsAWalk) {
   // A pyramid that is in the way of the feet, and not of who stands a step higher.
   Model model = boxModel({{"floor", {0, -0.2, -3}, {8, 0, 3}}});
