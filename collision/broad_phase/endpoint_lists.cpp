@@ -69,42 +69,26 @@ void EndpointLists::recordSwaps(std::uint32_t proxy, std::size_t count, bool add
 // The kind (lower or upper) of the swapped endpoints is unpredictable, so the loops have no branch:
 // each proxy is written, and counted only if its endpoint is of the opposite kind.
 
-void EndpointLists::bubbleUp(std::size_t axis, Endpoint endpoint,
-                             std::vector<PairChange>& changes) {
+template <bool isUp>
+void EndpointLists::bubble(std::size_t axis, Endpoint endpoint, std::vector<PairChange>& changes) {
   Endpoint* const endpoints = endpoints_[axis].data();
   const std::uint32_t from = endpointIndex(axis, endpoint.tag);
   std::uint32_t at = from;
   std::size_t count = 0;
-  for (; isBefore(endpoints[at + 1], endpoint); ++at) {
-    const Endpoint other = endpoints[at + 1];
+  for (;;) {
+    const std::uint32_t next = isUp ? at + 1 : at - 1;
+    const Endpoint other = endpoints[next];
+    if (!(isUp ? isBefore(other, endpoint) : isBefore(endpoint, other))) break;
     swapped_[count] = other.proxy();
     count += other.isUpper() != endpoint.isUpper() ? 1 : 0;
     endpoints[at] = other;
     endpointIndex(axis, other.tag) = at;
+    at = next;
   }
-  swaps += at - from;
+  swaps += isUp ? at - from : from - at;
   endpoints[at] = endpoint;
   endpointIndex(axis, endpoint.tag) = at;
-  recordSwaps(endpoint.proxy(), count, endpoint.isUpper(), changes);
-}
-
-void EndpointLists::bubbleDown(std::size_t axis, Endpoint endpoint,
-                               std::vector<PairChange>& changes) {
-  Endpoint* const endpoints = endpoints_[axis].data();
-  const std::uint32_t from = endpointIndex(axis, endpoint.tag);
-  std::uint32_t at = from;
-  std::size_t count = 0;
-  for (; isBefore(endpoint, endpoints[at - 1]); --at) {
-    const Endpoint other = endpoints[at - 1];
-    swapped_[count] = other.proxy();
-    count += other.isUpper() != endpoint.isUpper() ? 1 : 0;
-    endpoints[at] = other;
-    endpointIndex(axis, other.tag) = at;
-  }
-  swaps += from - at;
-  endpoints[at] = endpoint;
-  endpointIndex(axis, endpoint.tag) = at;
-  recordSwaps(endpoint.proxy(), count, !endpoint.isUpper(), changes);
+  recordSwaps(endpoint.proxy(), count, endpoint.isUpper() == isUp, changes);
 }
 
 /// Moves the two endpoints of a proxy to their new positions. The leading endpoint moves first, so
@@ -113,10 +97,10 @@ void EndpointLists::repair(std::size_t axis, Endpoint lower, Endpoint upper,
                            std::vector<PairChange>& changes) {
   const double wasLower = endpoints_[axis][endpointIndex(axis, lower.tag)].value;
   const double wasUpper = endpoints_[axis][endpointIndex(axis, upper.tag)].value;
-  if (upper.value > wasUpper) bubbleUp(axis, upper, changes);
-  if (lower.value > wasLower) bubbleUp(axis, lower, changes);
-  if (lower.value < wasLower) bubbleDown(axis, lower, changes);
-  if (upper.value < wasUpper) bubbleDown(axis, upper, changes);
+  if (upper.value > wasUpper) bubble<true>(axis, upper, changes);
+  if (lower.value > wasLower) bubble<true>(axis, lower, changes);
+  if (lower.value < wasLower) bubble<false>(axis, lower, changes);
+  if (upper.value < wasUpper) bubble<false>(axis, upper, changes);
 }
 
 void EndpointLists::move(std::uint32_t proxy, std::vector<PairChange>& changes) {

@@ -64,8 +64,8 @@ class EndpointLists {
 
   void growTo(std::uint32_t proxy);
   void repair(std::size_t axis, Endpoint lower, Endpoint upper, std::vector<PairChange>& changes);
-  void bubbleUp(std::size_t axis, Endpoint endpoint, std::vector<PairChange>& changes);
-  void bubbleDown(std::size_t axis, Endpoint endpoint, std::vector<PairChange>& changes);
+  template <bool isUp>
+  void bubble(std::size_t axis, Endpoint endpoint, std::vector<PairChange>& changes);
   void recordSwaps(std::uint32_t proxy, std::size_t count, bool added,
                    std::vector<PairChange>& changes);
   void renumber(std::size_t axis);

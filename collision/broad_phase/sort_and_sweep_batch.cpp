@@ -4,8 +4,8 @@
 // Proxies that have not moved for some time rest: they are in a second table, which is built
 // rarely, and pairs of two of them are not looked at. A heap asleep thus costs nothing.
 //
-// Which way is cheaper is predicted from the work of each, in estimated nanoseconds, not from
-// clocks: runs are reproducible, and in both ways the pairs and their order are the same.
+// The cheaper method is predicted from the work of each, in estimated nanoseconds, not from clocks:
+// runs are reproducible, and both methods yield the same pairs in the same order.
 #include "collision/broad_phase/sort_and_sweep_batch.hpp"
 
 #include <algorithm>

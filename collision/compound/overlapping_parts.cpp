@@ -145,7 +145,7 @@ class BvttTraversal {
  private:
   /// Entry::separatedUntil of two branches. Negative: their boxes overlap.
   double testBranches(std::uint32_t a, std::uint32_t b) {
-    ++front_.boxTests;
+    ++front_.aabbTests;
     const double gap = computeAxisGap(a_.box(a), b_.box(b));
     if (!(gap > 0)) return kOverlapping;
     const double margins = margins_ * (1 - 0x1p-48);
@@ -157,7 +157,7 @@ class BvttTraversal {
     const std::size_t before = pairs_.size();
     for (const std::uint32_t partA : a_.parts(a))
       for (const std::uint32_t partB : b_.parts(b)) {
-        ++front_.boxTests;
+        ++front_.aabbTests;
         if (overlaps(a_.partBox(partA), b_.partBox(partB))) pairs_.push_back({partA, partB});
       }
     return pairs_.size() > before ? kOverlapping : 0;

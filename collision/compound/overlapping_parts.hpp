@@ -24,9 +24,9 @@ struct PartPair {
   auto operator<=>(const PartPair&) const = default;
 };
 
-/// Where the last descent of two trees ended. It holds for these two trees and is reset, at the
-/// cost of a descent, with others; a tree is known by its address and size. Poses may change
-/// arbitrarily. The pairs found never depend on it.
+/// The nodes at which the last descent of two trees ended. It holds for these two trees and is
+/// reset, at the cost of a descent, with others; a tree is known by its address and size. Poses may
+/// change arbitrarily. The pairs found never depend on it.
 struct PartFront {
   /// Two branches. Branch 0 is the root; 2k + 1 and 2k + 2 are the children of node k.
   struct Entry {
@@ -46,7 +46,7 @@ struct PartFront {
   std::vector<Entry> entries;  ///< in the order of the descent, siblings adjacent
   Object a, b;
   double clock = 0;  ///< metres, upper bound: motions of A and B so far, summed
-  std::uint64_t calls = 0, boxTests = 0, boxesComputed = 0;  ///< counters
+  std::uint64_t calls = 0, aabbTests = 0, boxesComputed = 0;  ///< counters
 };
 
 /// Replaces `pairs` by the pairs of parts whose boxes in `a` and `b` overlap: exactly those for

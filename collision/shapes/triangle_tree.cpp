@@ -1,5 +1,9 @@
 #include "collision/shapes/triangle_tree.hpp"
 
+#include <algorithm>
+
+#include "collision/assert.hpp"
+
 namespace enfilade::collision {
 namespace {
 
@@ -21,11 +25,13 @@ TriangleTree::TriangleTree(const std::vector<Triangle>& triangles) : tree_(build
 }
 
 void TriangleTree::query(const Aabb& box, std::vector<std::uint32_t>& indices) const {
+  const auto begin = static_cast<std::ptrdiff_t>(indices.size());
   forEachOverlappingLeaf(tree_, toFloatAabb(box, tree_.origin),
                          [&](std::uint32_t first, std::uint32_t count) {
                            for (std::uint32_t i = first; i < first + count; ++i)
                              if (overlaps(computeAabb(triangles_[i]), box)) indices.push_back(i);
                          });
+  ENFILADE_ASSERT(std::is_sorted(indices.begin() + begin, indices.end()));
 }
 
 }  // namespace enfilade::collision

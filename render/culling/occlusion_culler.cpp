@@ -82,7 +82,7 @@ bool OcclusionCuller::addMark(Mark& mark, std::uint64_t view) {
   return isNew;
 }
 
-void OcclusionCuller::markDrawn(const std::vector<std::uint32_t>& items, std::uint64_t view) {
+void OcclusionCuller::markVisible(const std::vector<std::uint32_t>& items, std::uint64_t view) {
   for (const std::uint32_t item : items) {
     ENFILADE_ASSERT(item < items_.size());
     addMark(itemMarks_[item], view);
@@ -164,7 +164,7 @@ std::vector<OcclusionCuller::CullingResult> OcclusionCuller::findVisible(
   ++generation_;
   std::uint64_t all = 0;
   for (std::size_t v = 0; v < views.size(); ++v) {
-    markDrawn(views[v].drawn, std::uint64_t{1} << v);
+    markVisible(views[v].drawn, std::uint64_t{1} << v);
     all |= std::uint64_t{1} << v;
   }
   Search search(*this, views);

@@ -51,7 +51,7 @@ class OcclusionCuller {
     std::uint64_t views = 0;
   };
   struct Search;
-  void markDrawn(const std::vector<std::uint32_t>& items, std::uint64_t view);
+  void markVisible(const std::vector<std::uint32_t>& items, std::uint64_t view);
   std::uint64_t getMarkedViews(const Mark& mark) const {
     return mark.generation == generation_ ? mark.views : 0;
   }

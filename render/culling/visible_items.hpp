@@ -1,4 +1,4 @@
-// Which items of a scene a view draws, by its frustum, by its depth and by earlier frames.
+// The items of a scene that a view draws, by its frustum, by its depth and by earlier frames.
 // Independent of OpenGL.
 #pragma once
 

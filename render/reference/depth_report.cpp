@@ -4,6 +4,8 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::render {
 namespace {
 
@@ -113,6 +115,7 @@ DepthReport compareWithReference(const Frame& frame, const ReferenceFrame& refer
                       " of ids, its reference " + std::to_string(reference.depth.size()) +
                       "; request the depth channel and use the same camera for the reference");
   }
+  ENFILADE_ASSERT(std::ranges::is_sorted(reference.ties, {}, &ReferenceFrame::Tie::pixel));
   DepthReport report;
   report.renderer = frame.renderer;
   report.frames = 1;

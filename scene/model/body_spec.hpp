@@ -29,7 +29,7 @@ enum class BodyKind : std::uint8_t {
   trigger   ///< not solid, not drawn: reports entities that enter and leave
 };
 
-/// What moves a body.
+/// The source of a body's motion.
 enum class MotionSource : std::uint8_t {
   none,   ///< nothing
   joint,  ///< its joint position (kinematic); only an obstacle that cannot yield stops it
@@ -93,7 +93,7 @@ constexpr const char* toString(BodyKind kind) {
 /// Source of a spec, by descending precedence.
 enum class BodySource : std::uint8_t { sidecar, khr, extras, suffix, ifc };
 
-/// What opens a door in addition to commands.
+/// The cause that opens a door, in addition to commands.
 enum class OpenedBy : std::uint8_t {
   command,  ///< nothing
   touch     ///< an avatar that walks into it; it opens away from the avatar if it can

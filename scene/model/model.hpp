@@ -89,7 +89,7 @@ struct Object {
   /// The object that this one is a part of, by which people name it: for a collision shape the
   /// drawn object, for a door's frame the door.
   std::optional<std::uint32_t> partOf = std::nullopt;
-  /// What it is, as "chair", by the sidecar or the node's extras; empty: unknown.
+  /// Its class, as "chair", by the sidecar or the node's extras; empty: unknown.
   std::string className = {};
   /// The first object of those that are one thing by the sidecar or the node's extras.
   std::optional<std::uint32_t> thing = std::nullopt;

@@ -69,7 +69,7 @@ ObstacleDistance measureObstacle(const WorldData& world, const NavigationAgent& 
   const double limit = std::max(kPrecision, maxDistance - kThinRadius);
   ObstacleSet obstacles =
       collectObstaclesInBox(world, inflated(placeBox(shape->box, feet), limit), 0);
-  // What lies only below the step height, as the floor, is no obstacle.
+  // An object that lies only below the step height, as the floor, is no obstacle.
   std::erase_if(obstacles.list,
                 [&](const Obstacle& obstacle) { return obstacle.box.max.y() < feet.y(); });
   QueryCount count;

@@ -1,4 +1,4 @@
-// How much space there is around places: measured with a thin prism above the step height.
+// The free space around places, measured with a thin prism above the step height.
 #pragma once
 
 #include <vector>
@@ -16,7 +16,7 @@ struct NarrowPlace {
   double clearWidth = 0;         ///< metres, measured across the path above the step height
 };
 
-/// How far a standing agent is from what it could walk into.
+/// Distance of a standing agent from the closest thing that it could walk into.
 struct ObstacleDistance {
   double distance = 0;  ///< metres from the agent's axis, above the step height
   EntityId entity = 0;  ///< 0: none within the searched distance

@@ -11,7 +11,8 @@
 namespace enfilade::scene {
 namespace {
 
-/// What an agent sweeps over on a leg: the hull of its prism at both ends, seen from the first.
+/// The volume that an agent sweeps on a leg: the hull of its prism at both ends, relative to the
+/// first.
 std::shared_ptr<const AvatarShape> makeSweptShape(const AvatarShape& prism, const Vec3& leg) {
   std::vector<Vec3> points;
   for (const AvatarPart& part : prism.parts)

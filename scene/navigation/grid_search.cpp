@@ -116,7 +116,7 @@ std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, S
   const auto canWalk = [&](const Vec3& from, const Vec3& to) {
     if (kind == Shortcuts::all) return walks(walker, from, to);
     walker.returnTo(from);
-    return walker.isWayFree(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
+    return walker.isPathClear(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
   };
   std::vector<Vec3> path{places.front()};
   for (std::size_t at = 0; at + 1 < places.size();) {

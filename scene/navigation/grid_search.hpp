@@ -22,9 +22,9 @@ struct GridSearch {
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
                                               GridSearch& search);
 
-/// Which lines between places of a way are tried. A line that is stopped is walked tick by tick,
-/// which takes long: this pays after a search on a grid, and rarely at the corners of a shortest
-/// line.
+/// Lines between places of a path that are tried as shortcuts. A line that is stopped is walked
+/// tick by tick, which takes long: this pays after a search on a grid, and rarely at the corners of
+/// a shortest line.
 enum class Shortcuts : std::uint8_t { all, free };
 
 /// Leaves out places of a way as long as the legs between the others can be walked.

@@ -32,7 +32,7 @@ struct Stop {
   std::vector<Vec3> outside;
 };
 
-/// Where an agent stands on a lift.
+/// Returns the place where an agent stands on a lift.
 std::optional<Vec3> findPlatform(const Body& lift, Walker& walker) {
   const Aabb& box = lift.boxes.whole;
   const Vec3 middle = box.centre(), half = 0.5 * kPlatformRoom * box.size();
@@ -46,16 +46,16 @@ std::optional<Vec3> findPlatform(const Body& lift, Walker& walker) {
   return std::nullopt;
 }
 
-/// Metres along `direction` from a place to where an agent is clear of a box.
-double computeWayOut(const Aabb& box, const Vec3& place, const Vec3& direction, double room) {
+/// Returns the metres along `direction` from a place until an agent is clear of a box.
+double computeExitDistance(const Aabb& box, const Vec3& place, const Vec3& direction, double room) {
   const Aabb grown = inflated(box, room);
-  double way = box.size().norm() + 2 * room;
+  double distance = box.size().norm() + 2 * room;
   for (const int axis : {0, 2}) {
     if (std::abs(direction[axis]) < 1e-9) continue;
     const double side = direction[axis] > 0 ? grown.max[axis] : grown.min[axis];
-    way = std::min(way, (side - place[axis]) / direction[axis]);
+    distance = std::min(distance, (side - place[axis]) / direction[axis]);
   }
-  return way;
+  return distance;
 }
 
 /// Whether an agent that stands at a place stands on this body. After a walk over even floor the
@@ -75,7 +75,7 @@ std::vector<Vec3> findExits(const Body& lift, const Vec3& inside, Walker& walker
     const Vec3 direction(cosine, 0, sine);
     walker.returnTo(inside);
     const WalkOutcome out = walker.walkTo(
-        inside + computeWayOut(lift.boxes.whole, inside, direction, room) * direction);
+        inside + computeExitDistance(lift.boxes.whole, inside, direction, room) * direction);
     if (out.kind != WalkOutcome::Kind::arrived || isStandingOn(lift, out.footPosition, walker))
       continue;
     walker.returnTo(out.footPosition);

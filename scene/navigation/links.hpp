@@ -12,7 +12,7 @@
 
 namespace enfilade::scene {
 
-/// What a path may use in addition to floors, steps and stairs.
+/// Means that a path may use in addition to floors, steps and stairs.
 struct PathOptions {
   double maxDrop = 0;  ///< metres that it may fall at once; no more than a step: not at all
   bool lifts = false;  ///< it may call lifts and ride

@@ -37,7 +37,7 @@ struct NavigationMap {
   std::vector<std::uint8_t> cells;      ///< row by row along x; 1: walkable
 };
 
-/// Which places to draw.
+/// Restricts the places that are drawn at random.
 struct RandomPlace {
   std::optional<Vec3> near = {};  ///< within `maxDistance` metres in space
   double maxDistance = 0;
@@ -79,13 +79,13 @@ class Navigation {
   NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {});
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
   std::optional<NarrowPlace> findNarrowest(const std::vector<Vec3>& points);
-  /// Where an agent stands in a named place, as close to its middle as it can, horizontally.
+  /// The standing place in a named place that is horizontally closest to its middle.
   std::optional<Vec3> findPlaceIn(const NamedPlace& named);
-  /// Where an agent at `point` stands, or else the closest place within `maxDistance` metres.
+  /// The standing place at `point`, or else the closest one within `maxDistance` metres.
   std::optional<Vec3> snap(const Vec3& point, double maxDistance);
   /// A place that is uniform in area; nullopt: none was found.
   std::optional<Vec3> findRandomPlace(std::mt19937_64& random, const RandomPlace& wanted);
-  /// Where a walk from one place towards another ends: at the first obstacle, or, if it slides,
+  /// The end of a walk from one place towards another: at the first obstacle, or, if it slides,
   /// where it gains nothing more. nullopt: there is no place to stand at `from`.
   std::optional<Vec3> tryStep(const Vec3& from, const Vec3& to, bool slides);
   /// nullopt: there is no place to stand at `point`.

@@ -33,7 +33,7 @@ double computeLength(const std::vector<Vec3>& points) {
   return length;
 }
 
-/// What a search has spent and met.
+/// The work and the obstacles of a search so far.
 struct Proof {
   GridSearch coarse{kCoarseSpacing, 1.5, kMaxRepairWalks};
   GridSearch fine{kFineSpacing, 0.7, kMaxRepairWalks};
@@ -189,13 +189,14 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
     if (!corners.empty()) corners.pop_back();
     corners.push_back(to);
     path.points = {from};
-    finder.walker.takeMetSteps();
+    finder.walker.takeCrossedSteps();
     proof.isRepaired = false;
     if (proveLegs(finder, corners, clearance, path, proof)) {
       path.points = shortenPath(finder.walker, path.points,
                                 proof.isRepaired ? Shortcuts::all : Shortcuts::free);
       path.length = computeLength(path.points);
-      if (!finder.walker.takeMetSteps() || walksOn(finder.walker, path.points, proof)) return path;
+      if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof))
+        return path;
     }
     path.points.clear();
     if (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0) return path;  // proves nothing

@@ -11,7 +11,7 @@
 
 namespace enfilade::scene {
 
-/// What blocks every path to a goal.
+/// The obstacle that blocks every path to a goal.
 struct Obstruction {
   EntityId entity = 0;           ///< that the walker hit; 0: the floor ends
   Vec3 position = Vec3::Zero();  ///< of the walker's feet there, scene frame, metres
@@ -40,7 +40,7 @@ struct NavigationPath {
   bool found() const { return !points.empty(); }
 };
 
-/// What a search uses. A search may close portals of the meshes.
+/// Inputs of a search. A search may close portals of the meshes.
 struct PathFinder {
   const WorldData& world;
   const NavigationAgent& agent;

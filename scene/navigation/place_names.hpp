@@ -8,7 +8,7 @@
 
 namespace enfilade::scene {
 
-/// Where to look for a place, scene frame, metres.
+/// The region in which to look for a place, scene frame, metres.
 struct NamedPlace {
   Aabb box;                      ///< of a room or a storey, or around an object
   Vec3 middle = Vec3::Zero();    ///< the place closest to it is wanted, horizontally

@@ -12,8 +12,8 @@ inline constexpr double kMaxStandDrop = 0.6;
 /// metres. Heights of polygons are those of voxels.
 inline constexpr double kHeightError = 0.3;
 
-/// Where the walker stands if it is put down at `point`; nullopt: no room, or no floor within
-/// `maxDrop` metres below.
+/// Puts the walker down at `point` and returns the place where it stands. nullopt: no room, or no
+/// floor within `maxDrop` metres below.
 std::optional<Vec3> standAt(Walker& walker, const Vec3& point, double maxDrop = kMaxStandDrop);
 
 /// A place within 0.4 m of a point of a mesh, at about its height: polygons for scarce clearance

@@ -74,7 +74,7 @@ void Walker::collectNearObstacles() {
   neighbourhoods_.erase(cell_);
 }
 
-/// How far the floor is even on the way to `goal`, metres.
+/// Returns the length of even floor on the way to `goal`, metres.
 double Walker::measureEvenFloor(const Vec3& goal, double distance) {
   const Vec3 direction = projectToGround(goal - avatar_.footPosition) / distance;
   return computeEvenDistance(floor_, avatar_.footPosition, direction, std::min(distance, kMaxStep));
@@ -165,7 +165,7 @@ WalkOutcome Walker::walkTo(const Vec3& goal) {
   }
 }
 
-bool Walker::isWayFree(const Vec3& goal) {
+bool Walker::isPathClear(const Vec3& goal) {
   isUneven_ = false;
   avatar_.shape = wideShape_;
   bool isFree = true;
@@ -220,7 +220,7 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
         stepLimit = std::min(kMaxStep, 2 * stepLimit);
         continue;
       }
-      // What was met on a very long step may lie far ahead.
+      // An obstacle met on a very long step may lie far ahead.
       if (length > kLongStep)
         stepLimit = std::max(kLongStep, 0.25 * length);
       else
@@ -241,7 +241,7 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
     lastFloor = avatar_.footPosition.y();
     isOnStair = true;
     const double across = computeGroundDistance(before, avatar_.footPosition);
-    if (isStep(before, avatar_.footPosition)) hasStepped_ = metSteps_ = true;
+    if (isStep(before, avatar_.footPosition)) hasStepped_ = crossedSteps_ = true;
     if (avatar_.blockedBy != 0) return end(WalkOutcome::Kind::blocked);
     shortDistance -= across;
   }
@@ -266,7 +266,7 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity, ticks};
     const Vec3 before = avatar_.footPosition;
     step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));
-    if (isStep(before, avatar_.footPosition)) hasStepped_ = metSteps_ = true;
+    if (isStep(before, avatar_.footPosition)) hasStepped_ = crossedSteps_ = true;
     if (!avatar_.grounded) {
       isOnStair = isOnStair && hasFloorBelow();
       if (avatar_.footPosition.y() < lastFloor - maxDrop && !isOnStair)

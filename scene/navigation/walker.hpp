@@ -45,9 +45,9 @@ class Walker {
   /// or else walks tick by tick: a later walk along the same line differs by less than that.
   WalkOutcome walkTo(const Vec3& goal);
 
-  /// Whether nothing is met on the way to `goal`, with some millimetres more room, and the floor is
-  /// even. Quick; walkTo() also arrives over steps and through narrower places.
-  bool isWayFree(const Vec3& goal);
+  /// Whether the straight path to `goal` is free of obstacles, with some millimetres more room, and
+  /// its floor is even. Quick; walkTo() also arrives over steps and through narrower places.
+  bool isPathClear(const Vec3& goal);
 
   /// Whether a body that moves straight and carries the agent from `from` to `to` brings it against
   /// nothing else.
@@ -61,9 +61,9 @@ class Walker {
   /// Walks tick by tick towards `goal`, slides along obstacles, and ends where it gains nothing.
   WalkOutcome slideTo(const Vec3& goal);
 
-  /// Whether a walk stepped up or down since the last call. Where it then stands may depend on the
-  /// way that it came.
-  bool takeMetSteps() { return std::exchange(metSteps_, false); }
+  /// Whether a walk stepped up or down since the last call. The place where it then stands may
+  /// depend on its path.
+  bool takeCrossedSteps() { return std::exchange(crossedSteps_, false); }
 
   const Vec3& footPosition() const { return avatar_.footPosition; }
   EntityId groundEntity() const { return avatar_.groundEntity; }  ///< after place()
@@ -84,7 +84,7 @@ class Walker {
   Avatar avatar_;
   std::shared_ptr<const AvatarShape> shape_, wideShape_;
   bool hasStepped_ = false;  ///< in the present walk
-  bool metSteps_ = false;
+  bool crossedSteps_ = false;
   bool isUneven_ = false;  ///< the present walk left even floor
   QueryCount count_;
   /// Obstacles around a cell, with their caches. The avatar has those of `cell_`.

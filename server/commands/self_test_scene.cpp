@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "scene/model/box_mesh.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -34,24 +36,13 @@ constexpr const char* kGolden =
     "1c2b3a01c1b3a01beb09d1bbad9b1bbad9b1bfb09d1beb09d1bdaf9c1c0b29f1c1b3a01c2b4a11c3b5a2"
     "1c4b5a21c4b6a31c4b6a31c5b7a31c5b7a31c4b6a31c4b6a31c4b5a21c3b5a21c2b4a11c1b3a01c0b29f";
 
-scene::Mesh makeCube() {
-  scene::Mesh mesh;
-  mesh.name = "cube";
-  for (int i = 0; i < 8; ++i) {
-    mesh.positions.emplace_back((i & 1) != 0 ? 0.5f : -0.5f, (i & 2) != 0 ? 0.5f : -0.5f,
-                                (i & 4) != 0 ? 0.5f : -0.5f);
-  }
-  mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
-                  2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
-  return mesh;
-}
-
 void addBox(scene::Model& model, const char* name, const collision::Vec3& centre,
             const collision::Vec3& size, const Eigen::Vector4f& colour) {
+  const collision::Vec3 half = collision::Vec3::Constant(0.5);
   scene::Material material;
   material.baseColour = colour;
   if (colour.w() < 1) material.alpha = scene::Material::Alpha::blend;
-  scene::Mesh mesh = makeCube();
+  scene::Mesh mesh = scene::makeBoxMesh({-half, half});
   mesh.material = static_cast<std::uint32_t>(model.materials.size());
   scene::Object object;
   object.path = name;

@@ -11,7 +11,7 @@ namespace enfilade::server {
 
 using GlbJson = nlohmann::ordered_json;
 
-/// What a buffer view holds.
+/// The contents of a buffer view.
 enum class GlbTarget : std::uint8_t { vertices, indices, other };
 
 class GlbFile {

@@ -13,6 +13,7 @@
 
 #include "render/service/render_thread.hpp"
 #include "server/base/work_thread.hpp"
+#include "server/messages/frame_encoding.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -32,8 +33,8 @@ EncodedMessage encodeFrameReply(PendingFrame& pending, const scene::Scene& scene
   reply.set_reply_to(pending.job.requestId);
   const FrameJob& job = pending.job;
   *reply.mutable_frame() =
-      toProto(frame, {job.request, scene, *job.snapshot, job.earlier ? &*job.earlier : nullptr},
-              attachment);
+      encodeFrame(frame, {job.request, scene, *job.snapshot, job.earlier ? &*job.earlier : nullptr},
+                  attachment);
   reply.mutable_frame()->set_watch(pending.job.subscription);
   reply.mutable_frame()->set_dropped(pending.job.dropped);
   if (pending.job.onRendered) pending.job.onRendered(reply.frame(), attachment);

@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "collision/assert.hpp"
+#include "server/messages/frame_encoding.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -44,8 +45,8 @@ v1::Error prefixErrorField(v1::Error error) {
   return error;
 }
 
-/// Where the flow of the next picture begins: at the last picture that the client gets. The view
-/// follows the avatar: where that was not there yet, all points are new.
+/// Returns the start of the flow of the next picture: the last picture that the client gets. The
+/// view follows the avatar: if the avatar did not exist then, all points are new.
 std::variant<EarlierView, v1::Error> findFlowStart(
     FrameSubscription& subscription, bool isLastSent,
     const std::shared_ptr<const scene::Snapshot>& now) {

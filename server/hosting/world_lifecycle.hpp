@@ -8,7 +8,7 @@ namespace enfilade::server {
 /// Resets the world to tick 0. Clients receive the end of contacts and the leave notices.
 void resetWorld(HostedWorld& hosted);
 
-/// What becomes of the recording of a world that is replaced.
+/// The fate of the recording of a world that is replaced.
 enum class RecordingAfter : std::uint8_t { ends, continues };
 
 /// Replaces the world by another one of the same scene (seek, restore). Clients receive the end of

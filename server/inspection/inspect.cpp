@@ -48,10 +48,11 @@ void writePage(const Inspection& inspection, const InspectCommand& command) {
 }
 
 /// Logs the kinds that fail the check, with the option that accepts them.
-ExitCode checkProblems(const scene::SceneReport& report, const std::vector<std::string>& accepted) {
+ExitCode checkDiagnostics(const scene::SceneReport& report,
+                          const std::vector<std::string>& accepted) {
   std::string kinds;
-  for (const Problem& problem : listProblems(report, accepted))
-    if (problem.fails()) kinds += (kinds.empty() ? "" : ",") + problem.diagnostic->kind;
+  for (const InspectedDiagnostic& entry : listDiagnostics(report, accepted))
+    if (entry.fails()) kinds += (kinds.empty() ? "" : ",") + entry.diagnostic->kind;
   if (kinds.empty()) return ExitCode::success;
   spdlog::error("--strict: the scene has problems; --accept {} accepts them", kinds);
   return ExitCode::violations;
@@ -71,7 +72,7 @@ ExitCode inspect(const InspectCommand& command) {
                     : formatInspectionTable(inspection, command.accepted, command.objects));
   if (!command.plan.empty()) writePlans(inspection.loaded.scene, command);
   if (!command.html.empty()) writePage(inspection, command);
-  return command.strict ? checkProblems(inspection.report, command.accepted) : ExitCode::success;
+  return command.strict ? checkDiagnostics(inspection.report, command.accepted) : ExitCode::success;
 }
 
 }  // namespace enfilade::server

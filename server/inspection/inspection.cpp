@@ -45,16 +45,16 @@ Json toJson(const scene::ShellCounts& shells) {
           {"closed", shells.closed},      {"open", shells.open}};
 }
 
-Json toJson(const std::vector<Problem>& problems) {
+Json toJson(const std::vector<InspectedDiagnostic>& problems) {
   Json list = Json::array();
-  for (const Problem& problem : problems)
-    list.push_back({{"kind", problem.diagnostic->kind},
-                    {"severity", toString(problem.kind.severity)},
-                    {"count", problem.diagnostic->count},
-                    {"example", problem.diagnostic->example},
-                    {"note", problem.kind.severity == scene::Severity::note},
-                    {"accepted", problem.accepted},
-                    {"meaning", problem.kind.meaning}});
+  for (const InspectedDiagnostic& entry : problems)
+    list.push_back({{"kind", entry.diagnostic->kind},
+                    {"severity", toString(entry.kind.severity)},
+                    {"count", entry.diagnostic->count},
+                    {"example", entry.diagnostic->example},
+                    {"note", entry.kind.severity == scene::Severity::note},
+                    {"accepted", entry.accepted},
+                    {"meaning", entry.kind.meaning}});
   return list;
 }
 
@@ -242,15 +242,15 @@ void addLargest(const scene::Scene& scene, TextTable& table) {
   }
 }
 
-void addProblems(const std::vector<Problem>& problems, TextTable& table) {
+void addDiagnostics(const std::vector<InspectedDiagnostic>& problems, TextTable& table) {
   table.appendLine("\nproblems: %s", problems.empty() ? "none" : "");
-  for (const Problem& problem : problems) {
-    const std::string_view meaning = problem.kind.meaning;
-    table.appendLine("  %-7s %8zu  %-26s %s%.*s", toString(problem.kind.severity),
-                     problem.diagnostic->count, problem.diagnostic->kind.c_str(),
-                     problem.accepted ? "(accepted) " : "", static_cast<int>(meaning.size()),
+  for (const InspectedDiagnostic& entry : problems) {
+    const std::string_view meaning = entry.kind.meaning;
+    table.appendLine("  %-7s %8zu  %-26s %s%.*s", toString(entry.kind.severity),
+                     entry.diagnostic->count, entry.diagnostic->kind.c_str(),
+                     entry.accepted ? "(accepted) " : "", static_cast<int>(meaning.size()),
                      meaning.data());
-    table.appendLine("                    example: %s", problem.diagnostic->example.c_str());
+    table.appendLine("                    example: %s", entry.diagnostic->example.c_str());
   }
 }
 
@@ -307,21 +307,22 @@ Inspection makeInspection(LoadedScene loaded, const std::optional<scene::ModelCa
   return inspection;
 }
 
-std::vector<Problem> listProblems(const scene::SceneReport& report,
-                                  const std::vector<std::string>& accepted) {
+std::vector<InspectedDiagnostic> listDiagnostics(const scene::SceneReport& report,
+                                                 const std::vector<std::string>& accepted) {
   const auto accepts = [&](std::string_view word) {
     return std::find(accepted.begin(), accepted.end(), word) != accepted.end();
   };
-  std::vector<Problem> problems;
+  std::vector<InspectedDiagnostic> problems;
   for (const scene::Diagnostic& diagnostic : report.diagnostics) {
     const scene::DiagnosticKind kind = scene::findDiagnosticKind(diagnostic);
     const bool isWarning = kind.severity == scene::Severity::warning;
     problems.push_back(
         {&diagnostic, kind, accepts(diagnostic.kind) || (isWarning && accepts(kAllWarnings))});
   }
-  std::stable_sort(problems.begin(), problems.end(), [](const Problem& a, const Problem& b) {
-    return a.kind.severity > b.kind.severity;
-  });
+  std::stable_sort(problems.begin(), problems.end(),
+                   [](const InspectedDiagnostic& a, const InspectedDiagnostic& b) {
+                     return a.kind.severity > b.kind.severity;
+                   });
   return problems;
 }
 
@@ -374,7 +375,7 @@ std::string formatInspectionJson(const Inspection& inspection,
   all["storeys"] = storeysToJson(model);
   all["spaces"] = spacesToJson(model);
   all["bodies"] = bodiesToJson(model);
-  all["problems"] = toJson(listProblems(report, accepted));
+  all["problems"] = toJson(listDiagnostics(report, accepted));
   all["import_seconds"] = inspection.loaded.importSeconds;
   all["load_seconds"] = inspection.loaded.loadSeconds;
   all["from_cache"] = inspection.loaded.fromCache;
@@ -391,7 +392,7 @@ std::string formatInspectionTable(const Inspection& inspection,
   addBodies(inspection.loaded.scene->model(), table);
   addStoreys(inspection.loaded.scene->model(), table);
   addClasses(inspection.loaded.scene->model(), table);
-  addProblems(listProblems(inspection.report, accepted), table);
+  addDiagnostics(listDiagnostics(inspection.report, accepted), table);
   if (objects) addObjects(*inspection.loaded.scene, table);
   return table.release();
 }

@@ -27,7 +27,7 @@ Inspection makeInspection(LoadedScene loaded, const std::optional<scene::ModelCa
 inline constexpr std::string_view kAllWarnings = "warnings";
 
 /// A diagnostic of the report with its meaning.
-struct Problem {
+struct InspectedDiagnostic {
   const scene::Diagnostic* diagnostic = nullptr;
   scene::DiagnosticKind kind;
   bool accepted = false;  ///< `--strict` does not fail because of it
@@ -37,8 +37,8 @@ struct Problem {
 
 /// The report's problems: errors, then warnings, then notes. `accepted` holds the kinds that the
 /// user accepts, or kAllWarnings.
-std::vector<Problem> listProblems(const scene::SceneReport& report,
-                                  const std::vector<std::string>& accepted);
+std::vector<InspectedDiagnostic> listDiagnostics(const scene::SceneReport& report,
+                                                 const std::vector<std::string>& accepted);
 
 struct ClassCount {
   std::string name;

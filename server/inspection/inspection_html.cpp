@@ -42,16 +42,16 @@ void addFacts(const Inspection& inspection, HtmlPage& page) {
        {"North", describeNorth(scene.model().north)}});
 }
 
-void addProblems(const Inspection& inspection, const std::vector<std::string>& accepted,
-                 HtmlPage& page) {
+void addDiagnostics(const Inspection& inspection, const std::vector<std::string>& accepted,
+                    HtmlPage& page) {
   page.addHeading("Problems");
   std::vector<Row> rows;
-  for (const Problem& problem : listProblems(inspection.report, accepted))
-    rows.push_back({{toString(problem.kind.severity), toString(problem.kind.severity)},
-                    {fmt::format("{}", problem.diagnostic->count), "number"},
-                    {problem.diagnostic->kind + (problem.accepted ? " (accepted)" : ""), "name"},
-                    {std::string(problem.kind.meaning)},
-                    {problem.diagnostic->example}});
+  for (const InspectedDiagnostic& entry : listDiagnostics(inspection.report, accepted))
+    rows.push_back({{toString(entry.kind.severity), toString(entry.kind.severity)},
+                    {fmt::format("{}", entry.diagnostic->count), "number"},
+                    {entry.diagnostic->kind + (entry.accepted ? " (accepted)" : ""), "name"},
+                    {std::string(entry.kind.meaning)},
+                    {entry.diagnostic->example}});
   if (rows.empty()) return page.addParagraph("None.");
   page.addTable({{"Severity"}, {"Count", "number"}, {"Kind"}, {"Meaning"}, {"Example"}}, rows);
 }
@@ -139,7 +139,7 @@ std::string formatInspectionHtml(const Inspection& inspection,
   const std::string reader = model.reader.empty() ? "" : "read by " + model.reader + "; ";
   HtmlPage page(file, reader + "report by " + formatVersion());
   addFacts(inspection, page);
-  addProblems(inspection, accepted, page);
+  addDiagnostics(inspection, accepted, page);
   addPlans(plans, page);
   addStoreys(model, page);
   addSpaces(model, page);

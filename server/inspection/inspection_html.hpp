@@ -14,7 +14,7 @@ struct StoreyPlan {
   render::Image image;
 };
 
-/// `accepted`: as for listProblems().
+/// `accepted`: as for listDiagnostics().
 std::string formatInspectionHtml(const Inspection& inspection,
                                  const std::vector<std::string>& accepted,
                                  const std::vector<StoreyPlan>& plans);

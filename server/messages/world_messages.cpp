@@ -306,18 +306,8 @@ v1::Scene toProto(const scene::Scene& scene) {
 
 v1::Policies toProto(const scene::WorldSettings& settings) {
   v1::Policies message;
-  message.set_epsilon(settings.contactOffset);
-  message.set_step_height(settings.stepHeight);
-  message.set_near_miss(settings.nearMissDistance);
-  message.set_tick(settings.tickDuration);
-  message.set_speed_limit(settings.maxSpeed);
+  setWorldSettings(settings, message);
   message.set_walkable_slope(std::acos(settings.walkableNormalY));
-  message.set_gravity(settings.gravity);
-  message.set_patience(settings.stuckTimeout);
-  message.set_sliding(settings.sliding == scene::Sliding::slide ? "slide" : "stop");
-  message.set_jump_limit(settings.maxJumpHeight);
-  message.set_joint_speed_limit(settings.maxJointSpeed);
-  message.set_push_force(settings.maxPushForce);
   message.set_bodies("push_and_tell");
   return message;
 }

@@ -34,6 +34,22 @@ void setSeparation(const collision::SeparationResult& separation, Message& messa
   message.set_feature_b(toProto(separation.featureB));
 }
 
+/// Writes the settings that live and recorded messages share.
+template <class Message>
+void setWorldSettings(const scene::WorldSettings& settings, Message& message) {
+  message.set_epsilon(settings.contactOffset);
+  message.set_step_height(settings.stepHeight);
+  message.set_near_miss(settings.nearMissDistance);
+  message.set_tick(settings.tickDuration);
+  message.set_speed_limit(settings.maxSpeed);
+  message.set_gravity(settings.gravity);
+  message.set_patience(settings.stuckTimeout);
+  message.set_sliding(settings.sliding == scene::Sliding::slide ? "slide" : "stop");
+  message.set_jump_limit(settings.maxJumpHeight);
+  message.set_joint_speed_limit(settings.maxJointSpeed);
+  message.set_push_force(settings.maxPushForce);
+}
+
 /// The IFC GlobalId of an object or, of a part without one, of its whole; "" for all else.
 const std::string& findGlobalId(const scene::Model& model, scene::EntityId entity);
 /// Fills in what the model knows of an object. `entity` is an object's id.

@@ -15,7 +15,7 @@
 #include "server/base/version.hpp"
 #include "server/hosting/world_lifecycle.hpp"
 #include "server/messages/decode_message.hpp"
-#include "server/messages/frame_messages.hpp"
+#include "server/messages/frame_encoding.hpp"
 #include "server/net/tcp_transport.hpp"
 
 namespace enfilade::server {

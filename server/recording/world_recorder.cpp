@@ -226,18 +226,8 @@ void fillState(v1::State& state, const scene::World& world) {
 
 v1::Lengths toRecordedProto(const scene::WorldSettings& settings) {
   v1::Lengths message;
-  message.set_epsilon(settings.contactOffset);
-  message.set_step_height(settings.stepHeight);
-  message.set_near_miss(settings.nearMissDistance);
+  setWorldSettings(settings, message);
   message.set_walkable_normal_y(settings.walkableNormalY);
-  message.set_gravity(settings.gravity);
-  message.set_speed_limit(settings.maxSpeed);
-  message.set_push_force(settings.maxPushForce);
-  message.set_tick(settings.tickDuration);
-  message.set_patience(settings.stuckTimeout);
-  message.set_jump_limit(settings.maxJumpHeight);
-  message.set_joint_speed_limit(settings.maxJointSpeed);
-  message.set_sliding(settings.sliding == scene::Sliding::stop ? "stop" : "slide");
   return message;
 }
 

@@ -1,7 +1,7 @@
 #include "server/runs/in_process_driver.hpp"
 
 #include "scene/world/data/world_data.hpp"
-#include "server/messages/frame_messages.hpp"
+#include "server/messages/frame_encoding.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/navigation/go_order.hpp"
 
@@ -92,7 +92,8 @@ protocol::ReceivedFrame InProcessDriver::frame(const v1::FrameRequest& request) 
         renderer_->render(*snapshot, frameView.camera, frameView.options, frameView.renderer);
     ++frames_;
     protocol::ReceivedFrame received;
-    received.description = toProto(rendered, {request, world_.scene(), *snapshot}, received.pixels);
+    received.description =
+        encodeFrame(rendered, {request, world_.scene(), *snapshot}, received.pixels);
     return received;
   } catch (const render::RenderError& error) {
     throw protocol::ProtocolError(v1::ERROR_INTERNAL, error.what());

@@ -177,6 +177,15 @@ TEST(ArchitectureRules, AnOddWordIsAFault) {
                                        "scene/model/a.hpp:1: beside"}));
 }
 
+TEST(ArchitectureRules, ACommentWithoutASubjectIsAFault) {
+  const Sources sources{{"scene/model/a.hpp",
+                         "/// Who waits.\nint n;  ///< Which one\n  // What comes, comes.\n"
+                         "// Where it is red, stop.\n/// Whatever is left.\n"}};
+  EXPECT_EQ(oddWords(sources),
+            (Faults{"scene/model/a.hpp:1: a comment about \"Who\"; name the thing",
+                    "scene/model/a.hpp:3: a comment about \"What\"; name the thing"}));
+}
+
 TEST(ArchitectureRules, ATestsFileUnderASharedNameIsAFault) {
   const Sources sources{
       {"tests/support/temporary_folder.hpp", "std::filesystem::temp_directory_path() / own\n"},

@@ -182,7 +182,7 @@ void oursAlone(std::size_t objects, std::size_t movers, std::size_t ticks) {
   BuildingMotion motion(building, movers);
   for (const Aabb& box : motion.next()) sweep.insert(box);
   sweep.update();
-  std::size_t ends = 0, exchanges = 0, boxTests = 0, laid = 0;
+  std::size_t ends = 0, exchanges = 0, aabbTests = 0, laid = 0;
   std::vector<double> microseconds;
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     const auto boxes = motion.next();
@@ -190,7 +190,7 @@ void oursAlone(std::size_t objects, std::size_t movers, std::size_t ticks) {
     ends += oursTick(sweep, boxes);
     microseconds.push_back(1e6 * secondsSince(start));
     exchanges += sweep.counters().swaps;
-    boxTests += sweep.counters().aabbTests;
+    aabbTests += sweep.counters().aabbTests;
     laid += sweep.counters().windowsBuilt;
   }
   const double share = 1 / static_cast<double>(movers * ticks);
@@ -199,7 +199,7 @@ void oursAlone(std::size_t objects, std::size_t movers, std::size_t ticks) {
               quantile(microseconds, 0.99));
   std::printf("a mover and tick: %.2f pairs, %.3f swaps, %.3f box tests, %.4f windows built\n",
               static_cast<double>(ends) * share, static_cast<double>(exchanges) * share,
-              static_cast<double>(boxTests) * share, static_cast<double>(laid) * share);
+              static_cast<double>(aabbTests) * share, static_cast<double>(laid) * share);
 }
 
 }  // namespace

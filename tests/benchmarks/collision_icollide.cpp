@@ -253,7 +253,7 @@ class PeerDetector : public Detector {
   }
 
  private:
-  static Placement placementOf(const Swarm& swarm, std::uint32_t k) {
+  static RigidTransform placementOf(const Swarm& swarm, std::uint32_t k) {
     return {swarm.flyers[k].rotation, swarm.flyers[k].pose.translation};
   }
   BoxMaker boxes_;

@@ -59,10 +59,10 @@ Points bodyPoints() {
   return points;
 }
 
-std::vector<Placement> flight(bool dipping, std::size_t steps) {
+std::vector<RigidTransform> flight(bool dipping, std::size_t steps) {
   const Vec3 axis = Vec3(0.3, 1, 0.2).normalized();
   const double side = 0.25 * kStep * kAlongX;  // circles about the centre
-  std::vector<Placement> places;
+  std::vector<RigidTransform> places;
   for (std::size_t k = 0; k < steps; ++k) {
     const double along = 0.025 * static_cast<double>(k) / side;
     const double x = 2 * side + side * std::cos(along);
@@ -82,7 +82,7 @@ struct Truth {
   std::vector<std::uint32_t> contacts;
 };
 
-Truth truthOf(const collision::Hull& hull, const Placement& at, const Triangles& mesh) {
+Truth truthOf(const collision::Hull& hull, const RigidTransform& at, const Triangles& mesh) {
   const collision::PlacedConvex body{hull.vertices, at.translation, &at.rotation, &hull};
   const Vec3 reach = Vec3::Constant(3 * kRadius);
   const collision::Aabb near{at.translation - reach, at.translation + reach};
@@ -115,7 +115,7 @@ double microsecondsOf(const Ask& ask) {
 
 /// Two passes, so that neither query warms the other's cache: a tick of the library makes only one
 /// of them.
-void fly(Row& row, std::span<const Placement> places, std::span<const Truth> truths,
+void fly(Row& row, std::span<const RigidTransform> places, std::span<const Truth> truths,
          std::size_t every) {
   row.query->forget();
   for (std::size_t k = 0; k < places.size(); ++k) {
@@ -146,7 +146,7 @@ void fly(Row& row, std::span<const Placement> places, std::span<const Truth> tru
   }
 }
 
-void askCold(Row& row, std::span<const Placement> places, std::size_t every) {
+void askCold(Row& row, std::span<const RigidTransform> places, std::size_t every) {
   for (std::size_t k = 0; k < places.size(); k += every) {
     row.query->forget();
     row.coldDistance.push_back(microsecondsOf([&] { row.query->distance(places[k]); }));

@@ -174,7 +174,7 @@ struct TimedAnswer {
   double nanoseconds = 0;
 };
 
-Placement placementOf(const accuracy::Placed& body) {
+RigidTransform placementOf(const accuracy::Placed& body) {
   return {body.rotation, body.translation};
 }
 
@@ -214,8 +214,8 @@ class CaseAnswerer {
 
  private:
   TimedAnswer ask(const accuracy::Case& asked) {
-    const Placement a = placementOf(asked.a);
-    const Placement b = placementOf(asked.b);
+    const RigidTransform a = placementOf(asked.a);
+    const RigidTransform b = placementOf(asked.b);
     const auto start = Clock::now();
     const Answer answer = pair_->ask(a, b);
     return {answer, 1e9 * secondsSince(start)};

@@ -22,7 +22,7 @@ using namespace enfilade::collision;
 
 constexpr double kHorizon = 10;  // seconds
 
-struct Encounter {
+struct MovingPair {
   Hull hullA, hullB;
   Motion motionA, motionB;
   Vec3 between;  ///< from A's reference point to B's
@@ -51,17 +51,17 @@ Hull stone(Random& random) {
   return buildHull(points);
 }
 
-Encounter rod(Random& random) {
+MovingPair rod(Random& random) {
   const double halfLength = uniform(random, 0.5, 2);
   const double gap = std::pow(10.0, uniform(random, -5, -2));
-  Encounter e{boxHull({halfLength, 0.02, 0.02}), boxHull({5, 0.1, 5}), {}, {}, {0, 0, 0}};
+  MovingPair e{boxHull({halfLength, 0.02, 0.02}), boxHull({5, 0.1, 5}), {}, {}, {0, 0, 0}};
   e.between.y() = -(0.02 + gap + 0.1);
   e.motionA.angularVelocity = Vec3(0, 0, uniform(random, 0.5, 3));
   return e;
 }
 
-Encounter flight(Random& random, bool turning) {
-  Encounter e{stone(random), stone(random), {}, {}, {uniform(random, 2, 4), 0, 0}};
+MovingPair flight(Random& random, bool turning) {
+  MovingPair e{stone(random), stone(random), {}, {}, {uniform(random, 2, 4), 0, 0}};
   e.motionA.velocity = Vec3(uniform(random, 0.5, 3), 0, 0) + vector(random, 0.2);
   e.motionB.acceleration = vector(random, 0.5);
   if (!turning) return e;
@@ -77,13 +77,13 @@ MotionBounds boundsOf(const MovingBody& moving) {
 }
 
 /// Gap, normal and closest points are the input of both bounds.
-double ourTime(const Encounter& e, const SeparationResult& gap) {
+double ourTime(const MovingPair& e, const SeparationResult& gap) {
   const ClosingBounds closing =
       computeClosingBounds(boundsOf(e.a()), boundsOf(e.b()), gap.normal, kHorizon);
   return computeTimeToContact(gap.distance - gap.errorBound, closing);
 }
 
-double seedTime(const Encounter& e, const SeparationResult& gap) {
+double seedTime(const MovingPair& e, const SeparationResult& gap) {
   const auto velocityAt = [](const MovingBody& moving, const Vec3& point) {
     return Vec3(moving.motion.velocity +
                 moving.motion.angularVelocity.cross(point - moving.body.translation));
@@ -105,10 +105,10 @@ struct Tally {
   double seconds = 0;
 };
 
-void measure(const char* motion, const std::vector<Encounter>& encounters, Results& results) {
+void measure(const char* motion, const std::vector<MovingPair>& pairs, Results& results) {
   Tally ours, seeds, impacts;
   std::size_t met = 0, unproved = 0;
-  for (const Encounter& e : encounters) {
+  for (const MovingPair& e : pairs) {
     FeatureCache cache;
     const SeparationResult gap = computeSeparation(e.a().body, e.b().body, cache);
     auto start = Clock::now();
@@ -143,7 +143,7 @@ void measure(const char* motion, const std::vector<Encounter>& encounters, Resul
   };
   printRow("ours: bound", ours, met);
   printRow("bound of Lin (1993)", seeds, met);
-  printRow("ours: time of impact", impacts, encounters.size());
+  printRow("ours: time of impact", impacts, pairs.size());
 }
 
 }  // namespace
@@ -153,10 +153,10 @@ int main(int argc, char** argv) {
   Results results(arguments);
   const std::size_t count = arguments.quick ? 100 : 1000;
   Random random(5);
-  const auto some = [&](const std::function<Encounter()>& one) {
-    std::vector<Encounter> encounters;
-    for (std::size_t k = 0; k < count; ++k) encounters.push_back(one());
-    return encounters;
+  const auto some = [&](const std::function<MovingPair()>& one) {
+    std::vector<MovingPair> pairs;
+    for (std::size_t k = 0; k < count; ++k) pairs.push_back(one());
+    return pairs;
   };
   measure("translation", some([&] { return flight(random, false); }), results);
   measure("turning", some([&] { return flight(random, true); }), results);

@@ -42,8 +42,8 @@ ConvexMotion makeMotion(Random& random, std::size_t vertices, Gap gap, std::size
   const Turning turnA(random), turnB(random), orbit(random);
   const Vec3 away = orbit.axis.unitOrthogonal();
   for (std::size_t k = 0; k < steps; ++k) {
-    Placement a{turnA.at(k), Vec3(0.25, 0.5, 0.125)};
-    Placement b{turnB.at(k), a.translation + kFarApart * (orbit.at(k) * away)};
+    RigidTransform a{turnA.at(k), Vec3(0.25, 0.5, 0.125)};
+    RigidTransform b{turnB.at(k), a.translation + kFarApart * (orbit.at(k) * away)};
     collision::FeatureCache none;
     const auto separation =
         collision::computeSeparation({hullA.vertices, a.translation, &a.rotation, &hullA},

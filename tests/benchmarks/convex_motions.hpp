@@ -17,7 +17,7 @@ const char* nameOf(Gap gap);
 
 struct ConvexMotion {
   Points a, b;
-  std::vector<Placement> placesA, placesB;  ///< one for each step
+  std::vector<RigidTransform> placesA, placesB;  ///< one for each step
 };
 
 /// Polytopes with vertices on unit spheres. Both rotate by 0.6 to 1.8 degrees a step about their

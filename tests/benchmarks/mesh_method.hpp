@@ -19,10 +19,10 @@ class MeshQuery {
  public:
   virtual ~MeshQuery() = default;
   /// Metres; 0 if they touch or penetrate.
-  virtual double distance(const Placement& body) = 0;
+  virtual double distance(const RigidTransform& body) = 0;
   /// Appends the indices (into the mesh's triangle list) of all triangles that the body touches or
   /// penetrates, in any order.
-  virtual void contacts(const Placement& body, std::vector<std::uint32_t>& triangles) = 0;
+  virtual void contacts(const RigidTransform& body, std::vector<std::uint32_t>& triangles) = 0;
   virtual void forget() {}
 };
 

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "collision/types.hpp"
+#include "collision/motion/rigid_motion.hpp"
 
 namespace enfilade::benchmarks {
 
@@ -17,11 +17,8 @@ using collision::Mat3;
 using collision::Vec3;
 using Points = std::vector<Vec3>;
 
-/// World = rotation * local + translation, with the doubles taken as exact.
-struct Placement {
-  Mat3 rotation = Mat3::Identity();
-  Vec3 translation = Vec3::Zero();
-};
+/// Its doubles are taken as exact.
+using collision::RigidTransform;
 
 struct Answer {
   enum class Verdict : std::uint8_t {
@@ -53,7 +50,7 @@ inline Answer collides(double depth = std::numeric_limits<double>::quiet_NaN()) 
 class PairOfBodies {
  public:
   virtual ~PairOfBodies() = default;
-  virtual Answer ask(const Placement& a, const Placement& b) = 0;
+  virtual Answer ask(const RigidTransform& a, const RigidTransform& b) = 0;
   /// Makes the next query a cold one.
   virtual void forget() {}
 };

@@ -14,7 +14,7 @@ class OurMeshQuery : public MeshQuery {
   OurMeshQuery(const Points& body, const Triangles& mesh)
       : hull_(buildHull(body)), tree_(buildBoxTree(std::span(&localBox(), 1), 1)), mesh_(mesh) {}
 
-  double distance(const Placement& at) override {
+  double distance(const RigidTransform& at) override {
     const CompoundView body{&tree_, at.rotation, at.translation,
                             [&](std::uint32_t) { return bodyAt(at); }};
     const CompoundView mesh{&mesh_.boxes(), Mat3::Identity(), Vec3::Zero(),
@@ -23,7 +23,7 @@ class OurMeshQuery : public MeshQuery {
     return findNearestParts({&body, 1}, {&mesh, 1}, std::numeric_limits<double>::infinity(), budget)
         .separation.distance;
   }
-  void contacts(const Placement& at, std::vector<std::uint32_t>& triangles) override {
+  void contacts(const RigidTransform& at, std::vector<std::uint32_t>& triangles) override {
     const PlacedConvex body = bodyAt(at);
     Aabb box;
     for (const Vec3& vertex : body.vertices) box.include(at.rotation * vertex + at.translation);
@@ -42,7 +42,7 @@ class OurMeshQuery : public MeshQuery {
     for (const Vec3& vertex : hull_.vertices) box_.include(vertex);
     return box_;
   }
-  PlacedConvex bodyAt(const Placement& at) const {
+  PlacedConvex bodyAt(const RigidTransform& at) const {
     return {hull_.vertices, at.translation, &at.rotation, &hull_};
   }
   PlacedConvex triangle(std::uint32_t i) const { return {mesh_.triangles()[i]}; }

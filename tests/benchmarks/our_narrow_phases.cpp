@@ -19,7 +19,7 @@ class OurPair : public PairOfBodies {
   void forget() override { features_ = {}; }
 
  protected:
-  static PlacedConvex bodyOf(const Hull& hull, const Placement& at) {
+  static PlacedConvex bodyOf(const Hull& hull, const RigidTransform& at) {
     return {hull.vertices, at.translation, &at.rotation, &hull};
   }
   Hull hullA_, hullB_;
@@ -29,7 +29,7 @@ class OurPair : public PairOfBodies {
 class Decides : public OurPair {
  public:
   using OurPair::OurPair;
-  Answer ask(const Placement& a, const Placement& b) override {
+  Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     const auto result =
         collision::computeSeparation(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
     Answer answer = result.verdict == Verdict::separated ? apart(result.distance) : collides();
@@ -41,7 +41,7 @@ class Decides : public OurPair {
 class DecidesWithDepth : public OurPair {
  public:
   using OurPair::OurPair;
-  Answer ask(const Placement& a, const Placement& b) override {
+  Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     const PlacedConvex bodyA = bodyOf(hullA_, a);
     const PlacedConvex bodyB = bodyOf(hullB_, b);
     const auto result = collision::computeSeparation(bodyA, bodyB, features_);
@@ -66,7 +66,7 @@ class DecidesWithDepth : public OurPair {
 class Refines : public OurPair {
  public:
   using OurPair::OurPair;
-  Answer ask(const Placement& a, const Placement& b) override {
+  Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     const auto result =
         collision::refineSeparation(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
     Answer answer = result.verdict == Verdict::separated ? apart(result.distance)

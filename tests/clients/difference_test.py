@@ -1,4 +1,4 @@
-"""What changed between two walks, recorded walks in other models, and what recordings export."""
+"""Differences between two walks, recorded walks in other models, and exports of recordings."""
 
 import json
 import os

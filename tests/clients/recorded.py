@@ -22,7 +22,7 @@ def verify(file, *before):
 
 
 def other_reader(test, file, *arguments):
-    """What the other reader says; without it the test is skipped, or in CI fails."""
+    """Return the output of the other reader. Without it the test is skipped, or in CI fails."""
     if not shutil.which("node") or not (_MCAP / "node_modules").is_dir():
         if os.environ.get("CI"):
             test.fail(f"no other reader of MCAP: npm ci in {_MCAP}")

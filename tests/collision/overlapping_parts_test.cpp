@@ -97,7 +97,7 @@ TEST(OverlappingParts, EqualThoseOfTheDoubleLoopAlongAMotion) {
     }
     EXPECT_GT(pairs, 1000u);
     EXPECT_GT(without, 20u);
-    EXPECT_LT(front.boxTests, 250u * 40 * 256 / 20);
+    EXPECT_LT(front.aabbTests, 250u * 40 * 256 / 20);
   }
 }
 
@@ -194,10 +194,10 @@ TEST(OverlappingParts, ObjectsAtRestCostOnlyTheirOverlaps) {
   const Placed b(sheet, Mat3::Identity(), Vec3::Zero(), 0);
   PartFront front;
   const auto pairs = findPairs(a, b, front);
-  const std::uint64_t fresh = front.boxTests;
+  const std::uint64_t fresh = front.aabbTests;
   ASSERT_EQ(findPairs(a, b, front), pairs);
   EXPECT_GT(pairs.size(), 5u);
-  EXPECT_LE(front.boxTests - fresh, 1 + 2 * pairs.size());  // the roots, then leaves and parts
+  EXPECT_LE(front.aabbTests - fresh, 1 + 2 * pairs.size());  // the roots, then leaves and parts
 }
 
 TEST(OverlappingParts, TheFrontSavesMostOfADescentInSmallSteps) {
@@ -210,9 +210,9 @@ TEST(OverlappingParts, TheFrontSavesMostOfADescentInSmallSteps) {
     const Placed b(sheet, Mat3::Identity(), Vec3::Zero(), 0);
     PartFront cold;
     ASSERT_EQ(findPairs(a, b, front), findPairs(a, b, cold));
-    fresh += cold.boxTests;
+    fresh += cold.aabbTests;
   }
-  EXPECT_LT(front.boxTests, fresh / 2);
+  EXPECT_LT(front.aabbTests, fresh / 2);
 }
 
 }  // namespace

@@ -390,18 +390,18 @@ TEST(SortAndSweep, CountsTheEndpointsThatAProxyPasses) {
   SortAndSweep sweep(posts);
   const ProxyId id = sweep.insert(boxAt(Vec3(-1, 0.5, 0), Vec3(0.05, 1, 0.05)));
   sweep.update();
-  std::uint64_t exchanges = 0, begins = 0, ends = 0;
+  std::uint64_t swaps = 0, begins = 0, ends = 0;
   for (int tick = 1; tick <= 55; ++tick) {
     sweep.move(id, boxAt(Vec3(-1 + 0.1 * tick, 0.5, 0), Vec3(0.05, 1, 0.05)));
     sweep.update();
-    exchanges += sweep.counters().swaps;
+    swaps += sweep.counters().swaps;
     begins += sweep.addedPairs().size();
     ends += sweep.removedPairs().size();
   }
   EXPECT_EQ(begins, 5u);
   EXPECT_EQ(ends, 5u);
-  EXPECT_LE(exchanges, 10u);  // entering a window does not swap past its endpoints
-  EXPECT_GE(exchanges, 8u);
+  EXPECT_LE(swaps, 10u);  // entering a window does not swap past its endpoints
+  EXPECT_GE(swaps, 8u);
 }
 
 /// Swaps and AABB tests per proxy and tick, among `count` boxes of one density.
@@ -447,7 +447,7 @@ TEST(SortAndSweep, AStraightWalkRarelyRebuildsTheWindow) {
     sweep.insert(boxes.back());
   }
   sweep.update();
-  std::uint64_t laid = 0, most = 0, exchanges = 0;
+  std::uint64_t laid = 0, most = 0, swaps = 0;
   for (int tick = 0; tick < 300; ++tick) {
     for (ProxyId id = 0; id < boxes.size(); ++id) {
       const Vec3 step(0.02, 0, 0.015);
@@ -457,9 +457,9 @@ TEST(SortAndSweep, AStraightWalkRarelyRebuildsTheWindow) {
     sweep.update();
     laid += sweep.counters().windowsBuilt;
     most = std::max(most, sweep.counters().windowsBuilt);
-    exchanges += sweep.counters().swaps;
+    swaps += sweep.counters().swaps;
   }
-  EXPECT_GT(exchanges, 1000u);
+  EXPECT_GT(swaps, 1000u);
   EXPECT_GT(laid, 50u);
   EXPECT_LT(laid, 300u * 50 / 20) << "a cell lasts for more than 20 ticks";
   EXPECT_LT(most, 10u) << "few movers have theirs laid in one tick";

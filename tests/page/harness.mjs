@@ -1,4 +1,4 @@
-// What the tests of this folder share.
+// Code that the tests of this folder share.
 
 /** The line with which `enfilade serve` says that it is ready. */
 export function awaitReady(child) {

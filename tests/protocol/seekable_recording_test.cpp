@@ -13,7 +13,7 @@ namespace {
 
 constexpr double kTick = 1.0 / 60;
 
-struct Written {
+struct WrittenRecording {
   std::filesystem::path file;
   std::vector<std::uint64_t> checkpoints;  ///< ticks
 };
@@ -38,10 +38,10 @@ void writeTick(RecordingWriter& writer, std::uint64_t tick, bool checkpoint) {
   }
   writer.write(bulkyStateOf(tick));
   if (!checkpoint) return;
-  v1::RecordedCheckpoint made;
-  made.set_tick(tick);
-  made.set_world("world after " + std::to_string(tick));
-  writer.write(made, static_cast<double>(tick) * kTick);
+  v1::RecordedCheckpoint record;
+  record.set_tick(tick);
+  record.set_world("world after " + std::to_string(tick));
+  writer.write(record, static_cast<double>(tick) * kTick);
 }
 
 /// Writes one run. `first`: first tick of a branch; 0: no branch. Returns the ticks of its
@@ -67,29 +67,30 @@ std::vector<std::uint64_t> writeRun(RecordingWriter& writer, std::uint64_t first
   return checkpoints;
 }
 
-Written written(const std::string& name, std::uint64_t first, std::uint64_t last, bool close) {
-  Written made{tests::ownFile(name + ".mcap"), {}};
-  RecordingWriter writer(made.file, "test");
-  made.checkpoints = writeRun(writer, first, last);
+WrittenRecording writeRecording(const std::string& name, std::uint64_t first, std::uint64_t last,
+                                bool close) {
+  WrittenRecording written{tests::ownFile(name + ".mcap"), {}};
+  RecordingWriter writer(written.file, "test");
+  written.checkpoints = writeRun(writer, first, last);
   if (close) {
     writer.close();
-    return made;
+    return written;
   }
   // As after a kill: everything except the records that closing adds.
   const auto size = writer.bytesWritten();
   writer.close();
-  std::filesystem::resize_file(made.file, size);
-  return made;
+  std::filesystem::resize_file(written.file, size);
+  return written;
 }
 
-void expectSeeks(const Written& made, std::uint64_t first, std::uint64_t last,
+void expectSeeks(const WrittenRecording& written, std::uint64_t first, std::uint64_t last,
                  std::uint32_t run = 1) {
-  SeekableRecording recording(made.file, run);
+  SeekableRecording recording(written.file, run);
   EXPECT_EQ(recording.firstTick(), first);
   ASSERT_EQ(recording.lastTick(), last);
   for (std::uint64_t tick = last; tick >= first && tick <= last; tick -= 137) {
     std::optional<std::uint64_t> expected;
-    for (const std::uint64_t checkpoint : made.checkpoints)
+    for (const std::uint64_t checkpoint : written.checkpoints)
       if (checkpoint <= tick) expected = checkpoint;
     const auto found = recording.checkpointBefore(tick);
     ASSERT_EQ(found.has_value(), expected.has_value()) << tick;
@@ -114,18 +115,18 @@ void expectSeeks(const Written& made, std::uint64_t first, std::uint64_t last,
 }
 
 TEST(SeekableRecording, ResumesAfterAnyTickFromTheCheckpointBeforeIt) {
-  expectSeeks(written("seek", 0, 3000, true), 0, 3000);
+  expectSeeks(writeRecording("seek", 0, 3000, true), 0, 3000);
 }
 
 TEST(SeekableRecording, ABranchBeginsWhereItLeftItsParent) {
-  expectSeeks(written("seek_branch", 777, 2000, true), 777, 2000);
+  expectSeeks(writeRecording("seek_branch", 777, 2000, true), 777, 2000);
 }
 
 /// One short run after another, as tests of agents record them.
 TEST(SeekableRecording, EachRunOfAFileIsReadAloneFromAnyTickOn) {
   const std::vector<std::uint64_t> lasts{1700, 3, 1, 2, 1200};
   const auto file = tests::ownFile("runs.mcap");
-  std::vector<Written> runs;
+  std::vector<WrittenRecording> runs;
   {
     RecordingWriter writer(file, "test");
     for (const std::uint64_t last : lasts) runs.push_back({file, writeRun(writer, 0, last)});
@@ -160,21 +161,22 @@ TEST(SeekableRecording, EachRunOfAFileIsReadAloneFromAnyTickOn) {
 }
 
 TEST(SeekableRecording, WithoutASummaryTheChunksAreFoundByTheirHeads) {
-  const Written made = written("seek_killed", 0, 3000, false);
-  SeekableRecording recording(made.file);
+  const WrittenRecording written = writeRecording("seek_killed", 0, 3000, false);
+  SeekableRecording recording(written.file);
   EXPECT_FALSE(recording.closed());
   const std::uint64_t last = recording.lastTick();
   EXPECT_GE(last, 2500u);
-  expectSeeks(made, 0, last);
+  expectSeeks(written, 0, last);
 }
 
 TEST(SeekableRecording, AFileThatWasCutAnywhereIsReadAsFarAsItIsWhole) {
-  const Written made = written("seek_cut", 0, 1200, true);
-  const auto whole = std::filesystem::file_size(made.file);
+  const WrittenRecording written = writeRecording("seek_cut", 0, 1200, true);
+  const auto whole = std::filesystem::file_size(written.file);
   std::uint64_t before = 0;
   for (std::uint64_t size = whole / 3; size < whole; size += whole / 40) {
-    const auto cut = made.file.string() + ".cut";
-    std::filesystem::copy_file(made.file, cut, std::filesystem::copy_options::overwrite_existing);
+    const auto cut = written.file.string() + ".cut";
+    std::filesystem::copy_file(written.file, cut,
+                               std::filesystem::copy_options::overwrite_existing);
     std::filesystem::resize_file(cut, size);
     SeekableRecording recording(cut);
     EXPECT_GE(recording.lastTick(), before);
@@ -188,12 +190,12 @@ TEST(SeekableRecording, AFileThatWasCutAnywhereIsReadAsFarAsItIsWhole) {
 }
 
 TEST(SeekableRecording, AFlippedBitInReadDataIsReported) {
-  const Written made = written("seek_flip", 0, 600, true);
-  std::ifstream stream(made.file, std::ios::binary);
+  const WrittenRecording written = writeRecording("seek_flip", 0, 600, true);
+  std::ifstream stream(written.file, std::ios::binary);
   const std::string bytes{std::istreambuf_iterator<char>(stream), {}};
   const auto read = [&](const std::string& content) {
     std::string text;
-    const auto file = made.file.string() + ".flipped";
+    const auto file = written.file.string() + ".flipped";
     std::ofstream(file, std::ios::binary)
         .write(content.data(), static_cast<std::streamsize>(content.size()));
     SeekableRecording recording(file);

@@ -22,11 +22,11 @@ constexpr const char* kTour = R"({"spawn":"ann","at":[1,0,0]}
 )";
 
 /// Serves a world as the real server does, and logs the requested images.
-struct ServedWorld {
+struct FakeServer {
   FakeWorld world;
-  std::vector<std::string> framesAskedFor;
+  std::vector<std::string> requestedFrames;
   v1::Subscribe subscription;
-  bool lockstepAsked = false;
+  bool lockstepRequested = false;
   bool stranger = false;  ///< another client's avatar is active, too
 
   void serve(TestConnection& connection) {
@@ -51,7 +51,7 @@ struct ServedWorld {
     } else if (request.has_frame()) {
       frame(request.frame(), reply);
     } else if (request.has_set_clock()) {
-      lockstepAsked = request.set_clock().has_lockstep();
+      lockstepRequested = request.set_clock().has_lockstep();
       reply.mutable_set_clock();
     } else {
       subscription = request.subscribe();
@@ -90,7 +90,7 @@ struct ServedWorld {
   }
 
   void frame(const v1::FrameRequest& request, v1::ServerMessage& reply) {
-    framesAskedFor.push_back(request.eyes().avatar() + " " + std::to_string(request.tick()));
+    requestedFrames.push_back(request.eyes().avatar() + " " + std::to_string(request.tick()));
     if (request.tick() != world.tick()) {
       reply.mutable_error()->set_code(v1::ERROR_TICK_GONE);
     } else if (request.eyes().avatar() == "stuck") {
@@ -113,23 +113,23 @@ TEST(SocketDriver, AScriptRunsAsItDoesInProcess) {
           framesInProcess.push_back(frame.avatar + " " + std::to_string(outcome.tick));
         }
       });
-  ServedWorld served;
+  FakeServer fake;
   ScriptResult there;
   {
-    const TestServer server([&](TestConnection& connection) { served.serve(connection); });
+    const TestServer server([&](TestConnection& connection) { fake.serve(connection); });
     Client client("127.0.0.1", server.port());
     SocketDriver driver(client);
     there = runScript(script, driver, [](StepOutcome& outcome, const ScriptProgress&) {
       EXPECT_FALSE(outcome.avatars.empty());
     });
   }
-  EXPECT_EQ(served.world.diary(), inProcess.diary());
+  EXPECT_EQ(fake.world.diary(), inProcess.diary());
   EXPECT_EQ(there.stateHash, here.stateHash);
   EXPECT_EQ(there.ticks, here.ticks);
   EXPECT_EQ(there.refused, 1u);
   EXPECT_EQ(there.blocked, here.blocked);
   EXPECT_EQ(there.arrived, here.arrived);
-  EXPECT_EQ(served.framesAskedFor, framesInProcess);
+  EXPECT_EQ(fake.requestedFrames, framesInProcess);
   EXPECT_EQ(framesInProcess.size(), 3u);
   EXPECT_EQ(there.captured, 2u);
   EXPECT_EQ(there.uncaptured, 1u);
@@ -137,22 +137,22 @@ TEST(SocketDriver, AScriptRunsAsItDoesInProcess) {
 }
 
 TEST(SocketDriver, SetsTheClockAndSubscribes) {
-  ServedWorld served;
+  FakeServer fake;
   {
-    const TestServer server([&](TestConnection& connection) { served.serve(connection); });
+    const TestServer server([&](TestConnection& connection) { fake.serve(connection); });
     Client client("127.0.0.1", server.port());
     const SocketDriver driver(client);
     EXPECT_DOUBLE_EQ(driver.tickSeconds(), 1.0 / 60.0);
   }
-  EXPECT_TRUE(served.lockstepAsked);
-  EXPECT_TRUE(served.subscription.contacts());
-  EXPECT_TRUE(served.subscription.notices());
+  EXPECT_TRUE(fake.lockstepRequested);
+  EXPECT_TRUE(fake.subscription.contacts());
+  EXPECT_TRUE(fake.subscription.notices());
 }
 
 TEST(SocketDriver, NoticesOfOtherClientsAvatarsAreIgnored) {
-  ServedWorld served;
-  served.stranger = true;
-  const TestServer server([&](TestConnection& connection) { served.serve(connection); });
+  FakeServer fake;
+  fake.stranger = true;
+  const TestServer server([&](TestConnection& connection) { fake.serve(connection); });
   Client client("127.0.0.1", server.port());
   SocketDriver driver(client);
   const Script script = parseScript(R"({"spawn":"ann","at":[1,0,0]})", "tour.jsonl");

@@ -5,32 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <set>
 
 #include "render/image/image.hpp"
 #include "tests/render/render_fixtures.hpp"
 
 namespace enfilade::render {
 namespace {
-
-TEST(GlRenderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
-  // The box's face is 2 m square, 4 m ahead; the image is 8 m wide there: the middle 50 pixels of
-  // 200.
-  GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
-  const Frame frame = renderer.render({}, squareCamera());
-  for (int y = 0; y < 200; ++y) {
-    for (int x = 0; x < 200; ++x) {
-      const bool inside = x >= 75 && x < 125 && y >= 75 && y < 125;
-      ASSERT_EQ(frame.ids[at(frame, x, y)], inside ? 1u : 0u) << x << ' ' << y;
-      const float depth = frame.depth[at(frame, x, y)];
-      if (inside) {
-        ASSERT_NEAR(depth, 4, 4e-4);
-      } else {
-        ASSERT_TRUE(std::isnan(depth));
-      }
-    }
-  }
-}
 
 TEST(GlRenderer, DepthIsTrueToRelative1e4NearAndFarInBothProjections) {
   for (const double distance : {0.06, 0.5, 3.0, 40.0, 900.0}) {
@@ -72,27 +52,6 @@ TEST(GlRenderer, AMirroredObjectLooksLikeItsOriginal) {
   EXPECT_EQ(a.ids, b.ids);
   EXPECT_GT(std::count(a.ids.begin(), a.ids.end(), 1u), 100);
   for (std::size_t i = 0; i < a.rgb.size(); ++i) ASSERT_NEAR(a.rgb[i], b.rgb[i], 3) << i;
-}
-
-TEST(GlRenderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
-  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
-  const PlacedBox pane{{0, 0, -3}, {1, 1, 0.1}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
-  GlRenderer renderer(sceneOf({pane, wall}));
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
-  const std::size_t through = at(frame, 100, 100), nextTo = at(frame, 20, 100);
-  EXPECT_NEAR(frame.depth[through], 5, 5e-4);
-  EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * nextTo]);
-  EXPECT_GT(frame.rgb[3 * through + 2], frame.rgb[3 * through] + 30);
-  EXPECT_NEAR(frame.rgb[3 * nextTo], frame.rgb[3 * nextTo + 2], 25);
-}
-
-TEST(GlRenderer, GlassBehindAWallIsNotSeen) {
-  const PlacedBox wall{{0, 0, -3}, {20, 20, 1}, {}};
-  const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, coloured(0.9f, 0.0f, 0.0f, 0.5f)};
-  GlRenderer with(sceneOf({wall, pane}));
-  GlRenderer without(sceneOf({wall}));
-  EXPECT_EQ(with.render({}, squareCamera()).rgb, without.render({}, squareCamera()).rgb);
 }
 
 TEST(GlRenderer, SolidGlassIsAFirstHitInAllChannels) {
@@ -197,37 +156,6 @@ TEST(GlRenderer, ADeviceThatIsNotThereIsRefusedWithAllThatWereTried) {
   }
 }
 
-TEST(GlRenderer, AMaskCutsHolesIntoColourIdsAndDepth) {
-  GlRenderer renderer(maskedSquare());
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(frame.ids[at(frame, 60, 100)], 1u);
-  EXPECT_EQ(frame.ids[at(frame, 140, 100)], 0u);
-  EXPECT_TRUE(std::isnan(frame.depth[at(frame, 140, 100)]));
-}
-
-TEST(GlRenderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
-  GlRenderer renderer(sceneOf({{{0, 0, -20}, {60, 60, 1}, {}}}));
-  scene::Snapshot snapshot;
-  snapshot.tick = 42;
-  snapshot.avatars = {avatarAt(2, {-1, -1, -4}), avatarAt(3, {1, -1, -4})};
-  const Frame both = renderer.render(snapshot, squareCamera());
-  EXPECT_EQ(both.tick, 42u);
-  EXPECT_EQ(idsIn(both), (std::set<std::uint32_t>{1, 2, 3}));
-  EXPECT_EQ(both.ids[at(both, 75, 100)], 2u);
-  EXPECT_EQ(both.ids[at(both, 125, 100)], 3u);
-  EXPECT_NEAR(both.depth[at(both, 75, 100)], 3.7, 1e-3);
-  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), {.hiddenEntity = 2})),
-            (std::set<std::uint32_t>{1, 3}));
-}
-
-TEST(GlRenderer, AnEmptySceneIsSkyAndNothingElse) {
-  GlRenderer renderer(std::make_shared<const scene::Scene>(scene::Model{}));
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{0}));
-  EXPECT_GT(frame.rgb[2], 100);
-  EXPECT_EQ(frame.rgb.size(), 200u * 200u * 3u);
-}
-
 TEST(GlRenderer, TheSamePictureHasTheSameBytesInEveryRenderer) {
   const auto scene = sceneOf(crowd(300));
   scene::Snapshot snapshot;
@@ -276,14 +204,6 @@ TEST(GlRenderer, ProjectAgreesWithThePictureOfIds) {
     }
   }
   EXPECT_GT(seen, 60);
-}
-
-TEST(GlRenderer, ARefusedCameraIsAnErrorAndTheNextPictureIsFine) {
-  GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
-  Camera bad = squareCamera();
-  bad.far = std::nan("");
-  EXPECT_THROW(renderer.render({}, bad), RenderError);
-  EXPECT_EQ(idsIn(renderer.render({}, squareCamera())), (std::set<std::uint32_t>{0, 1}));
 }
 
 TEST(GlRenderer, SizesMayChangeFromPictureToPicture) {

@@ -6,20 +6,13 @@
 #include <vector>
 
 #include "render/gl/gl_renderer.hpp"
+#include "scene/model/box_mesh.hpp"
 
 namespace enfilade::render {
 
 /// A box from -1/2 to 1/2 on each axis, eight corners, no normals.
 inline scene::Mesh unitCube() {
-  scene::Mesh mesh;
-  mesh.name = "cube";
-  for (int i = 0; i < 8; ++i) {
-    mesh.positions.emplace_back((i & 1) != 0 ? 0.5f : -0.5f, (i & 2) != 0 ? 0.5f : -0.5f,
-                                (i & 4) != 0 ? 0.5f : -0.5f);
-  }
-  mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
-                  2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
-  return mesh;
+  return scene::makeBoxMesh({Vec3::Constant(-0.5), Vec3::Constant(0.5)});
 }
 
 struct PlacedBox {

@@ -80,23 +80,6 @@ Agreement compareWithBruteForce(const std::shared_ptr<const scene::Scene>& scene
   return result;
 }
 
-TEST(RayRenderer, ABoxIsSeenExactlyWhereItsGeometrySays) {
-  RayRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
-  const Frame frame = renderer.render({}, squareCamera());
-  for (int y = 0; y < 200; ++y) {
-    for (int x = 0; x < 200; ++x) {
-      const bool inside = x >= 75 && x < 125 && y >= 75 && y < 125;
-      ASSERT_EQ(frame.ids[at(frame, x, y)], inside ? 1u : 0u) << x << ' ' << y;
-      const float depth = frame.depth[at(frame, x, y)];
-      if (inside) {
-        ASSERT_EQ(depth, 4);
-      } else {
-        ASSERT_TRUE(std::isnan(depth));
-      }
-    }
-  }
-}
-
 TEST(RayRenderer, DepthAndIdsAreThoseOfABruteForceSearchInDoubles) {
   const auto scene = sceneOf(opaque(crowd(150)));
   const auto cameras = camerasAround(Vec3::Zero(), 12, 67, 41);
@@ -114,24 +97,6 @@ TEST(RayRenderer, DepthIsAsTrueAKilometreFromTheOriginOfTheScene) {
   const Agreement found = compareWithBruteForce(sceneOf(boxes), camerasAround(far, 6, 67, 41));
   EXPECT_GT(found.hits, 6u * 67u * 41u / 4);
   EXPECT_LT(found.worst, 1e-5);
-}
-
-TEST(RayRenderer, GlassTintsTheColourAndLetsIdsAndDepthThrough) {
-  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
-  const PlacedBox pane{{0, 0, -3}, {1, 1, 0.1}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
-  RayRenderer renderer(sceneOf({pane, wall}));
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
-  const std::size_t through = at(frame, 100, 100), nextTo = at(frame, 20, 100);
-  EXPECT_EQ(frame.depth[through], 5);
-  EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * nextTo]);
-  EXPECT_GT(frame.rgb[3 * through + 2], frame.rgb[3 * through] + 30);
-  FrameOptions solid;
-  solid.transparency = TransparencyMode::opaque;
-  const Frame first = renderer.render({}, squareCamera(), solid);
-  EXPECT_EQ(first.ids[through], 1u);
-  EXPECT_NEAR(first.depth[through], 2.95, 1e-6);
-  EXPECT_EQ(first.ids[nextTo], 2u);
 }
 
 TEST(RayRenderer, APaneSeenSquarelyIsTintedOnceAlongItsDiagonalToo) {
@@ -170,44 +135,6 @@ TEST(RayRenderer, AFlatBodyIsVisible) {
   RayRenderer renderer(scene);
   const Frame frame = renderer.render(snapshotOfLift(*scene, 0), squareCamera());
   EXPECT_TRUE(idsIn(frame).contains(object + 1));
-}
-
-TEST(RayRenderer, GlassBehindAWallIsNotSeen) {
-  const PlacedBox wall{{0, 0, -3}, {20, 20, 1}, {}};
-  const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, coloured(0.9f, 0.0f, 0.0f, 0.5f)};
-  RayRenderer with(sceneOf({wall, pane}));
-  RayRenderer without(sceneOf({wall}));
-  EXPECT_EQ(with.render({}, squareCamera()).rgb, without.render({}, squareCamera()).rgb);
-}
-
-TEST(RayRenderer, AMaskCutsHolesIntoColourIdsAndDepth) {
-  RayRenderer renderer(maskedSquare());
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(frame.ids[at(frame, 60, 100)], 1u);
-  EXPECT_EQ(frame.ids[at(frame, 140, 100)], 0u);
-  EXPECT_TRUE(std::isnan(frame.depth[at(frame, 140, 100)]));
-}
-
-TEST(RayRenderer, AHiddenAvatarIsNotDrawnAndOthersAre) {
-  RayRenderer renderer(sceneOf({{{0, 0, -20}, {60, 60, 1}, {}}}));
-  scene::Snapshot snapshot;
-  snapshot.tick = 42;
-  snapshot.avatars = {avatarAt(2, {-1, -1, -4}), avatarAt(3, {1, -1, -4})};
-  const Frame both = renderer.render(snapshot, squareCamera());
-  EXPECT_EQ(both.tick, 42u);
-  EXPECT_EQ(idsIn(both), (std::set<std::uint32_t>{1, 2, 3}));
-  EXPECT_EQ(both.ids[at(both, 75, 100)], 2u);
-  EXPECT_NEAR(both.depth[at(both, 75, 100)], 3.7, 1e-6);
-  FrameOptions eyes;
-  eyes.hiddenEntity = 2;
-  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), eyes)),
-            (std::set<std::uint32_t>{1, 3}));
-  snapshot.avatars.front().footPosition.x() = 1;
-  snapshot.avatars.back().footPosition.x() = -1;
-  const Frame moved = renderer.render(snapshot, squareCamera());
-  EXPECT_EQ(moved.ids[at(moved, 75, 100)], 3u);
-  snapshot.avatars.clear();
-  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera())), (std::set<std::uint32_t>{1}));
 }
 
 TEST(RayRenderer, ABodyIsSeenWhereTheSnapshotHasIt) {
@@ -282,15 +209,9 @@ TEST(RayRenderer, NearAndFarCutAsInEveryPicture) {
   EXPECT_EQ(idsIn(renderer.render({}, camera)), (std::set<std::uint32_t>{0}));
 }
 
-TEST(RayRenderer, AnEmptySceneIsSkyAndARefusedCameraAnError) {
+TEST(RayRenderer, NamesEmbreeInItsFrames) {
   RayRenderer renderer(std::make_shared<const scene::Scene>(scene::Model{}));
-  Camera camera = squareCamera();
-  const Frame frame = renderer.render({}, camera);
-  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{0}));
-  EXPECT_GT(frame.rgb[2], 100);
-  EXPECT_EQ(frame.renderer.rfind("Embree ", 0), 0u);
-  camera.far = std::nan("");
-  EXPECT_THROW(renderer.render({}, camera), RenderError);
+  EXPECT_TRUE(renderer.render({}, squareCamera(8)).renderer.starts_with("Embree "));
 }
 
 TEST(RayRenderer, IdsEqualThoseOfOpenGlExceptAtEdges) {

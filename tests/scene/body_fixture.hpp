@@ -10,6 +10,7 @@
 #include "scene/world/data/world_data.hpp"
 #include "scene/world/world.hpp"
 #include "tests/scene/box_scene.hpp"
+#include "tests/scene/world_controls.hpp"
 
 namespace enfilade::scene::testing {
 
@@ -54,14 +55,10 @@ inline std::string whoPenetrates(const World& world) {
   return found;
 }
 
-struct BodyFixture {
+struct BodyFixture : WorldControls<BodyFixture> {
   explicit BodyFixture(Model model, const WorldSettings& lengths = {})
       : world(std::make_shared<const Scene>(std::move(model)), lengths) {}
 
-  void order(const std::string& name, Order o) {
-    const auto why = submitAvatarCommand(world, {name, std::move(o), 0});
-    ASSERT_FALSE(why) << *why;
-  }
   void submit(BodyCommand command) {
     const auto why = submitBodyCommand(world, std::move(command));
     ASSERT_FALSE(why) << *why;
@@ -71,14 +68,6 @@ struct BodyFixture {
     EXPECT_EQ(report.maxPenetration, 0) << "tick " << report.snapshot->tick;
     events.insert(events.end(), report.contacts.begin(), report.contacts.end());
     return report;
-  }
-  void ticks(int count) {
-    for (int i = 0; i < count; ++i) step();
-  }
-  void untilIdle() {
-    for (int i = 0; i < 3600; ++i)
-      if (step().idle) return;
-    FAIL() << "not idle after a minute";
   }
   Vec3 feet(const std::string& name) const {
     return world.data().findAvatarByName(name)->footPosition;

@@ -5,6 +5,7 @@
 #include <string>
 #include <vector>
 
+#include "scene/model/box_mesh.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::scene::testing {
@@ -24,11 +25,7 @@ inline std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
 
 /// Twelve triangles, wound outward.
 inline Mesh boxMesh(const Vec3& min, const Vec3& max) {
-  Mesh mesh;
-  for (const Vec3& corner : boxPoints(min, max)) mesh.positions.push_back(corner.cast<float>());
-  mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
-                  2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
-  return mesh;
+  return makeBoxMesh({min, max});
 }
 
 inline Model boxModel(const std::vector<NamedBox>& boxes) {

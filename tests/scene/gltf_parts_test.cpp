@@ -1,4 +1,4 @@
-// Which parts of a glTF file are read: one of its scenes, and the meshes that can be read.
+// The parts of a glTF file that are read: one of its scenes, and the meshes that can be read.
 #include <gtest/gtest.h>
 
 #include <cstring>

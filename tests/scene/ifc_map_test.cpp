@@ -43,7 +43,7 @@ TEST(IfcMap, OnRequestCoordinatesAreThoseOfTheMap) {
   }
 }
 
-/// Where the origin of a house with these statements lies on its map.
+/// The place on its map of the origin of a house with these statements.
 Vec3 findOriginOnMap(const std::string& more, const std::string& schema,
                      std::string* crs = nullptr) {
   const TemporaryFolder folder;

@@ -1,4 +1,4 @@
-// What an import reports: its diagnostics, or its error.
+// The report of an import: its diagnostics, or its error.
 #pragma once
 
 #include <filesystem>

@@ -27,7 +27,7 @@ std::vector<NamedBox> twoRooms(double gap) {
           {"wall/right", {3.9, 0, 0.5 * gap}, {4.1, kWall, 3}}};
 }
 
-/// What an avatar that walks the path reports at the end.
+/// The report at the end of an avatar that walks the path.
 Notice walkPath(World& world, const NavigationPath& path, const NavigationAgent& agent) {
   Spawn spawn;
   spawn.position = path.points.front();

@@ -9,29 +9,17 @@
 
 #include "scene/world/world.hpp"
 #include "tests/scene/box_scene.hpp"
+#include "tests/scene/world_controls.hpp"
 
 namespace enfilade::scene::testing {
 
 /// A world and all events that its ticks reported.
-struct WorldFixture {
+struct WorldFixture : WorldControls<WorldFixture> {
   explicit WorldFixture(const std::vector<NamedBox>& boxes, const WorldSettings& lengths = {})
       : WorldFixture(boxScene(boxes), lengths) {}
   explicit WorldFixture(std::shared_ptr<const Scene> scene, const WorldSettings& lengths = {})
       : world(std::move(scene), lengths) {}
 
-  void order(const std::string& name, Order o) {
-    const auto why = submitAvatarCommand(world, {name, std::move(o), 0});
-    ASSERT_FALSE(why) << *why;
-  }
-  void ticks(int count) {
-    for (int i = 0; i < count; ++i) step();
-  }
-  /// Steps until every queue is empty; fails after a simulated minute.
-  void untilIdle() {
-    for (int i = 0; i < 3600; ++i)
-      if (step().idle) return;
-    FAIL() << "not idle after a minute";
-  }
   TickReport step() {
     TickReport report = tickWorld(world);
     worstPenetration = std::max(worstPenetration, report.maxPenetration);

@@ -22,9 +22,9 @@ v1::BodyCommand opening(const std::string& body) {
 }
 
 /// The event of this kind between these two; null if none was received.
-const v1::ContactEvent* eventOf(const Heard& heard, v1::ContactEvent::Kind kind,
+const v1::ContactEvent* eventOf(const ReceivedEvents& received, v1::ContactEvent::Kind kind,
                                 const std::string& a, const std::string& b) {
-  for (const v1::ContactEvent& event : heard.contacts)
+  for (const v1::ContactEvent& event : received.contacts)
     if (event.kind() == kind && event.a_name() == a && event.b_name() == b) return &event;
   return nullptr;
 }
@@ -60,9 +60,9 @@ TEST_F(ServedBodies, AnOpeningDoorPushesAnAvatarAndReportsIt) {
   ann.step(90);
   guest.metrics();  // all events of the steps arrive before its reply
   const auto messages = guest.takeEvents();
-  Heard heard;
-  heard.add(messages);
-  EXPECT_NE(eventOf(heard, v1::ContactEvent::KIND_BEGIN, "ann", "door"), nullptr);
+  ReceivedEvents received;
+  received.add(messages);
+  EXPECT_NE(eventOf(received, v1::ContactEvent::KIND_BEGIN, "ann", "door"), nullptr);
   const auto door = stateOf(messages, "door");
   ASSERT_TRUE(door);
   EXPECT_EQ(door->id(), kLeaf);
@@ -93,9 +93,10 @@ TEST_F(ServedBodies, AnAvatarWithoutRoomBlocksTheDoorAndIsReported) {
   ann.step(120);
   ann.metrics();
   const auto messages = ann.takeEvents();
-  Heard heard;
-  heard.add(messages);
-  const v1::ContactEvent* blocked = eventOf(heard, v1::ContactEvent::KIND_BLOCKED, "door", "ann");
+  ReceivedEvents received;
+  received.add(messages);
+  const v1::ContactEvent* blocked =
+      eventOf(received, v1::ContactEvent::KIND_BLOCKED, "door", "ann");
   const auto door = stateOf(messages, "door");
   ASSERT_TRUE(door);
   ASSERT_NE(blocked, nullptr) << door->coordinate();
@@ -114,10 +115,10 @@ TEST_F(ServedBodies, AnAvatarThroughATriggerEntersAndLeavesIt) {
   ASSERT_FALSE(ann.command(walkTo("ann", -1, 0, 0)));
   ann.step(300);
   guest.metrics();
-  Heard heard;
-  heard.add(guest.takeEvents());
-  const auto* enters = eventOf(heard, v1::ContactEvent::KIND_ENTER, "ann", "zone");
-  const auto* leaves = eventOf(heard, v1::ContactEvent::KIND_LEAVE, "ann", "zone");
+  ReceivedEvents received;
+  received.add(guest.takeEvents());
+  const auto* enters = eventOf(received, v1::ContactEvent::KIND_ENTER, "ann", "zone");
+  const auto* leaves = eventOf(received, v1::ContactEvent::KIND_LEAVE, "ann", "zone");
   ASSERT_NE(enters, nullptr);
   ASSERT_NE(leaves, nullptr);
   EXPECT_EQ(enters->b(), kZone);
@@ -132,10 +133,10 @@ TEST_F(ServedBodies, ABodyThatFallsOutOfTheWorldIsReportedOnce) {
   ann.subscribe(everything());
   for (int i = 0; i < 4; ++i) ann.step(150);
   ann.metrics();
-  Heard heard;
-  heard.add(ann.takeEvents());
-  ASSERT_EQ(heard.count(v1::ContactEvent::KIND_LEFT_WORLD), 1u);
-  const auto* left = eventOf(heard, v1::ContactEvent::KIND_LEFT_WORLD, "crate", "");
+  ReceivedEvents received;
+  received.add(ann.takeEvents());
+  ASSERT_EQ(received.count(v1::ContactEvent::KIND_LEFT_WORLD), 1u);
+  const auto* left = eventOf(received, v1::ContactEvent::KIND_LEFT_WORLD, "crate", "");
   ASSERT_NE(left, nullptr);
   EXPECT_EQ(left->a(), kCrate);
   EXPECT_EQ(left->b(), 0u);

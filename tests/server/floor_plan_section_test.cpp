@@ -1,4 +1,5 @@
 #include "server/plans/floor_plan_section.hpp"
+#include "scene/model/box_mesh.hpp"
 
 #include <gtest/gtest.h>
 
@@ -10,12 +11,8 @@ using collision::Vec3;
 /// A column, 1 m square and 3 m high at (5, 0, 5), and a wall of one face along x from 0 to 4 m, 2
 /// m high.
 scene::Model columnAndSheet() {
-  scene::Mesh column, sheet;
-  for (int i = 0; i < 8; ++i)
-    column.positions.emplace_back((i & 1) != 0 ? 5.5f : 4.5f, (i & 2) != 0 ? 3.0f : 0.0f,
-                                  (i & 4) != 0 ? 5.5f : 4.5f);
-  column.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
-                    2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
+  const scene::Mesh column = scene::makeBoxMesh({{4.5, 0, 4.5}, {5.5, 3, 5.5}});
+  scene::Mesh sheet;
   sheet.positions = {{0, 0, 0}, {4, 0, 0}, {4, 2, 0}, {0, 2, 0}};
   sheet.indices = {0, 1, 2, 0, 2, 3};
   scene::Model model;

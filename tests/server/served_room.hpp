@@ -81,7 +81,7 @@ inline v1::Subscribe everything() {
 }
 
 /// All contact events and notices among the received messages.
-struct Heard {
+struct ReceivedEvents {
   std::vector<v1::ContactEvent> contacts;
   std::vector<v1::Notice> notices;
 

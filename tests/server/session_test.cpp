@@ -149,22 +149,22 @@ TEST_F(Sessions, TwoClientsHearTheSameContacts) {
   ann.subscribe(everything());
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   ASSERT_FALSE(ann.command(walkTo("ann", 8, 0, 0)));
-  Heard annHeard, bobHeard;
+  ReceivedEvents annEvents, bobEvents;
   for (int i = 0; i < 400; ++i) {
     ann.step();
-    annHeard.add(ann.takeEvents());
+    annEvents.add(ann.takeEvents());
   }
   bob.metrics();
-  bobHeard.add(bob.takeEvents());
-  ASSERT_GE(annHeard.count(v1::ContactEvent::KIND_BEGIN), 2u) << "the floor and the wall";
-  ASSERT_EQ(annHeard.contacts.size(), bobHeard.contacts.size());
-  for (std::size_t i = 0; i < annHeard.contacts.size(); ++i) {
-    EXPECT_EQ(annHeard.contacts[i].SerializeAsString(), bobHeard.contacts[i].SerializeAsString());
+  bobEvents.add(bob.takeEvents());
+  ASSERT_GE(annEvents.count(v1::ContactEvent::KIND_BEGIN), 2u) << "the floor and the wall";
+  ASSERT_EQ(annEvents.contacts.size(), bobEvents.contacts.size());
+  for (std::size_t i = 0; i < annEvents.contacts.size(); ++i) {
+    EXPECT_EQ(annEvents.contacts[i].SerializeAsString(), bobEvents.contacts[i].SerializeAsString());
   }
   const auto blocked = std::find_if(
-      bobHeard.notices.begin(), bobHeard.notices.end(),
+      bobEvents.notices.begin(), bobEvents.notices.end(),
       [](const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_BLOCKED; });
-  ASSERT_NE(blocked, bobHeard.notices.end());
+  ASSERT_NE(blocked, bobEvents.notices.end());
   EXPECT_EQ(blocked->obstacle_name(), "room_wall");
 }
 
@@ -241,22 +241,23 @@ TEST_F(Sessions, AVanishedClientsAvatarLeavesAndItsContactsEnd) {
   serve();
   protocol::Client bob = client("bob");
   bob.subscribe(everything());
-  Heard heard;
+  ReceivedEvents received;
   {
     protocol::Client ann = client("ann");
     ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
     ASSERT_FALSE(ann.command(walkTo("ann", 9, 0, 6)));
     bob.step(30);
-    heard.add(bob.takeEvents());
-    ASSERT_GE(heard.count(v1::ContactEvent::KIND_BEGIN), 1u);
+    received.add(bob.takeEvents());
+    ASSERT_GE(received.count(v1::ContactEvent::KIND_BEGIN), 1u);
   }
   EXPECT_TRUE(becomesTrue([&] {
     const bool gone = bob.step(1, true).avatars().empty();
-    heard.add(bob.takeEvents());
+    received.add(bob.takeEvents());
     return gone;
   }));
-  EXPECT_EQ(heard.count(v1::ContactEvent::KIND_BEGIN), heard.count(v1::ContactEvent::KIND_END));
-  EXPECT_EQ(heard.contacts.back().reason(), v1::ContactEvent::REASON_LEFT);
+  EXPECT_EQ(received.count(v1::ContactEvent::KIND_BEGIN),
+            received.count(v1::ContactEvent::KIND_END));
+  EXPECT_EQ(received.contacts.back().reason(), v1::ContactEvent::REASON_LEFT);
 }
 
 TEST_F(Sessions, ALateSubscriberGetsTheActiveContacts) {
@@ -333,9 +334,9 @@ TEST_F(Sessions, AContactPersistsInEachTickBetweenBeginAndEnd) {
     const std::uint64_t tick = ann.step().tick();
     const auto messages = ann.takeEvents();
     followed.add(messages, tick);
-    Heard heard;
-    heard.add(messages);
-    for (const v1::ContactEvent& event : heard.contacts) {
+    ReceivedEvents received;
+    received.add(messages);
+    for (const v1::ContactEvent& event : received.contacts) {
       if (event.kind() == v1::ContactEvent::KIND_PERSIST) expectAsItIsNow(ann, event);
       if (event.b() == kWall && event.kind() != v1::ContactEvent::KIND_BLOCKED)
         wall.push_back(event);
@@ -358,26 +359,26 @@ TEST_F(Sessions, PersistsReachOnlySubscribers) {
   EXPECT_EQ(cy.subscribe(withPersists({})).live_size(), 0);
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   ann.step(60);
-  Heard annHeard, bobHeard, cyHeard;
-  annHeard.add(ann.takeEvents());
+  ReceivedEvents annEvents, bobEvents, cyEvents;
+  annEvents.add(ann.takeEvents());
   bob.metrics();
-  bobHeard.add(bob.takeEvents());
+  bobEvents.add(bob.takeEvents());
   cy.metrics();
   const auto messages = cy.takeEvents();
-  cyHeard.add(messages);
-  const std::size_t persists = annHeard.count(v1::ContactEvent::KIND_PERSIST);
+  cyEvents.add(messages);
+  const std::size_t persists = annEvents.count(v1::ContactEvent::KIND_PERSIST);
   EXPECT_GT(persists, 30u) << "the floor";
-  EXPECT_EQ(bobHeard.count(v1::ContactEvent::KIND_PERSIST), 0u);
-  EXPECT_EQ(bobHeard.contacts.size() + persists, annHeard.contacts.size());
-  EXPECT_EQ(cyHeard.contacts.size(), persists) << "and nothing else";
-  EXPECT_EQ(cyHeard.count(v1::ContactEvent::KIND_PERSIST), persists);
+  EXPECT_EQ(bobEvents.count(v1::ContactEvent::KIND_PERSIST), 0u);
+  EXPECT_EQ(bobEvents.contacts.size() + persists, annEvents.contacts.size());
+  EXPECT_EQ(cyEvents.contacts.size(), persists) << "and nothing else";
+  EXPECT_EQ(cyEvents.count(v1::ContactEvent::KIND_PERSIST), persists);
   EXPECT_EQ(messages.size(), persists) << "no tick without one";
   for (std::size_t i = 0; i < messages.size(); ++i)
     EXPECT_EQ(messages[i].events().sequence(), i + 1);
   EXPECT_EQ(bob.subscribe(withPersists(everything())).live_size(), 1);
   ann.subscribe(everything());
   ann.step(3);
-  Heard annThen, bobThen;
+  ReceivedEvents annThen, bobThen;
   annThen.add(ann.takeEvents());
   bob.metrics();
   bobThen.add(bob.takeEvents());
@@ -514,10 +515,10 @@ TEST_F(Sessions, OrdersDroppedByADriveAreReportedWithTagAndReason) {
   for (const v1::Command& command : {walk, wait, drive}) ASSERT_FALSE(ann.command(command));
   ann.takeEvents();
   ann.step(1);
-  Heard heard;
-  heard.add(ann.takeEvents());
+  ReceivedEvents received;
+  received.add(ann.takeEvents());
   std::vector<std::uint64_t> dropped;
-  for (const v1::Notice& notice : heard.notices) {
+  for (const v1::Notice& notice : received.notices) {
     ASSERT_EQ(notice.kind(), v1::Notice::KIND_DROPPED) << notice.text();
     EXPECT_NE(notice.text().find("Drive"), std::string::npos) << notice.text();
     dropped.push_back(notice.tag());
@@ -648,22 +649,23 @@ TEST_F(Sessions, AtShutdownContactsEndAndClientsGetBye) {
   ann.subscribe(everything());
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   ann.step(60);
-  Heard heard;
-  heard.add(ann.takeEvents());
+  ReceivedEvents received;
+  received.add(ann.takeEvents());
   std::thread stopping([&] { server_->stop(); });
   bool ended = false;
   while (!ended) {
     const auto message = ann.nextEvent(std::chrono::seconds(10));
     ASSERT_TRUE(message);
-    heard.add({*message});
+    received.add({*message});
     ended = message->has_bye();
     if (ended) {
       EXPECT_EQ(message->bye().code(), v1::ERROR_SHUTTING_DOWN);
     }
   }
-  EXPECT_EQ(heard.contacts.back().kind(), v1::ContactEvent::KIND_END);
-  EXPECT_EQ(heard.contacts.back().reason(), v1::ContactEvent::REASON_SHUTDOWN);
-  EXPECT_EQ(heard.count(v1::ContactEvent::KIND_BEGIN), heard.count(v1::ContactEvent::KIND_END));
+  EXPECT_EQ(received.contacts.back().kind(), v1::ContactEvent::KIND_END);
+  EXPECT_EQ(received.contacts.back().reason(), v1::ContactEvent::REASON_SHUTDOWN);
+  EXPECT_EQ(received.count(v1::ContactEvent::KIND_BEGIN),
+            received.count(v1::ContactEvent::KIND_END));
   stopping.join();
 }
 

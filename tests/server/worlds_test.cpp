@@ -171,18 +171,18 @@ TEST_F(HostedWorlds, ClientsOfADroppedWorldAreNotifiedAndTheirContactsEnd) {
   ASSERT_FALSE(bob.command(spawn("bob", 0, 0.001, 0)));
   bob.step(10);
   drop(main, "b");
-  Heard heard;
+  ReceivedEvents received;
   v1::Bye bye;
   while (const auto event = bob.nextEvent(std::chrono::seconds(20))) {
     if (event->has_bye()) {
       bye = event->bye();
       break;
     }
-    heard.add({*event});
+    received.add({*event});
   }
   EXPECT_EQ(bye.code(), v1::ERROR_WORLD_DROPPED);
   EXPECT_EQ(bye.reason(), "the world 'b' was dropped");
-  EXPECT_EQ(heard.count(v1::ContactEvent::KIND_END), 1u);
+  EXPECT_EQ(received.count(v1::ContactEvent::KIND_END), 1u);
   EXPECT_EQ(main.step().tick(), 1u) << "the others go on";
   EXPECT_EQ(codeOf([&] { clientIn("b"); }), v1::ERROR_UNKNOWN_WORLD);
   EXPECT_EQ(create(main, "b").tick(), 0u) << "the name is free";
@@ -231,10 +231,11 @@ TEST_F(HostedWorlds, OneIsDroppedWhileItsPicturesAreDrawn) {
     ASSERT_TRUE(bob.receive().value().has_welcome());
     drop(main, "b");
     std::vector<std::uint64_t> answered;
-    std::optional<v1::ServerMessage> heard;
-    while ((heard = bob.receive()) && !heard->has_bye()) answered.push_back(heard->reply_to());
-    ASSERT_TRUE(heard) << "no last words";
-    EXPECT_EQ(heard->bye().code(), v1::ERROR_WORLD_DROPPED);
+    std::optional<v1::ServerMessage> received;
+    while ((received = bob.receive()) && !received->has_bye())
+      answered.push_back(received->reply_to());
+    ASSERT_TRUE(received) << "no last words";
+    EXPECT_EQ(received->bye().code(), v1::ERROR_WORLD_DROPPED);
     // Each once and in order; the last request that the service took may be lost with the
     // connection.
     for (std::size_t i = 0; i + 1 < answered.size(); ++i) EXPECT_LT(answered[i], answered[i + 1]);

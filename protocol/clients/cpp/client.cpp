@@ -207,11 +207,20 @@ namespace {
 
 /// Throws if the reply has another type than requested.
 void expectBody(const v1::ServerMessage& reply, v1::ServerMessage::BodyCase wanted,
-                const char* name) {
+                const std::string& name) {
   if (reply.body_case() != wanted) {
-    throw ProtocolError(v1::ERROR_BAD_MESSAGE, std::string("the server's reply is not a ") + name +
-                                                   "; do the versions match?");
+    throw ProtocolError(v1::ERROR_BAD_MESSAGE,
+                        "the server's reply is not a " + name + "; do the versions match?");
   }
+}
+
+/// Sends a request and returns the body of its reply.
+template <class Reply>
+Reply requestBody(Client& client, v1::ClientMessage message, v1::ServerMessage::BodyCase wanted,
+                  Reply* (v1::ServerMessage::*mutableBody)()) {
+  v1::ServerMessage reply = client.request(std::move(message));
+  expectBody(reply, wanted, Reply::descriptor()->name());
+  return std::move(*(reply.*mutableBody)());
 }
 
 }  // namespace
@@ -249,41 +258,36 @@ v1::StepReply Client::step(std::uint32_t ticks, bool withAvatars) {
   v1::ClientMessage message;
   message.mutable_step()->set_ticks(ticks);
   message.mutable_step()->set_avatars(withAvatars);
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kStep, "StepReply");
-  return std::move(*reply.mutable_step());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kStep,
+                     &v1::ServerMessage::mutable_step);
 }
 
 v1::SetClockReply Client::setClock(const v1::SetClock& clock) {
   v1::ClientMessage message;
   *message.mutable_set_clock() = clock;
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kSetClock, "SetClockReply");
-  return std::move(*reply.mutable_set_clock());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kSetClock,
+                     &v1::ServerMessage::mutable_set_clock);
 }
 
 v1::SeekReply Client::seek(std::uint64_t tick) {
   v1::ClientMessage message;
   message.mutable_seek()->set_tick(tick);
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kSeek, "SeekReply");
-  return std::move(*reply.mutable_seek());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kSeek,
+                     &v1::ServerMessage::mutable_seek);
 }
 
 v1::TakeOverReply Client::takeOver(const std::string& avatar) {
   v1::ClientMessage message;
   message.mutable_take_over()->set_avatar(avatar);
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kTakeOver, "TakeOverReply");
-  return std::move(*reply.mutable_take_over());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kTakeOver,
+                     &v1::ServerMessage::mutable_take_over);
 }
 
 v1::SubscribeReply Client::subscribe(const v1::Subscribe& subscription) {
   v1::ClientMessage message;
   *message.mutable_subscribe() = subscription;
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kSubscribe, "SubscribeReply");
-  return std::move(*reply.mutable_subscribe());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kSubscribe,
+                     &v1::ServerMessage::mutable_subscribe);
 }
 
 ReceivedFrame Client::frame(const v1::FrameRequest& frameRequest) {
@@ -333,25 +337,22 @@ v1::RayReply Client::rays(const v1::RayQuery& query, ReceivedScan* scan) {
 v1::DistanceReply Client::distances(const v1::DistanceQuery& query) {
   v1::ClientMessage message;
   *message.mutable_distances() = query;
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kDistances, "DistanceReply");
-  return std::move(*reply.mutable_distances());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kDistances,
+                     &v1::ServerMessage::mutable_distances);
 }
 
 v1::TouchingReply Client::touching(const v1::TouchingQuery& query) {
   v1::ClientMessage message;
   *message.mutable_touching() = query;
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kTouching, "TouchingReply");
-  return std::move(*reply.mutable_touching());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kTouching,
+                     &v1::ServerMessage::mutable_touching);
 }
 
 v1::CannotTouchReply Client::cannotTouch(const v1::CannotTouchQuery& query) {
   v1::ClientMessage message;
   *message.mutable_cannot_touch() = query;
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kCannotTouch, "CannotTouchReply");
-  return std::move(*reply.mutable_cannot_touch());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kCannotTouch,
+                     &v1::ServerMessage::mutable_cannot_touch);
 }
 
 std::vector<v1::Entity> Client::describe(std::span<const std::uint32_t> ids) {
@@ -365,9 +366,8 @@ std::vector<v1::Entity> Client::describe(std::span<const std::uint32_t> ids) {
 v1::Metrics Client::metrics() {
   v1::ClientMessage message;
   message.mutable_metrics();
-  v1::ServerMessage reply = request(std::move(message));
-  expectBody(reply, v1::ServerMessage::kMetrics, "Metrics");
-  return std::move(*reply.mutable_metrics());
+  return requestBody(*this, std::move(message), v1::ServerMessage::kMetrics,
+                     &v1::ServerMessage::mutable_metrics);
 }
 
 std::deque<v1::ServerMessage> Client::takeEvents() {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::scene {
 
 Eigen::Matrix3d makeYUpRotation(char up) {
@@ -12,6 +14,7 @@ Eigen::Matrix3d makeYUpRotation(char up) {
 }
 
 double computeMedian(std::vector<double> values) {
+  ENFILADE_ASSERT(!values.empty());
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;

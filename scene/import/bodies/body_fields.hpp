@@ -7,7 +7,7 @@
 
 namespace enfilade::scene {
 
-/// Which keys with a default were given.
+/// Keys with a default that were given.
 struct ExplicitBodyFields {
   bool anchor = false, axis = false;
 };

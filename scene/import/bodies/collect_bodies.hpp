@@ -11,8 +11,8 @@
 
 namespace enfilade::scene {
 
-/// What IFC doors become if the file describes them well enough. Elevators are static with `fixed`,
-/// and otherwise move.
+/// The treatment of IFC doors that the file describes well enough. Elevators are static with
+/// `fixed`, and otherwise move.
 enum class IfcDoors : std::uint8_t {
   movable,  ///< bodies that open
   fixed,    ///< static, as in the file

@@ -1,5 +1,6 @@
 #include "scene/import/bodies/implicit_shapes.hpp"
 
+#include "scene/model/box_mesh.hpp"
 #include "scene/model/rotation.hpp"
 
 namespace enfilade::scene {
@@ -99,19 +100,6 @@ std::optional<Mesh> makeUpright(const Json& shape, bool rounded) {
 }
 
 }  // namespace
-
-Mesh makeBoxMesh(const Aabb& box) {
-  Mesh mesh;
-  for (unsigned i = 0; i < 8; ++i) {
-    mesh.positions.push_back(Vec3((i & 1u) != 0 ? box.max.x() : box.min.x(),
-                                  (i & 2u) != 0 ? box.max.y() : box.min.y(),
-                                  (i & 4u) != 0 ? box.max.z() : box.min.z())
-                                 .cast<float>());
-  }
-  mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
-                  2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
-  return mesh;
-}
 
 std::optional<Mesh> makeImplicitShape(const Json& shape) {
   if (!shape.is_object() || !shape.contains("type") || !shape["type"].is_string())

@@ -12,7 +12,4 @@ namespace enfilade::scene {
 /// invalid. Round shapes are polytopes with their vertices on the surface.
 std::optional<Mesh> makeImplicitShape(const nlohmann::json& shape);
 
-/// A closed mesh of a box, counter-clockwise seen from outside.
-Mesh makeBoxMesh(const Aabb& box);
-
 }  // namespace enfilade::scene

@@ -4,7 +4,7 @@
 #include <map>
 
 #include "scene/import/bodies/body_fields.hpp"
-#include "scene/import/bodies/implicit_shapes.hpp"
+#include "scene/model/box_mesh.hpp"
 #include "scene/model/shapes/collision_geometry.hpp"
 
 namespace enfilade::scene {

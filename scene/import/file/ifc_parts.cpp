@@ -1,7 +1,7 @@
 // Marks each statement with the parts whose shapes refer to it, by depth-first search from the
-// shapes of the products. What no product's shape refers to belongs to all parts, as does what it
-// refers to, except for statements about geometry that a reader finds from the geometry: styles of
-// items, layers, types of products.
+// shapes of the products. A statement that no product's shape refers to belongs to all parts, and
+// so do the statements that it refers to. Statements about geometry that a reader finds from the
+// geometry are excepted: styles of items, layers, types of products.
 #include "scene/import/file/ifc_parts.hpp"
 
 #include <algorithm>
@@ -172,7 +172,7 @@ class IfcDivider {
     });
   }
 
-  /// Where a statement begins and ends in the text, with its semicolon.
+  /// The range of a statement in the text, with its semicolon.
   TextRange locate(const StepStatement& statement) const {
     const std::string_view text = file_.text();
     const auto type = static_cast<std::size_t>(statement.type.data() - text.data());

@@ -22,7 +22,7 @@ std::optional<ModelFormat> detectModelFormat(const std::filesystem::path& file);
 /// Returns the extensions that importModel() accepts, lower case, with the dot.
 std::span<const std::string_view> importableExtensions();
 
-/// What a model file says about its coordinates.
+/// Statements of a model file about its coordinates.
 struct FileMetadata {
   double metresPerUnit = 1;  ///< metres per unit of the file's coordinates
   char up = 'y';

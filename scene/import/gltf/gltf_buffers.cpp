@@ -141,11 +141,11 @@ void GltfBuffers::fail(const std::string& message) const {
 
 void GltfBuffers::spend(std::size_t count, std::size_t bytesEach, const std::string& what) {
   const std::size_t limit = kMaxExpansion * loaded_ + kFreeBytes;
-  if (bytesEach > 0 && count > (limit - std::min(spent_, limit)) / bytesEach)
+  if (bytesEach > 0 && count > (limit - std::min(decoded_, limit)) / bytesEach)
     throw UnreadableGltf(file_.string() + ": " + what + " has " + std::to_string(count) +
                          " elements, more than the file's " + std::to_string(loaded_) +
                          " bytes can contain; export the file again (open)");
-  spent_ += count * bytesEach;
+  decoded_ += count * bytesEach;
 }
 
 const Json& GltfBuffers::getEntry(const char* list, std::size_t index) const {

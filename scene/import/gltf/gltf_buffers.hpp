@@ -83,7 +83,7 @@ class GltfBuffers {
   const nlohmann::json& json_;
   std::map<std::size_t, std::string> buffers_, decodedViews_;
   std::vector<std::string> dependencies_;
-  std::size_t loaded_ = 0, spent_ = 0;  // bytes
+  std::size_t loaded_ = 0, decoded_ = 0;  // bytes
 };
 
 }  // namespace enfilade::scene

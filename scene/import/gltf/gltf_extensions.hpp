@@ -1,5 +1,5 @@
-// Which glTF extensions the import reads, which it may leave out, and which it refuses. Private to
-// the import.
+// The glTF extensions that the import reads, those that it may leave out, and those that it
+// refuses. Private to the import.
 #pragma once
 
 #include <filesystem>

@@ -58,8 +58,8 @@ std::vector<ObjectAttribute> readOwnAttributes(const Json& node) {
   return attributes;
 }
 
-/// What the import needs of a node of the JSON. A file may have a million nodes, so they are read
-/// one by one, and their JSON is not kept.
+/// The data that the import needs of a node of the JSON. A file may have a million nodes, so they
+/// are read one by one, and their JSON is not kept.
 struct PlainNode {
   bool isObject = false, hasChildList = true;
   Eigen::Affine3d parentFromNode = Eigen::Affine3d::Identity();

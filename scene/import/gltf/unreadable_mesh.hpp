@@ -1,4 +1,4 @@
-// What stands in place of a glTF mesh whose data cannot be read. Private to the import.
+// The mesh that replaces a glTF mesh whose data cannot be read. Private to the import.
 #pragma once
 
 #include <nlohmann/json.hpp>

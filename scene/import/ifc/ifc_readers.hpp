@@ -16,7 +16,7 @@ namespace enfilade::scene {
 /// The file and the requested products, in memory shared with the reader processes.
 class IfcInput {
  public:
-  /// What one process of web-ifc reads.
+  /// The products that one process of web-ifc reads.
   struct Part {
     std::vector<std::uint32_t> products;
     int listDescriptor = -1;

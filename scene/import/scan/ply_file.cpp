@@ -66,7 +66,7 @@ class PlyValues {
   BinaryCursor binary_;
 };
 
-/// What the import takes from a vertex, or from a face: colours only.
+/// Values that the import takes from a vertex, or from a face: colours only.
 enum class PlyField : std::uint8_t { x, y, z, nx, ny, nz, red, green, blue, count };
 constexpr std::size_t kPlyFields = static_cast<std::size_t>(PlyField::count);
 using PlyFieldValues = std::array<double, kPlyFields>;

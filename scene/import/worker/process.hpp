@@ -35,7 +35,7 @@ struct ImportRequest {
 /// parent.
 std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& parent);
 
-/// How an import worker ended.
+/// The end of an import worker.
 struct ImportExit {
   enum class Reason : std::uint8_t {
     exited,      ///< closed its pipe and exited; `status` is valid

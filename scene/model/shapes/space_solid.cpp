@@ -28,7 +28,7 @@ GroundPoint toGround(const Vec3& point) {
   return {point.x(), point.z()};
 }
 
-/// Where an edge of a triangle meets a height between its ends.
+/// The point at which an edge of a triangle meets a height between its ends.
 GroundPoint cutEdge(const Vec3& low, const Vec3& high, double height) {
   const double t = (height - low.y()) / (high.y() - low.y());
   return toGround(low) + t * (toGround(high) - toGround(low));

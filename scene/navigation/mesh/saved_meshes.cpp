@@ -24,7 +24,7 @@ std::uint64_t computeMeshChecksum(std::span<const std::uint8_t> bytes) {
   return hash.value();
 }
 
-/// What decides meshes, with the scene.
+/// The sizes that decide meshes, together with the scene.
 std::vector<double> collectSizes(const WorldSettings& settings, const NavigationAgent& agent) {
   return {agent.radius, agent.height, settings.stepHeight, settings.walkableNormalY};
 }

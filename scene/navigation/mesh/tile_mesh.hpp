@@ -10,7 +10,7 @@
 
 namespace enfilade::scene {
 
-/// How much space the polygons keep from obstacles.
+/// The space that the polygons keep from obstacles.
 enum class Clearance : std::uint8_t {
   ample,   ///< at least the agent's radius: nearly all paths can be walked
   scarce,  ///< less than it: contains the paths that can be walked, and some that cannot

@@ -1,5 +1,8 @@
 #include "scene/world/avatars/avatar_islands.hpp"
 
+#include <algorithm>
+
+#include "collision/assert.hpp"
 #include "scene/physics/disjoint_sets.hpp"
 
 namespace enfilade::scene {
@@ -33,6 +36,8 @@ AvatarIslands::AvatarIslands(const WorldData& world) {
   members_.resize(begins_.back());
   for (std::uint32_t i = 0; i < count; ++i)
     if (!world.avatars[i].idle) members_[next[islands.find(i)]++] = i;
+  for (std::size_t island = 0; island < size(); ++island)
+    ENFILADE_ASSERT(std::ranges::is_sorted(members(island)));
 }
 
 }  // namespace enfilade::scene

@@ -1,4 +1,4 @@
-// Where an avatar will stand after its orders.
+// The place where an avatar will stand after its orders.
 #pragma once
 
 #include <optional>

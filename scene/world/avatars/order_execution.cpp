@@ -100,7 +100,7 @@ OrderStatus executeOrder(const Walk& walk, OrderContext& context) {
   avatar.driveVelocity = Vec3::Zero();
   avatar.viewHeld = false;
   if (avatar.walk.minDistance < 0) startWaypoint(context.world, walk, avatar);
-  prepareWay(context.world, walk, avatar);
+  commandWalkBodies(context.world, walk, avatar);
   return OrderStatus::running;
 }
 

@@ -23,7 +23,7 @@ bool mayCall(const Walk& walk, const Avatar& avatar) {
   return avatar.walk.calls < kMaxCalls * countBodies(walk);
 }
 
-/// Where a door may be while it opens or closes, scene frame.
+/// The box that a door stays in while it opens or closes, scene frame.
 Aabb computeSwing(const Body& door) {
   const BodySpec& spec = *door.spec;
   Aabb swing = door.boxes.whole;
@@ -151,7 +151,7 @@ void prepareLift(WorldData& world, const Walk& walk, Avatar& avatar, const Body&
 
 }  // namespace
 
-void prepareWay(WorldData& world, const Walk& walk, Avatar& avatar) {
+void commandWalkBodies(WorldData& world, const Walk& walk, Avatar& avatar) {
   const EntityId before = std::exchange(avatar.walk.waitsFor, 0);
   if (countBodies(walk) == 0) return;
   for (const Ride& ride : walk.rides)

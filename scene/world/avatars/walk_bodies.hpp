@@ -9,7 +9,7 @@ namespace enfilade::scene {
 
 /// Commands the doors ahead and the lift of the next way point where necessary, and sets
 /// WalkProgress::waitsFor. A walk gives three commands for each of its bodies, and no more.
-void prepareWay(WorldData& world, const Walk& walk, Avatar& avatar);
+void commandWalkBodies(WorldData& world, const Walk& walk, Avatar& avatar);
 
 /// Why a walk that waits ends.
 std::string describeWait(const WorldData& world, const Walk& walk, const Avatar& avatar);

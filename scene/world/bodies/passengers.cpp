@@ -69,7 +69,8 @@ std::vector<Avatar*> findNearbyAvatars(WorldData& world, const Body& body) {
   for (const auto& overlap : world.broadPhase.overlapsOf(body.proxy))
     if (Avatar* avatar = overlap.isDynamic ? world.findAvatarByProxy(overlap.id) : nullptr)
       avatars.push_back(avatar);
-  std::ranges::sort(avatars);  // WorldData::avatars is sorted by name
+  std::ranges::sort(avatars);  // by name, as WorldData::avatars
+  ENFILADE_ASSERT(std::ranges::is_sorted(avatars, {}, &Avatar::name));
   return avatars;
 }
 

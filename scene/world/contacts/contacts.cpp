@@ -7,6 +7,7 @@
 #include <iterator>
 #include <limits>
 
+#include "collision/assert.hpp"
 #include "collision/narrow_phase/penetration_depth.hpp"
 #include "collision/narrow_phase/refine.hpp"
 #include "scene/world/contacts/dense_obstacles.hpp"
@@ -184,8 +185,8 @@ std::optional<SeparationResult> computeSeparationFrom(Avatar& avatar, EntityId o
 }
 
 const Contact* findContact(const std::vector<Contact>& contacts, EntityId other) {
-  const auto at = std::lower_bound(contacts.begin(), contacts.end(), other,
-                                   [](const Contact& c, EntityId id) { return c.other < id; });
+  ENFILADE_ASSERT(std::ranges::is_sorted(contacts, {}, &Contact::other));
+  const auto at = std::ranges::lower_bound(contacts, other, {}, &Contact::other);
   return at != contacts.end() && at->other == other ? &*at : nullptr;
 }
 
@@ -218,6 +219,7 @@ Contact makeContact(EntityId blocker, const SeparationResult& separation) {
 /// nothing if they still touch.
 template <class Touch>
 void addTransientContact(EntityId body, const Touch& touch, std::vector<Contact>& now) {
+  ENFILADE_ASSERT(std::ranges::is_sorted(now, {}, &Contact::other));
   const auto at = std::ranges::lower_bound(now, body, {}, &Contact::other);
   const bool listed = at != now.end() && at->other == body;
   if (listed && at->touching) return;
@@ -254,6 +256,7 @@ void addYieldedBodies(const WorldData& world, Avatar& avatar, std::vector<Contac
     addTransientContact(
         avatar.blockedBy, [&] { return std::optional(avatar.blockingHit); }, now);
   const auto& transient = world.dynamicBodies.avatarBodyPairs;
+  ENFILADE_ASSERT(std::ranges::is_sorted(transient));
   for (auto at = std::ranges::lower_bound(transient, EntityPair(avatar.id, 0));
        at != transient.end() && at->first == avatar.id; ++at)
     addTransientContact(

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
 #include "scene/world/contacts/dense_obstacles.hpp"
 
 namespace enfilade::scene {
@@ -104,6 +105,7 @@ void forEachDenseIndex(const WorldData& world, const Aabb& box, const Each& each
       if (overlaps(box, scene.staticBoxes()[i])) each(i);
     return;
   }
+  ENFILADE_ASSERT(std::ranges::is_sorted(dense));
   for (const collision::StaticId i : world.broadPhase.overlapStatic(box))
     if (std::ranges::binary_search(dense, i)) each(i);
 }
@@ -251,7 +253,7 @@ void updateObstaclePose(const WorldData& world, Obstacle& obstacle) {
     const Body& body = world.bodies[obstacle.bodyIndex];
     obstacle.box = getPartBox(body, obstacle.part);
     obstacle.convex = makePlacedPart(body, obstacle.part);
-    // Where the body will stand: the solver moves it after the avatars.
+    // The box where the body will stand: the solver moves it after the avatars.
     obstacle.box.min.y() += body.pendingLift, obstacle.box.max.y() += body.pendingLift;
     obstacle.convex.translation.y() += body.pendingLift;
   } else if (obstacle.entity >= world.firstAvatarId()) {

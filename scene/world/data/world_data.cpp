@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -34,6 +36,7 @@ Avatar* WorldData::findAvatar(EntityId id) {
 }
 
 const Avatar* WorldData::findAvatarByName(std::string_view name) const {
+  ENFILADE_ASSERT(std::ranges::is_sorted(avatars, {}, &Avatar::name));
   const auto at = std::ranges::lower_bound(avatars, name, {}, &Avatar::name);
   return at != avatars.end() && at->name == name ? &*at : nullptr;
 }
@@ -63,6 +66,7 @@ EntityId WorldData::insertAvatar(Avatar avatar) {
   setAvatarProxy(avatar, avatar.proxy);
   avatarNames.push_back(avatar.name);
   avatarIndices.push_back(kNoAvatar);
+  ENFILADE_ASSERT(std::ranges::is_sorted(avatars, {}, &Avatar::name));
   const auto at = std::ranges::lower_bound(avatars, avatar.name, {}, &Avatar::name);
   const auto index = static_cast<std::size_t>(at - avatars.begin());
   avatars.insert(at, std::move(avatar));

@@ -4,7 +4,7 @@
 // 2. In each tick, the pairs whose proof ends leave the schedule. Their exact distance and the
 //    speed limits of both give a new proof (motion_limits.hpp). Boxes that are far apart suffice.
 // 3. The search is repeated when its time is over.
-// A proof covers all commands, so commands do not invalidate it. What does:
+// A proof covers all commands, so commands do not invalidate it. These events do:
 //  - An avatar joins or is teleported: it is paired with all avatars that it may reach before their
 //    next search.
 //  - An avatar leaves: its pairs go.

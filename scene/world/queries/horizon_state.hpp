@@ -1,4 +1,5 @@
-// What contact horizons read of a snapshot: boxes, speed limits and the last motion of entities.
+// The state that contact horizons read of a snapshot: boxes, speed limits and the last motion of
+// entities.
 #pragma once
 
 #include <map>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 
+#include "collision/assert.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
@@ -75,6 +76,7 @@ void countRepeatedObjects(const Scene& scene, std::vector<Diagnostic>& diagnosti
 
 Aabb computeAuthoredAabb(const Scene& scene, std::uint32_t object) {
   const auto& staticObjects = scene.solidObjects();
+  ENFILADE_ASSERT(std::ranges::is_sorted(staticObjects));
   const auto at = std::lower_bound(staticObjects.begin(), staticObjects.end(), object);
   if (at != staticObjects.end() && *at == object)
     return scene.staticBoxes()[static_cast<std::size_t>(at - staticObjects.begin())];

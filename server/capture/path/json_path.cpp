@@ -17,11 +17,11 @@ constexpr double kRotationTolerance = 1e-3;  // tolerance of a rotation's entrie
 constexpr std::size_t kMaxQuoteLength = 60;
 
 /// The position of a value in the file, for example "path.json: frames[3].eye".
-struct JsonPlace {
+struct JsonCursor {
   std::string text;
 
-  JsonPlace element(std::size_t index) const { return {text + "[" + std::to_string(index) + "]"}; }
-  JsonPlace member(const char* key) const {
+  JsonCursor element(std::size_t index) const { return {text + "[" + std::to_string(index) + "]"}; }
+  JsonCursor member(const char* key) const {
     return {text + (text.ends_with(": ") ? "" : ".") + key};
   }
   [[noreturn]] void fail(const std::string& what) const {
@@ -36,14 +36,14 @@ std::string excerpt(const Json& value) {
   return text;
 }
 
-double parseNumber(const Json& value, const JsonPlace& cursor) {
+double parseNumber(const Json& value, const JsonCursor& cursor) {
   if (!value.is_number() || !std::isfinite(value.get<double>()))
     cursor.fail("must be a finite number, not " + excerpt(value));
   return value.get<double>();
 }
 
 template <std::size_t count>
-std::array<double, count> parseNumbers(const Json& value, const JsonPlace& cursor) {
+std::array<double, count> parseNumbers(const Json& value, const JsonCursor& cursor) {
   if (!value.is_array() || value.size() != count)
     cursor.fail("must be " + std::to_string(count) + " numbers, not " + excerpt(value));
   std::array<double, count> numbers{};
@@ -51,7 +51,7 @@ std::array<double, count> parseNumbers(const Json& value, const JsonPlace& curso
   return numbers;
 }
 
-Vec3 parseVector(const Json& value, const JsonPlace& cursor) {
+Vec3 parseVector(const Json& value, const JsonCursor& cursor) {
   const auto numbers = parseNumbers<3>(value, cursor);
   const Vec3 vector(numbers[0], numbers[1], numbers[2]);
   if (!(vector.cwiseAbs().maxCoeff() <= kMaxEyeCoordinate)) cursor.fail("is beyond 1e9 m");
@@ -59,7 +59,7 @@ Vec3 parseVector(const Json& value, const JsonPlace& cursor) {
 }
 
 /// Reads three or four rows of worldFromCamera.
-void readMatrix(const Json& value, const JsonPlace& cursor, CameraAxes axes, CameraPose& pose) {
+void readMatrix(const Json& value, const JsonCursor& cursor, CameraAxes axes, CameraPose& pose) {
   if (!value.is_array() || value.size() < 3 || value.size() > 4)
     cursor.fail("must be 3 or 4 rows of 4 numbers, not " + excerpt(value));
   for (std::size_t row = 0; row < 3; ++row) {
@@ -82,7 +82,7 @@ void readMatrix(const Json& value, const JsonPlace& cursor, CameraAxes axes, Cam
 }
 
 /// Makes the rotation of a camera that looks along `forward`, with `up` upwards in the picture.
-Mat3 makeLookRotation(const Vec3& forward, const Vec3& up, const JsonPlace& cursor) {
+Mat3 makeLookRotation(const Vec3& forward, const Vec3& up, const JsonCursor& cursor) {
   const Vec3 back = -forward.stableNormalized();
   const Vec3 right = up.stableNormalized().cross(back);
   if (!(forward.stableNorm() > 1e-12) || !(up.stableNorm() > 1e-12) || !(right.norm() > 1e-6))
@@ -95,7 +95,7 @@ Mat3 makeLookRotation(const Vec3& forward, const Vec3& up, const JsonPlace& curs
 }
 
 /// Reads {"eye":..., and one of "look_at", "forward", "quaternion"}.
-void readEye(const Json& entry, const JsonPlace& cursor, CameraAxes axes, CameraPose& pose) {
+void readEye(const Json& entry, const JsonCursor& cursor, CameraAxes axes, CameraPose& pose) {
   pose.eye = parseVector(entry["eye"], cursor.member("eye"));
   const Vec3 up =
       entry.contains("up") ? parseVector(entry["up"], cursor.member("up")) : Vec3::UnitY();
@@ -117,7 +117,7 @@ void readEye(const Json& entry, const JsonPlace& cursor, CameraAxes axes, Camera
   }
 }
 
-void requireKnownKeys(const Json& entry, const JsonPlace& cursor) {
+void requireKnownKeys(const Json& entry, const JsonCursor& cursor) {
   static const std::set<std::string> kKnown{"time", "eye",        "look_at", "forward",
                                             "up",   "quaternion", "fov",     "transform_matrix"};
   for (const auto& [key, value] : entry.items()) {
@@ -129,7 +129,7 @@ void requireKnownKeys(const Json& entry, const JsonPlace& cursor) {
   }
 }
 
-CameraPose parsePose(const Json& entry, const JsonPlace& cursor, CameraAxes axes, double time) {
+CameraPose parsePose(const Json& entry, const JsonCursor& cursor, CameraAxes axes, double time) {
   if (!entry.is_object()) cursor.fail("must be an object, not " + excerpt(entry));
   CameraPose pose;
   pose.time = entry.contains("time") ? parseNumber(entry["time"], cursor.member("time")) : time;
@@ -150,7 +150,7 @@ CameraPose parsePose(const Json& entry, const JsonPlace& cursor, CameraAxes axes
 }
 
 /// Parses the horizontal field of view of Blender's exports, radians; nullopt if missing.
-std::optional<double> parseFieldOfView(const Json& file, const JsonPlace& cursor) {
+std::optional<double> parseFieldOfView(const Json& file, const JsonCursor& cursor) {
   if (!file.contains("camera_angle_x")) return std::nullopt;
   const double radians = parseNumber(file["camera_angle_x"], cursor.member("camera_angle_x"));
   if (!(radians > 0 && radians < std::numbers::pi))
@@ -159,7 +159,7 @@ std::optional<double> parseFieldOfView(const Json& file, const JsonPlace& cursor
 }
 
 /// Parses the lens; nullopt if missing. Distortion is refused, because renderers do not support it.
-std::optional<PathLens> parseLens(const Json& file, const JsonPlace& cursor) {
+std::optional<PathLens> parseLens(const Json& file, const JsonCursor& cursor) {
   for (const char* key : {"k1", "k2", "k3", "k4", "p1", "p2"}) {
     if (file.contains(key) && parseNumber(file[key], cursor.member(key)) != 0)
       cursor.member(key).fail("lens distortion is not supported; set it to 0, or undistort first");
@@ -190,7 +190,7 @@ std::optional<PathLens> parseLens(const Json& file, const JsonPlace& cursor) {
 
 /// Parses the lens of a frame, if any; missing keys come from the file.
 std::optional<PathLens> parseFrameLens(const Json& file, const Json& frame,
-                                       const JsonPlace& cursor) {
+                                       const JsonCursor& cursor) {
   Json both = Json::object();
   for (const char* key :
        {"fl_x", "fl_y", "cx", "cy", "w", "h", "k1", "k2", "k3", "k4", "p1", "p2"}) {
@@ -216,7 +216,7 @@ CameraPath parseJsonPath(std::string_view text, const std::string& source, Camer
     throw CameraPathError(source + ": byte " + std::to_string(error.byte) +
                           ": is not JSON; a walk script's name ends in .jsonl");
   }
-  const JsonPlace whole{source + ": "};
+  const JsonCursor whole{source + ": "};
   const bool listed = file.is_array();
   if (!listed && !(file.is_object() && file.contains("frames") && file["frames"].is_array()))
     throw CameraPathError(source +
@@ -226,11 +226,11 @@ CameraPath parseJsonPath(std::string_view text, const std::string& source, Camer
   if (!listed) path.lens = parseLens(file, whole);
   if (!listed && !path.lens) path.fovX = parseFieldOfView(file, whole);
   const Json& entries = listed ? file : file["frames"];
-  const JsonPlace list = listed ? JsonPlace{source + ": pose"} : whole.member("frames");
+  const JsonCursor list = listed ? JsonCursor{source + ": pose"} : whole.member("frames");
   if (entries.empty() || entries.size() > kMaxPoses)
     list.fail(std::to_string(entries.size()) + " poses; give 1 to 10,000,000");
   for (std::size_t i = 0; i < entries.size(); ++i) {
-    const JsonPlace cursor = list.element(i);
+    const JsonCursor cursor = list.element(i);
     if (listed && entries[i].is_object()) requireKnownKeys(entries[i], cursor);
     path.poses.push_back(parsePose(entries[i], cursor, axes, static_cast<double>(i) / fps));
     if (!listed) path.poses.back().lens = parseFrameLens(file, entries[i], cursor);

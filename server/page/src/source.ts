@@ -1,4 +1,4 @@
-// Where the page gets a world from: a server, or a recording in the page's own file.
+// The source of the page's world: a server, or a recording in the page's own file.
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import type {
   ClientMessageSchema, ClockChange, ContactEvent, Replay, ServerMessage, State, TickEvents, Welcome,

@@ -1,5 +1,5 @@
-// Where to begin: a free place on the floor of a room in the middle of the scene. Scenes differ, so the places are
-// only proposals; the server decides whether an avatar fits.
+// Start places: free places on the floor of rooms in the middle of the scene. Scenes differ, so the places are only
+// proposals; the server decides whether an avatar fits.
 import { Box3, Vector3 } from "three";
 import type { SceneModel } from "./scene";
 

@@ -6,7 +6,7 @@
 #include <map>
 
 #include "scene/world/world.hpp"
-#include "server/messages/frame_messages.hpp"
+#include "server/messages/frame_encoding.hpp"
 
 namespace enfilade::server {
 
@@ -25,7 +25,7 @@ struct ViewerSink {
   std::function<double(double)> stampTime;
 };
 
-/// What viewers show of the static objects.
+/// The form in which viewers show the static objects.
 enum class StaticObjects : std::uint8_t {
   asPrimitives,  ///< triangles if there are few, otherwise AABBs
   none           ///< the client has the scene as a model

@@ -59,7 +59,7 @@ class BulletMeshQuery : public MeshQuery {
     mesh_ = std::make_unique<btBvhTriangleMeshShape>(&triangles_, true);
   }
 
-  double distance(const Placement& body) override {
+  double distance(const RigidTransform& body) override {
     double reach = last_ > 0 ? 1.1 * last_ : kFirstReach;
     for (int k = 0; k < kMaxDoublings; ++k, reach *= 2) {
       const double found = ask(body, reach).nearest;
@@ -70,13 +70,13 @@ class BulletMeshQuery : public MeshQuery {
     }
     return std::numeric_limits<double>::quiet_NaN();
   }
-  void contacts(const Placement& body, std::vector<std::uint32_t>& triangles) override {
+  void contacts(const RigidTransform& body, std::vector<std::uint32_t>& triangles) override {
     triangles = ask(body, 0).met;
   }
   void forget() override { last_ = 0; }
 
  private:
-  EachTriangle ask(const Placement& body, double reach) const {
+  EachTriangle ask(const RigidTransform& body, double reach) const {
     const Mat3& r = body.rotation;
     const btTransform at(btMatrix3x3(r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2), r(2, 0),
                                      r(2, 1), r(2, 2)),

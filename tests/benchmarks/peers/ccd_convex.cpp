@@ -13,7 +13,7 @@ constexpr unsigned long kMaxIterations = 1000;
 struct Shape {
   Points vertices;
   Vec3 centre = Vec3::Zero();
-  const Placement* at = nullptr;
+  const RigidTransform* at = nullptr;
 };
 
 Vec3 vectorOf(const ccd_vec3_t& v) {
@@ -60,7 +60,7 @@ class CcdPair : public PairOfBodies {
     ccd_.max_iterations = kMaxIterations;
   }
 
-  Answer ask(const Placement& a, const Placement& b) override {
+  Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     a_.at = &a;
     b_.at = &b;
     if (!depth_) return ccdMPRIntersect(&a_, &b_, &ccd_) != 0 ? collides() : undistanced();

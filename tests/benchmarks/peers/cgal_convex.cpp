@@ -15,7 +15,7 @@ using Kernel = CGAL::Cartesian<double>;
 using Traits = CGAL::Polytope_distance_d_traits_3<Kernel, CGAL::Gmpzf, double>;
 using Distance = CGAL::Polytope_distance_d<Traits>;
 
-std::vector<Kernel::Point_3> placed(const Points& vertices, const Placement& at) {
+std::vector<Kernel::Point_3> placed(const Points& vertices, const RigidTransform& at) {
   std::vector<Kernel::Point_3> result;
   for (const Vec3& vertex : vertices) {
     const Vec3 world = at.rotation * vertex + at.translation;
@@ -29,7 +29,7 @@ class CgalPair : public PairOfBodies {
   CgalPair(const Points& a, const Points& b)
       : a_(collision::buildHull(a).vertices), b_(collision::buildHull(b).vertices) {}
 
-  Answer ask(const Placement& a, const Placement& b) override {
+  Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     const auto pointsA = placed(a_, a);
     const auto pointsB = placed(b_, b);
     const Distance distance(pointsA.begin(), pointsA.end(), pointsB.begin(), pointsB.end());

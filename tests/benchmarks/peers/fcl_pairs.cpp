@@ -18,7 +18,7 @@ void setBox(Object& object, const Aabb& box) {
   aabb.max_ = box.max;
 }
 
-struct Asked {
+struct PairQuery {
   std::span<const Aabb> still, movers;
   PairTally* tally;
 };
@@ -29,18 +29,18 @@ std::uintptr_t tagOf(const Object& object) {
 }
 
 bool reportPairs(Object* first, Object* second, void* data) {
-  const Asked& asked = *static_cast<Asked*>(data);
+  const PairQuery& query = *static_cast<PairQuery*>(data);
   std::uintptr_t a = tagOf(*first);
   std::uintptr_t b = tagOf(*second);
   if (a % 2 == 0) std::swap(a, b);
   const auto mover = static_cast<std::uint32_t>(a / 2);
   const auto other = static_cast<std::uint32_t>(b / 2);
   const bool moves = b % 2 == 1;
-  if (!collision::overlaps(asked.movers[mover], moves ? asked.movers[other] : asked.still[other])) {
+  if (!collision::overlaps(query.movers[mover], moves ? query.movers[other] : query.still[other])) {
     return false;
   }
-  if (moves) asked.tally->addMovers(mover, other);
-  if (!moves) asked.tally->addStill(mover, other);
+  if (moves) query.tally->addMovers(mover, other);
+  if (!moves) query.tally->addStill(mover, other);
   return false;  // continue
 }
 
@@ -63,9 +63,9 @@ class FclPairs : public BroadPhase {
       for (std::size_t k = 0; k < movers.size(); ++k) setBox(*moverObjects_[k], movers[k]);
       moverManager_.update();
     }
-    Asked asked{still_, movers, &tally};
-    moverManager_.collide(&stillManager_, &asked, reportPairs);
-    moverManager_.collide(&asked, reportPairs);
+    PairQuery query{still_, movers, &tally};
+    moverManager_.collide(&stillManager_, &query, reportPairs);
+    moverManager_.collide(&query, reportPairs);
   }
 
  private:

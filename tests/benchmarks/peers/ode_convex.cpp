@@ -31,7 +31,7 @@ class Shape {
   Shape(const Shape&) = delete;
   Shape& operator=(const Shape&) = delete;
 
-  void place(const Placement& at) {
+  void place(const RigidTransform& at) {
     dMatrix3 rotation{};
     for (int row = 0; row < 3; ++row) {
       for (int column = 0; column < 3; ++column) {
@@ -62,7 +62,7 @@ class OdePair : public PairOfBodies {
  public:
   OdePair(const Points& a, const Points& b) : a_(a), b_(b) {}
 
-  Answer ask(const Placement& a, const Placement& b) override {
+  Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     if (a_.geom() == nullptr || b_.geom() == nullptr) return {};
     a_.place(a);
     b_.place(b);

@@ -8,7 +8,7 @@
 namespace enfilade::benchmarks {
 namespace {
 
-struct Asked {
+struct PairQuery {
   std::span<const Aabb> still, movers;
   PairTally* tally;
 };
@@ -18,18 +18,18 @@ std::uintptr_t tagOf(dGeomID geom) {
 }
 
 void reportPairs(void* data, dGeomID first, dGeomID second) {
-  const Asked& asked = *static_cast<Asked*>(data);
+  const PairQuery& query = *static_cast<PairQuery*>(data);
   std::uintptr_t a = tagOf(first);
   std::uintptr_t b = tagOf(second);
   if (a % 2 == 0) std::swap(a, b);
   const auto mover = static_cast<std::uint32_t>(a / 2);
   const auto other = static_cast<std::uint32_t>(b / 2);
   const bool moves = b % 2 == 1;
-  if (!collision::overlaps(asked.movers[mover], moves ? asked.movers[other] : asked.still[other])) {
+  if (!collision::overlaps(query.movers[mover], moves ? query.movers[other] : query.still[other])) {
     return;
   }
-  if (moves) asked.tally->addMovers(mover, other);
-  if (!moves) asked.tally->addStill(mover, other);
+  if (moves) query.tally->addMovers(mover, other);
+  if (!moves) query.tally->addStill(mover, other);
 }
 
 class OdeSpace : public BroadPhase {
@@ -52,8 +52,8 @@ class OdeSpace : public BroadPhase {
         place(movers_[k], movers[k]);
       }
     }
-    Asked asked{still_, movers, &tally};
-    dSpaceCollide(space_, &asked, reportPairs);
+    PairQuery query{still_, movers, &tally};
+    dSpaceCollide(space_, &query, reportPairs);
   }
 
  private:

@@ -16,7 +16,7 @@ const WANTED = 5;
 const FLOATS_A_VERTEX = 6; // position and normal, as web-ifc delivers them
 
 // Sends small parts in one piece, and large blocks after them without copying them.
-function sendFrame(kind, parts = [], blocks = []) {
+function sendMessage(kind, parts = [], blocks = []) {
   const header = Buffer.alloc(9);
   const size = [...parts, ...blocks].reduce((sum, part) => sum + part.length, 0);
   header.write(kind, 0, 'latin1');
@@ -41,7 +41,7 @@ function wordsOf(api, address, count) {
 }
 
 function sendProgress(stage, fraction) {
-  sendFrame('P', [doubles(fraction), Buffer.from(stage)]);
+  sendMessage('P', [doubles(fraction), Buffer.from(stage)]);
 }
 
 function readAll(descriptor) {
@@ -106,7 +106,7 @@ function sendGeometry(api, model, id, known) {
   const geometry = api.GetGeometry(model, id);
   const vertices = wordsOf(api, geometry.GetVertexData(), geometry.GetVertexDataSize());
   const indices = wordsOf(api, geometry.GetIndexData(), geometry.GetIndexDataSize());
-  sendFrame('G', [words(id, vertices.length / 4 / FLOATS_A_VERTEX, indices.length / 4)],
+  sendMessage('G', [words(id, vertices.length / 4 / FLOATS_A_VERTEX, indices.length / 4)],
             [vertices, indices]);
   geometry.delete();
 }
@@ -120,7 +120,7 @@ function sendProduct(api, model, mesh, known) {
     const { x, y, z, w } = placed.color;
     parts.push(words(placed.geometryExpressID), doubles(x, y, z, w, ...placed.flatTransformation));
   }
-  sendFrame('O', [words(mesh.expressID, count), ...parts]);
+  sendMessage('O', [words(mesh.expressID, count), ...parts]);
 }
 
 // Whether the heap of web-ifc may be corrupt: a WebAssembly trap corrupts it, web-ifc's own
@@ -143,28 +143,28 @@ async function main() {
   const { ranges, wanted } = readList();
   const model = api.OpenModelFromCallback(makeReader(ranges));
   if (model < 0) {
-    sendFrame('E', [Buffer.from('web-ifc does not know its schema')]);
+    sendMessage('E', [Buffer.from('web-ifc does not know its schema')]);
     return 1;
   }
   const known = new Set();
   for (let i = first; i < wanted.length; ++i) {
-    sendFrame('T', [words(i)]); // identifies the product if this process dies
+    sendMessage('T', [words(i)]); // identifies the product if this process dies
     if (i % 64 === 0) sendProgress('shapes (web-ifc)', i / wanted.length);
     try {
       api.StreamMeshes(model, [wanted[i]], (mesh) => sendProduct(api, model, mesh, known));
     } catch (error) {
-      sendFrame('F', [words(wanted[i]), Buffer.from(textOf(error))]);
+      sendMessage('F', [words(wanted[i]), Buffer.from(textOf(error))]);
       if (isBroken(error)) return 1; // the importer starts another process for the rest
     }
   }
-  sendFrame('D');
+  sendMessage('D');
   return 0;
 }
 
 main().then(
   (code) => process.exit(code),
   (error) => {
-    sendFrame('E', [Buffer.from(textOf(error))]);
+    sendMessage('E', [Buffer.from(textOf(error))]);
     process.exit(1);
   },
 );

@@ -1,0 +1,34 @@
+// Orders and ticks of the fixtures that have a `world` and step().
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <utility>
+
+#include "scene/world/world.hpp"
+
+namespace enfilade::scene::testing {
+
+template <class Fixture>
+class WorldControls {
+ public:
+  void order(const std::string& name, Order o) {
+    const auto why = submitAvatarCommand(fixture().world, {name, std::move(o), 0});
+    ASSERT_FALSE(why) << *why;
+  }
+  void ticks(int count) {
+    for (int i = 0; i < count; ++i) fixture().step();
+  }
+  /// Steps until every queue is empty; fails after a simulated minute.
+  void untilIdle() {
+    for (int i = 0; i < 3600; ++i)
+      if (fixture().step().idle) return;
+    FAIL() << "not idle after a minute";
+  }
+
+ private:
+  Fixture& fixture() { return static_cast<Fixture&>(*this); }
+};
+
+}  // namespace enfilade::scene::testing
