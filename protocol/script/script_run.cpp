@@ -20,7 +20,7 @@ std::uint64_t countTicks(double seconds, double tick) {
 
 std::string formatPoint(const v1::Vec3& point) {
   std::array<char, 128> text{};
-  std::snprintf(text.data(), text.size(), "(%.2f, %.2f, %.2f)", point.x(), point.y(), point.z());
+  std::snprintf(text.data(), text.size(), "[%.2f, %.2f, %.2f]", point.x(), point.y(), point.z());
   return text.data();
 }
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdio>
 
 #include "protocol/json_depth.hpp"
 #include "protocol/script/script_line.hpp"
@@ -19,6 +20,13 @@ constexpr double kMaxCoordinate = 1e7;  // metres; scene/world/data/validation.c
 bool isNameLetter(char c) {
   return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '.' ||
          c == '_' || c == '-';
+}
+
+/// "1000000" rather than "1000000.0" or "1e+06".
+std::string formatLimit(double limit) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.15g", limit);
+  return text.data();
 }
 
 }  // namespace
@@ -49,8 +57,9 @@ double parseNumberInRange(const json& value, std::string_view field, const char*
                           double high, bool above) {
   const double read = parseNumber(value, field, what);
   if (read <= high && (above ? read > low : read >= low)) return read;
-  refuse(field, excerpt(value) + " is out of range; use " + (above ? "more than " : "") +
-                    json(low).dump() + " to " + json(high).dump());
+  const std::string range =
+      above ? " above " + formatLimit(low) + " and at most " : " from " + formatLimit(low) + " to ";
+  refuse(field, excerpt(value) + " is out of range; give " + what + range + formatLimit(high));
 }
 
 bool parseFlag(const json& value, std::string_view field) {

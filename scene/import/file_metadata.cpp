@@ -18,7 +18,7 @@ namespace {
 /// Reads the first `limit` bytes of a file.
 std::string readStart(const std::filesystem::path& file, std::size_t limit) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw ImportError(file.string() + ": cannot be opened for reading (open)");
+  if (!in) throw ImportError(file.string() + ": cannot be opened for reading");
   const std::size_t size = std::min(limit, static_cast<std::size_t>(file_size(file)));
   std::string text(size, '\0');
   in.read(text.data(), static_cast<std::streamsize>(size));
@@ -46,18 +46,18 @@ void requireWholeGlb(const std::filesystem::path& file) {
   const std::string start = readStart(file, 12);
   if (start.size() < 12 || start.compare(0, 4, "glTF") != 0) {
     throw ImportError(file.string() + ": not a GLB file (it does not begin with 'glTF'); export " +
-                      "it again, or rename a JSON file to .gltf (open)");
+                      "it again, or rename a JSON file to .gltf");
   }
   if (readLittleEndian32(start, 4) != 2) {
     throw ImportError(file.string() + ": glTF version " +
                       std::to_string(readLittleEndian32(start, 4)) +
-                      " cannot be read; export it as glTF 2.0 (open)");
+                      " cannot be read; export it as glTF 2.0");
   }
   const std::uint64_t declaredSize = readLittleEndian32(start, 8);
   if (declaredSize > file_size(file)) {
     throw ImportError(file.string() + ": cut off: its header says " + std::to_string(declaredSize) +
                       " bytes, the file has " + std::to_string(file_size(file)) +
-                      "; copy or download it again (open)");
+                      "; copy or download it again");
   }
 }
 
@@ -66,7 +66,7 @@ void rejectGlb(const std::filesystem::path& file) {
   if (readStart(file, 4) == "glTF")
     throw ImportError(file.string() +
                       ": is a GLB file by its first bytes; check where it comes from and rename " +
-                      "it to .glb (open)");
+                      "it to .glb");
 }
 
 // ---- COLLADA ------------------------------------------------------------------------------------

@@ -37,27 +37,28 @@ void validateReadable(const fs::path& file) {
                         error == std::errc::not_a_directory;
     if (!absent)
       throw ImportError(name + ": cannot be read: " + error.message() +
-                        "; check the path and its permissions (open)");
-    throw ImportError(name + ": no such file; check the path (open)");
+                        "; check the path and its permissions");
+    throw ImportError(name + ": no such file; check the path");
   }
   if (fs::is_directory(status)) {
-    throw ImportError(name + ": is a folder; name the model file in it (open)");
+    throw ImportError(name + ": is a folder; name the model file in it");
   }
-  if (!fs::is_regular_file(status)) throw ImportError(name + ": is not a regular file (open)");
+  if (!fs::is_regular_file(status))
+    throw ImportError(name + ": is not a regular file; copy it to one");
   const std::string extension = file.extension().string();
   if (toLowerCase(extension) == ".ifcxml") {
-    throw ImportError(name + ": IFC in XML is not read; export it as .ifc, the STEP form (open)");
+    throw ImportError(name + ": IFC in XML is not read; export it as .ifc, the STEP form");
   }
   if (!detectModelFormat(file)) {
     throw ImportError(name + ": unknown extension '" + extension +
-                      "'; supported: " + listExtensions() + " (open)");
+                      "'; supported: " + listExtensions());
   }
   if (fs::file_size(file, error) == 0 && !error) {
-    throw ImportError(name + ": is empty; export or copy it again (open)");
+    throw ImportError(name + ": is empty; export or copy it again");
   }
   if (access(file.c_str(), R_OK) != 0) {
     throw ImportError(name + ": cannot be read: " + std::strerror(errno) +
-                      "; check its permissions (open)");
+                      "; check its permissions");
   }
 }
 

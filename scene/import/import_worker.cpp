@@ -120,7 +120,7 @@ std::string readDescriptor(int descriptor) {
   while (done < text.size()) {
     const ssize_t size =
         pread(descriptor, text.data() + done, text.size() - done, static_cast<off_t>(done));
-    if (size <= 0) throw ImportError("the file cannot be read from memory (open)");
+    if (size <= 0) throw ImportError("the file cannot be read from memory");
     done += static_cast<std::size_t>(size);
   }
   return text;
@@ -131,8 +131,7 @@ std::string readDescriptor(int descriptor) {
   if (input.format == ModelFormat::ifc)
     throw ImportError(reason);  // other readers may have tried too
   throw ImportError(input.file.string() + ": cannot be read: " + reason +
-                    "; check the file in the program that wrote it, or re-export it as glTF "
-                    "(parse)");
+                    "; check the file in the program that wrote it, or re-export it as glTF");
 }
 
 bool isGltf(ModelFormat format) {
@@ -199,10 +198,10 @@ Model importByFormat(const ImportRequest& request) {
   const ModelFormat format = detectModelFormat(request.file).value();
   if (request.options.georeference && format != ModelFormat::ifc)
     throw ImportError(request.file +
-                      ": --georeference needs an IFC file: no other format has a map (open)");
+                      ": --georeference needs an IFC file: no other format has a map");
   if (!request.options.gltfScene.empty() && !isGltf(format))
     throw ImportError(request.file +
-                      ": --gltf-scene needs a glTF file: no other format has scenes (open)");
+                      ": --gltf-scene needs a glTF file: no other format has scenes");
   switch (format) {
     case ModelFormat::ifc:
       return importIfc(request, sendProgress);

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <set>
 
+#include "scene/model/format_number.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
@@ -21,15 +22,15 @@ constexpr std::size_t kMaxPathKeys = 100000;
 
 using OptionalError = std::optional<std::string>;
 
-OptionalError validateFieldRange(const char* field, double value, double min, double max) {
+OptionalError validateFieldRange(const char* field, double value, double min, double max,
+                                 const char* unit = "") {
   if (value >= min && value <= max) return std::nullopt;
-  return std::string(field) + " is " + std::to_string(value) + "; it must lie in " +
-         std::to_string(min) + ".." + std::to_string(max);
+  return formatRangeError(field, value, min, max, unit);
 }
 
 OptionalError validateFieldVector(const char* field, const Vec3& value) {
   for (int i = 0; i < 3; ++i)
-    if (auto error = validateFieldRange(field, value[i], -kMaxCoordinate, kMaxCoordinate))
+    if (auto error = validateFieldRange(field, value[i], -kMaxCoordinate, kMaxCoordinate, "m"))
       return error;
   return std::nullopt;
 }
@@ -37,6 +38,7 @@ OptionalError validateFieldVector(const char* field, const Vec3& value) {
 OptionalError validateLimits(const BodySpec& body) {
   const bool lift = getTraits(body.kind).takesStops;
   const std::string field = lift ? "stops" : "limits";
+  const char* const unit = getTraits(body.kind).rotates ? "radians" : "m";
   if (lift && body.stops.size() < 2) return "stops: a lift needs at least two";
   if (std::adjacent_find(body.stops.begin(), body.stops.end(), std::greater_equal<>()) !=
       body.stops.end())
@@ -47,11 +49,11 @@ OptionalError validateLimits(const BodySpec& body) {
   if (!(body.low >= -kMaxCoordinate && body.high <= kMaxCoordinate))
     return field + ": farther than 1000 km";
   for (const double stop : body.stops)
-    if (auto error = validateFieldRange("stops", stop, body.low, body.high)) return error;
-  if (auto error = validateFieldRange("closed", body.closedPosition, body.low, body.high))
+    if (auto error = validateFieldRange("stops", stop, body.low, body.high, "m")) return error;
+  if (auto error = validateFieldRange("closed", body.closedPosition, body.low, body.high, unit))
     return error;
   if (body.autoCloseDelay)
-    return validateFieldRange("closes_after", *body.autoCloseDelay, 0, kMaxDuration);
+    return validateFieldRange("closes_after", *body.autoCloseDelay, 0, kMaxDuration, "s");
   return std::nullopt;
 }
 
@@ -63,10 +65,10 @@ OptionalError validatePath(const BodySpec& body) {
   for (const PathKey& key : body.keys) {
     if (!(key.time > last)) return "keys: times must ascend";
     last = key.time;
-    if (auto error = validateFieldRange("time", key.time, 0, kMaxDuration)) return error;
+    if (auto error = validateFieldRange("time", key.time, 0, kMaxDuration, "s")) return error;
     if (auto error = validateFieldVector("offset", key.offset)) return error;
     if (auto error =
-            validateFieldRange("turn (in radians)", key.angle, -kMaxCoordinate, kMaxCoordinate))
+            validateFieldRange("turn", key.angle, -kMaxCoordinate, kMaxCoordinate, "radians"))
       return error;
   }
   const PathKey &first = body.keys.front(), &end = body.keys.back();
@@ -79,15 +81,17 @@ OptionalError validatePath(const BodySpec& body) {
 }
 
 OptionalError validatePhysicalProperties(const BodySpec& body) {
-  if (auto error = validateFieldRange("density", body.density, 1e-3, kMaxDensity)) return error;
+  if (auto error = validateFieldRange("density", body.density, 1e-3, kMaxDensity, "kg/m3"))
+    return error;
   if (body.mass) {
-    if (auto error = validateFieldRange("mass", *body.mass, 1e-6, 1e9)) return error;
+    if (auto error = validateFieldRange("mass", *body.mass, 1e-6, 1e9, "kg")) return error;
   }
   if (auto error = validateFieldRange("friction", body.friction, 0, 100)) return error;
   for (int i = 0; i < 3; ++i) {
-    if (auto error = validateFieldRange("velocity", body.velocity[i], -kMaxSpeed, kMaxSpeed))
+    if (auto error = validateFieldRange("velocity", body.velocity[i], -kMaxSpeed, kMaxSpeed, "m/s"))
       return error;
-    if (auto error = validateFieldRange("spin", body.angularVelocity[i], -kMaxSpeed, kMaxSpeed))
+    if (auto error =
+            validateFieldRange("spin", body.angularVelocity[i], -kMaxSpeed, kMaxSpeed, "radians/s"))
       return error;
   }
   return validateFieldRange("restitution", body.restitution, 0, 1);

@@ -20,7 +20,7 @@ constexpr std::array kCatalog{
                    "the file states no up axis: that of the largest level area; --up sets it"},
     DiagnosticKind{
         "unclear_up_axis", warning,
-        "the file states no up axis, and no level is clearly the largest: say it by --up"},
+        "the file states no up axis, and no level is clearly the largest: give it with --up"},
     DiagnosticKind{"ignored_extension", error,
                    "a glTF extension that is not read, so shapes may differ; export without it"},
     DiagnosticKind{"mended_text", note, "the text was repaired in memory; export the file again"},
@@ -107,7 +107,8 @@ constexpr std::array kCatalog{
     DiagnosticKind{"unsupported_physics", warning, "the file has physics that is not simulated"},
     DiagnosticKind{"collision_suffix", note, "solid, visual or moving by the suffix of its name"},
     DiagnosticKind{"guessed_doors", note, "how they open was guessed; a sidecar can define it"},
-    DiagnosticKind{"replaced_bodies", note, "described in several sources; the first one wins"},
+    DiagnosticKind{"replaced_bodies", note,
+                   "bodies of a source below another one, which replaces them"},
     DiagnosticKind{"still_doors", note, "doors that are static; a sidecar can move them"},
     DiagnosticKind{"still_lifts", note, "lifts that are static; a sidecar can move them"},
 };

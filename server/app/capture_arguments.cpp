@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "collision/motion/sine_cosine.hpp"
+#include "server/app/validators.hpp"
 #include "server/base/parse_number.hpp"
 
 namespace enfilade::server {
@@ -24,30 +25,6 @@ std::vector<std::string> split(const std::string& text, char separator) {
     from = i + 1;
   }
   return parts;
-}
-
-/// Makes a validator for numbers in a range.
-CLI::Validator makeRangeValidator(double low, double high, const char* name) {
-  return CLI::Validator(
-      [low, high](const std::string& text) -> std::string {
-        const auto number = parseNumber<double>(text);
-        if (number && *number >= low && *number <= high) return "";
-        std::ostringstream problem;
-        problem << text << ": give a number from " << low << " to " << high;
-        return problem.str();
-      },
-      name);
-}
-
-CLI::Validator makeWholeRangeValidator(std::uint64_t low, std::uint64_t high, const char* name) {
-  return CLI::Validator(
-      [low, high](const std::string& text) -> std::string {
-        const auto number = parseNumber<std::uint64_t>(text);
-        if (number && *number >= low && *number <= high) return "";
-        return text + ": give a whole number from " + std::to_string(low) + " to " +
-               std::to_string(high);
-      },
-      name);
 }
 
 struct Size {
@@ -164,23 +141,22 @@ void addPath(CLI::App& verb, CaptureArguments& into) {
                   "looks "
                   "along +z, y down")
       ->capture_default_str()
-      ->check(CLI::IsMember({"opengl", "opencv"}));
+      ->check(makeChoiceValidator({"opengl", "opencv"}));
   verb.add_option("--fps", into.fps,
                   "Frames per second for glTF cameras and for poses without "
                   "times")
       ->capture_default_str()
       ->check(makeRangeValidator(0.001, 10000, "N"));
   verb.add_option("--camera", into.camera,
-                  "Name of the glTF camera (default: the first animated "
-                  "camera)");
+                  "Name of the glTF camera (default: the first animated camera)")
+      ->type_name("NAME");
   verb.add_option("--every", into.every,
                   "Walk script: one frame every N ticks from an avatar's eyes; 0: one frame per "
                   "capture command")
       ->capture_default_str()
       ->check(makeWholeRangeValidator(0, 1'000'000'000, "TICKS"));
-  verb.add_option("--avatar", into.avatar,
-                  "Avatar whose view --every renders (default: the "
-                  "first)");
+  verb.add_option("--avatar", into.avatar, "Avatar whose view --every renders (default: the first)")
+      ->type_name("NAME");
   verb.add_flag("--still", into.still,
                 "Camera path: bodies keep their initial poses, although the times of the path "
                 "pass");
@@ -219,7 +195,7 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
       ->check(CLI::Validator(validateChannels, "LIST"));
   verb.add_option("--rgb", into.rgb, "File format of rgb")
       ->capture_default_str()
-      ->check(CLI::IsMember({"png", "jpeg"}));
+      ->check(makeChoiceValidator({"png", "jpeg"}));
   verb.add_option("--quality", into.quality, "JPEG quality")
       ->capture_default_str()
       ->check(makeWholeRangeValidator(1, 100, "1..100"));
@@ -228,21 +204,21 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
                   "the "
                   "same, compressed")
       ->capture_default_str()
-      ->check(CLI::IsMember({"npy", "png", "zst"}));
+      ->check(makeChoiceValidator({"npy", "png", "zst"}));
   verb.add_option("--depth-scale", into.depthScale,
                   "Steps per metre of 16-bit depth (1000; 5000 in the TUM layout)")
       ->check(makeRangeValidator(1e-3, 1e6, "STEPS"));
   verb.add_option("--too-far", into.tooFar,
                   "Depth beyond 16 bits. refuse: error; clamp: write 65535 and report it")
       ->capture_default_str()
-      ->check(CLI::IsMember({"refuse", "clamp"}));
+      ->check(makeChoiceValidator({"refuse", "clamp"}));
   verb.add_option("--ids", into.ids, "npy: uint32; png: 16 bits, ids beyond that are an error")
       ->capture_default_str()
-      ->check(CLI::IsMember({"npy", "png"}));
+      ->check(makeChoiceValidator({"npy", "png"}));
   verb.add_option("--layout", into.layout,
                   "tum: adds rgb.txt, depth.txt and groundtruth.txt, depth as 16-bit PNG")
       ->capture_default_str()
-      ->check(CLI::IsMember({"plain", "tum"}));
+      ->check(makeChoiceValidator({"plain", "tum"}));
   verb.add_option(
           "--overlay", into.overlay,
           "Colour copies in overlay/ with marks: list of contacts, boxes, names, paths; contacts "
@@ -252,17 +228,17 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
                   "Depth, ids and normals at transparent surfaces. clear: of the object behind; "
                   "solid: of the glass, which is then opaque in colour, too")
       ->capture_default_str()
-      ->check(CLI::IsMember({"clear", "solid"}));
+      ->check(makeChoiceValidator({"clear", "solid"}));
   verb.add_option("--avatars", into.avatars,
                   "Shape of avatars in all channels. people: figures, within the shapes that "
                   "collide; shapes: the shapes that collide")
       ->capture_default_str()
-      ->check(CLI::IsMember({"people", "shapes"}));
+      ->check(makeChoiceValidator({"people", "shapes"}));
   verb.add_option("--samples", into.samples,
                   "Samples of the colour in each pixel, which smooth its edges; the other channels "
                   "have one. The time of the colour grows with it")
       ->capture_default_str()
-      ->check(CLI::IsMember({"1", "4", "16"}));
+      ->check(makeChoiceValidator({"1", "4", "16"}));
   verb.add_flag("--no-shadows", into.noShadows, "Draw no shadows of the sun in the colour");
   verb.add_flag("--shadows")->group("");  // the default, which earlier versions had to be given
 }
@@ -273,14 +249,14 @@ void addRun(CLI::App& verb, CaptureArguments& into) {
                   "gl: OpenGL; rays: Embree ray tracing; auto: the faster one for device, size and "
                   "channels, the same for all frames")
       ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "gl", "rays"}));
+      ->check(makeChoiceValidator({"auto", "gl", "rays"}));
   verb.add_option("--shard", into.shard,
                   "Render every Nth frame starting at frame I; all N shards form the full set")
       ->capture_default_str()
       ->check(CLI::Validator(validateShard, "I/N"));
   verb.add_option("--progress", into.progress, "Progress format on stderr")
       ->capture_default_str()
-      ->check(CLI::IsMember({"bar", "json"}));
+      ->check(makeChoiceValidator({"bar", "json"}));
   verb.add_flag("--no-mp4", into.noMp4, "Do not make video.mp4 (which needs ffmpeg)");
   verb.add_flag("--report-depth", into.reportDepth,
                 "Compare depth and ids of each frame with ray-traced ground truth; writes "

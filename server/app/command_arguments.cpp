@@ -8,6 +8,7 @@
 #include "scene/model/rotation.hpp"
 #include "scene/world/audit.hpp"
 #include "scene/world/data/validation.hpp"
+#include "server/app/validators.hpp"
 #include "server/base/host_port.hpp"
 #include "server/base/parse_number.hpp"
 #include "server/inspection/inspection.hpp"
@@ -22,18 +23,6 @@ std::string validateFile(const std::string& text) {
 std::string validateEndpoint(const std::string& text) {
   if (parseHostPort(text)) return {};
   return text + ": give HOST:PORT with a port from 0 to 65535, for example 127.0.0.1:7878";
-}
-
-std::string validateSeconds(const std::string& text) {
-  const auto seconds = parseNumber<double>(text);
-  if (seconds && *seconds >= 0 && *seconds <= 1e6) return {};
-  return text + ": give seconds from 0 to 1000000";
-}
-
-std::string validateTolerance(const std::string& text) {
-  const auto metres = parseNumber<double>(text);
-  if (metres && *metres >= 0 && *metres <= 1000) return {};
-  return text + ": give metres from 0 to 1000";
 }
 
 std::string validateAudit(const std::string& text) {
@@ -57,14 +46,9 @@ void addAudit(CLI::App& verb, CommandArguments& into) {
 std::string setSetting(scene::WorldSettings& settings, double scene::WorldSettings::*field,
                        const std::string& text) {
   const auto number = parseNumber<double>(text);
-  if (!number) return text + " is not a number";
+  if (!number) return text + ": give a number";
   settings.*field = *number;
   return scene::validateWorldSettings(settings).value_or("");
-}
-
-std::string validateSlope(const std::string& text) {
-  const auto degrees = parseNumber<double>(text);
-  return degrees && *degrees >= 0 && *degrees <= 89 ? "" : text + ": give 0 to 89 degrees";
 }
 
 CLI::Validator makeSettingValidator(double scene::WorldSettings::*field,
@@ -90,7 +74,7 @@ void addMotion(CLI::App& verb, CommandArguments& into) {
                   "Report pairs that come closer than this without contact; 0: none (0)")
       ->check(makeSettingValidator(&scene::WorldSettings::nearMissDistance));
   verb.add_option("--slope", into.slope, "Steepest slope that avatars stand on, in degrees (50)")
-      ->check(CLI::Validator(validateSlope, "DEGREES"));
+      ->check(makeRangeValidator(0, 89, "DEGREES"));
   verb.add_option("--speed-limit", into.speedLimit,
                   "Highest speed of commands and falls, in m/s (1000). Walks without a speed need "
                   "1.4; for contact horizons give about 4")
@@ -99,7 +83,7 @@ void addMotion(CLI::App& verb, CommandArguments& into) {
                   "Reaction to obstacles: avatars slide along them, "
                   "or stop")
       ->capture_default_str()
-      ->check(CLI::IsMember({"slide", "stop"}));
+      ->check(makeChoiceValidator({"slide", "stop"}));
 }
 
 void addAccess(CLI::App& verb, CommandArguments& into) {
@@ -107,8 +91,7 @@ void addAccess(CLI::App& verb, CommandArguments& into) {
   verb.add_option("--token-file", into.tokenFile,
                   "File with a role (observe, drive, admin) and a token per line; clients need a "
                   "token")
-      ->type_name("")
-      ->check(CLI::ExistingFile.description("FILE"));
+      ->check(CLI::Validator(validateExistingFile, "FILE"));
   verb.add_flag("--insecure", into.access.insecure,
                 "Allow a token file on a public address, although the connection is not encrypted");
   verb.add_option("--allow-host", into.access.hosts,
@@ -136,7 +119,7 @@ void addRenderer(CLI::App& verb, CommandArguments& into) {
                   "gl: OpenGL; rays: Embree ray tracing; auto: the faster one for device, size and "
                   "channels")
       ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "gl", "rays"}));
+      ->check(makeChoiceValidator({"auto", "gl", "rays"}));
 }
 
 void addWalk(CLI::App& verb, CommandArguments& into) {
@@ -203,13 +186,13 @@ void addRecording(CLI::App& verb, CommandArguments& into, const char* descriptio
                   "walk: the data that a replay needs; foxglove: also channels for Foxglove and "
                   "Lichtblick, ten times a second")
       ->capture_default_str()
-      ->check(CLI::IsMember({"walk", "foxglove"}))
+      ->check(makeChoiceValidator({"walk", "foxglove"}))
       ->needs(file);
   verb.add_option("--record-frames", into.recordFrames,
                   "Record JPEG views of each avatar, one per SECONDS of simulated time, and all "
                   "other "
                   "frames from its eyes; 0: only the other frames")
-      ->check(CLI::Validator(validateSeconds, "SECONDS"))
+      ->check(makeRangeValidator(0, 1e6, "SECONDS"))
       ->needs(file);
 }
 
@@ -218,7 +201,7 @@ void addTolerance(CLI::App& verb, CommandArguments& into) {
   verb.add_option("--tolerance", into.tolerance,
                   "Position and clearance differences up to this are ignored")
       ->capture_default_str()
-      ->check(CLI::Validator(validateTolerance, "METRES"));
+      ->check(makeRangeValidator(0, 1000, "METRES"));
 }
 
 /// Empty if the word is a kind of problem; otherwise the error, with the nearest kind.
@@ -277,7 +260,7 @@ void addReplayOptions(CLI::App& replay, CommandArguments& into) {
       .add_option("--pictures", into.pictures,
                   "SCENE RECORDING: maximum number of change pictures, worst first")
       ->capture_default_str()
-      ->check(CLI::Range(0U, 1000U).description("N"));
+      ->check(makeWholeRangeValidator(0, 1000, "N"));
   addTolerance(replay, into);
   replay.footer(
       "Uses:\n"
@@ -320,7 +303,7 @@ void addExportOptions(CLI::App& verb, CommandArguments& into) {
   addRun(verb, into, "1");
   verb.add_option("--max-size", into.maxMegabytes,
                   "Size of the --html file; above it, textures are left out first, then pictures")
-      ->check(CLI::Range(1.0, 2000.0).description("MB"))
+      ->check(makeRangeValidator(1.0, 2000.0, "MB"))
       ->capture_default_str();
   verb.footer(
       "Uses:\n"
@@ -384,10 +367,10 @@ void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
   inspect.add_option("--plan", into.plan, "Folder for one floor plan per storey")
       ->check(CLI::Validator(validateFolder, "DIR"));
   inspect.add_option("--plan-format", into.planFormat, "Format of the plans")
-      ->check(CLI::IsMember({"png", "svg", "pdf"}))
+      ->check(makeChoiceValidator({"png", "svg", "pdf"}))
       ->capture_default_str();
   inspect.add_option("--plan-scale", into.planScale, "Scale of svg and pdf plans: 1:N")
-      ->check(CLI::Range(1.0, 100000.0).description("N"))
+      ->check(makeRangeValidator(1.0, 100000.0, "N"))
       ->capture_default_str();
   inspect.footer(
       "Of the options, --json and --strict apply to a recording.\n"
@@ -404,20 +387,19 @@ void addRouteOptions(CLI::App& verb, CommandArguments& into) {
   verb.add_option("FROM", into.route.from, std::string("Start") + kPlaces)->required();
   verb.add_option("TO", into.route.to, std::string("Goal") + kPlaces)->required();
   verb.add_option("--radius", into.route.agent.radius, "Radius of the walker")
-      ->check(CLI::Range(0.05, 5.0).description("METRES"))
+      ->check(makeRangeValidator(0.05, 5.0, "METRES"))
       ->capture_default_str();
   verb.add_option("--height", into.route.agent.height, "Height of the walker")
-      ->check(CLI::Range(0.2, 10.0).description("METRES"))
+      ->check(makeRangeValidator(0.2, 10.0, "METRES"))
       ->capture_default_str();
   verb.add_option("--speed", into.route.agent.speed, "Speed of the walk")
-      ->check(CLI::Range(0.1, 20.0).description("M/S"))
+      ->check(makeRangeValidator(0.1, 20.0, "M/S"))
       ->capture_default_str();
   verb.add_flag("--doors-as-they-are", into.route.doorsAsTheyAre,
                 "Doors that move stay as in the file. Default: they are open");
   verb.add_option("--drop", into.route.links.maxDrop,
                   "Jumps down from edges, up to this height. 0: not at all")
-      ->type_name("METRES")
-      ->check(CLI::Range(0.0, 10.0))
+      ->check(makeRangeValidator(0, 10, "METRES"))
       ->capture_default_str();
   verb.add_flag("--lifts", into.route.links.lifts, "Rides lifts");
   verb.add_flag("--json", into.json, "Print one JSON object");

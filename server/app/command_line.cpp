@@ -7,6 +7,7 @@
 #include "protocol/nearest_word.hpp"
 #include "server/app/command_arguments.hpp"
 #include "server/app/help_formatter.hpp"
+#include "server/app/parse_errors.hpp"
 #include "server/base/parse_number.hpp"
 #include "server/base/server_limits.hpp"
 #include "server/base/version.hpp"
@@ -323,7 +324,8 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
     }
     const auto verbs = app.get_subcommands();
     std::cerr << "enfilade: "
-              << (verbs.empty() ? describeMissingVerb(requestedVerb) : std::string(error.what()))
+              << (verbs.empty() ? describeMissingVerb(requestedVerb)
+                                : describeParseError(*verbs.front(), error))
               << "\n"
               << "enfilade " << (verbs.empty() ? "" : verbs[0]->get_name() + " ")
               << "--help lists the options\n";

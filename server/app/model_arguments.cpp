@@ -2,6 +2,8 @@
 
 #include <CLI/CLI.hpp>
 
+#include "server/app/validators.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -22,25 +24,27 @@ void addModel(CLI::App& verb, ModelArguments& into) {
       ->required();
   verb.add_option("--unit", into.unit, "Unit of the file: m, mm, cm, ft, in or a number of metres")
       ->check(CLI::Validator(validateUnit, "UNIT"));
-  verb.add_option("--up", into.up, "Up axis of the file")->check(CLI::IsMember({"x", "y", "z"}));
+  verb.add_option("--up", into.up, "Up axis of the file")
+      ->check(makeChoiceValidator({"x", "y", "z"}));
   verb.add_option("--offset", into.offset,
                   "Offset (m, Y up) subtracted from the file's coordinates; use one value for all "
                   "versions of a model. Default: 0 near the origin, else the model's position")
       ->delimiter(',')
       ->type_name("X,Y,Z")
-      ->expected(3);
+      ->expected(3)
+      ->check(CLI::Validator(validateAnyNumber, ""));
   verb.add_flag("--no-cache", into.noCache, "Import the model again and ignore the cached import");
   verb.add_option(
           "--ifc-reader", into.ifcReader,
           "IFC reader. auto: web-ifc, else ifcplusplus (also for products that web-ifc omits), "
           "else assimp")
       ->capture_default_str()
-      ->check(CLI::IsMember({"auto", "web-ifc", "ifcplusplus", "assimp"}));
+      ->check(makeChoiceValidator({"auto", "web-ifc", "ifcplusplus", "assimp"}));
   verb.add_option("--ifc-doors", into.ifcDoors,
                   "IFC doors. move: they are bodies if the file describes their motion; still: "
                   "they and lifts are static; open: static, with open leaves; none: without leaves")
       ->capture_default_str()
-      ->check(CLI::IsMember({"move", "still", "open", "none"}));
+      ->check(makeChoiceValidator({"move", "still", "open", "none"}));
   verb.add_flag("--georeference", into.georeference,
                 "IFC: apply the file's map conversion, so that coordinates are the map's");
   verb.add_option("--gltf-scene", into.gltfScene,

@@ -6,6 +6,7 @@
 
 #include "scene/import/bodies/collect_bodies.hpp"
 #include "scene/import/cache/model_cache.hpp"
+#include "scene/model/diagnostic_catalog.hpp"
 #include "server/base/progress.hpp"
 
 namespace enfilade::server {
@@ -47,8 +48,9 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
 std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options) {
   std::shared_ptr<const scene::Scene> scene = loadSceneTimed(options).scene;
   for (const scene::Diagnostic& problem : scene->model().diagnostics)
-    spdlog::info("{}: {} x {}, as {}", options.file.filename().string(), problem.count,
-                 problem.kind, problem.example);
+    spdlog::info("{}: {} ({}, {}), for example {}", options.file.filename().string(),
+                 scene::findDiagnosticKind(problem).meaning, problem.kind, problem.count,
+                 problem.example);
   return scene;
 }
 

@@ -12,6 +12,7 @@
 #include "render/service/renderer_selector.hpp"
 #include "scene/world/queries/point_in_solid.hpp"
 #include "server/base/load_scene.hpp"
+#include "server/base/prepare_folder.hpp"
 #include "server/base/signal_handling.hpp"
 #include "server/base/standard_output.hpp"
 #include "server/capture/capture_folder.hpp"

@@ -56,18 +56,6 @@ void removeStalePartFiles(const fs::path& folder) {
 
 }  // namespace
 
-void prepareFolder(const fs::path& folder, const char* option) {
-  const fs::path probe = folder / ".writable";
-  std::error_code error;
-  fs::create_directories(folder, error);
-  if (!error && !std::ofstream(probe).put(' ').flush())
-    error = std::error_code(errno, std::generic_category());
-  if (error)
-    throw std::runtime_error("cannot write to " + folder.string() + ": " + error.message() +
-                             "; give another folder with " + option);
-  fs::remove(probe, error);
-}
-
 void claimFolder(const fs::path& folder, const PictureOptions& options,
                  const std::string& manifest) {
   const std::string remedy = "; give another folder with --out, or empty this one";

@@ -11,10 +11,6 @@ namespace enfilade::server {
 
 inline constexpr const char* kManifestName = "capture.json";
 
-/// Creates the folder and checks that it is writable, before a long import starts. Throws
-/// std::runtime_error with its name; `option` is the option that selects another folder.
-void prepareFolder(const std::filesystem::path& folder, const char* option = "--out");
-
 /// Claims the folder for this manifest: it must be empty or contain frames of the same capture.
 /// Removes partial files of killed runs. Throws std::runtime_error with a remedy for a folder with
 /// other files.

@@ -12,6 +12,7 @@
 
 #include "protocol/recording/recording.hpp"
 #include "server/base/camera_rotation.hpp"
+#include "server/base/prepare_folder.hpp"
 #include "server/base/standard_output.hpp"
 #include "server/commands/camera_track.hpp"
 #include "server/messages/world_messages.hpp"
@@ -76,7 +77,7 @@ class RunExport {
  public:
   RunExport(std::filesystem::path folder, const v1::RecordingStart& start)
       : folder_(std::move(folder)), offset_(vectorFromProto(start.scene().offset())) {
-    std::filesystem::create_directories(folder_);
+    prepareFolder(folder_);
     contacts_.emplace(folder_ / "contacts.jsonl", "");
   }
 

@@ -8,6 +8,7 @@
 #include <optional>
 #include <stdexcept>
 #include <thread>
+#include <variant>
 #include <vector>
 
 #include "render/service/renderer_selector.hpp"
@@ -37,22 +38,27 @@ std::optional<Vec3> parsePoint(const std::string& text) {
   return at == end && point.allFinite() ? std::optional(point) : std::nullopt;
 }
 
+using Place = std::variant<Vec3, scene::NamedPlace>;
+
 /// The place that an argument means. Throws std::runtime_error, which names the argument.
-Vec3 resolvePlace(const std::string& text, const char* argument, const scene::Scene& scene,
-                  scene::Navigation& navigation) {
+Place parsePlace(const std::string& text, const char* argument, const scene::Scene& scene,
+                 double radius) {
   constexpr double kNextTo = 1;  // metres from an object
   if (const auto point = parsePoint(text)) return *point;
-  const auto named = scene::findNamedPlace(scene, text, navigation.agent().radius + kNextTo);
-  if (!named)
-    throw std::runtime_error(fmt::format(
-        "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey or an object; "
-        "`enfilade inspect --objects` lists the names",
-        argument, text));
-  const auto place = navigation.findPlaceIn(*named);
-  if (!place)
-    throw std::runtime_error(
-        fmt::format("{}: there is no free place to stand at '{}'", argument, text));
-  return *place;
+  if (const auto named = scene::findNamedPlace(scene, text, radius + kNextTo)) return *named;
+  throw std::runtime_error(fmt::format(
+      "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey or an object; "
+      "`enfilade inspect --objects` lists the names",
+      argument, text));
+}
+
+/// A point of the place. Throws std::runtime_error, which names the argument.
+Vec3 resolvePlace(const Place& place, const std::string& text, const char* argument,
+                  scene::Navigation& navigation) {
+  if (const auto* point = std::get_if<Vec3>(&place)) return *point;
+  if (const auto free = navigation.findPlaceIn(std::get<scene::NamedPlace>(place))) return *free;
+  throw std::runtime_error(
+      fmt::format("{}: there is no free place to stand at '{}'", argument, text));
 }
 
 Json toJson(const Vec3& point) {
@@ -186,6 +192,9 @@ void writePlan(const std::shared_ptr<const scene::Scene>& scene,
 
 ExitCode route(const RouteCommand& command) {
   const auto scene = loadScene(command.model);
+  // Before the meshes, whose building takes long.
+  const Place start = parsePlace(command.from, "FROM", *scene, command.agent.radius);
+  const Place goal = parsePlace(command.to, "TO", *scene, command.agent.radius);
   const auto snapshot = command.doorsAsTheyAre
                             ? scene::World(scene, command.settings).snapshot()
                             : scene::makeSnapshotWithOpenDoors(scene, command.settings);
@@ -194,8 +203,8 @@ ExitCode route(const RouteCommand& command) {
   scene::Navigation navigation(scene, command.settings, command.agent, snapshot.get(), threads,
                                [&](double done) { bar.show(done, "navigation mesh"); });
   bar.clear();
-  const Vec3 from = resolvePlace(command.from, "FROM", *scene, navigation);
-  const Vec3 to = resolvePlace(command.to, "TO", *scene, navigation);
+  const Vec3 from = resolvePlace(start, command.from, "FROM", navigation);
+  const Vec3 to = resolvePlace(goal, command.to, "TO", navigation);
   const scene::NavigationPath path = navigation.findPath(from, to, command.links);
   const auto narrowest =
       path.found() ? navigation.findNarrowest(path.points) : std::optional<scene::NarrowPlace>();

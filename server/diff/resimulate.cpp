@@ -10,6 +10,7 @@
 #include "render/image/atomic_file.hpp"
 #include "scene/import/import_model.hpp"
 #include "server/base/load_scene.hpp"
+#include "server/base/prepare_folder.hpp"
 #include "server/base/progress.hpp"
 #include "server/base/signal_handling.hpp"
 #include "server/base/standard_output.hpp"
@@ -229,7 +230,7 @@ ExitCode resimulate(const ResimulateCommand& requested) {
         const auto scene = loadScene(command.model);
         const auto renderer = tryMakeRenderer(scene, command.drawing);
         const auto record = command.record.empty() ? command.out / "new.mcap" : command.record;
-        std::filesystem::create_directories(command.out);
+        prepareFolder(command.out);
         requireDifferentFiles(record, command.recording);
         auto refused = resimulateWalk(command, recording, start, scene, renderer.get(), record);
         WalkDifference difference =

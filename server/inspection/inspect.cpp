@@ -7,8 +7,8 @@
 #include "protocol/mcap/reader.hpp"
 #include "render/image/atomic_file.hpp"
 #include "render/service/renderer_selector.hpp"
+#include "server/base/prepare_folder.hpp"
 #include "server/base/standard_output.hpp"
-#include "server/capture/capture_folder.hpp"
 #include "server/inspection/inspect_recording.hpp"
 #include "server/inspection/inspection.hpp"
 #include "server/inspection/inspection_html.hpp"
@@ -58,11 +58,19 @@ ExitCode checkDiagnostics(const scene::SceneReport& report,
   return ExitCode::violations;
 }
 
+/// Throws for a file that is a recording by its name, but not by its first bytes.
+void requireNoMcapName(const std::filesystem::path& file) {
+  if (file.extension() == ".mcap" && std::filesystem::is_regular_file(file))
+    throw std::runtime_error(file.string() +
+                             ": not an MCAP file by its first bytes; copy the recording again");
+}
+
 }  // namespace
 
 ExitCode inspect(const InspectCommand& command) {
   if (protocol::mcap::isMcap(command.model.file))
     return inspectRecording(command.model.file, command.json, command.strict);
+  requireNoMcapName(command.model.file);
   if (!command.plan.empty()) prepareFolder(command.plan, "--plan");
   const Inspection inspection =
       makeInspection(loadSceneTimed(command.model),

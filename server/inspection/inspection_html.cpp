@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "scene/model/diagnostic_catalog.hpp"
+#include "scene/model/format_number.hpp"
 #include "server/base/version.hpp"
 #include "server/inspection/html_page.hpp"
 
@@ -13,10 +14,6 @@ namespace {
 
 using Row = std::vector<HtmlCell>;
 using Vec3 = scene::Vec3;
-
-std::string formatPoint(const Vec3& point) {
-  return fmt::format("{:.3f}, {:.3f}, {:.3f} m", point.x(), point.y(), point.z());
-}
 
 std::string describeNorth(const std::optional<Eigen::Vector2d>& north) {
   if (!north) return "not stated by the file";
@@ -32,7 +29,7 @@ void addFacts(const Inspection& inspection, HtmlPage& page) {
       {{"Size", fmt::format("{:.2f} × {:.2f} × {:.2f} m (y is up)", size.x(), size.y(), size.z())},
        {"Unit, up axis",
         fmt::format("{} m, {}", scene.model().metresPerUnit, std::string(1, scene.model().upAxis))},
-       {"Subtracted from the file", formatPoint(scene.model().offset)},
+       {"Subtracted from the file", scene::formatPoint(scene.model().offset) + " m"},
        {"Objects", fmt::format("{}, of which {} are solid", report.objects, report.solidObjects)},
        {"Meshes", fmt::format("{}", report.meshes)},
        {"Triangles", fmt::format("{}; {} in the meshes", report.triangles, report.uniqueTriangles)},

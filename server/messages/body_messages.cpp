@@ -3,6 +3,7 @@
 #include <variant>
 
 #include "collision/assert.hpp"
+#include "server/messages/name_suggestions.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -74,7 +75,7 @@ std::optional<v1::Error> submitBodyCommand(scene::World& world, const v1::BodyCo
   if (auto* error = std::get_if<v1::Error>(&command)) return std::move(*error);
   if (auto refusal =
           scene::submitBodyCommand(world, std::get<scene::BodyCommand>(std::move(command))))
-    return makeError(v1::ERROR_REFUSED_COMMAND, *refusal,
+    return makeError(v1::ERROR_REFUSED_COMMAND, *refusal + suggestBody(world, message.body()),
                      "body." + refusal->substr(0, refusal->find_first_of(" :'")));
   return std::nullopt;
 }

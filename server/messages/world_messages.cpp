@@ -6,6 +6,7 @@
 #include "collision/assert.hpp"
 #include "server/messages/body_messages.hpp"
 #include "server/messages/event_place.hpp"
+#include "server/messages/name_suggestions.hpp"
 
 namespace enfilade::server {
 
@@ -138,7 +139,7 @@ Buffer makeErrorReply(std::uint64_t requestId, v1::Error error) {
 v1::Error makeRefusalError(const v1::Command& command, const std::string& reason) {
   ENFILADE_ASSERT(!reason.empty());
   const auto* order = v1::Command::descriptor()->FindFieldByNumber(command.order_case());
-  std::string field = reason.substr(0, reason.find_first_of(" '"));
+  std::string field = reason.substr(0, reason.find_first_of(" :'"));
   if (order && field != "avatar") field = order->name() + "." + field;
   return makeError(v1::ERROR_REFUSED_COMMAND, reason, field);
 }
@@ -247,6 +248,7 @@ v1::Notice toProto(const scene::World& world, const scene::Notice& notice, std::
   message.set_obstacle_name(scene::findEntityName(world, notice.obstacle));
   message.set_obstacle_global_id(findGlobalId(world.scene().model(), notice.obstacle));
   message.set_text(notice.text);
+  if (notice.isAvatarUnknown) message.mutable_text()->append(suggestAvatar(world, notice.avatar));
   return message;
 }
 

@@ -13,8 +13,8 @@
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/ghost.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
-#include "scene/navigation/place_names.hpp"
 #include "server/messages/world_messages.hpp"
+#include "server/navigation/query_fields.hpp"
 #include "server/navigation/shared_meshes.hpp"
 
 namespace enfilade::server {
@@ -24,35 +24,6 @@ using scene::Vec3;
 
 constexpr std::size_t kMaxEntries = 8;         // sizes whose meshes are kept
 constexpr std::size_t kMaxIslandAreas = 1000;  // in a reply
-constexpr double kNextToObject = 1;            // metres
-constexpr double kMaxCoordinate = 1e7;         // metres
-constexpr double kMaxDrop = 10;                // metres
-
-v1::Error makeFieldError(const std::string& field, const std::string& remedy,
-                         v1::ErrorCode code = v1::ERROR_BAD_MESSAGE) {
-  return makeError(code, "navigation." + field + ": " + remedy, "navigation." + field);
-}
-
-std::optional<v1::Error> validateNumber(const std::string& field, double value, double low,
-                                        double high) {
-  if (value >= low && value <= high) return std::nullopt;
-  char text[96];
-  std::snprintf(text, sizeof text, "give %g to %g, not %g", low, high, value);
-  return makeFieldError(field, text);
-}
-
-std::optional<v1::Error> validateCount(const std::string& field, std::int64_t count,
-                                       std::int64_t limit) {
-  if (count >= 1 && count <= limit) return std::nullopt;
-  return makeFieldError(field, "give 1 to " + std::to_string(limit),
-                        count < 1 ? v1::ERROR_BAD_MESSAGE : v1::ERROR_TOO_LARGE);
-}
-
-std::optional<v1::Error> validatePoint(const std::string& field, const v1::Vec3& point) {
-  const Vec3 place = vectorFromProto(point);
-  if (place.allFinite() && place.cwiseAbs().maxCoeff() <= kMaxCoordinate) return std::nullopt;
-  return makeFieldError(field, "give finite coordinates of at most 1e7 m");
-}
 
 /// Writes the answers to one query into its reply.
 struct Answer {
@@ -66,36 +37,20 @@ struct Answer {
   std::function<scene::Navigation&()> withOpenDoors;
   std::optional<scene::EntityIndex>& lazyIndex;
   const std::shared_ptr<const scene::Scene>& shared;
+  const PathPlaces& places;  ///< of a path query
 
   scene::EntityIndex& index() const {
     if (!lazyIndex) lazyIndex.emplace(shared);
     return *lazyIndex;
   }
 
-  std::variant<Vec3, v1::Error> resolve(const v1::NavigationPlace& place,
+  std::variant<Vec3, v1::Error> resolve(const QueryPlace& place, const v1::NavigationPlace& given,
                                         const std::string& field) const {
-    if (place.has_point()) {
-      if (auto error = validatePoint(field + ".point", place.point())) return std::move(*error);
-      return vectorFromProto(place.point());
-    }
-    if (place.has_avatar()) {
-      const scene::AvatarSnapshot* avatar = findAvatar(*state.snapshot, place.avatar());
-      if (!avatar) return makeUnknownAvatarError(place.avatar(), "navigation." + field + ".avatar");
-      return avatar->footPosition;
-    }
-    if (place.name().empty()) return makeFieldError(field, "give a point, a name or an avatar");
-    const auto named =
-        scene::findNamedPlace(scene, place.name(), navigation.agent().radius + kNextToObject);
-    if (!named)
-      return makeFieldError(
-          field + ".name",
-          "no room, storey or object is named '" + place.name() + "', or its extent is not known",
-          v1::ERROR_UNKNOWN_ENTITY);
-    const auto found = navigation.findPlaceIn(*named);
-    if (!found)
-      return makeFieldError(field + ".name", "there is no free place at '" + place.name() + "'",
-                            v1::ERROR_REFUSED_COMMAND);
-    return *found;
+    if (const auto* point = std::get_if<Vec3>(&place)) return *point;
+    if (const auto found = navigation.findPlaceIn(std::get<scene::NamedPlace>(place)))
+      return *found;
+    return makeNavigationError(field + ".name", "there is no free place at '" + given.name() + "'",
+                               v1::ERROR_REFUSED_COMMAND);
   }
 
   void addSpot(const std::optional<Vec3>& place) const {
@@ -237,13 +192,12 @@ struct Answer {
   }
 
   std::optional<v1::Error> operator()(const v1::NavigationQuery::Path& query) const {
-    if (auto error = validateCount("path.to", query.to_size(), 100)) return error;
-    if (auto error = validateNumber("path.max_drop", query.max_drop(), 0, kMaxDrop)) return error;
     const scene::PathOptions options{query.max_drop(), query.lifts()};
-    const auto from = resolve(query.from(), "path.from");
+    const auto from = resolve(places.from, query.from(), "path.from");
     if (const auto* error = std::get_if<v1::Error>(&from)) return *error;
     for (int i = 0; i < query.to_size(); ++i) {
-      const auto to = resolve(query.to(i), "path.to[" + std::to_string(i) + "]");
+      const auto to = resolve(places.to[static_cast<std::size_t>(i)], query.to(i),
+                              "path.to[" + std::to_string(i) + "]");
       if (const auto* error = std::get_if<v1::Error>(&to)) return *error;
       writePath(std::get<Vec3>(from), std::get<Vec3>(to), options, query.narrowest(),
                 *reply.add_paths());
@@ -361,7 +315,7 @@ struct Answer {
       reply.set_map_height(map.height);
       attachment = std::move(map.cells);
     } catch (const std::invalid_argument& error) {
-      return makeFieldError("map.cell", error.what(), v1::ERROR_TOO_LARGE);
+      return makeNavigationError("map.cell", error.what(), v1::ERROR_TOO_LARGE);
     }
     return std::nullopt;
   }
@@ -425,7 +379,7 @@ std::optional<v1::Error> NavigationService::load(const scene::NavigationAgent& a
     keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
     return std::nullopt;
   } catch (const scene::MeshFileError& error) {
-    return makeFieldError("load_mesh.mesh", error.what());
+    return makeNavigationError("load_mesh.mesh", error.what());
   }
 }
 
@@ -440,8 +394,14 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   if (auto error = validateNumber("height", agent.height, 0.2, 10)) return std::move(*error);
   if (auto error = validateNumber("speed", agent.speed, 0.01, 20)) return std::move(*error);
   if (query.query_case() == v1::NavigationQuery::QUERY_NOT_SET)
-    return makeFieldError(
+    return makeNavigationError(
         "query", "give path, random, snap, steps, clearance, map, islands, save_mesh or load_mesh");
+  PathPlaces places;
+  if (query.has_path()) {  // before the meshes, whose building takes long
+    auto found = findPathPlaces(query.path(), *scene_, *state.snapshot, agent.radius);
+    if (auto* error = std::get_if<v1::Error>(&found)) return std::move(*error);
+    places = std::move(std::get<PathPlaces>(found));
+  }
   const bool doorsOpen = query.doors() == v1::NavigationQuery::DOORS_OPEN;
   if (query.has_load_mesh())
     if (auto error = load(agent, doorsOpen, state, query.load_mesh().mesh()))
@@ -454,8 +414,8 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   std::function<scene::Navigation&()> withOpenDoors;
   if (scene::hasDoors(*scene_))
     withOpenDoors = [&]() -> scene::Navigation& { return *prepare(agent, true, state).navigation; };
-  const Answer answer{*scene_,         navigation,    reply,  state, doorsOpen,
-                      *entry.snapshot, withOpenDoors, index_, scene_};
+  const Answer answer{*scene_,         navigation,    reply,  state,  doorsOpen,
+                      *entry.snapshot, withOpenDoors, index_, scene_, places};
   std::optional<v1::Error> error;
   switch (query.query_case()) {
     case v1::NavigationQuery::kPath:

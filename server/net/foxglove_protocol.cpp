@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/json_depth.hpp"
+#include "scene/model/trim.hpp"
 #include "server/base/sanitize_for_log.hpp"
 #include "server/export/base64.hpp"
 
@@ -25,12 +26,6 @@ constexpr std::size_t kMaxEchoedBytes = 64;  // of a client's text in an answer
 
 std::string dump(const Json& json) {
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-std::string_view trim(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t");
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t") - first + 1);
 }
 
 template <class Number>
@@ -92,7 +87,7 @@ ClientRequest parseUnsubscribe(const Json& message) {
 std::string chooseSubprotocol(std::string_view header) {
   while (!header.empty()) {
     const std::size_t comma = header.find(',');
-    const std::string_view word = trim(header.substr(0, comma));
+    const std::string_view word = scene::trim(header.substr(0, comma));
     if (std::find(std::begin(kSubprotocols), std::end(kSubprotocols), word) !=
         std::end(kSubprotocols))
       return std::string(word);

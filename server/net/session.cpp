@@ -3,6 +3,7 @@
 #include <spdlog/spdlog.h>
 
 #include <boost/asio/post.hpp>
+#include <ranges>
 #include <utility>
 
 #include "collision/assert.hpp"
@@ -28,6 +29,15 @@ v1::ErrorCode toErrorCode(protocol::FramingError::Code code) {
 /// Period of disconnect checks while a client is not read.
 constexpr std::chrono::seconds kDisconnectPollPeriod{1};
 constexpr std::size_t kMaxNameBytes = 64;  // bytes, of names of clients and worlds
+
+std::string listWorlds(const WorldRegistry& worlds) {
+  constexpr std::size_t kMaxListed = 10;
+  const auto all = worlds.allWorlds();
+  std::string list;
+  for (const auto& world : all | std::views::take(kMaxListed))
+    list += (list.empty() ? "'" : ", '") + world->identity().name + "'";
+  return list + (all.size() > kMaxListed ? ", ..." : "");
+}
 
 }  // namespace
 
@@ -194,7 +204,7 @@ void Session::joinWorld(const v1::Hello& hello, Role role, std::uint64_t request
     return fail(v1::ERROR_SHUTTING_DOWN, "the server is stopping", requestId);
   fail(v1::ERROR_UNKNOWN_WORLD,
        "there is no world '" + sanitizeForLog(hello.world(), kMaxNameBytes) +
-           "', or it has ended: leave hello.world empty for the main world; it lists all worlds",
+           "', or it has ended: the worlds are " + listWorlds(context_.worlds),
        requestId);
 }
 

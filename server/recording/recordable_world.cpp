@@ -2,6 +2,7 @@
 
 #include "collision/assert.hpp"
 #include "server/messages/body_messages.hpp"
+#include "server/messages/name_suggestions.hpp"
 #include "server/messages/order_messages.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -50,7 +51,7 @@ std::optional<v1::Error> RecordableWorld::submit(const v1::Command& command) {
   if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
   if (const auto refusal =
           scene::submitAvatarCommand(world_, std::get<scene::Command>(std::move(order))))
-    return makeRefusalError(command, *refusal);
+    return makeRefusalError(command, *refusal + suggestBodies(world_, command));
   if (recorder_) recorder_->onCommand(command);
   return std::nullopt;
 }

@@ -9,6 +9,7 @@
 #include "protocol/recording/recording.hpp"
 #include "render/image/atomic_file.hpp"
 #include "render/image/contact_sheet.hpp"
+#include "server/base/prepare_folder.hpp"
 #include "server/messages/event_names.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -116,15 +117,8 @@ std::string formatContactLine(const v1::ContactEvent& event) {
 }
 
 RunReport::RunReport(std::filesystem::path folder) : folder_(std::move(folder)) {
-  try {
-    std::filesystem::create_directories(folder_ / "frames");
-    const std::filesystem::path probe = folder_ / ".writable";
-    render::writeFileAtomically(probe, "");
-    std::filesystem::remove(probe);
-  } catch (const std::exception& error) {
-    throw ReportError("cannot write to " + folder_.string() + ": " + error.what() +
-                      "; give another folder with --out");
-  }
+  prepareFolder(folder_);
+  prepareFolder(folder_ / "frames");
 }
 
 void RunReport::removePreviousRun() {
@@ -139,9 +133,9 @@ void RunReport::removePreviousRun() {
          {"contacts.jsonl", "summary.json", "sheet.png", "map.png", kFrameListFile}) {
       std::filesystem::remove(folder_ / file);
     }
-  } catch (const std::exception& error) {
-    throw ReportError("cannot remove an earlier run from " + folder_.string() + ": " +
-                      error.what() + "; give another folder with --out");
+  } catch (const std::system_error& error) {
+    throw std::runtime_error("cannot remove an earlier run from " + folder_.string() + ": " +
+                             error.code().message() + "; give another folder with --out");
   }
 }
 

@@ -13,11 +13,6 @@
 
 namespace enfilade::server {
 
-/// A folder or file is not writable; the text has its name.
-struct ReportError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
 /// Data of a run that its ticks do not contain.
 struct RunSummary {
   std::string script;
@@ -30,7 +25,8 @@ struct RunSummary {
 
 class RunReport {
  public:
-  /// Creates the folder and checks that it is writable. Throws ReportError.
+  /// Creates the folder and checks that it is writable. Throws std::runtime_error
+  /// with its name.
   explicit RunReport(std::filesystem::path folder);
 
   /// Removes the files of an earlier run, and no others.

@@ -153,7 +153,7 @@ TEST(RunScript, ABlockedWalkNamesItsObstacleAndTheNextCommandBegins) {
   EXPECT_EQ(result.ticks, 1u + FakeWorld::kStuckTicks + 1u);
   ASSERT_EQ(result.outcomes.size(), 1u);
   EXPECT_EQ(result.outcomes[0].text,
-            "tour.jsonl:2: stuck: blocked by Hall/Table#2 at (4.00, 0.00, 0.00)");
+            "tour.jsonl:2: stuck: blocked by Hall/Table#2 at [4.00, 0.00, 0.00]");
 }
 
 TEST(RunScript, CapturesShowTheTickInWhichTheyRun) {

@@ -139,7 +139,8 @@ TEST(Script, NonFiniteNumbersAreRefused) {
     expectError(R"({"walk":"ann","to":[0,0,)" + std::string(huge) + "]}",
                 "tour.jsonl:1: a number exceeds the range of a double");
   }
-  expectError(R"({"wait":-1})", "tour.jsonl:1: wait: -1 is out of range");
+  expectError(R"({"wait":-1})",
+              "tour.jsonl:1: wait: -1 is out of range; give a number of seconds from 0 to 1000000");
   expectError(R"({"wait":1e300})", "tour.jsonl:1: wait: ");
   expectError(R"({"wait":-0.1,"for":"ann"})", "tour.jsonl:1: wait: -0.1 is out of range");
 }
@@ -153,7 +154,9 @@ TEST(Script, NumbersOutOfRangeAreRefusedBeforeTheWalk) {
   expectError(R"({"walk":"a","to":[0,0,0],"speed":1001})", "tour.jsonl:1: speed: ");
   expectError(R"({"wait":86401,"for":"a"})", "tour.jsonl:1: wait: ");
   expectError(R"({"jump":"a","height":0})", "tour.jsonl:1: height: ");
-  expectError(R"({"crouch":"a","height":-1})", "tour.jsonl:1: height: ");
+  expectError(
+      R"({"crouch":"a","height":-1})",
+      "tour.jsonl:1: height: -1 is out of range; give a number of metres above 0 and at most 10");
   expectError(R"({"joints":"a","to":[1e4]})", "tour.jsonl:1: to[0]: ");
   expectError(R"({"joints":"a","to":[1],"speed":21})", "tour.jsonl:1: speed: ");
 }

@@ -146,6 +146,7 @@ TEST(Crouch, HeightsBelowAThirdOrAboveTheSpawnHeightAreRefused) {
   run.order("ann", Crouch{1.8});
   run.untilIdle();
   EXPECT_EQ(run.count(Kind::refused), 2);
+  EXPECT_NE(run.text(Kind::refused).find(" m; give 0.525 to 1.75 m"), std::string::npos);
   EXPECT_EQ(run.view("ann").height, 1.75);
 }
 

@@ -303,6 +303,10 @@ TEST(Sources, TheHigherOneHasTheSayAndTheLowerOneAddsTheRest) {
   EXPECT_EQ(bodyOf(model, "a").mass, 2.0) << "the physics extension before extras";
   EXPECT_EQ(bodyOf(model, "b-rigid").mass, 3.0) << "extras before names";
   EXPECT_EQ(countOf(model, "replaced_bodies"), 3u);
+  for (const Diagnostic& diagnostic : model.diagnostics)
+    if (diagnostic.kind == "replaced_bodies")
+      EXPECT_EQ(diagnostic.example,
+                "'c-rigid' of the suffix by 'mine' of the sidecar, object c-rigid");
   EXPECT_EQ(formatBodySources(model), "1 of sidecar, 1 of khr, 1 of extras");
 }
 

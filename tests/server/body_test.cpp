@@ -51,6 +51,24 @@ TEST_F(ServedBodies, WelcomeListsTheBodies) {
   EXPECT_GT(bodies[2].mass(), 1);
 }
 
+TEST_F(ServedBodies, AnUnknownBodyIsRefusedWithTheNearestOne) {
+  protocol::Client ann = client("ann");
+  const auto refuse = [&](const std::string& name) {
+    const auto refused = ann.bodyCommand(opening(name));
+    return refused ? refused->message() : "accepted";
+  };
+  EXPECT_EQ(refuse("dor"), "body: no body named 'dor'; did you mean 'door'?");
+  EXPECT_EQ(refuse("rat"), "body: no body named 'rat'; did you mean 'crate'?");
+  EXPECT_EQ(refuse("lift"), "body: no body named 'lift'; the bodies are 'door', 'zone', 'crate'");
+  v1::Command walk = spawn("ann", 0, 0, 0);
+  walk.mutable_walk()->add_opens("dor");
+  walk.mutable_walk()->add_along()->set_x(1);
+  const auto refused = ann.command(walk);
+  ASSERT_TRUE(refused);
+  EXPECT_EQ(refused->message(), "opens[0]: body: no body named 'dor'; did you mean 'door'?");
+  EXPECT_EQ(refused->field(), "walk.opens[0]");
+}
+
 TEST_F(ServedBodies, AnOpeningDoorPushesAnAvatarAndReportsIt) {
   protocol::Client ann = client("ann"), guest = client("guest");
   guest.subscribe(everything());

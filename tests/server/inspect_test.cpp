@@ -159,6 +159,14 @@ TEST_F(Inspect, PagesOfPlansAreToScale) {
   EXPECT_LT(margins, 100);
 }
 
+TEST_F(Inspect, ADamagedRecordingIsNoUnknownModel) {
+  write(path("x.mcap"), "garbage");
+  const Ended ended = run({"inspect", path("x.mcap")});
+  EXPECT_EQ(ended.code, 1);
+  EXPECT_NE(ended.err.find("x.mcap: not an MCAP file by its first bytes"), std::string::npos)
+      << ended.err;
+}
+
 TEST_F(Inspect, WrongUsageExitsWithTwoAndUnreadableFilesWithOne) {
   const std::vector<std::vector<std::string>> mistakes{
       {"inspect"},

@@ -1,6 +1,11 @@
 // Tests of navigation through a connection, in scripts and by `enfilade route`.
-#include <nlohmann/json.hpp>
+#include <spdlog/sinks/ostream_sink.h>
+#include <spdlog/spdlog.h>
 
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "server/navigation/navigation_service.hpp"
 #include "tests/server/program_fixture.hpp"
 #include "tests/server/served_room.hpp"
 
@@ -63,6 +68,35 @@ TEST_F(NavigationRequests, GoIsAWalkAfterTheQueuedOrders) {
     }
   }
   EXPECT_EQ(arrived, 2);
+}
+
+/// The log lines of an answer.
+std::string logOfAnswer(const std::shared_ptr<const scene::Scene>& scene, const std::string& goal,
+                        std::string& error) {
+  std::ostringstream log;
+  const auto usual = spdlog::default_logger();
+  spdlog::set_default_logger(std::make_shared<spdlog::logger>(
+      "answer", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
+  v1::NavigationQuery query;
+  *query.mutable_path()->mutable_from()->mutable_point() = vec(2, 0, 0);
+  query.mutable_path()->add_to()->set_name(goal);
+  std::vector<std::uint8_t> attachment;
+  NavigationService service(scene);
+  const auto answer = service.answer(query, {scene::World(scene).snapshot(), {}}, attachment);
+  spdlog::set_default_logger(usual);
+  const auto* refused = std::get_if<v1::Error>(&answer);
+  error = refused ? refused->message() : "";
+  return log.str();
+}
+
+TEST(NavigationPlaces, AnUnknownNameIsRefusedBeforeMeshesAreBuilt) {
+  const auto scene = smallRoom();
+  std::string error;
+  EXPECT_EQ(logOfAnswer(scene, "room:attic", error), "");
+  EXPECT_NE(error.find("'room:attic'"), std::string::npos) << error;
+  const std::string log = logOfAnswer(scene, scene->model().objects.back().path, error);
+  EXPECT_NE(log.find("built in"), std::string::npos) << log;
+  EXPECT_EQ(error, "");
 }
 
 class Route : public ProgramFixture {};

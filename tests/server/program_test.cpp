@@ -63,13 +63,48 @@ TEST_F(Program, UsageMistakesEndWithTwoAndSayHow) {
   EXPECT_EQ(run({"--help"}).code, 0);
 }
 
+TEST_F(Program, UsageMistakesNameTheOptionAndWhatToGive) {
+  struct Mistake {
+    std::vector<std::string> arguments;
+    std::string text;
+  };
+  const std::vector<Mistake> mistakes{
+      {{"inspect", "a", "--plan-scale", "abc"}, "--plan-scale: abc: give N from 1 to 100000\n"},
+      {{"inspect", "a", "--plan-format", "bmp"}, "--plan-format: bmp: give png, svg or pdf\n"},
+      {{"inspect", "a", "--offset", "1,2"}, "--offset: give X,Y,Z\n"},
+      {{"inspect", "a", "--offset", "1,2,x"}, "--offset: x: give a number\n"},
+      {{"inspect", "a", "--plan"}, "--plan: give DIR\n"},
+      {{"doctor", "nothere", "--device"}, "unknown option '--device'\n"},
+      {{"doctor", "nothere"}, "unexpected argument 'nothere'; leave it out\n"},
+      {{"serve", "a", "--token-file", "nothere"},
+       "--token-file: nothere: no such file; check the path\n"},
+      {{"serve", "a", "--port", "80"}, "unknown option '--port'; did you mean '--listen'?\n"},
+      {{"serve", "a", "--step-height", "5"}, "--step-height: step height is 5 m; give 0 to 2 m\n"},
+      {{"capture", "a", "--no-such"}, "unknown option '--no-such'"},
+      {{"capture", "a", "--no-cach=1"}, "unknown option '--no-cach'; did you mean '--no-cache'?\n"},
+      {{"capture", "a", "b"}, "--out is required: output folder for the frames\n"}};
+  for (const Mistake& mistake : mistakes) {
+    const Ended ended = run(mistake.arguments);
+    EXPECT_EQ(ended.code, 2);
+    EXPECT_EQ(ended.err.find("enfilade: " + mistake.text), 0u) << ended.err;
+  }
+}
+
+TEST_F(Program, HelpMarksRequiredOptionsAndHasNoTypes) {
+  const std::string walk = run({"walk", "--help"}).out, route = run({"route", "--help"}).out;
+  EXPECT_NE(walk.find("--out DIR (required)"), std::string::npos) << walk;
+  EXPECT_NE(walk.find("--connect HOST:PORT (required)"), std::string::npos) << walk;
+  EXPECT_NE(route.find("--drop METRES (0)"), std::string::npos) << route;
+}
+
 TEST_F(Program, UnreadableFilesAreNamedAndExitWithOne) {
   const auto replay = [&](const std::string& scene, const std::string& script) {
     return run({"replay", scene, script, "--out", path("out")});
   };
   const Ended noScene = replay(path("absent.obj"), path("walk.jsonl"));
   EXPECT_EQ(noScene.code, 1);
-  EXPECT_NE(noScene.err.find("absent.obj"), std::string::npos) << noScene.err;
+  EXPECT_NE(noScene.err.find("absent.obj: no such file; check the path\n"), std::string::npos)
+      << noScene.err;
   write(path("room.xyz"), smallRoomObj());
   const Ended unknown = replay(path("room.xyz"), path("walk.jsonl"));
   EXPECT_EQ(unknown.code, 1);
@@ -115,7 +150,9 @@ TEST_F(Program, AnUnwritableFolderIsReportedBeforeTheWalk) {
   const Ended ended =
       run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("file") + "/out"});
   EXPECT_EQ(ended.code, 1);
-  EXPECT_NE(ended.err.find("file/out"), std::string::npos) << ended.err;
+  EXPECT_NE(ended.err.find("file/out: Not a directory; give another folder with --out\n"),
+            std::string::npos)
+      << ended.err;
   EXPECT_EQ(ended.out, "");
 }
 

@@ -94,7 +94,7 @@ class NodeCollector {
   void visit(const aiNode& node, const VisitState& state) {
     if (state.depth > kMaxNodeDepth) {
       throw ImportError("nodes are nested more than " + std::to_string(kMaxNodeDepth) +
-                        " levels deep; re-export the file with a flatter tree (convert)");
+                        " levels deep; re-export the file with a flatter tree");
     }
     const std::string_view name(node.mName.C_Str(), node.mName.length);
     const GltfNode* const exact = findExact(node);

@@ -38,10 +38,10 @@ void mergeLowerPriorityBodies(Model& model, std::vector<BodySpec> bodies,
     if (conflict != body.objects.end()) {
       if (isSameBody(body, *bodyOfObject[*conflict])) continue;
       addDiagnostic(model.diagnostics, "replaced_bodies",
-                    body.name + " of " + toString(body.source) + ": '" +
-                        bodyOfObject[*conflict]->name + "' of " +
-                        toString(bodyOfObject[*conflict]->source) + " has '" +
-                        model.objects[*conflict].path + "'");
+                    "'" + body.name + "' of the " + toString(body.source) + " by '" +
+                        bodyOfObject[*conflict]->name + "' of the " +
+                        toString(bodyOfObject[*conflict]->source) + ", object " +
+                        model.objects[*conflict].path);
       continue;
     }
     std::erase_if(body.objects,

@@ -138,11 +138,10 @@ std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, const s
     mergeLowerPriorityBodies(model, std::move(ofExtras), staticObjects);
     attachCollisionShapes(model);
   } catch (const SidecarError& error) {
-    throw ImportError(std::string(error.what()) + " (convert)");
+    throw ImportError(error.what());
   }
   if (const auto reason = validateBodies(model))
-    throw ImportError(file.filename().string() + ": " + *reason +
-                      "; correct the node's extras (convert)");
+    throw ImportError(file.filename().string() + ": " + *reason + "; correct the node's extras");
   return staticObjects;
 }
 

@@ -4,14 +4,10 @@
 #include <charconv>
 #include <cmath>
 
+#include "scene/model/trim.hpp"
+
 namespace enfilade::scene {
 namespace {
-
-std::string_view trim(std::string_view text) {
-  const std::size_t begin = text.find_first_not_of(" \t\r\n");
-  if (begin == std::string_view::npos) return {};
-  return text.substr(begin, text.find_last_not_of(" \t\r\n") - begin + 1);
-}
 
 /// Blanks out /* comments */ outside of strings; an unclosed comment is kept.
 void blankComments(std::string& text) {

@@ -31,14 +31,13 @@ bool isWantedName(std::string name, const std::string& extension) {
 
 [[noreturn]] void throwDamaged(const fs::path& file, const std::string& reason) {
   throw ImportError(file.string() + ": cannot be unzipped: " + reason +
-                    "; copy or export it again (unzip)");
+                    "; copy or export it again");
 }
 
 [[noreturn]] void throwNoMember(const fs::path& file, const std::string& extension,
                                 std::size_t others) {
   throw ImportError(file.string() + ": contains no " + extension + " file (" +
-                    std::to_string(others) + " others); zip the " + extension +
-                    " file itself (unzip)");
+                    std::to_string(others) + " others); zip the " + extension + " file itself");
 }
 
 struct ArchiveMember {
@@ -81,14 +80,14 @@ void seekToOnlyMember(unzFile archive, const fs::path& file, const std::string& 
   if (code != UNZ_END_OF_LIST_OF_FILE) throwDamaged(file, kDamagedDirectory);
   if (found == 0 && !xml.empty())
     throw ImportError(file.string() + ": contains " + xml +
-                      ", and IFC in XML is not read; export it as .ifc, the STEP form (unzip)");
+                      ", and IFC in XML is not read; export it as .ifc, the STEP form");
   if (found == 0) throwNoMember(file, extension, count);
   if (found > 1) {
     throw ImportError(file.string() + ": has " + std::to_string(found) + " " + extension +
-                      " files (" + names + "); unzip it and name one of them (unzip)");
+                      " files (" + names + "); unzip it and name one of them");
   }
   if (encrypted) {
-    throw ImportError(file.string() + ": is encrypted; unzip it with its password (unzip)");
+    throw ImportError(file.string() + ": is encrypted; unzip it with its password");
   }
   if (unzGoToFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
 }
@@ -109,7 +108,7 @@ std::string unpack(unzFile archive, const fs::path& file, const std::string& ext
       throw ImportError(file.string() + ": unpacks to more than the " +
                         std::to_string(maxBytes >> 20) +
                         " MiB allowed; unzip it yourself if you trust it, or raise the "
-                        "memory limit (unzip)");
+                        "memory limit");
     }
   }
   if (unzCloseCurrentFile(archive) != UNZ_OK)

@@ -136,7 +136,7 @@ GltfBuffers::GltfBuffers(std::filesystem::path file, ModelFormat format, const J
 }
 
 void GltfBuffers::fail(const std::string& message) const {
-  throw ImportError(file_.string() + ": " + message + "; export the file again (open)");
+  throw ImportError(file_.string() + ": " + message + "; export the file again");
 }
 
 void GltfBuffers::spend(std::size_t count, std::size_t bytesEach, const std::string& what) {
@@ -144,7 +144,7 @@ void GltfBuffers::spend(std::size_t count, std::size_t bytesEach, const std::str
   if (bytesEach > 0 && count > (limit - std::min(decoded_, limit)) / bytesEach)
     throw UnreadableGltf(file_.string() + ": " + what + " has " + std::to_string(count) +
                          " elements, more than the file's " + std::to_string(loaded_) +
-                         " bytes can contain; export the file again (open)");
+                         " bytes can contain; export the file again");
   decoded_ += count * bytesEach;
 }
 
@@ -184,7 +184,7 @@ std::string GltfBuffers::readBuffer(std::size_t index) {
     return bytes;
   }
   throw UnreadableGltf(file_.string() + ": its buffer '" + uri +
-                       "' is missing; put it next to the model, or export the file again (open)");
+                       "' is missing; put it next to the model, or export the file again");
 }
 
 const std::string& GltfBuffers::getBuffer(std::size_t index) {

@@ -64,7 +64,7 @@ class GltfCameraReader {
 
  private:
   [[noreturn]] void fail(const std::string& message) const {
-    throw ImportError(file_.string() + ": " + message + " (open)");
+    throw ImportError(file_.string() + ": " + message);
   }
   template <std::size_t count>
   bool readArray(const Json& node, const char* key, std::array<double, count>& numbers) const;
@@ -322,7 +322,7 @@ GltfCameraPath sampleGltfCamera(const std::filesystem::path& file, const std::st
                                 double fps) {
   const auto format = detectModelFormat(file);
   if (format != ModelFormat::gltf && format != ModelFormat::glb)
-    throw ImportError(file.string() + ": is neither .gltf nor .glb (open)");
+    throw ImportError(file.string() + ": is neither .gltf nor .glb");
   GltfCameraReader cameras(file, *format);
   return cameras.samplePath(cameras.chooseCamera(name), fps);
 }

@@ -88,7 +88,7 @@ std::vector<Diagnostic> checkGltfExtensions(const nlohmann::json& gltf, const Ex
                                             const std::filesystem::path& file) {
   for (const std::string& name : findUnsupported(gltf, "extensionsRequired")) {
     throw ImportError(file.string() + ": requires the glTF extension " + name +
-                      ", which is not supported; export without it (open)");
+                      ", which is not supported; export without it");
   }
   std::set<std::string> ignored = findUnsupported(gltf, "extensionsUsed");
   for (const std::string& name : inUse.names())

@@ -63,12 +63,12 @@ void requireVersion2(const Json& gltf, const std::filesystem::path& file) {
   const Json* minimum = findMember(findMember(&gltf, "asset"), "minVersion");
   if (minimum != nullptr && minimum->is_string() && *minimum != "2.0")
     throw ImportError(file.string() + ": needs a reader of glTF " + minimum->get<std::string>() +
-                      "; export it as glTF 2.0 (open)");
+                      "; export it as glTF 2.0");
   const Json* meshes = findMember(&gltf, "meshes");
   if (!isOld && (meshes == nullptr || !meshes->is_object())) return;
   throw ImportError(file.string() + ": glTF version " +
                     (isOld ? version->get<std::string>() : "1.0") +
-                    " cannot be read; export it as glTF 2.0 (open)");
+                    " cannot be read; export it as glTF 2.0");
 }
 
 // ---- does the file need rewriting? --------------------------------------------------------------
@@ -326,7 +326,7 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   to.json = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
   to.glb = binary.makeGlb(to.json);
   if (to.glb.empty())
-    throw ImportError(file.string() + ": its meshes exceed 4 GiB when decoded; split it (open)");
+    throw ImportError(file.string() + ": its meshes exceed 4 GiB when decoded; split it");
   to.dependencies = buffers.dependencies();
 }
 
@@ -349,7 +349,7 @@ std::uint32_t findScene(const std::vector<std::string>& scenes, const std::strin
   for (std::size_t i = 0; i < scenes.size(); ++i)
     if (choice == std::to_string(i)) return static_cast<std::uint32_t>(i);
   throw ImportError(file.string() + ": no scene '" + choice + "'; its scenes are " +
-                    listScenes(scenes) + " (open)");
+                    listScenes(scenes));
 }
 
 /// Reads the scenes of a file and chooses one. Returns whether it is not the file's default.
@@ -359,13 +359,11 @@ bool chooseScene(const Json& sections, const std::string& choice, const std::fil
     const Json* name = findMember(&scene, "name");
     to.scenes.push_back(name != nullptr && name->is_string() ? name->get<std::string>() : "");
   }
-  if (to.scenes.empty())
-    throw ImportError(file.string() + ": has no scene; export it with one (open)");
+  if (to.scenes.empty()) throw ImportError(file.string() + ": has no scene; export it with one");
   const std::size_t standard = readIndexMember(&sections, "scene").value_or(0);
   if (choice.empty() && standard >= to.scenes.size())
     throw ImportError(file.string() + ": its default scene " + std::to_string(standard) +
-                      " is missing; choose one by --gltf-scene: " + listScenes(to.scenes) +
-                      " (open)");
+                      " is missing; choose one by --gltf-scene: " + listScenes(to.scenes));
   to.scene =
       choice.empty() ? static_cast<std::uint32_t>(standard) : findScene(to.scenes, choice, file);
   if (to.scenes.size() > 1)
@@ -388,7 +386,7 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   Json sections = parseMeshSections(plain.json, tooDeep, extensions);
   if (tooDeep)
     throw ImportError(file.string() + ": its JSON is nested deeper than " +
-                      std::to_string(kMaxJsonDepth) + " levels; export it again (open)");
+                      std::to_string(kMaxJsonDepth) + " levels; export it again");
   if (!sections.is_object()) return plain;
   requireVersion2(sections, file);
   plain.problems = checkGltfExtensions(sections, extensions, file);

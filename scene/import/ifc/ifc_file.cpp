@@ -19,11 +19,11 @@ bool startsWith(const fs::path& file, const std::string& magic) {
 
 std::string readWholeFile(const fs::path& file, std::size_t maxBytes) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw ImportError(file.string() + ": cannot be opened for reading (open)");
+  if (!in) throw ImportError(file.string() + ": cannot be opened for reading");
   const std::size_t size = static_cast<std::size_t>(file_size(file));
   if (size > maxBytes) {
     throw ImportError(file.string() + ": is larger than the " + std::to_string(maxBytes >> 20) +
-                      " MiB allowed; split it or raise the memory limit (open)");
+                      " MiB allowed; split it or raise the memory limit");
   }
   std::string text(size, '\0');
   in.read(text.data(), static_cast<std::streamsize>(size));

@@ -29,7 +29,7 @@ int createSharedMemory(const void* bytes, std::size_t size, const std::string& f
   const auto fail = [&] {
     const std::string reason = std::strerror(errno);
     if (fd >= 0) close(fd);
-    throw ImportError(file + ": no memory to pass the file to its reader: " + reason + " (start)");
+    throw ImportError(file + ": no memory to pass the file to its reader: " + reason);
   };
   const int low = memfd_create("enfilade-ifc", MFD_CLOEXEC);
   if (low < 0) fail();

@@ -284,7 +284,7 @@ void requireMapScale(const IfcMapConversion& conversion) {
   scale << (max > 2 ? max : min);
   throw ImportError("--georeference: its " + conversion.source + " scales by " + scale.str() +
                     "; leave the option out, or correct its Scale, which converts from the file's "
-                    "length unit to the map's (open)");
+                    "length unit to the map's");
 }
 
 }  // namespace enfilade::scene

@@ -182,7 +182,7 @@ class IfcImport {
     std::string text = readIfcFile(request_.file, maxBytes);
     if (text.find("ISO-10303-21") == std::string::npos) {
       throw ImportError(request_.file + ": not an IFC file (it does not begin with " +
-                        "ISO-10303-21); export it again as IFC (open)");
+                        "ISO-10303-21); export it again as IFC");
     }
     reportProgress("index", 0);
     readText(std::move(text));
@@ -248,7 +248,7 @@ class IfcImport {
       throw ImportError(request_.file +
                         ": --georeference: the file has no IfcMapConversion, IfcRigidOperation "
                         "or ePSet_MapConversion in metres; leave the option out, or export the "
-                        "file with its map (open)");
+                        "file with its map");
     if (request_.options.georeference) {
       requireMapScale(*metadata_.mapConversion);
       metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
@@ -274,7 +274,7 @@ class IfcImport {
       throw ImportError(
           request_.file + ": contains no products with a shape" +
           (metadata_.complete ? "" : ", and is cut off (END-ISO-10303-21 is missing)") +
-          "; export it again with its geometry (open)");
+          "; export it again with its geometry");
     }
     return wanted;
   }
@@ -316,7 +316,7 @@ class IfcImport {
         request_.file + ": cannot be read: " + failures_ + "; " +
         (metadata_.complete ? "" : "it is cut off (END-ISO-10303-21 is missing): copy it again; ") +
         (all ? "" : "try --ifc-reader auto, ") +
-        "check it with an IFC validator, or re-export it as IFC2x3 or glTF (parse)");
+        "check it with an IFC validator, or re-export it as IFC2x3 or glTF");
   }
 
   void recordFailure(const std::string& reader, const IfcReadResult& result) {

@@ -18,7 +18,7 @@ namespace {
 
 std::string readScanFile(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  if (!in) throw ImportError(file.string() + ": cannot be opened for reading (open)");
+  if (!in) throw ImportError(file.string() + ": cannot be opened for reading");
   std::string bytes(static_cast<std::size_t>(file_size(file)), '\0');
   in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   bytes.resize(static_cast<std::size_t>(in.gcount()));

@@ -19,7 +19,7 @@ namespace {
 constexpr double kMaxPlyCoordinate = 1e9;  // file units; a greater one is invalid, like NaN
 
 [[noreturn]] void failPly(const std::string& message) {
-  throw ImportError("PLY: " + message + "; export it again (open)");
+  throw ImportError("PLY: " + message + "; export it again");
 }
 
 /// Values of a PLY file in any encoding.
@@ -300,7 +300,7 @@ ScanMesh parsePly(std::string_view bytes) {
   if (mesh.indices.empty() && mesh.brokenFaces == 0)
     throw ImportError(
         "PLY: a point cloud without faces, which has no surface to walk on; mesh it first, for "
-        "example in MeshLab or CloudCompare (open)");
+        "example in MeshLab or CloudCompare");
   return mesh;
 }
 

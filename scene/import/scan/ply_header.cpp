@@ -13,7 +13,7 @@ constexpr std::size_t kMaxPlyHeader = 1 << 20;  // bytes; real ones have some hu
 constexpr std::size_t kMaxPlyProperties = 1000;
 
 [[noreturn]] void failHeader(const std::string& message) {
-  throw ImportError("PLY header: " + message + "; export it again (open)");
+  throw ImportError("PLY header: " + message + "; export it again");
 }
 
 std::optional<PlyType> parsePlyType(std::string_view name) {

@@ -20,7 +20,7 @@ constexpr std::size_t kStlHeader = 80, kStlFacet = 50;  // bytes
 constexpr double kMaxStlCoordinate = 1e9;               // file units; a greater one is invalid
 
 [[noreturn]] void failStl(const std::string& message) {
-  throw ImportError("STL: " + message + "; export it again (open)");
+  throw ImportError("STL: " + message + "; export it again");
 }
 
 /// Joins corners of equal position.

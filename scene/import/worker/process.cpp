@@ -181,7 +181,7 @@ pid_t spawnWorker(const ImportRequest& request, int writeEnd) {
                                 argv.data(), environ);
   if (error != 0) {
     throw ImportError(request.file + ": the import process cannot be started: " +
-                      std::strerror(error) + "; is /proc mounted? (start)");
+                      std::strerror(error) + "; is /proc mounted?");
   }
   return pid;
 }
@@ -190,8 +190,7 @@ pid_t spawnWorker(const ImportRequest& request, int writeEnd) {
 std::array<int, 2> openPipe(const ImportRequest& request) {
   std::array<int, 2> ends{};
   const auto fail = [&] {
-    throw ImportError(request.file + ": no pipe to the import process: " + std::strerror(errno) +
-                      " (start)");
+    throw ImportError(request.file + ": no pipe to the import process: " + std::strerror(errno));
   };
   if (pipe2(ends.data(), O_CLOEXEC) != 0) fail();
   const FileDescriptor lowRead(ends[0]), lowWrite(ends[1]);

@@ -153,9 +153,9 @@ OrderStatus executeOrder(const Crouch& crouch, OrderContext& context) {
   }
   if (!(height >= kMinCrouchFraction * avatar.spawnHeight && height <= avatar.spawnHeight)) {
     context.emitNotice(Notice::Kind::refused,
-                       "height is " + formatShortNumber(height) + "; it must lie in " +
-                           formatShortNumber(kMinCrouchFraction * avatar.spawnHeight) + ".." +
-                           formatShortNumber(avatar.spawnHeight));
+                       "height is " + formatShortNumber(height) + " m; give " +
+                           formatShortNumber(kMinCrouchFraction * avatar.spawnHeight) + " to " +
+                           formatShortNumber(avatar.spawnHeight) + " m");
     return OrderStatus::done;
   }
   auto shape = makePrismShape(avatar.radius, height, avatar.spawnHeight, context.world.settings);

@@ -1,9 +1,7 @@
 // Context and result of the execution of an order. Private to avatars/.
 #pragma once
 
-#include <array>
-#include <cstdio>
-
+#include "scene/model/format_number.hpp"
 #include "scene/world/data/tick_report.hpp"
 #include "scene/world/data/world_data.hpp"
 
@@ -33,12 +31,5 @@ enum class OrderStatus : std::uint8_t {
   doneThisTick,  ///< completed, but the next order starts in the next tick
   running
 };
-
-/// Formats a number with three significant digits for messages: "0.123".
-inline std::string formatShortNumber(double value) {
-  std::array<char, 32> text{};
-  std::snprintf(text.data(), text.size(), "%.3g", value);
-  return text.data();
-}
 
 }  // namespace enfilade::scene

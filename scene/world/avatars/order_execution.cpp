@@ -170,10 +170,15 @@ OrderStatus executeOrder(const Teleport& teleport, OrderContext& context) {
   return OrderStatus::doneThisTick;
 }
 
+std::string describeUnknownAvatar(const std::string& name) {
+  return "no avatar '" + name + "' is in the world";
+}
+
 OrderStatus executeFrontOrder(OrderContext& context) {
   const Order& order = context.queue.orders.front().order;  // valid until runQueue() pops it
   if (!context.findAvatar() && !std::holds_alternative<Spawn>(order)) {
-    context.emitNotice(Notice::Kind::refused, "there is no avatar of this name");
+    context.emitNotice(Notice::Kind::refused, describeUnknownAvatar(context.queue.name));
+    context.report.notices.back().isAvatarUnknown = true;
     return OrderStatus::done;
   }
   return std::visit([&](const auto& o) { return executeOrder(o, context); }, order);
@@ -211,7 +216,8 @@ Avatar* dropPendingOrders(WorldData& world, const Command& command, TickReport& 
   if (avatar) notice.id = avatar->id, notice.position = avatar->footPosition;
   dropQueuedOrders(queue.orders, 0, notice, describeCause(command.order), report);
   if (!avatar) {
-    notice.text = "there is no avatar of this name" + droppedText;
+    notice.text = describeUnknownAvatar(command.avatar) + droppedText;
+    notice.isAvatarUnknown = true;
     report.notices.push_back(std::move(notice));
     return nullptr;
   }

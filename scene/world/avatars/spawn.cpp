@@ -61,11 +61,6 @@ FloorHit findFloorBelow(PlacementSearch& search, const Avatar& avatar) {
   return {hit.entity, hit.fraction * depth};
 }
 
-std::string formatPoint(const Vec3& v) {
-  return "[" + std::to_string(v.x()) + ", " + std::to_string(v.y()) + ", " + std::to_string(v.z()) +
-         "]";
-}
-
 /// Error of the avatar's current position, without lifts; nullopt if it is valid.
 std::optional<std::string> validatePlacement(PlacementSearch& search, const Avatar& avatar,
                                              ObstacleSet& obstacles) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <tuple>
 
+#include "scene/model/format_number.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -271,8 +273,10 @@ std::optional<std::string> validateBodyCommandFields(const Body& body, const Bod
   if (command.action == Action::moveTo && isLoopingPath(spec))
     return "to: body '" + spec.name + "' is a looping path; " + describeAcceptedCommands(spec);
   if (command.action == Action::moveTo && !(command.target >= low && command.target <= high))
-    return "to is " + std::to_string(command.target) + "; it must lie in " + std::to_string(low) +
-           ".." + std::to_string(high) + (getTraits(spec.kind).rotates ? " radians" : "");
+    return formatRangeError("to", command.target, low, high,
+                            getTraits(spec.kind).rotates     ? "radians"
+                            : getTraits(spec.kind).takesKeys ? "s"
+                                                             : "m");
   if (command.action == Action::moveToLevel && command.level >= spec.stops.size())
     return "level is " + std::to_string(command.level) + "; body '" + spec.name + "' has " +
            std::to_string(spec.stops.size()) + " stops, counted from 0";

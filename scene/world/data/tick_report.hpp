@@ -82,6 +82,7 @@ struct Notice {
   Vec3 position = Vec3::Zero();  ///< the feet
   EntityId obstacle = 0;
   std::string text;
+  bool isAvatarUnknown = false;  ///< refused, because no avatar has this name
 };
 
 /// Timed stages of a tick, in order of execution.

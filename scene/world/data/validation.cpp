@@ -2,10 +2,10 @@
 #include "scene/world/data/validation.hpp"
 
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <numbers>
 
+#include "scene/model/format_number.hpp"
 #include "scene/model/names.hpp"
 
 namespace enfilade::scene {
@@ -16,33 +16,27 @@ constexpr double kMaxWait = 86400;      // seconds
 constexpr std::size_t kMaxWaypoints = 100000;
 constexpr double kMaxJointAngle = 1000;  // radians: magnitude of a joint's limits
 
-std::string formatExactNumber(double value) {
-  if (std::isnan(value)) return "NaN";
-  if (std::isinf(value)) return value > 0 ? "infinity" : "-infinity";
-  std::array<char, 32> text{};  // shortest round-trip form
-  const auto end = std::to_chars(text.data(), text.data() + text.size(), value).ptr;
-  return {text.data(), end};
-}
-
 using OptionalError = std::optional<std::string>;
 
-OptionalError validateRange(const std::string& field, double value, double min, double max) {
+OptionalError validateRange(const std::string& field, double value, double min, double max,
+                            const char* unit) {
   if (value >= min && value <= max) return std::nullopt;
-  return field + " is " + formatExactNumber(value) + "; it must lie in " + formatExactNumber(min) +
-         ".." + formatExactNumber(max);
+  return formatRangeError(field, value, min, max, unit);
 }
 
 /// As validateRange(), but `value` must be above 0.
-OptionalError validatePositive(const std::string& field, double value, double max) {
-  if (!(value > 0)) return field + " is " + formatExactNumber(value) + "; it must be above 0";
-  return validateRange(field, value, 0, max);
+OptionalError validatePositive(const std::string& field, double value, double max,
+                               const char* unit) {
+  if (value > 0 && value <= max) return std::nullopt;
+  return field + " is " + formatExactNumber(value) + " " + unit +
+         "; give more than 0 and at most " + formatExactNumber(max) + " " + unit;
 }
 
 OptionalError validatePoint(const std::string& field, const Vec3& point,
                             double maxCoordinate = kMaxCoordinate) {
   constexpr std::array<const char*, 3> kAxes{".x", ".y", ".z"};
   for (int i = 0; i < 3; ++i)
-    if (auto error = validateRange(field + kAxes[i], point[i], -maxCoordinate, maxCoordinate))
+    if (auto error = validateRange(field + kAxes[i], point[i], -maxCoordinate, maxCoordinate, "m"))
       return error;
   return std::nullopt;
 }
@@ -73,17 +67,20 @@ OptionalError validateLink(const std::string& field, const Link& link, std::size
   if (auto error = validatePoint(field + ".axis", joint.axis, kMaxPartCoordinate)) return error;
   if (!(joint.axis.norm() > 1e-6)) return field + ".axis has no direction; give one, as [0, 1, 0]";
   const bool isRevolute = joint.kind == LinkJoint::Kind::revolute;
+  const char* const unit = isRevolute ? "radians" : "m";
   const double maxValue = isRevolute ? kMaxJointAngle : kMaxPartCoordinate;
-  if (auto error = validateRange(field + ".low", joint.low, -maxValue, maxValue)) return error;
-  if (auto error = validateRange(field + ".high", joint.high, joint.low, maxValue)) return error;
-  return validateRange(field + ".value", link.value, joint.low, joint.high);
+  if (auto error = validateRange(field + ".low", joint.low, -maxValue, maxValue, unit))
+    return error;
+  if (auto error = validateRange(field + ".high", joint.high, joint.low, maxValue, unit))
+    return error;
+  return validateRange(field + ".value", link.value, joint.low, joint.high, unit);
 }
 
 OptionalError validateOrder(const Spawn& spawn, const WorldSettings&) {
   if (auto error = validatePoint("at", spawn.position)) return error;
-  if (auto error = validateRange("facing", spawn.facing, -1e6, 1e6)) return error;
-  if (auto error = validateRange("radius", spawn.radius, 0.05, 5)) return error;
-  if (auto error = validateRange("height", spawn.height, 0.2, 10)) return error;
+  if (auto error = validateRange("facing", spawn.facing, -1e6, 1e6, "degrees")) return error;
+  if (auto error = validateRange("radius", spawn.radius, 0.05, 5, "m")) return error;
+  if (auto error = validateRange("height", spawn.height, 0.2, 10, "m")) return error;
   if (spawn.parts.size() > kMaxParts)
     return "parts has more than " + std::to_string(kMaxParts) + " parts";
   if (spawn.links.size() > kMaxLinks)
@@ -115,14 +112,14 @@ OptionalError validateOrder(const Walk& walk, const WorldSettings& settings) {
     if (i > 0 && walk.rides[i].waypoint <= walk.rides[i - 1].waypoint)
       return field + " must be above that of the ride before";
   }
-  return validatePositive("speed", walk.speed, settings.maxSpeed);
+  return validatePositive("speed", walk.speed, settings.maxSpeed, "m/s");
 }
 
 OptionalError validateOrder(const Look& look, const WorldSettings&) {
   return validatePoint("at", look.target);
 }
 OptionalError validateOrder(const Wait& wait, const WorldSettings&) {
-  return validateRange("seconds", wait.seconds, 0, kMaxWait);
+  return validateRange("seconds", wait.seconds, 0, kMaxWait, "s");
 }
 OptionalError validateOrder(const Capture& capture, const WorldSettings&) {
   return validateName("as", capture.name);
@@ -133,21 +130,22 @@ OptionalError validateOrder(const Leave&, const WorldSettings&) {
 
 OptionalError validateVelocity(const Vec3& velocity, const WorldSettings& settings) {
   if (auto error = validatePoint("velocity", velocity)) return error;
-  return validateRange("velocity's length", velocity.norm(), 0, settings.maxSpeed);
+  return validateRange("velocity's length", velocity.norm(), 0, settings.maxSpeed, "m/s");
 }
 
 OptionalError validateOrder(const Drive& drive, const WorldSettings& settings) {
   return validateVelocity(drive.velocity, settings);
 }
 OptionalError validateOrder(const Jump& jump, const WorldSettings& settings) {
-  if (auto error = validatePositive("height", jump.height, settings.maxJumpHeight)) return error;
+  if (auto error = validatePositive("height", jump.height, settings.maxJumpHeight, "m"))
+    return error;
   return jump.velocity ? validateVelocity(*jump.velocity, settings) : std::nullopt;
 }
 OptionalError validateOrder(const Fly&, const WorldSettings&) {
   return std::nullopt;
 }
 OptionalError validateOrder(const Crouch& crouch, const WorldSettings&) {
-  return validateRange("height", crouch.height, 0, 10);
+  return validateRange("height", crouch.height, 0, 10, "m");
 }
 
 OptionalError validateOrder(const DriveJoints& drive, const WorldSettings& settings) {
@@ -158,20 +156,21 @@ OptionalError validateOrder(const DriveJoints& drive, const WorldSettings& setti
   for (std::size_t i = 0; i < drive.targets.size(); ++i)
     if (drive.targets[i])
       if (auto error = validateRange("to[" + std::to_string(i) + "]", *drive.targets[i],
-                                     -kMaxJointAngle, kMaxJointAngle))
+                                     -kMaxJointAngle, kMaxJointAngle, "radians or m"))
         return error;
-  return validatePositive("speed", drive.speed, settings.maxJointSpeed);
+  return validatePositive("speed", drive.speed, settings.maxJointSpeed, "radians/s or m/s");
 }
 
 OptionalError validateOrder(const Turn& turn, const WorldSettings& settings) {
-  if (auto error = validateRange(turn.relative ? "by" : "facing", turn.angle, -1e6, 1e6))
+  if (auto error = validateRange(turn.relative ? "by" : "facing", turn.angle, -1e6, 1e6, "degrees"))
     return error;
-  return validatePositive("rate", turn.rate, settings.maxJointSpeed * 180 / std::numbers::pi);
+  return validatePositive("rate", turn.rate, settings.maxJointSpeed * 180 / std::numbers::pi,
+                          "degrees/s");
 }
 
 OptionalError validateOrder(const Teleport& teleport, const WorldSettings&) {
   if (auto error = validatePoint("at", teleport.position)) return error;
-  return validateRange("facing", teleport.facing.value_or(0), -1e6, 1e6);
+  return validateRange("facing", teleport.facing.value_or(0), -1e6, 1e6, "degrees");
 }
 
 }  // namespace
@@ -184,19 +183,22 @@ std::optional<std::string> validateCommandFields(const Command& command,
 }
 
 std::optional<std::string> validateWorldSettings(const WorldSettings& settings) {
-  if (auto error = validateRange("epsilon", settings.contactOffset, 1e-6, 0.05)) return error;
-  if (auto error = validateRange("step height", settings.stepHeight, 0, 2)) return error;
-  if (auto error = validateRange("near miss", settings.nearMissDistance, 0, 10)) return error;
-  if (auto error = validateRange("walkable normal", settings.walkableNormalY, 0.01, 1))
+  if (auto error = validateRange("epsilon", settings.contactOffset, 1e-6, 0.05, "m")) return error;
+  if (auto error = validateRange("step height", settings.stepHeight, 0, 2, "m")) return error;
+  if (auto error = validateRange("near miss", settings.nearMissDistance, 0, 10, "m")) return error;
+  if (auto error = validateRange("walkable normal", settings.walkableNormalY, 0.01, 1, ""))
     return error;
-  if (auto error = validateRange("gravity", settings.gravity, 0.01, 100)) return error;
-  if (auto error = validateRange("speed limit", settings.maxSpeed, 0.01, 1e4)) return error;
-  if (auto error = validateRange("tick", settings.tickDuration, 1e-4, 1)) return error;
-  if (auto error = validateRange("patience", settings.stuckTimeout, settings.tickDuration, 3600))
+  if (auto error = validateRange("gravity", settings.gravity, 0.01, 100, "m/s2")) return error;
+  if (auto error = validateRange("speed limit", settings.maxSpeed, 0.01, 1e4, "m/s")) return error;
+  if (auto error = validateRange("tick", settings.tickDuration, 1e-4, 1, "s")) return error;
+  if (auto error =
+          validateRange("patience", settings.stuckTimeout, settings.tickDuration, 3600, "s"))
     return error;
-  if (auto error = validateRange("jump limit", settings.maxJumpHeight, 0, 1000)) return error;
-  if (auto error = validateRange("joint speed limit", settings.maxJointSpeed, 0, 100)) return error;
-  return validateRange("push force", settings.maxPushForce, 0, 1e6);
+  if (auto error = validateRange("jump limit", settings.maxJumpHeight, 0, 1000, "m")) return error;
+  if (auto error =
+          validateRange("joint speed limit", settings.maxJointSpeed, 0, 100, "radians/s or m/s"))
+    return error;
+  return validateRange("push force", settings.maxPushForce, 0, 1e6, "N");
 }
 
 }  // namespace enfilade::scene

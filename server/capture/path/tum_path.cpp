@@ -4,6 +4,8 @@
 #include <charconv>
 #include <cmath>
 
+#include "scene/model/trim.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -12,13 +14,6 @@ constexpr double kUnitTolerance = 1e-2;  // tolerance of a quaternion's length
 [[noreturn]] void throwPathError(const std::string& source, std::size_t line,
                                  const std::string& what) {
   throw CameraPathError(source + ":" + std::to_string(line) + ": " + what);
-}
-
-std::string_view trim(std::string_view text) {
-  constexpr std::string_view kBlank = " \t\r";
-  const std::size_t first = text.find_first_not_of(kBlank);
-  if (first == std::string_view::npos) return {};
-  return text.substr(first, text.find_last_not_of(kBlank) - first + 1);
 }
 
 /// Parses eight finite numbers separated by blanks.
@@ -75,7 +70,7 @@ CameraPath parseTumPath(std::string_view text, const std::string& source, Camera
     const std::size_t end = std::min(text.find('\n'), text.size());
     std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
-    line = trim(line.substr(0, line.find('#')));
+    line = scene::trim(line.substr(0, line.find('#')));
     if (line.empty()) continue;
     if (path.poses.size() == kMaxPoses)
       throwPathError(source, number, "more than 10,000,000 poses; split the file");

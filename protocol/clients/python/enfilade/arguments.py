@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import operator
-from typing import Any, Sequence, Tuple
+from typing import Any, Optional, Sequence, Tuple
 
 UINT32, UINT64 = 2**32 - 1, 2**64 - 1  # largest values
 
@@ -34,12 +34,16 @@ def number(given: Any, name: str, low: float = -math.inf, high: float = math.inf
     raise ValueError(f"{name}: give a finite number {' '.join(limits)}".rstrip() + f", not {given!r}")
 
 
-def whole(given: Any, name: str, low: int, high: int) -> int:
+def whole(given: Any, name: str, low: int = 0, high: int = UINT32) -> int:
     """Returns a whole number from `low` to `high`."""
     try:
         found = operator.index(given)
     except TypeError:
-        found = low - 1
+        raise TypeError(f"{name}: give a whole number, not {given!r}") from None
     if not low <= found <= high:
         raise ValueError(f"{name}: give a whole number from {low} to {high}, not {given!r}")
     return found
+
+
+def optional_whole(given: Any, name: str, low: int = 0, high: int = UINT64) -> Optional[int]:
+    return None if given is None else whole(given, name, low, high)

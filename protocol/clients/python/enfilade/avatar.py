@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any, Optional, Sequence, Tuple, Union
 
 from . import messages
 from .errors import OrderFailed
+from .arguments import whole
 from .questions import Point, doors_value, vec
 from .results import AvatarState, Frame
 
@@ -46,7 +47,8 @@ class Avatar:
         """Walks to each of the points in turn. Opens the doors `opens` when they are in its way. `rides`:
         before point number WAYPOINT a LIFT must stand at a LEVEL; it is called."""
         order = messages.Walk(along=[vec(point) for point in along], opens=opens, rides=[
-            messages.Walk.Ride(waypoint=waypoint, lift=lift, level=level) for waypoint, lift, level in rides])
+            messages.Walk.Ride(waypoint=whole(waypoint, "rides: the way point"), lift=lift,
+                               level=whole(level, "rides: the level")) for waypoint, lift, level in rides])
         if speed is not None:
             order.speed = speed
         return self._client.command(self.name, walk=order)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import itertools
-import operator
 import time
 import warnings
 from collections import deque
@@ -17,7 +16,8 @@ from .avatar import Avatar
 from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
 from .navigation import Navigation
-from .questions import Point, cannot_touch_query, entity, frame_request, points, vec
+from .arguments import UINT32, UINT64, optional_whole, whole
+from .questions import Point, avatar_ids, cannot_touch_query, entity, frame_request, points, vec
 from .results import (Apart, Contact, Frame, Hits, Horizon, Notice, Pair, Replay, Scan, State,
                       Step, Touching, World)
 
@@ -39,13 +39,6 @@ def connect(address: str = "127.0.0.1:7878", *, name: str = "enfilade python", t
         raise ValueError(f"address: give HOST:PORT, as 127.0.0.1:7878, not {address!r}")
     return Client(host.strip("[]"), int(port), name=name, token=token,
                   timeout=timeout, world=world)
-
-
-def _some_avatars(ids: Iterable[int]) -> List[int]:
-    found = list(ids) if isinstance(ids, Iterable) else []
-    if not found or not all(isinstance(one, int) for one in found):  # none would mean all of them
-        raise ValueError("contact_horizon: give ids of avatars, or True for all of them")
-    return found
 
 
 class Client:
@@ -235,7 +228,8 @@ class Client:
 
     def step(self, ticks: int = 1, *, avatars: bool = False) -> Step:
         """Runs ticks, in lockstep. `avatars` requests the state of all avatars after the last."""
-        reply, _ = self.request(step=messages.Step(ticks=operator.index(ticks), avatars=avatars))
+        count = whole(ticks, "ticks", 1, self.limits.max_ticks_per_step)
+        reply, _ = self.request(step=messages.Step(ticks=count, avatars=avatars))
         return results.step(reply.step)
 
     def run_until_idle(self, most: int = LONGEST_RUN, *, at_a_time: int = 60) -> Step:
@@ -282,7 +276,7 @@ class Client:
     def seek(self, tick: int) -> Step:
         """Moves to another tick of the recording, replay.first_tick to replay.last_tick, and
         abandons a branch. contacts() includes those that end (reason "seek") and begin by it."""
-        reply, _ = self.request(seek=messages.Seek(tick=tick))
+        reply, _ = self.request(seek=messages.Seek(tick=whole(tick, "tick", high=UINT64)))
         self._horizons.clear()
         return Step(reply.seek.tick, reply.seek.time, reply.seek.state_hash, False)
 
@@ -341,7 +335,7 @@ class Client:
     def command(self, avatar: str, *, tag: Optional[int] = None, **order: Any) -> int:
         """Queues an order, given as walk=messages.Walk(...). Returns the tag of its notices. Raises
         ServerError if it is refused at once."""
-        tag = next(self._tags) if tag is None else tag
+        tag = next(self._tags) if tag is None else whole(tag, "tag", high=UINT64)
         self.request(command=messages.Command(avatar=avatar, tag=tag, **order))
         return tag
 
@@ -364,7 +358,7 @@ class Client:
         if len(given) != 1:
             raise ValueError("body: give one of open=True, close=True, stop=True, run=True, to, "
                              f"level; {given or 'none'} given")
-        command = messages.BodyCommand(body=name, to=to, level=level, speed=speed)
+        command = messages.BodyCommand(body=name, to=to, level=optional_whole(level, "level", high=UINT32), speed=speed)
         if to is None and level is None:
             getattr(command, given[0]).SetInParent()
         self.request(body_command=command)
@@ -395,9 +389,9 @@ class Client:
             if "contact_horizon" not in self.welcome.capabilities:
                 warnings.warn("subscribe: this server computes no contact horizons; start a newer "
                               "one", stacklevel=2)
-            wanted.contact_horizon.approaches = approaches
+            wanted.contact_horizon.approaches = whole(approaches, "approaches")
             if contact_horizon is not True:
-                wanted.contact_horizon.avatars.extend(_some_avatars(contact_horizon))
+                wanted.contact_horizon.avatars.extend(avatar_ids(contact_horizon))
         reply, _ = self.request(subscribe=wanted)
         return [results.contact(one) for one in reply.subscribe.live]
 
@@ -510,10 +504,10 @@ class Client:
         simulated time (0: one per tick). `view` as for frame(). frames() takes them, the latest
         only."""
         self.request(watch_frames=messages.WatchFrames(
-            watch=number, rate=rate, frame=frame_request(avatar, **view)))
+            watch=whole(number, "number"), rate=rate, frame=frame_request(avatar, **view)))
 
     def unwatch(self, number: int = 1) -> None:
-        self.request(watch_frames=messages.WatchFrames(watch=number))
+        self.request(watch_frames=messages.WatchFrames(watch=whole(number, "number")))
 
     def frames(self, seconds: float = 0.0) -> Iterator[Frame]:
         """Takes the pictures of watches: Frame.message.watch names the watch, and .dropped counts
@@ -568,8 +562,8 @@ class Client:
         its component perpendicular to forward counts. From (1, 0, 0), +Z is to the right."""
         if (at is None) == (not avatar):
             raise ValueError("scan: give either an avatar or at")
-        scan = messages.RangeScan(width=width, height=height, columns=columns, rows=rows,
-                                  reach=reach)
+        scan = messages.RangeScan(width=width, height=height, columns=whole(columns, "columns"),
+                                  rows=whole(rows, "rows"), reach=reach)
         if at is not None:
             scan.at.CopyFrom(vec(at))
         else:
@@ -595,7 +589,7 @@ class Client:
         found: List[Pair] = []
         page = self.limits.max_pairs
         for start in range(0, len(pairs), page):
-            query = messages.DistanceQuery(refined=refined, tick=tick, pairs=[
+            query = messages.DistanceQuery(refined=refined, tick=optional_whole(tick, "tick"), pairs=[
                 messages.DistanceQuery.Pair(a=entity(a), b=entity(b))
                 for a, b in pairs[start:start + page]])
             reply = self.request(distances=query)[0].distances
@@ -610,7 +604,7 @@ class Client:
                  tick: Optional[int] = None) -> Touching:
         """Returns the entities that touch or penetrate one, and those closer than `within` metres."""
         reply, _ = self.request(touching=messages.TouchingQuery(
-            entity=entity(which), within=within, tick=tick))
+            entity=entity(which), within=within, tick=optional_whole(tick, "tick")))
         return results.touching(reply.touching)
 
     def cannot_touch_before(self, a: Entity, b: Entity, *, assume: str = "present_motion",
@@ -632,7 +626,7 @@ class Client:
         id. An array may have any shape: names(picture.ids)."""
         if isinstance(ids, np.ndarray):
             ids = np.unique(ids).tolist()
-        wanted = list(dict.fromkeys(int(one) for one in ids))
+        wanted = list(dict.fromkeys(whole(one, "ids") for one in ids))
         found: Dict[int, str] = {}
         page = 4096
         for start in range(0, len(wanted), page):

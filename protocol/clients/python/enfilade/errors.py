@@ -25,14 +25,6 @@ _REMEDIES = {
 _FIELD_REMEDIES = {
     ("ERROR_TICK_GONE", "frame.flow_from"): "give a tick that the world has completed, one of the last 32",
 }
-# Codes whose remedy is the named field.
-_BY_FIELD = ("ERROR_BAD_MESSAGE", "ERROR_REFUSED_COMMAND", "ERROR_BAD_CAMERA", "ERROR_BAD_RAYS")
-
-
-def _remedy(code: str, field: str) -> str:
-    if code in _BY_FIELD and field:
-        return "change the named field"
-    return _FIELD_REMEDIES.get((code, field), _REMEDIES.get(code, ""))
 
 
 class EnfiladeError(Exception):
@@ -53,7 +45,7 @@ class ServerError(EnfiladeError):
         self.message = message
         self.field = field
         self.fatal = fatal
-        self.remedy: str = _remedy(self.code, field)
+        self.remedy: str = _FIELD_REMEDIES.get((self.code, field), _REMEDIES.get(self.code, ""))
         text = f"{self.code}: {message}"
         if field:
             text += f" (field: {field})"

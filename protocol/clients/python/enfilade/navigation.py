@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from . import messages
-from .arguments import UINT32, UINT64, whole
+from .arguments import UINT32, UINT64, optional_whole, whole
 from .questions import Point, doors_value, points, vec
 
 if TYPE_CHECKING:
@@ -194,7 +194,7 @@ class Navigation:
         query = messages.NavigationQuery.Random(
             count=whole(count, "count", 1, UINT32), seed=whole(seed, "seed", 0, UINT64),
             max_distance=max_distance, min_distance=min_distance,
-            island=None if island is None else whole(island, "island", 0, UINT32))
+            island=optional_whole(island, "island", high=UINT32))
         if near is not None:
             query.near.CopyFrom(vec(near))
         if away_from is not None:
@@ -237,7 +237,7 @@ class Navigation:
 
     def islands(self, count: int = 10) -> List[Island]:
         """Returns the largest islands, and why no path leads from each to the largest."""
-        query = messages.NavigationQuery.Islands(count=count)
+        query = messages.NavigationQuery.Islands(count=whole(count, "count"))
         return [Island(one.area, _xyz(one.at), _path(one.path) if one.HasField("path") else None)
                 for one in self._ask(islands=query)[0].islands]
 

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any, Mapping, Optional, Sequence, Union
+from typing import Any, Iterable, List, Mapping, Optional, Sequence, Union
 
 import numpy as np
 
 from . import messages, results
-from .arguments import UINT32, UINT64, whole
+from .arguments import UINT64, optional_whole, whole
 
 Point = Sequence[float]
+
+
+def avatar_ids(ids: Iterable[int]) -> List[int]:
+    found = list(ids) if isinstance(ids, Iterable) else []
+    if not found or not all(isinstance(one, int) for one in found):  # none would mean all of them
+        raise ValueError("contact_horizon: give ids of avatars, or True for all of them")
+    return [whole(one, "contact_horizon") for one in found]
 
 
 def vec(point: Point) -> Any:
@@ -45,7 +52,7 @@ def entity(which: Any) -> Any:
         return messages.EntityRef(name=which)
     if isinstance(getattr(which, "name", None), str):
         return messages.EntityRef(name=which.name)
-    return messages.EntityRef(id=which)
+    return messages.EntityRef(id=whole(which, "entity"))
 
 
 def _named(prefix: str, name: str, argument: str) -> int:
@@ -61,7 +68,7 @@ def cannot_touch_query(a: Any, b: Any, assume: str, least: float, tick: Optional
     if kind is None or kind.number == 0:
         raise ValueError(f"assume: unknown value {assume!r}; give present_motion or any_command")
     return messages.CannotTouchQuery(a=entity(a), b=entity(b), assume=kind.number, least=least,
-                                     tick=tick)
+                                     tick=optional_whole(tick, "tick"))
 
 
 def _set_lens(asked: Any, lens: str, width: Optional[float], distortion: Sequence[float]) -> None:
@@ -140,13 +147,10 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
     for name, given in (("flow_from", flow_from), ("flow_forward", flow_forward)):
         if given is not None and "flow" not in channels:
             raise ValueError(f"{name}: it needs \"flow\" among the channels")
-    for name, given in (("width", width), ("height", height), ("samples", samples)):
-        whole(given, name, 1, UINT32)
-    for name, given in (("flow_from", flow_from), ("tick", tick)):
-        if given is not None:
-            whole(given, name, 0, UINT64)
-    asked = messages.FrameRequest(width=width, height=height, channels=results.channels(channels),
-                                  shadows=shadows, collision_shapes=collision_shapes, samples=samples, tick=tick)
+    asked = messages.FrameRequest(width=whole(width, "width"), height=whole(height, "height"),
+                                  channels=results.channels(channels), shadows=shadows,
+                                  collision_shapes=collision_shapes, samples=whole(samples, "samples"),
+                                  tick=optional_whole(tick, "tick"))
     if eye is None:
         view = asked.eyes
         view.avatar = avatar
@@ -166,7 +170,7 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
     if lens or len(distortion):
         _set_lens(asked, lens, fov_y, distortion)
     if flow_from is not None:
-        asked.flow_from = flow_from
+        asked.flow_from = whole(flow_from, "flow_from", high=UINT64)
     if flow_forward is not None:
         asked.flow_forward.CopyFrom(vec(flow_forward))
     if depth_noise is not None:

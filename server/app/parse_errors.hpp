@@ -1,0 +1,13 @@
+// Texts for mistakes on the command line: what is wrong, and what to give.
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+
+namespace enfilade::server {
+
+/// `verb`: the command, after the parse that threw `error`. An unknown option comes first, because
+/// other errors may follow from it.
+std::string describeParseError(const CLI::App& verb, const CLI::ParseError& error);
+
+}  // namespace enfilade::server

@@ -1,0 +1,63 @@
+#include "server/messages/name_suggestions.hpp"
+
+#include <algorithm>
+#include <ranges>
+#include <span>
+#include <vector>
+
+#include "protocol/nearest_word.hpp"
+#include "scene/world/data/world_data.hpp"
+
+namespace enfilade::server {
+namespace {
+
+constexpr std::size_t kMaxCompared = 1000;  // names: about 1 ms
+
+/// The nearest name, otherwise the first one that contains `typed`; "" without one.
+std::string findSimilarName(const std::string& typed, std::span<const std::string> names) {
+  const std::string nearest = protocol::findNearestWord(typed, names);
+  if (!nearest.empty() || typed.empty()) return nearest;
+  const auto longer = std::ranges::find_if(
+      names, [&](const std::string& name) { return name.find(typed) != std::string::npos; });
+  return longer == names.end() ? "" : *longer;
+}
+
+std::string suggestName(const std::string& typed, std::span<const std::string> names,
+                        const std::string& what, const std::string& without) {
+  if (names.empty()) return without;
+  if (const std::string similar = findSimilarName(typed, names); !similar.empty())
+    return "; did you mean '" + similar + "'?";
+  constexpr std::size_t kMaxListed = 5;
+  std::string list;
+  for (const std::string& name : names | std::views::take(kMaxListed))
+    list += (list.empty() ? "'" : ", '") + name + "'";
+  return "; the " + what + " are " + list + (names.size() > kMaxListed ? ", ..." : "");
+}
+
+}  // namespace
+
+std::string suggestAvatar(const scene::World& world, const std::string& name) {
+  std::vector<std::string> names;
+  for (const scene::Avatar& avatar : world.data().avatars | std::views::take(kMaxCompared))
+    names.push_back(avatar.name);
+  return suggestName(name, names, "avatars", "; spawn it first");
+}
+
+std::string suggestBody(const scene::World& world, const std::string& name) {
+  if (world.data().findBodyByName(name)) return "";
+  std::vector<std::string> names;
+  for (const scene::BodySpec& body : world.scene().model().bodies | std::views::take(kMaxCompared))
+    names.push_back(body.name);
+  return suggestName(name, names, "bodies", "; the scene has no bodies");
+}
+
+std::string suggestBodies(const scene::World& world, const v1::Command& command) {
+  std::string text;
+  for (const std::string& door : command.walk().opens())
+    if (text.empty()) text = suggestBody(world, door);
+  for (const v1::Walk::Ride& ride : command.walk().rides())
+    if (text.empty()) text = suggestBody(world, ride.lift());
+  return text;
+}
+
+}  // namespace enfilade::server
