@@ -12,11 +12,11 @@ from typing import Any, Deque, Dict, Iterable, Iterator, List, Mapping, Optional
 import numpy as np
 
 from . import messages, results
+from .arguments import UINT32, UINT64, optional_whole, whole
 from .avatar import Avatar
 from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
 from .navigation import Navigation
-from .arguments import UINT32, UINT64, optional_whole, whole
 from .questions import Point, avatar_ids, cannot_touch_query, entity, frame_request, points, vec
 from .results import (Apart, Contact, Frame, Hits, Horizon, Notice, Pair, Replay, Scan, State,
                       Step, Touching, World)
