@@ -103,6 +103,7 @@ void removeClient(HostedWorld& hosted, ClientId id) {
 }
 
 void sendMessage(Client& client, const v1::ServerMessage& message) {
+  if (client.pack && client.pack(message)) return;
   client.out->push(encodeShared(message));
 }
 

@@ -19,6 +19,7 @@
 #include "server/hosting/frame_service.hpp"
 #include "server/hosting/query_service.hpp"
 #include "server/hosting/viewer_feed.hpp"
+#include "server/hosting/world_directory.hpp"
 #include "server/hosting/world_options.hpp"
 #include "server/messages/outgoing_queue.hpp"
 #include "server/messages/tick_statistics.hpp"
@@ -74,6 +75,7 @@ struct Client {
   Role role = Role::observe;
   bool guest = false;  ///< an HTTP visitor: not counted as a client
   std::shared_ptr<OutgoingQueue> out;
+  MessagePacker pack;  ///< null: every message goes to `out`
   v1::Subscribe subscription;
   std::uint64_t sequence = 0;                           ///< of the last TickEvents
   std::map<scene::EntityId, std::string> sentHorizons;  ///< serialized, by avatar
@@ -94,8 +96,6 @@ struct WorldClock {
   std::chrono::steady_clock::time_point nextTick;
   std::optional<ClientId> driver;
 };
-
-class WorldDirectory;
 
 /// Identifies a world among the worlds of a server.
 struct WorldIdentity {

@@ -21,11 +21,16 @@ struct CreateWorldRequest {
   bool dropWhenEmpty = false;
 };
 
+/// Takes a message to a client in another form, on the world's thread; false: send it as it is.
+using MessagePacker = std::function<bool(const v1::ServerMessage&)>;
+
 /// A client in a world, until its destruction.
 class WorldMembership {
  public:
   virtual ~WorldMembership() = default;
-  virtual void receive(std::vector<v1::ClientMessage> messages) = 0;
+  /// Queues the requests. Returns the work that answers them, for work(); it may be run after the
+  /// membership's end.
+  virtual std::function<void()> receive(std::vector<v1::ClientMessage> messages) = 0;
 };
 
 /// Lists, creates, drops and enters worlds. Callable from any thread.
@@ -44,7 +49,10 @@ class WorldDirectory {
   /// Enters a world as a client, whose messages go to `out`, first its Welcome with reply_to = 0.
   /// Null: there is no such world.
   virtual std::unique_ptr<WorldMembership> join(const std::string& world, const std::string& name,
-                                                Role role, std::shared_ptr<OutgoingQueue> out) = 0;
+                                                Role role, std::shared_ptr<OutgoingQueue> out,
+                                                MessagePacker pack) = 0;
+  /// Lets the worlds of several receive() answer, on all processors. Does not wait.
+  virtual void work(std::vector<std::function<void()>> received) = 0;
 };
 
 }  // namespace enfilade::server

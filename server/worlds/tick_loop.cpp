@@ -23,6 +23,9 @@ constexpr std::chrono::milliseconds kMaxCatchUp{250};
 /// Time for requests before a due tick of a free-running world.
 constexpr std::chrono::milliseconds kRequestSlice{5};
 
+/// Time that a guest works in a world before the world's own thread continues.
+constexpr std::chrono::milliseconds kGuestTime{5};
+
 /// Idle time after which a recording is flushed to its file.
 constexpr std::chrono::milliseconds kFlushDelay{500};
 
@@ -103,7 +106,7 @@ TickLoop::~TickLoop() {
 }
 
 ClientId TickLoop::join(std::string name, Role role, std::shared_ptr<OutgoingQueue> out,
-                        std::uint64_t requestId, bool guest) {
+                        std::uint64_t requestId, bool guest, MessagePacker pack) {
   ClientId id = 0;
   {
     const std::lock_guard lock(inbox_->mutex);
@@ -111,8 +114,8 @@ ClientId TickLoop::join(std::string name, Role role, std::shared_ptr<OutgoingQue
     id = ++inbox_->lastId;
     if (!guest) inbox_->members.insert(id);
   }
-  const auto addClient = [id, role, requestId, guest, name = std::move(name),
-                          out](HostedWorld& hosted) {
+  const auto addClient = [id, role, requestId, guest, name = std::move(name), out,
+                          pack = std::move(pack)](HostedWorld& hosted) {
     if (hosted.closeNotice) return out->finish(encodeBye(*hosted.closeNotice));
     ENFILADE_ASSERT(!hosted.clients.contains(id));
     Client& client = hosted.clients[id];
@@ -120,6 +123,7 @@ ClientId TickLoop::join(std::string name, Role role, std::shared_ptr<OutgoingQue
     client.role = role;
     client.guest = guest;
     client.out = out;
+    client.pack = pack;
     v1::ServerMessage message;
     message.set_reply_to(requestId);
     *message.mutable_welcome() = makeWelcome(hosted);
@@ -134,8 +138,8 @@ void TickLoop::receive(ClientId id, v1::ClientMessage message, RequestPermit per
            HostedWorld& hosted) mutable { enqueueRequest(hosted, id, std::move(request)); });
 }
 
-void TickLoop::receive(ClientId id, std::vector<v1::ClientMessage> messages) {
-  post([id, messages = std::move(messages)](HostedWorld& hosted) mutable {
+void TickLoop::queue(ClientId id, std::vector<v1::ClientMessage> messages) {
+  inbox_->queue([id, messages = std::move(messages)](HostedWorld& hosted) mutable {
     for (v1::ClientMessage& message : messages)
       enqueueRequest(hosted, id, {std::move(message), nullptr});
   });
@@ -151,14 +155,16 @@ void TickLoop::leave(ClientId id) {
   if (empty && identity().dropWhenEmpty) identity().becameEmpty();
 }
 
+bool TickInbox::queue(Job job) {
+  const std::lock_guard lock(mutex);
+  if (!closed) jobs.push_back(std::move(job));
+  return !closed;
+}
+
 bool TickInbox::post(Job job) {
-  {
-    const std::lock_guard lock(mutex);
-    if (closed) return false;
-    jobs.push_back(std::move(job));
-  }
-  posted.notify_one();
-  return true;
+  const bool queued = queue(std::move(job));
+  if (queued) posted.notify_one();
+  return queued;
 }
 
 v1::World TickLoop::makeStatus() const {
@@ -218,16 +224,55 @@ bool TickLoop::isRecordingComplete() const {
 
 void TickLoop::run() {
   try {
-    while (waitForJobs()) {
-      runJobs(jobs_, hosted_);
-      if (isStepDue() || takeFreeRunTick()) advance(hosted_);
-      processQueue(hosted_, hosted_.clock.driver.value_or(0));
-    }
+    while (waitForJobs()) work();
     runRemainingJobs();
     closeWorld(hosted_);
   } catch (const std::exception& error) {
     fail(error.what());
   }
+}
+
+void TickLoop::work() {
+  runJobs(jobs_, hosted_);
+  if (isStepDue() || takeFreeRunTick()) advance(hosted_);
+  processQueue(hosted_, hosted_.clock.driver.value_or(0));
+}
+
+/// Whether the owner may not rest until a job comes.
+bool TickLoop::hasWork() const {
+  return !jobs_.empty() || isFreeRunning(hosted_) || findSteppingClient(hosted_) != 0;
+}
+
+/// Returns false if the world has another owner or nothing to do.
+bool TickLoop::becomeGuest() {
+  const std::lock_guard lock(inbox_->mutex);
+  if (inbox_->owner != TickInbox::Owner::none || inbox_->closed || inbox_->jobs.empty())
+    return false;
+  inbox_->owner = TickInbox::Owner::guest;
+  takeJobs();
+  return true;
+}
+
+void TickLoop::workIfAtRest() {
+  using Owner = TickInbox::Owner;
+  if (!becomeGuest()) return inbox_->posted.notify_one();
+  std::exception_ptr failure;
+  try {
+    const auto end = SteadyClock::now() + kGuestTime;
+    do work();
+    while (hasWork() && !isFreeRunning(hosted_) && SteadyClock::now() < end);
+  } catch (...) {
+    failure = std::current_exception();
+  }
+  bool isAtRest = false;
+  {
+    const std::lock_guard lock(inbox_->mutex);
+    isAtRest = !failure && !inbox_->closed && inbox_->jobs.empty() && !hasWork() &&
+               !hosted_.world.recorder();
+    inbox_->guestFailure = failure;
+    inbox_->owner = isAtRest ? Owner::none : Owner::thread;
+  }
+  if (!isAtRest) inbox_->posted.notify_one();
 }
 
 /// Runs jobs posted before the end: requests get an error, new clients a Bye.
@@ -259,24 +304,43 @@ void TickLoop::fail(const std::string& reason) {
 bool TickLoop::waitForJobs() {
   std::unique_lock lock(inbox_->mutex);
   const auto awake = [this] { return inbox_->closed || !inbox_->jobs.empty(); };
-  const bool hasRemaining = !jobs_.empty();  // from the last slice
-  if (isFreeRunning(hosted_) && !hasRemaining) {
+  if (!hasWork()) {
+    rest(lock);
+  } else if (isFreeRunning(hosted_) && jobs_.empty()) {
     inbox_->posted.wait_until(lock, hosted_.clock.nextTick, awake);
-  } else if (!hasRemaining && findSteppingClient(hosted_) == 0) {
-    if (!inbox_->posted.wait_for(lock, kFlushDelay, awake)) {
-      lock.unlock();
-      if (WorldRecorder* recorder = hosted_.world.recorder()) recorder->flush();
-      lock.lock();
-      inbox_->posted.wait(lock, awake);
-    }
   }
-  std::move(inbox_->jobs.begin(), inbox_->jobs.end(), std::back_inserter(jobs_));
-  inbox_->jobs.clear();
-  hosted_.closeNotice = inbox_->closeNotice;
+  takeJobs();
   return !inbox_->closed;
 }
 
-bool TickLoop::isStepDue() {
+/// Waits for jobs. Meanwhile another thread may be the world's guest, unless the world is recorded:
+/// the recording is flushed after a while.
+void TickLoop::rest(std::unique_lock<std::mutex>& lock) {
+  using Owner = TickInbox::Owner;
+  const auto awake = [this] { return inbox_->closed || !inbox_->jobs.empty(); };
+  if (WorldRecorder* recorder = hosted_.world.recorder()) {
+    if (inbox_->posted.wait_for(lock, kFlushDelay, awake)) return;
+    lock.unlock();
+    recorder->flush();
+    lock.lock();
+    return inbox_->posted.wait(lock, awake);
+  }
+  inbox_->owner = Owner::none;
+  inbox_->posted.wait(lock, [this, awake] {
+    return inbox_->owner == Owner::thread || (inbox_->owner == Owner::none && awake());
+  });
+  inbox_->owner = Owner::thread;
+  if (inbox_->guestFailure) std::rethrow_exception(inbox_->guestFailure);
+}
+
+/// The owner calls it, and holds the lock.
+void TickLoop::takeJobs() {
+  std::move(inbox_->jobs.begin(), inbox_->jobs.end(), std::back_inserter(jobs_));
+  inbox_->jobs.clear();
+  hosted_.closeNotice = inbox_->closeNotice;
+}
+
+bool TickLoop::isStepDue() const {
   return hosted_.clock.mode == v1::Clock::MODE_LOCKSTEP && findSteppingClient(hosted_) != 0;
 }
 

@@ -1,8 +1,9 @@
-// The thread that owns a world: it runs posted jobs, answers requests, and runs due ticks. No other
-// thread accesses the world.
+// The thread that owns a world: it runs posted jobs, answers requests, and runs due ticks. While it
+// rests, another thread may do so for a moment; only the world's owner accesses it.
 #pragma once
 
 #include <condition_variable>
+#include <cstdint>
 #include <exception>
 #include <mutex>
 #include <set>
@@ -17,10 +18,18 @@ namespace enfilade::server {
 struct TickInbox {
   using Job = std::function<void(HostedWorld&)>;
 
+  /// The thread that accesses the world. `none`: the world's own thread rests and takes it back
+  /// when it wakes; until then another may become its guest.
+  enum class Owner : std::uint8_t { thread, none, guest };
+
   /// Returns false if the world has ended; the job is discarded then.
   bool post(Job job);
+  /// As post(), but does not wake the world's thread.
+  bool queue(Job job);
 
   std::mutex mutex;  ///< guards the members below
+  Owner owner = Owner::thread;
+  std::exception_ptr guestFailure;  ///< an internal error on the guest's thread
   std::condition_variable posted;
   std::vector<Job> jobs;
   bool closed = false;
@@ -47,10 +56,13 @@ class TickLoop {
   /// Adds a client; its Welcome replies to `requestId`. Returns 0 if the world has ended, without a
   /// message. Guests are not counted as clients of the world.
   ClientId join(std::string name, Role role, std::shared_ptr<OutgoingQueue> out,
-                std::uint64_t requestId, bool guest = false);
+                std::uint64_t requestId, bool guest = false, MessagePacker pack = nullptr);
   void receive(ClientId id, v1::ClientMessage message, RequestPermit permit);
-  /// Several requests at once, without permits.
-  void receive(ClientId id, std::vector<v1::ClientMessage> messages);
+  /// Several requests at once, without permits. workIfAtRest() has to follow.
+  void queue(ClientId id, std::vector<v1::ClientMessage> messages);
+  /// Answers what is queued on the calling thread, if the world's own thread rests. It takes over
+  /// after a few milliseconds.
+  void workIfAtRest();
   void leave(ClientId id);
   /// Runs a job between two ticks. Returns false if the world has ended.
   bool post(TickInbox::Job job) { return inbox_->post(std::move(job)); }
@@ -75,11 +87,16 @@ class TickLoop {
   void runRemainingJobs();
   void fail(const std::string& reason);
   bool waitForJobs();
-  bool isStepDue();
+  void rest(std::unique_lock<std::mutex>& lock);
+  void takeJobs();
+  bool becomeGuest();
+  void work();
+  bool hasWork() const;
+  bool isStepDue() const;
   bool takeFreeRunTick();
 
-  HostedWorld hosted_;     // tick thread only
-  std::vector<Job> jobs_;  // tick thread only: taken from the inbox
+  HostedWorld hosted_;     // owner only
+  std::vector<Job> jobs_;  // owner only: taken from the inbox
   const std::shared_ptr<TickInbox> inbox_ = std::make_shared<TickInbox>();
   std::mutex joinMutex_;  // guards the join of the thread
   std::thread thread_;

@@ -152,8 +152,9 @@ class TickLoopMembership final : public WorldMembership {
   TickLoopMembership(std::shared_ptr<TickLoop> world, ClientId id)
       : world_(std::move(world)), id_(id) {}
   ~TickLoopMembership() override { world_->leave(id_); }
-  void receive(std::vector<v1::ClientMessage> messages) override {
-    world_->receive(id_, std::move(messages));
+  std::function<void()> receive(std::vector<v1::ClientMessage> messages) override {
+    world_->queue(id_, std::move(messages));
+    return [world = world_] { world->workIfAtRest(); };
   }
 
  private:
@@ -165,9 +166,11 @@ class TickLoopMembership final : public WorldMembership {
 
 std::unique_ptr<WorldMembership> WorldRegistry::join(const std::string& world,
                                                      const std::string& name, Role role,
-                                                     std::shared_ptr<OutgoingQueue> out) {
+                                                     std::shared_ptr<OutgoingQueue> out,
+                                                     MessagePacker pack) {
   const TickLoopPtr found = find(world);
-  const ClientId id = found ? found->join(name, role, std::move(out), 0) : 0;
+  const ClientId id =
+      found ? found->join(name, role, std::move(out), 0, false, std::move(pack)) : 0;
   return id == 0 ? nullptr : std::make_unique<TickLoopMembership>(found, id);
 }
 
@@ -293,6 +296,7 @@ void WorldRegistry::stop() {
     world->stop(v1::ERROR_SHUTTING_DOWN, reason);
     auditTotals_.addTotals(world->auditTotals());
   }
+  workers_.finish();
 }
 
 void WorldRegistry::finishServices() {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "server/base/work_pool.hpp"
 #include "server/base/work_thread.hpp"
 #include "server/hosting/frame_service.hpp"
 #include "server/hosting/query_service.hpp"
@@ -65,7 +66,11 @@ class WorldRegistry : public WorldDirectory {
   void drop(const std::string& name, const std::string& requestingWorld,
             std::function<void(std::optional<v1::Error>)> done) override;
   std::unique_ptr<WorldMembership> join(const std::string& world, const std::string& name,
-                                        Role role, std::shared_ptr<OutgoingQueue> out) override;
+                                        Role role, std::shared_ptr<OutgoingQueue> out,
+                                        MessagePacker pack) override;
+  void work(std::vector<std::function<void()>> received) override {
+    workers_.post(std::move(received));
+  }
 
   /// Ends all worlds. Later calls do nothing.
   void stop();
@@ -94,6 +99,7 @@ class WorldRegistry : public WorldDirectory {
   TickLoopPtr mainWorld_;                             ///< constant after construction
   bool stopping_ = false;
   AuditTotals auditTotals_;  ///< used by the thread, after it by stop()
+  WorkPool workers_;         ///< answer requests to worlds whose threads are at rest
   WorkThread thread_;        ///< creates and drops worlds; last member: it uses the others
 };
 

@@ -3,6 +3,7 @@
 import math
 import time
 import unittest
+import unittest.mock
 
 import numpy as np
 
@@ -102,6 +103,92 @@ class Environments(RoomCase):
         seen, rewards, terminated, truncated, infos = vector.step([[1, 0]] * 2)
         np.testing.assert_array_equal(rewards, [0, 0])
         np.testing.assert_array_equal(infos["tick"], [1, 1])
+
+    def vector(self, count, is_packing=True, **options):
+        vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=count,
+                                        **{"starts": _STARTS, "channels": (), **options})
+        self.addCleanup(vector.close)
+        self.assertEqual(vector._is_packing, [True] * count)
+        if not is_packing:
+            vector._is_packing = [False] * count  # as with a server without packed_steps
+        return vector
+
+    def assert_same_steps(self, count, steps, actions, **options):
+        """Packed steps are as those in messages. Returns the infos of the packed ones."""
+        both = [self.vector(count, is_packing, **options) for is_packing in (True, False)]
+        (seen, _), (expected, _) = (one.reset(seed=3) for one in both)
+        self.assert_same(seen, expected)
+        infos = []
+        for _ in range(steps):
+            action = actions()
+            (seen, *packed), (expected, *others) = (one.step(action) for one in both)
+            self.assert_same(seen, expected)
+            for one, other in zip(packed[:-1], others[:-1]):
+                np.testing.assert_array_equal(one, other)
+            self.assertEqual({name: list(one) for name, one in packed[-1].items()},
+                             {name: list(one) for name, one in others[-1].items()})
+            infos.append(packed[-1])
+        return infos
+
+    def test_packed_steps_are_as_steps_in_messages(self):
+        random = np.random.default_rng(2)
+        infos = self.assert_same_steps(3, 40, lambda: random.uniform((0.5, -0.3), 1, (3, 2)),
+                                       starts=[(3.5, 0, 0, 0), (-3, 0, 2)], goal=(4.4, 0, 1), max_steps=15)
+        self.assertIn("wall", {one for info in infos for one in info["stopped_by"]})
+        self.assertTrue(any(one for info in infos for one in info["contacts"]))
+        self.assertIn(1, {tick for info in infos for tick in info["tick"]}, "an episode ended")
+
+    def test_packed_steps_come_with_pictures_and_distances(self):
+        self.need_pictures()
+        self.assert_same_steps(2, 12, lambda: [1, 3], goals=[(-4, 0, 0)], discrete=True, max_steps=7,
+                               cameras=[enfilade.Camera("a", (16, 12), ahead=0.1),
+                                        enfilade.Camera("b", (8, 8), ("ids",), yaw=1.0)])
+
+    def test_an_avatar_that_falls_ends_its_episode_in_a_packed_step(self):
+        infos = self.assert_same_steps(2, 60, lambda: np.array([[1, 0], [0, 0]], float),
+                                       starts=[(9, 0, 9, 0)])
+        falls = [info["fell"] for info in infos if "fell" in info]
+        self.assertGreater(len(falls), 0)
+        self.assertEqual(list(falls[0]), [True, None])
+
+    def test_a_world_that_is_dropped_fails_its_packed_step_alone(self):
+        vector = self.vector(2)
+        vector.reset(seed=1)
+        self.client.drop_world(vector.envs[0].client.world)
+        with self.assertRaisesRegex(enfilade.ServerError, "environment 0"):
+            vector.step(np.ones((2, 2)))
+        self.assertGreater(vector.envs[1]._steps, 0)
+
+    def test_an_interrupted_packed_step_leaves_the_environments_usable(self):
+        vector = self.vector(3, starts=[(4, 0, 0, 0)])
+        vector.reset(seed=1)
+        for interrupted in range(3):
+            for step in range(6):
+                vector.step(np.ones((3, 2)))
+            with unittest.mock.patch.object(vector.envs[interrupted], "reward",
+                                            side_effect=KeyboardInterrupt):
+                with self.assertRaises(KeyboardInterrupt):
+                    vector.step(np.ones((3, 2)))
+            vector.reset(seed=1)
+
+    def test_a_kept_request_replaces_its_numbers(self):
+        m = enfilade.messages
+        def drive(x, z):
+            return m.ClientMessage(command=m.Command(avatar="ann", drive=m.Drive(
+                velocity=m.Vec3(x=x, z=z))))
+        request = drive(0, 0)
+        velocity = request.command.drive.velocity
+        kept = enfilade.kept_request.KeptRequest(request, (velocity, "x"), (velocity, "z"))
+        step = enfilade.kept_request.KeptRequest(m.ClientMessage(step=m.Step(ticks=700)))
+        for x, z in ((0.25, -7.0), (0.0, 1e300)):
+            expected = drive(x, z)
+            kept.set(x, z)
+            kept.request_id = expected.request_id = 300
+            self.assertEqual(m.ClientMessage.FromString(kept.SerializeToString()), expected)
+        joined = enfilade.kept_request.KeptRequest.joined(b"", b"\x12", [step, kept])
+        joined.set(3.0, 4.0)
+        world = m.StepMany.World.FromString(bytes(joined.body))
+        self.assertEqual(list(world.requests), [m.ClientMessage(step=m.Step(ticks=700)), drive(3.0, 4.0)])
 
     def test_a_server_with_tokens_takes_them_from_environments(self):
         tokens = self.folder / "tokens"

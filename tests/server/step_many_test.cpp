@@ -1,6 +1,7 @@
 // StepMany: requests to several worlds over one connection.
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <cstring>
 #include <thread>
 
@@ -10,6 +11,13 @@
 
 namespace enfilade::server::testing {
 namespace {
+
+v1::ClientMessage driveRequest(double x) {
+  v1::ClientMessage message;
+  message.mutable_command()->set_avatar("ann");
+  message.mutable_command()->mutable_drive()->mutable_velocity()->set_x(x);
+  return message;
+}
 
 class StepMany : public ServedRoom {
  protected:
@@ -90,6 +98,56 @@ TEST_F(StepMany, EachWorldAnswersItsRequestsInOrderAndWelcomesAtFirst) {
   }
   const v1::StepManyReply second = request(maker, manyOf(kWorlds, {stepRequest(1)}));
   for (const auto& world : second.worlds()) EXPECT_EQ(world.messages(0).step().tick(), 4u);
+}
+
+TEST_F(StepMany, PackedStepsReplaceRepliesToCommandsAndSteps) {
+  protocol::Client maker = client("maker");
+  for (int i = 0; i < 4; ++i) create(maker, "w" + std::to_string(i));
+  v1::StepMany spawn = manyOf(4, {spawnRequest(0), stepRequest(1)});
+  spawn.mutable_worlds(2)->clear_requests();
+  request(maker, spawn);
+  v1::StepMany many = manyOf(4, {driveRequest(1), stepRequest(60)});
+  for (const int i : {0, 2, 3}) many.mutable_worlds(i)->set_packed_avatar("ann");
+  many.mutable_worlds(3)->mutable_requests(0)->mutable_command()->set_avatar("a name");
+  const v1::StepManyReply reply = request(maker, many);
+  ASSERT_EQ(reply.worlds(0).messages_size(), 0);
+  ASSERT_EQ(reply.worlds(1).messages_size(), 2);
+  ASSERT_EQ(reply.worlds(2).messages_size(), 0);  // it has no avatar: the Drive has no effect
+  ASSERT_EQ(reply.worlds(3).messages_size(), 1);
+  EXPECT_FALSE(reply.worlds(3).messages(0).command().accepted());
+  const v1::StepReply& alone = reply.worlds(1).messages(1).step();
+  const v1::PackedSteps& steps = reply.steps();
+  ASSERT_EQ(steps.feet_size(), 12);
+  ASSERT_EQ(steps.stopped_by_name_size(), 4);
+  EXPECT_EQ(std::vector<std::uint64_t>(steps.tick().begin(), steps.tick().end()),
+            (std::vector<std::uint64_t>{61, 0, 60, 61}));
+  EXPECT_EQ(steps.state_hash(0), alone.state_hash());
+  EXPECT_EQ(steps.feet(0), alone.avatars(0).feet().x());
+  EXPECT_EQ(steps.feet(2), alone.avatars(0).feet().z());
+  EXPECT_EQ(steps.stopped_by_name(0), alone.avatars(0).move().stopped_by_name());
+  EXPECT_GT(steps.feet(0), 0.9);
+  EXPECT_TRUE(std::isnan(steps.feet(6)));
+  EXPECT_LT(steps.feet(9), 0.1) << "its Drive was refused";
+  const v1::StepManyReply next = request(maker, manyOf(4, {stepRequest(1)}));
+  EXPECT_FALSE(next.has_steps());
+  EXPECT_EQ(next.worlds(0).messages(0).step().tick(), 62u);
+}
+
+TEST_F(StepMany, AClockThatItSetsRunsOn) {
+  protocol::Client maker = client("maker");
+  create(maker, "w0");
+  v1::ClientMessage freeRun;
+  freeRun.mutable_set_clock()->mutable_free_run()->set_speed(100);
+  request(maker, manyOf(1, {stepRequest(1)}));
+  request(maker, manyOf(1, {freeRun}));
+  EXPECT_TRUE(becomesTrue([&] {
+    v1::ClientMessage message;
+    message.mutable_list_worlds();
+    const v1::ServerMessage reply = maker.request(std::move(message));
+    for (const v1::World& world : reply.worlds().worlds())
+      if (world.name() == "w0") return world.tick() > 20;
+    return false;
+  }));
 }
 
 TEST_F(StepMany, AttachmentsFollowOneAnotherOnMultiplesOf64) {

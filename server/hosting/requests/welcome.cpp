@@ -66,6 +66,7 @@ v1::Welcome makeWelcome(const HostedWorld& hosted) {
   if (hosted.identity.directory) {
     welcome.add_capabilities("worlds");
     welcome.add_capabilities("step_many");
+    welcome.add_capabilities("packed_steps");
     for (const std::string& scene : hosted.identity.directory->sceneNames())
       welcome.add_scenes(scene);
   }

@@ -6,8 +6,10 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
+#include <limits>
 #include <mutex>
 #include <set>
 #include <span>
@@ -52,6 +54,26 @@ v1::Error makeGoneError(const std::string& world) {
                    "step_many.worlds.world");
 }
 
+/// A world's entry in PackedSteps.
+struct PackedStep {
+  std::uint64_t tick = 0, stateHash = 0;
+  std::array<double, 3> feet{kMissing, kMissing, kMissing};
+  std::string stoppedBy;
+  static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
+};
+
+PackedStep packStep(const v1::StepReply& reply, const std::string& avatarName) {
+  PackedStep step;
+  step.tick = reply.tick();
+  step.stateHash = reply.state_hash();
+  for (const v1::AvatarState& avatar : reply.avatars()) {
+    if (avatar.name() != avatarName) continue;
+    step.feet = {avatar.feet().x(), avatar.feet().y(), avatar.feet().z()};
+    step.stoppedBy = avatar.move().stopped_by_name();
+  }
+  return step;
+}
+
 }  // namespace
 
 /// A client in one world.
@@ -64,11 +86,14 @@ struct WorldGroup::Member : std::enable_shared_from_this<Member> {
   std::shared_ptr<Round> round;  // null: none is under way
   std::uint64_t expected = 0, replies = 0;
   std::vector<EncodedMessage> messages;
-  bool welcomed = false;  // the Welcome was taken, or none will come
-  bool ended = false;     // the world said Bye
+  bool welcomed = false;     // the Welcome was taken, or none will come
+  bool ended = false;        // the world said Bye
+  std::string packedAvatar;  // in the round; empty: steps have replies
+  PackedStep step;
 
-  void begin(const std::shared_ptr<Round>& next, std::uint64_t requests);
+  void begin(const std::shared_ptr<Round>& next, const v1::StepMany::World& request);
   void collect();
+  bool pack(const v1::ServerMessage& message);
   void answerRest();
 };
 
@@ -100,6 +125,7 @@ struct WorldGroup::Round {
   std::function<void(EncodedMessage)> done;
   std::vector<std::shared_ptr<Member>> members;  ///< in the order of the request
   std::shared_ptr<Memory> memory;                ///< null: not requested
+  bool hasPackedSteps = false;
   std::atomic<std::size_t> unfinished = 0;
 
   void finishOne() {
@@ -112,14 +138,18 @@ struct WorldGroup::Round {
     }
   }
   EncodedMessage encodeReply();
+  void packSteps(v1::PackedSteps& steps) const;
 };
 
-void WorldGroup::Member::begin(const std::shared_ptr<Round>& next, std::uint64_t requests) {
+void WorldGroup::Member::begin(const std::shared_ptr<Round>& next,
+                               const v1::StepMany::World& request) {
   const std::lock_guard lock(mutex);
   round = next;
-  expected = requests;
+  expected = static_cast<std::uint64_t>(request.requests_size());
+  packedAvatar = request.packed_avatar();
   replies = 0;
   messages.clear();
+  step = {};
 }
 
 /// Takes what the world has sent; the last reply ends the round. Called from the threads of the
@@ -142,6 +172,22 @@ void WorldGroup::Member::collect() {
     if (welcomed && replies == expected) finished = std::exchange(round, nullptr);
   }
   if (finished) finished->finishOne();
+}
+
+/// Keeps a reply to a Command or a Step as numbers. Called from the world's thread.
+bool WorldGroup::Member::pack(const v1::ServerMessage& message) {
+  {
+    const std::lock_guard lock(mutex);
+    if (!round || packedAvatar.empty()) return false;
+    if (message.has_step()) {
+      step = packStep(message.step(), packedAvatar);
+    } else if (!message.command().accepted()) {
+      return false;
+    }
+    ++replies;
+  }
+  collect();
+  return true;
 }
 
 /// Errors for the requests that the world did not answer before it ended. The caller holds the
@@ -167,6 +213,7 @@ EncodedMessage WorldGroup::Round::encodeReply() {
       world.add_attachment_ends(bytes);
     }
   }
+  if (hasPackedSteps) packSteps(*reply.mutable_step_many()->mutable_steps());
   if (bytes > protocol::kClientLimits.total / 2 ||
       reply.ByteSizeLong() > protocol::kClientLimits.header / 2) {
     for (const auto& member : members) member->ended = true;  // it has lost events
@@ -192,6 +239,16 @@ EncodedMessage WorldGroup::Round::encodeReply() {
     at += attachment.size();
   }
   return encodeShared(reply, std::move(own));
+}
+
+void WorldGroup::Round::packSteps(v1::PackedSteps& steps) const {
+  for (const auto& member : members) {
+    const PackedStep& step = member->step;
+    steps.add_tick(step.tick);
+    steps.add_state_hash(step.stateHash);
+    for (const double coordinate : step.feet) steps.add_feet(coordinate);
+    steps.add_stopped_by_name(step.stoppedBy);
+  }
 }
 
 WorldGroup::WorldGroup(WorldDirectory& directory, std::string name, Role role,
@@ -241,7 +298,11 @@ std::shared_ptr<WorldGroup::Member> WorldGroup::enter(const std::string& world) 
       [weak = std::weak_ptr(member)] {
         if (const auto self = weak.lock()) self->collect();
       });
-  member->membership = directory_.join(world, name_, role_, member->out);
+  member->membership = directory_.join(world, name_, role_, member->out,
+                                       [weak = std::weak_ptr(member)](const auto& message) {
+                                         const auto self = weak.lock();
+                                         return self && self->pack(message);
+                                       });
   if (!member->membership) member->welcomed = true;
   return member;
 }
@@ -256,19 +317,22 @@ void WorldGroup::submit(const v1::StepMany& request, std::uint64_t requestId,
     round->memory = memory_;
   }
   round->unfinished = static_cast<std::size_t>(request.worlds_size()) + 1;
-  for (const v1::StepMany::World& world : request.worlds())
+  for (const v1::StepMany::World& world : request.worlds()) {
     round->members.push_back(enter(world.world()));
+    round->hasPackedSteps |= !world.packed_avatar().empty();
+  }
+  std::vector<std::function<void()>> received;
   for (int i = 0; i < request.worlds_size(); ++i) {
     const v1::StepMany::World& world = request.worlds(i);
     Member& member = *round->members[static_cast<std::size_t>(i)];
-    member.begin(round, static_cast<std::uint64_t>(world.requests_size()));
+    member.begin(round, world);
     if (!member.membership) {
       const std::lock_guard lock(member.mutex);
       member.answerRest();
     } else {
       std::vector<v1::ClientMessage> requests(world.requests().begin(), world.requests().end());
       for (std::size_t k = 0; k < requests.size(); ++k) requests[k].set_request_id(k + 1);
-      member.membership->receive(std::move(requests));
+      received.push_back(member.membership->receive(std::move(requests)));
     }
     member.collect();  // what was queued between rounds; ends the round if there are no requests
   }
@@ -276,6 +340,7 @@ void WorldGroup::submit(const v1::StepMany& request, std::uint64_t requestId,
     const auto member = members_.find(world.world());
     if (world.leave() || !member->second->membership) members_.erase(member);
   }
+  directory_.work(std::move(received));
   round->finishOne();
 }
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from . import messages, spaces
 from .arguments import number
+from .kept_request import KeptRequest
 from .questions import frame_request
 
 _CHANNELS = ("rgb", "depth", "ids", "class", "thing", "normals", "range")
@@ -86,27 +87,32 @@ class CameraRequest:
         self.channels = tuple(camera.channels)
         self.prefix = camera.name + "_" if camera.name else ""
         width, height = map(int, camera.size)
-        self.request = messages.ClientMessage(frame=frame_request(
+        request = messages.ClientMessage(frame=frame_request(
             avatar, forward=(1, 0, 0), width=width, height=height, fov_y=camera.fov_y,
             channels=camera.channels, samples=camera.samples))
-        self._eyes = self.request.frame.eyes
-        self._forward = self._eyes.forward
+        eyes = request.frame.eyes
         if camera.height is not None:
-            self._eyes.height = camera.height
+            eyes.height = camera.height
         self._is_aside = camera.ahead != 0 or camera.left != 0
+        numbers = [(eyes.forward, name) for name in "xyz"]
+        if self._is_aside:
+            numbers += [(eyes.offset, name) for name in "xz"]
+        self.request = KeptRequest(request, *numbers)
         self._across, self._up = math.cos(camera.pitch), math.sin(camera.pitch)
 
     def aim(self, heading: float) -> None:
         """Looks along the avatar's heading, radians."""
+        self.request.set(*self.numbers(heading))
+
+    def numbers(self, heading: float) -> Tuple[float, ...]:
+        """The doubles of `request` along a heading."""
         yaw = heading + self.camera.yaw
-        forward = self._forward
-        forward.x, forward.y, forward.z = \
-            self._across * math.cos(yaw), self._up, -self._across * math.sin(yaw)
-        if self._is_aside:
-            c, s = math.cos(heading), math.sin(heading)
-            ahead, left = self.camera.ahead, self.camera.left
-            self._eyes.offset.x = ahead * c - left * s
-            self._eyes.offset.z = -ahead * s - left * c
+        forward = self._across * math.cos(yaw), self._up, -self._across * math.sin(yaw)
+        if not self._is_aside:
+            return forward
+        c, s = math.cos(heading), math.sin(heading)
+        ahead, left = self.camera.ahead, self.camera.left
+        return (*forward, ahead * c - left * s, -ahead * s - left * c)
 
     def spaces(self) -> Dict[str, Any]:
         """The spaces of its observations, by name."""

@@ -22,7 +22,9 @@ from .client import Client, Reply, connect
 from .connection import raise_refusal
 from .episodes import Episode, check_episode, draw_episode
 from .errors import EnfiladeError, OrderFailed
+from .kept_request import KeptRequest
 from .process import Server, serve
+from .world_group import Member
 
 Observation = Dict[str, np.ndarray]
 
@@ -116,10 +118,12 @@ class WalkEnv(spaces.EnvBase):
         for name, count in (("ticks_per_step", ticks_per_step), ("max_steps", max_steps)):
             whole(count, name, 1, UINT32)
         self._name = "walker"
-        self._drive = messages.ClientMessage(command=messages.Command(
+        drive = messages.ClientMessage(command=messages.Command(
             avatar=self._name, drive=messages.Drive(velocity=messages.Vec3())))
-        self._velocity = self._drive.command.drive.velocity
-        self._run = messages.ClientMessage(step=messages.Step(ticks=ticks_per_step, avatars=True))
+        velocity = drive.command.drive.velocity
+        self._drive = KeptRequest(drive, (velocity, "x"), (velocity, "z"))
+        self._run = KeptRequest(messages.ClientMessage(
+            step=messages.Step(ticks=ticks_per_step, avatars=True)))
         self.min_distance = number(min_distance, "min_distance", 0)
         self._size = {"radius": None if radius is None else number(radius, "radius", *_RADII),
                       "height": None if height is None else number(height, "height", *_HEIGHTS)}
@@ -146,7 +150,7 @@ class WalkEnv(spaces.EnvBase):
             spaces.Box(-1.0, 1.0, (2,), np.float32)
         if not spaces.HAVE_GYMNASIUM:
             self.np_random = np.random.default_rng()
-        self._heading = 0.0
+        self._face(0.0)
         self._steps = 0
         self._start: Sequence[float] = ()  # of the episode
         self.episode: Optional[Episode] = None  # the present one, with goals or episodes
@@ -259,7 +263,7 @@ class WalkEnv(spaces.EnvBase):
         request = CameraRequest(Camera("", look.size, ("rgb",), look.fov_y, look.yaw, look.pitch,
                                        look.height, look.ahead, look.left), self._name)
         request.aim(self._heading)
-        reply, attachment = self.client.request(frame=request.request.frame)
+        reply, attachment = self.client.take(self.client._post([request.request]))[0]
         return results.frame(reply.frame, attachment).rgb
 
     def close(self) -> None:
@@ -281,7 +285,7 @@ class WalkEnv(spaces.EnvBase):
         start, self.goal = self._chosen(seed, options)
         facing = start[3] if len(start) > 3 else float(self.np_random.uniform(0, 360))
         self._feet = self._rgb = None  # until the spawn succeeds
-        self._heading = math.radians(facing)
+        self._face(math.radians(facing))
         self._steps = 0
         self._tag += 1
         self._start = start
@@ -351,7 +355,7 @@ class WalkEnv(spaces.EnvBase):
             raise OrderFailed(f"the avatar could not spawn at ({where}): {' '.join(why)}")
         for reply, _ in replies[3:]:
             raise_refusal(reply)
-        info = self._info(entered, contacts)
+        info = self._info(entered.tick, entered.state_hash, contacts)
         if self.is_geodesic:
             info["geodesic_distance"] = self._left
         return self._observation(replies[3:]), info
@@ -380,14 +384,29 @@ class WalkEnv(spaces.EnvBase):
                                "failed, or the environment was closed")
 
     def _post_step(self, meaning: Tuple[float, float]) -> List[int]:
-        self._check_begun()
-        ahead, turn = meaning
-        self._heading = math.remainder(self._heading + turn * self.turn_speed * self._seconds,
-                                       math.tau)
-        x, _, z = self._forward()
-        self._velocity.x, self._velocity.z = ahead * self.speed * x, ahead * self.speed * z
+        self._drive.set(*self._turn(meaning))
         return self.client._post([self._drive, self._run, *self._pictures(),
                                   *self._distance_query()])
+
+    def _turn(self, meaning: Tuple[float, float]) -> Tuple[float, float]:
+        """Turns the heading. Returns the velocity of the step on the ground, x and z."""
+        self._check_begun()
+        ahead, turn = meaning
+        self._face(math.remainder(self._heading + turn * self.turn_speed * self._seconds, math.tau))
+        cosine, sine = self._direction
+        return ahead * self.speed * cosine, ahead * self.speed * -sine
+
+    def _kept_step(self, member: Member) -> KeptRequest:
+        """The requests of a step in this episode. The doubles are _step_numbers()."""
+        queries = [KeptRequest(one) for one in self._distance_query()]
+        return member.kept_step(self._name, [self._drive, self._run,
+                                             *(one.request for one in self.cameras), *queries])
+
+    def _step_numbers(self, meaning: Tuple[float, float]) -> Sequence[float]:
+        numbers = self._turn(meaning)
+        for camera in self.cameras:
+            numbers += camera.numbers(self._heading)
+        return numbers
 
     def _distance_query(self) -> List[Any]:
         if not self.is_geodesic:
@@ -415,17 +434,32 @@ class WalkEnv(spaces.EnvBase):
             return self._seen, 0.0, True, False, self._fallen(made, contacts)
         for reply, _ in replies[2:]:
             raise_refusal(reply)
-        info = self._info(made, contacts)
+        path = replies.pop()[0].navigation.paths[0] if self.is_geodesic else None
+        return (self._observation(replies[2:]),
+                *self._judged(before, self._info(made.tick, made.state_hash, contacts), path))
+
+    def _take_packed(self, step: Tuple[int, int, np.ndarray, str]) -> Dict[str, Any]:
+        """Keeps the avatar's state of a packed step. Returns its info."""
+        tick, state_hash, self._feet, self._stopped_by = step
+        self._steps += 1
+        client = self.client
+        client._notices.clear()
+        contacts = client._kept_contacts() if client._contacts else []
+        return self._info(tick, state_hash, contacts)
+
+    def _judged(self, before: np.ndarray, info: Dict[str, Any],
+                path: Any) -> Tuple[float, bool, bool, Dict[str, Any]]:
+        """What step() returns after the observation. `path`: to the goal; None if it is not geodesic."""
         after = self._feet
         assert after is not None
-        if self.is_geodesic:
-            self._add_measures(info, before, after, replies.pop()[0].navigation.paths[0])
-        return (self._observation(replies[2:]), self.reward(before, after, info),
-                self.is_over(after, info), self._steps >= self.max_steps, info)
+        if path is not None:
+            self._add_measures(info, before, after, path)
+        return (self.reward(before, after, info), self.is_over(after, info),
+                self._steps >= self.max_steps, info)
 
     def _fallen(self, made: Any, contacts: List[results.Contact]) -> Dict[str, Any]:
         """The info of the step in which the avatar fell out of the scene."""
-        info = {**self._info(made, contacts), "fell": True}
+        info = {**self._info(made.tick, made.state_hash, contacts), "fell": True}
         if self.is_geodesic:
             info.update(progress=0.0, geodesic_distance=self._left, success=False, spl=0.0, collided=False)
         return info
@@ -457,8 +491,9 @@ class WalkEnv(spaces.EnvBase):
             raise ValueError(f"action: {action!r} is not a number")
         return min(max(ahead, -1.0), 1.0), min(max(turn, -1.0), 1.0)
 
-    def _forward(self) -> Tuple[float, float, float]:
-        return (math.cos(self._heading), 0.0, -math.sin(self._heading))
+    def _face(self, heading: float) -> None:
+        self._heading = heading
+        self._direction = math.cos(heading), math.sin(heading)  # along x and -z
 
     def _pictures(self) -> List[Any]:
         """The requests for the cameras' pictures along the present heading."""
@@ -468,6 +503,11 @@ class WalkEnv(spaces.EnvBase):
 
     def _observation(self, pictures: Sequence[Reply]) -> Observation:
         assert self._feet is not None
+        self._seen = {**self._pictured(pictures), **self._place()}
+        return self._seen
+
+    def _pictured(self, pictures: Sequence[Reply]) -> Observation:
+        """The channels of the pictures that came."""
         seen: Observation = {}
         for camera, (reply, attachment) in zip(self.cameras, pictures):
             frame = results.frame(reply.frame, attachment)
@@ -478,17 +518,19 @@ class WalkEnv(spaces.EnvBase):
                 seen[camera.prefix + name] = np.fmin(metres, np.float32(np.inf))  # NaN: background
         if self.render_mode is not None and self._picture_key in seen:
             self._rgb = seen[self._picture_key].copy()  # the observation belongs to its reader
-        seen["position"] = self._feet.copy()
-        x, _, z = self._forward()
-        seen["heading"] = np.array([x, -z])
+        return seen
+
+    def _place(self) -> Observation:
+        """Position, heading and goal, as seen by the avatar."""
+        assert self._feet is not None
+        seen = {"position": self._feet.copy(), "heading": np.array(self._direction)}
         if self.goal is not None:
             seen["to_goal"] = self.goal - seen["position"]
             angle = math.atan2(-seen["to_goal"][2], seen["to_goal"][0]) - self._heading
             seen["goal_polar"] = np.array([math.hypot(seen["to_goal"][0], seen["to_goal"][2]),
                                            math.remainder(angle, math.tau)])
-        self._seen = seen
         return seen
 
-    def _info(self, made: Any, contacts: List[results.Contact]) -> Dict[str, Any]:
-        return {"tick": made.tick, "state_hash": made.state_hash, "contacts": contacts,
+    def _info(self, tick: int, state_hash: int, contacts: List[results.Contact]) -> Dict[str, Any]:
+        return {"tick": tick, "state_hash": state_hash, "contacts": contacts,
                 "stopped_by": self._stopped_by}

@@ -8,6 +8,7 @@ from typing import Any, Dict, List, Optional, Tuple
 import numpy as np
 
 from . import messages
+from .kept_request import varint
 
 Vector = Tuple[float, float, float]
 
@@ -244,15 +245,6 @@ RAY_BYTES = _RAY.itemsize
 _RAYS_KEY = bytes((messages.ClientMessage.DESCRIPTOR.fields_by_name["rays"].number << 3 | 2,))
 
 
-def _length(count: int) -> bytes:
-    """Encodes a varint of protobuf: seven bits per byte, the lowest first."""
-    written = bytearray()
-    while count > 127:
-        written.append(count & 127 | 128)
-        count >>= 7
-    return bytes((*written, count))
-
-
 class RayRequest:
     """A ClientMessage with the rays of N x 3 arrays, written by numpy: a hundred times faster than a
     message per ray. `options` are the other fields of the RayQuery: concatenated bytes are merged
@@ -269,7 +261,7 @@ class RayRequest:
         query = rays.tobytes() + options.SerializeToString()
         self.request_id = request_id
         self._bytes = b"".join((messages.ClientMessage(request_id=request_id).SerializeToString(),
-                                _RAYS_KEY, _length(len(query)), query))
+                                _RAYS_KEY, varint(len(query)), query))
 
     def SerializeToString(self) -> bytes:
         return self._bytes

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import operator
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
@@ -12,8 +13,9 @@ from . import spaces
 from .client import Client, connect
 from .environment import Observation, WalkEnv
 from .errors import OrderFailed
+from .kept_request import KeptRequest
 from .process import Server, serve
-from .world_group import WorldGroup
+from .world_group import Member, WorldGroup
 
 MAX_DRAWS = 32  # of a start, for one episode
 
@@ -22,17 +24,16 @@ class _Batch:
     """Observations of all environments. Each is copied at once, because the server's shared memory is
     valid for two rounds only."""
 
-    def __init__(self, envs: List[WalkEnv]) -> None:
-        self._envs = envs
-        self.observations: Observation = {}
+    def __init__(self, space: Any, count: int) -> None:
+        self.observations = {name: np.empty((count, *one.shape), one.dtype)
+                             for name, one in space.spaces.items()}
 
     def add(self, i: int, seen: Observation) -> None:
-        if not self.observations:
-            self.observations = {name: np.empty((len(self._envs), *one.shape), one.dtype)
-                                 for name, one in seen.items()}
         for name, one in seen.items():
             self.observations[name][i] = one
-        self._envs[i]._seen = {name: all_[i] for name, all_ in self.observations.items()}
+
+    def of(self, i: int) -> Observation:
+        return {name: all_[i] for name, all_ in self.observations.items()}
 
 
 class VectorWalkEnv(spaces.VectorEnvBase):
@@ -98,6 +99,10 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         self.observation_space = spaces.batched(self.single_observation_space, num_envs)
         self.action_space = spaces.batched(self.single_action_space, num_envs)
         self._over: Optional[np.ndarray] = None  # None: reset() is next
+        self._is_packing = [isinstance(env.client, Member) and "packed_steps" in env.client.capabilities
+                            for env in self.envs]
+        self._kept: List[Optional[KeptRequest]] = []  # the requests of a step, if not to be made
+        self._last = _Batch(self.single_observation_space, num_envs)  # of the last reset() or step()
 
     def _in_worlds(self, maker: Client, scene: str) -> Sequence[Client]:
         """Creates num_envs worlds, and a client in each: all on one connection."""
@@ -114,8 +119,9 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         """`seed`: one per environment, or a number to which each adds its own index."""
         seeds = self._seeds(seed)
         self._over = None
+        self._kept = [None] * self.num_envs
         is_drawn = "start" not in (options or {})
-        batch = _Batch(self.envs)
+        batch = _Batch(self.single_observation_space, self.num_envs)
 
         def take(i: int, ids: List[int]) -> Dict[str, Any]:
             seen, info = self._entered(i, ids, is_drawn)
@@ -126,6 +132,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             lambda i: self.envs[i]._post_reset(seeds[i], options or {}), take)
         if failures:
             raise self._numbered(failures)
+        self._last = batch
         self._over = np.zeros(self.num_envs, bool)
         return batch.observations, self._gathered(infos)
 
@@ -144,39 +151,81 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         over = self._over
         if over is None:
             raise RuntimeError("call reset() first, also after a failed step()")
-        try:
-            actions = list(actions)
-        except TypeError:
-            raise ValueError(f"actions: give {self.num_envs}, one per environment, not {actions!r}") from None
-        if len(actions) != self.num_envs:
-            raise ValueError(f"actions: give {self.num_envs}, one per environment, not {len(actions)}")
-        meanings = [(0.0, 0.0) if ended else env._meaning(action)
-                    for env, ended, action in zip(self.envs, over, actions)]
+        meanings = self._meanings(actions, over)
 
         def post(i: int) -> List[int]:
-            env = self.envs[i]
-            return env._post_reset(None, {}) if over[i] else env._post_step(meanings[i])
+            if over[i]:
+                self._kept[i] = None  # it may have another goal
+                return self.envs[i]._post_reset(None, {})
+            return self._post_step(i, meanings[i])
 
-        batch = _Batch(self.envs)
+        batch = _Batch(self.single_observation_space, self.num_envs)
 
         def take(i: int, ids: List[int]) -> Tuple[float, bool, bool, Dict[str, Any]]:
             if over[i]:
                 seen, info = self._entered(i, ids, True)
-                result = (0.0, False, False, info)
-            else:
-                seen, *result = self.envs[i]._take_step(ids)
-            batch.add(i, seen)
-            return result
+                batch.add(i, seen)
+                return 0.0, False, False, info
+            return self._take_step(i, ids, batch)
 
         self._over = None
         taken, failures = self._each(post, take)
         if failures:
             self._over = np.array([one is None or one[1] or one[2] for one in taken])
             raise self._numbered(failures)
+        self._last = batch
         rewards, terminated, truncated, infos = zip(*taken)
         self._over = np.array(terminated, bool) | np.array(truncated, bool)
         return (batch.observations, np.array(rewards), np.array(terminated),
                 np.array(truncated), self._gathered(infos))
+
+    def _meanings(self, actions: Any, over: np.ndarray) -> Sequence[Tuple[float, float]]:
+        """WalkEnv._meaning() of each action; any for an environment that restarts."""
+        is_array = isinstance(actions, np.ndarray) and actions.shape == (self.num_envs, 2) and \
+            actions.dtype.kind == "f" and not any(env.discrete for env in self.envs)
+        if is_array and not np.isnan(actions).any():
+            return np.clip(actions.astype(np.float64), -1.0, 1.0).tolist()
+        try:
+            actions = list(actions)
+        except TypeError:
+            raise ValueError(f"actions: give {self.num_envs}, one per environment, not {actions!r}") from None
+        if len(actions) != self.num_envs:
+            raise ValueError(f"actions: give {self.num_envs}, one per environment, not {len(actions)}")
+        return [(0.0, 0.0) if ended else env._meaning(action)
+                for env, ended, action in zip(self.envs, over, actions)]
+
+    def _post_step(self, i: int, meaning: Tuple[float, float]) -> List[int]:
+        env = self.envs[i]
+        if not self._is_packing[i]:
+            return env._post_step(meaning)
+        kept = self._kept[i]
+        if kept is None:
+            kept = self._kept[i] = env._kept_step(env.client)
+        kept.set(*env._step_numbers(meaning))
+        env.client.post_kept(kept)
+        return []
+
+    def _take_step(self, i: int, ids: List[int],
+                   batch: _Batch) -> Tuple[float, bool, bool, Dict[str, Any]]:
+        env = self.envs[i]
+        if self._is_packing[i]:
+            others = len(env.cameras) + env.is_geodesic
+            reply = env.client.reply_to_kept()
+            step = reply.packed(others)
+            if step is not None:
+                path = reply.messages[-1].navigation.paths[0] if env.is_geodesic else None
+                pictures = list(zip(reply.messages, reply.attachments())) if env.cameras else ()
+                before = env._feet
+                info = env._take_packed(step)
+                batch.add(i, env._pictured(pictures))
+                batch.add(i, env._place())
+                env.client.forget_reply()
+                return env._judged(before, info, path)
+            ids = env.client.unpack_reply(env._name, 2 + others)
+        env._seen = self._last.of(i)  # for an avatar that falls out of the scene
+        seen, *result = env._take_step(ids)
+        batch.add(i, seen)
+        return tuple(result)
 
     def _entered(self, i: int, ids: List[int], is_drawn: bool) -> Tuple[Observation, Dict[str, Any]]:
         """Takes the reply to a reset. A start that is refused is drawn again."""
@@ -237,10 +286,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         """Returns arrays of objects: a state hash has 64 bits, and contacts are lists. `_NAME` marks
         the environments that have NAME."""
         gathered: Dict[str, Any] = {}
-        for name in dict.fromkeys(name for info in infos for name in info):
-            values = np.empty(len(infos), object)
-            for number, info in enumerate(infos):
-                values[number] = info.get(name)
-            gathered[name] = values
+        for name in dict.fromkeys(itertools.chain.from_iterable(infos)):
+            gathered[name] = values = np.empty(len(infos), object)
+            values[:] = [info.get(name) for info in infos]
             gathered["_" + name] = np.array([name in info for info in infos])
         return gathered

@@ -6,12 +6,26 @@ import mmap
 from collections import deque
 from typing import Any, Deque, List, Optional, Sequence, Tuple
 
+import numpy as np
+
 from . import messages
 from .client import Client
 from .connection import Received
 from .errors import ConnectionFailed, EnfiladeError
+from .kept_request import KeptRequest, varint
 
 _ALIGNMENT = 64  # bytes, of attachments in the reply
+_NOTHING = memoryview(b"")
+
+
+def _key(message: Any, field: str) -> bytes:
+    """The key of a message in a message, on the wire."""
+    return varint(message.DESCRIPTOR.fields_by_name[field].number << 3 | 2)
+
+
+_STEP_MANY_KEY = _key(messages.ClientMessage, "step_many")
+_WORLDS_KEY = _key(messages.StepMany, "worlds")
+_REQUESTS_KEY = _key(messages.StepMany.World, "requests")
 
 
 class WorldGroup:
@@ -39,23 +53,24 @@ class WorldGroup:
         """Sends the waiting requests of all members, and takes the replies. An interrupted call
         continues with the next."""
         if self._under_way is None:
-            active = [one for one in self._connections if one.waiting or one.is_entering]
+            active = [one for one in self._connections
+                      if one.kept is not None or one.waiting or one.is_entering]
             if not active:
                 raise EnfiladeError("no request awaits a reply")
             # The server overwrites its memory, so a round leaves it alone while pictures are unread.
-            is_unread = any(one.has_unread_picture() for one in self._connections)
-            step = messages.StepMany(shared_memory=self._is_shared and not is_unread)
-            for connection in active:
-                world = step.worlds.add(world=connection.world, requests=connection.waiting)
-                world.leave = connection.is_leaving
-            self._under_way = (self._client.post([{"step_many": step}]), active)
+            shares = self._is_shared and not any(one.has_unread_picture() for one in self._connections)
+            request = _StepManyRequest(active, shares)
+            self._under_way = (self._client._post([request]), active)
         posted, active = self._under_way
         reply, attachment = self._client.take(posted)[0]
         if reply.step_many.HasField("memory"):
             attachment = self._shared(reply.step_many.memory)
-        start = 0
-        for connection, world in zip(active, reply.step_many.worlds):
-            start = connection.receive(world, attachment, start)
+        many, start = reply.step_many, 0
+        steps = _Steps(many.steps) if many.HasField("steps") else None
+        for i, (connection, world) in enumerate(zip(active, many.worlds)):
+            found = WorldReply(world, attachment, start, steps, i)
+            start = found.end()
+            connection.receive(found)
         self._under_way = None
 
     def _shared(self, place: Any) -> memoryview:
@@ -73,6 +88,87 @@ class WorldGroup:
         return self._memory[1][place.offset:]
 
 
+class _Steps:
+    """PackedSteps as Python data, of all worlds of a round."""
+
+    def __init__(self, packed: Any) -> None:
+        self.ticks, self.hashes = packed.tick[:], packed.state_hash[:]
+        self.stopped_by = packed.stopped_by_name[:]
+        self.feet = np.array(packed.feet[:]).reshape(-1, 3)  # rows of NaN: no such avatar
+        self.has_avatar = (~np.isnan(self.feet[:, 0])).tolist()
+
+
+class WorldReply:
+    """The reply of one world to StepMany: its messages, and a packed step if it was requested."""
+
+    __slots__ = ("messages", "_ends", "_attachment", "_start", "_steps", "_index")
+
+    def __init__(self, world: Any, attachment: memoryview, start: int, steps: Optional[_Steps],
+                 index: int) -> None:
+        self.messages = world.messages
+        self._ends, self._attachment, self._start = world.attachment_ends, attachment, start
+        self._steps, self._index = steps, index
+
+    def end(self) -> int:
+        """Where its last attachment ends in that of the round."""
+        return max(self._start, self._ends[-1]) if self._ends else self._start
+
+    def attachments(self) -> List[memoryview]:
+        """The attachment of each message."""
+        found: List[memoryview] = []
+        start = self._start
+        for end in self._ends:
+            if end > start:
+                start = -(-start // _ALIGNMENT) * _ALIGNMENT
+            found.append(self._attachment[start:end])
+            start = max(start, end)
+        return found
+
+    def packed(self, others: int) -> Optional[Tuple[int, int, np.ndarray, str]]:
+        """Returns tick, hash, feet and stopped_by_name of the packed step; None if it was refused, the
+        avatar is not in the world, or more came with it than `others` replies."""
+        steps, i = self._steps, self._index
+        if steps is None or not steps.has_avatar[i] or len(self.messages) != others:
+            return None
+        if others and any(one.HasField("error") for one in self.messages):
+            return None
+        return steps.ticks[i], steps.hashes[i], steps.feet[i], steps.stopped_by[i]
+
+    def unpacked(self, avatar: str) -> List[Any]:
+        """Returns the replies to Drive and Step, the first two requests, that are in none of the
+        messages."""
+        steps, i = self._steps, self._index
+        answered = {one.reply_to for one in self.messages}
+        found = []
+        if 1 not in answered:
+            found.append(messages.ServerMessage(
+                reply_to=1, command=messages.CommandReply(accepted=True)))
+        if steps is not None and steps.ticks[i]:
+            made = messages.StepReply(tick=steps.ticks[i], state_hash=steps.hashes[i])
+            if steps.has_avatar[i]:
+                x, y, z = steps.feet[i].tolist()
+                made.avatars.add(name=avatar, feet=messages.Vec3(x=x, y=y, z=z),
+                                 move=messages.MoveResult(stopped_by_name=steps.stopped_by[i]))
+            found.append(messages.ServerMessage(reply_to=2, step=made))
+        return found
+
+
+class _StepManyRequest:
+    """A ClientMessage with the waiting requests of several members, joined from their bytes."""
+
+    def __init__(self, connections: List[_MemberConnection], shared_memory: bool) -> None:
+        self.request_id = 0
+        self._parts = [messages.StepMany(shared_memory=shared_memory).SerializeToString()]
+        for one in connections:
+            self._parts += one.encoded()
+
+    def SerializeToString(self) -> bytes:
+        """Concatenated bytes are merged messages in protobuf."""
+        body = b"".join(self._parts)
+        head = messages.ClientMessage(request_id=self.request_id).SerializeToString()
+        return b"".join((head, _STEP_MANY_KEY, varint(len(body)), body))
+
+
 class _MemberConnection:
     """What a Client needs of a Connection, for one world of a group."""
 
@@ -82,7 +178,11 @@ class _MemberConnection:
         self.max_message = 0
         self.world = world
         self.waiting: List[Any] = []
-        self.is_entering = self.is_leaving = False
+        self.kept: Optional[KeptRequest] = None  # of Member.post_kept()
+        self.raw: Optional[WorldReply] = None  # to `kept`
+        self.head = messages.StepMany.World(world=world).SerializeToString()
+        self.is_entering = self._is_raw = False
+        self._sent: List[int] = []  # ids of the requests in the round under way
         self._group = group
         self._received: Deque[Received] = deque()
         self._broken = ""
@@ -98,29 +198,57 @@ class _MemberConnection:
     def send(self, requests: Any) -> None:
         if self.broken:
             raise ConnectionFailed(f"{self.peer}: {self.broken}")
+        self.kept = None  # of an interrupted call
         self.waiting += requests
 
-    def receive(self, world: Any, attachment: memoryview, start: int) -> int:
-        """Keeps the messages of a reply. Returns the end of the last attachment."""
-        ids = [one.request_id for one in self.waiting]
-        for message, end in zip(world.messages, world.attachment_ends):
+    def encoded(self) -> List[bytes]:
+        """Returns the parts of StepMany with the waiting requests, which are then under way."""
+        if self.raw is not None:  # of an interrupted call: its replies are not awaited any more
+            self.unpack([])
+        if self.kept is not None:
+            kept, self.kept, self._is_raw = self.kept, None, True
+            return [kept.body]
+        parts: List[Any] = [self.head]
+        for one in self.waiting:
+            body = one.body if isinstance(one, KeptRequest) else one.SerializeToString()
+            parts += (_REQUESTS_KEY, varint(len(body)), body)
+        self._sent = [one.request_id for one in self.waiting]
+        self.waiting, self.is_entering, self._is_raw = [], False, False
+        return [_WORLDS_KEY, varint(sum(map(len, parts))), *parts]
+
+    def receive(self, reply: WorldReply) -> None:
+        if self._is_raw:
+            self.raw = reply
+        else:
+            self._append(reply.messages, reply.attachments(), self._sent)
+
+    def _append(self, found: Any, attachments: Sequence[memoryview], ids: Sequence[int]) -> None:
+        """Makes next() return messages; `ids`: of the requests, by number."""
+        for message, attachment in zip(found, attachments):
             if message.reply_to:
                 message.reply_to = ids[message.reply_to - 1]
-            if end > start:
-                start = -(-start // _ALIGNMENT) * _ALIGNMENT
-            self._received.append(Received(message, attachment[start:end], None, 0))
-            start = max(start, end)
-        self.waiting = []
-        self.is_entering = False
-        return start
+            self._received.append(Received(message, attachment, None, 0))
+
+    def unpack(self, ids: Sequence[int], avatar: str = "") -> None:
+        """Makes next() return the messages of a raw reply as if the requests had these ids; without
+        ids, the unsolicited messages only."""
+        assert self.raw is not None
+        reply, self.raw = self.raw, None
+        made = [(one, _NOTHING) for one in (reply.unpacked(avatar) if ids else ())]
+        came = [one for one in zip(reply.messages, reply.attachments()) if ids or not one[0].reply_to]
+        # Unsolicited messages precede the reply to the Step that led to them, the second request.
+        both = sorted(made + came, key=lambda one: one[0].reply_to or 1.5)
+        self._append([one for one, _ in both], [attachment for _, attachment in both], ids)
 
     def has_unread_picture(self) -> bool:
-        return any(len(one.attachment) > 0 for one in self._received)
+        if self.raw is not None:
+            return True
+        return len(self._received) > 0 and any(len(one.attachment) > 0 for one in self._received)
 
     def next(self, seconds: Optional[float] = None) -> Optional[Received]:
         """Returns the next message, the same one until done(). None, at once, if nothing waits and
         `seconds` are given: messages come with rounds only."""
-        if not self._received:
+        while not self._received:
             if seconds is not None and not self.waiting:
                 return None
             if self.broken:
@@ -154,6 +282,35 @@ class Member(Client):
             self._keep(received)
         self.welcome = received.message.welcome
         connection.done(received)
+
+    def kept_step(self, avatar: str, requests: Sequence[KeptRequest]) -> KeptRequest:
+        """Joins requests for post_kept(): a Drive of the avatar, a Step, and others."""
+        head = messages.StepMany.World(world=self.world, packed_avatar=avatar).SerializeToString()
+        world = KeptRequest.joined(head, _REQUESTS_KEY, requests)
+        return KeptRequest.joined(b"", _WORLDS_KEY, [world])
+
+    def post_kept(self, kept: KeptRequest) -> None:
+        """Posts joined requests; their bytes must not change until reply_to_kept()."""
+        connection = self._connection
+        if connection._broken:
+            raise ConnectionFailed(f"{connection.peer}: {connection.broken}")
+        connection.kept = kept
+
+    def reply_to_kept(self) -> WorldReply:
+        """Call forget_reply() or unpack_reply() next."""
+        connection = self._connection
+        if connection.raw is None:
+            connection._group._run()
+        return connection.raw
+
+    def forget_reply(self) -> None:
+        self._connection.raw = None
+
+    def unpack_reply(self, avatar: str, requests: int) -> List[int]:
+        """Turns the reply into messages. Returns ids of the requests, for take()."""
+        ids = [next(self._ids) for _ in range(requests)]
+        self._connection.unpack(ids, avatar)
+        return ids
 
     def close(self) -> None:
         """Leaves the world with the group's next round, or with its connection."""

@@ -1,0 +1,38 @@
+#include "server/base/work_pool.hpp"
+
+#include <algorithm>
+#include <atomic>
+#include <thread>
+
+namespace enfilade::server {
+
+WorkPool::WorkPool() {
+  constexpr unsigned kMaxThreads = 16;
+  const unsigned count = std::clamp(std::thread::hardware_concurrency(), 1u, kMaxThreads);
+  for (unsigned i = 0; i < count; ++i) threads_.push_back(std::make_unique<WorkThread>());
+}
+
+void WorkPool::post(std::vector<std::function<void()>> work) {
+  struct Shared {
+    std::vector<std::function<void()>> work;
+    std::atomic<std::size_t> next{0};
+  };
+  const auto shared = std::make_shared<Shared>();
+  shared->work = std::move(work);
+  const std::size_t helpers = std::min(threads_.size(), shared->work.size());
+  for (std::size_t i = 0; i < helpers; ++i) {
+    threads_[i]->post([shared] {
+      while (true) {
+        const std::size_t mine = shared->next++;
+        if (mine >= shared->work.size()) return;
+        shared->work[mine]();
+      }
+    });
+  }
+}
+
+void WorkPool::finish() {
+  for (const auto& thread : threads_) thread->finish();
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,26 @@
+// Threads, one per processor, that share short pieces of work.
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <vector>
+
+#include "server/base/work_thread.hpp"
+
+namespace enfilade::server {
+
+class WorkPool {
+ public:
+  WorkPool();
+
+  /// Runs all of it, in any order and on several threads. Does not wait. No work may throw.
+  /// Callable from any thread, until finish().
+  void post(std::vector<std::function<void()>> work);
+  /// Waits until all posted work is done.
+  void finish();
+
+ private:
+  std::vector<std::unique_ptr<WorkThread>> threads_;
+};
+
+}  // namespace enfilade::server
