@@ -247,6 +247,11 @@ TEST(Checkpoint, UnsortedEntriesAreRefused) {
   EXPECT_EQ(refusal(scene, makeCheckpoint(contacts)), "");
   std::swap(contacts.data().bodyContacts[0], contacts.data().bodyContacts[1]);
   EXPECT_NE(refusal(scene, makeCheckpoint(contacts)).find("do not ascend"), std::string::npos);
+  World avatars = livelyWorld();
+  ASSERT_GT(avatars.data().avatars.size(), 1u);
+  std::swap(avatars.data().avatars[0], avatars.data().avatars[1]);
+  EXPECT_NE(refusal(scene, makeCheckpoint(avatars)).find("names of avatars do not ascend"),
+            std::string::npos);
   World solids = livelyWorld();
   DynamicBodies& stage = solids.data().dynamicBodies;
   const auto entity = [&](std::size_t i) {

@@ -188,6 +188,7 @@ void archiveWorld(A& a, MaybeConst<A, WorldData>& world) {
   archiveBodies(a, bodies);
   a(avatars, bodyContacts);
   if constexpr (!A::kWrites) {
+    validateAvatarOrder(world);
     world.linkAvatars();
     validateRestoredWorld(world);
   }

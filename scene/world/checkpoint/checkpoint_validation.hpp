@@ -6,6 +6,8 @@
 
 namespace enfilade::scene {
 
+/// Validates that avatars ascend by name, on which lookups rely. Throws CheckpointError.
+void validateAvatarOrder(const WorldData& world);
 /// Validates all state but the physics bodies, which do not exist yet. Throws CheckpointError.
 void validateRestoredWorld(const WorldData& world);
 /// Validates physics bodies and pairs. Throws CheckpointError.
