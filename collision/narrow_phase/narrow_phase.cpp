@@ -215,7 +215,7 @@ double computeCertifiedExtraDistance(const MinkowskiDifference&, const WitnessPo
   return extra - 2 * kRoundoff * std::abs(extra);
 }
 
-/// What GJK certified.
+/// The outcome that GJK certified.
 enum class GjkOutcome : std::uint8_t {
   undecided,    ///< not certified, or not to the bound that SeparationResult promises
   beyondLimit,  ///< certified: the distance exceeds the limit

@@ -20,6 +20,7 @@ constexpr std::size_t kMaxNeighbourhoods = 512;  // remembered; above, all are f
 constexpr double kLongStep = 0.1, kMaxStep = 1;
 /// metres: more than the arrival distance, by which the walk of an avatar may differ
 constexpr double kMargin = 3e-3;
+constexpr double kMiddle = 0.25;       // of the radius: what must be above a floor on a stair
 constexpr double kMinStepRise = 0.01;  // metres in a tick
 constexpr double kTickedLength = 0.5;  // metres, through a place that is too narrow for the margin
 constexpr double kEvenHeight = 1e-3;   // metres: a step that rises or sinks more is not even
@@ -44,6 +45,7 @@ Walker::Walker(const WorldData& world, const NavigationAgent& agent)
   applySpawnShape(spawn, world.settings, avatar_);
   shape_ = avatar_.shape;
   wideShape_ = makePrismShape(agent.radius + kMargin, agent.height, agent.height, world.settings);
+  narrowShape_ = makePrismShape(kMiddle * agent.radius, agent.height, agent.height, world.settings);
 }
 
 void Walker::collectNearObstacles() {
@@ -113,12 +115,13 @@ void Walker::step(const Vec3& velocity) {
   moveAvatar(world_, avatar_, count_);
 }
 
-/// Whether the floor is at most a step below the feet.
+/// Whether a floor on which one can stand is at most a step below the middle of the feet.
 bool Walker::hasFloorBelow() {
   const Vec3 down(0, -world_.settings.stepHeight, 0);
-  return castAvatarShape(*avatar_.shape, avatar_.footPosition, down, avatar_.obstacles,
-                         makeContactOffset(world_.settings), count_)
-             .entity != 0;
+  const ShapeCastHit hit =
+      castAvatarShape(*narrowShape_, avatar_.footPosition, down, avatar_.obstacles,
+                      makeContactOffset(world_.settings), count_);
+  return hit.entity != 0 && hit.normal.y() >= world_.settings.walkableNormalY;
 }
 
 std::optional<std::string> Walker::place(const Vec3& footPosition, double maxDrop) {

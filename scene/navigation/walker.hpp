@@ -82,7 +82,7 @@ class Walker {
   const WorldData& world_;
   const NavigationAgent agent_;
   Avatar avatar_;
-  std::shared_ptr<const AvatarShape> shape_, wideShape_;
+  std::shared_ptr<const AvatarShape> shape_, wideShape_, narrowShape_;
   bool hasStepped_ = false;  ///< in the present walk
   bool crossedSteps_ = false;
   bool isUneven_ = false;  ///< the present walk left even floor

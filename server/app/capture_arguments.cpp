@@ -198,7 +198,7 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
       ->check(makeChoiceValidator({"png", "jpeg"}));
   verb.add_option("--quality", into.quality, "JPEG quality")
       ->capture_default_str()
-      ->check(makeWholeRangeValidator(1, 100, "1..100"));
+      ->check(makeWholeRangeValidator(1, 100, "N"));
   verb.add_option("--depth", into.depth,
                   "File format of depth and range. npy: float32 metres; png: 16-bit steps; zst: "
                   "the "

@@ -1,6 +1,7 @@
 #include "server/app/help_formatter.hpp"
 
 namespace enfilade::server {
+
 std::string formatValueName(std::string type) {
   const auto colon = type.find(':');
   if (colon != std::string::npos) type.erase(0, colon + 1);

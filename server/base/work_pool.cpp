@@ -20,8 +20,9 @@ void WorkPool::post(std::vector<std::function<void()>> work) {
   const auto shared = std::make_shared<Shared>();
   shared->work = std::move(work);
   const std::size_t helpers = std::min(threads_.size(), shared->work.size());
+  const std::size_t first = first_.fetch_add(helpers);
   for (std::size_t i = 0; i < helpers; ++i) {
-    threads_[i]->post([shared] {
+    threads_[(first + i) % threads_.size()]->post([shared] {
       while (true) {
         const std::size_t mine = shared->next++;
         if (mine >= shared->work.size()) return;

@@ -1,6 +1,8 @@
 // Threads, one per processor, that share short pieces of work.
 #pragma once
 
+#include <atomic>
+#include <cstddef>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -21,6 +23,7 @@ class WorkPool {
 
  private:
   std::vector<std::unique_ptr<WorkThread>> threads_;
+  std::atomic<std::size_t> first_ = 0;  ///< thread of the next call: groups of clients share all
 };
 
 }  // namespace enfilade::server

@@ -37,6 +37,7 @@ std::string suggestName(const std::string& typed, std::span<const std::string> n
 }  // namespace
 
 std::string suggestAvatar(const scene::World& world, const std::string& name) {
+  if (world.data().findAvatarByName(name)) return "";  // it has entered since
   std::vector<std::string> names;
   for (const scene::Avatar& avatar : world.data().avatars | std::views::take(kMaxCompared))
     names.push_back(avatar.name);

@@ -8,7 +8,8 @@
 
 namespace enfilade::server {
 
-/// "; did you mean 'ann'?", or which names exist. Looks at the first thousand names.
+/// "; did you mean 'ann'?", or which names exist. Looks at the first thousand names, which takes
+/// about 1 ms. "" if an avatar has this name by now.
 std::string suggestAvatar(const scene::World& world, const std::string& name);
 /// The same for bodies; "" if a body has this name.
 std::string suggestBody(const scene::World& world, const std::string& name);

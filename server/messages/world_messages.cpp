@@ -248,7 +248,6 @@ v1::Notice toProto(const scene::World& world, const scene::Notice& notice, std::
   message.set_obstacle_name(scene::findEntityName(world, notice.obstacle));
   message.set_obstacle_global_id(findGlobalId(world.scene().model(), notice.obstacle));
   message.set_text(notice.text);
-  if (notice.isAvatarUnknown) message.mutable_text()->append(suggestAvatar(world, notice.avatar));
   return message;
 }
 

@@ -76,18 +76,23 @@ double computeSolidArea(const ObjectSection& section) {
   return 2 * largest - sum;
 }
 
-/// Whether a cut above the floor goes through one solid that leaves no room, as a thick roof.
-bool isCutSolid(const scene::Scene& scene, double floor) {
+/// Area of the floors at a height, square metres.
+double sumFloors(const std::vector<WeightedHeight>& heights, double height) {
+  constexpr double kSameFloor = 0.1;  // metres
+  double area = 0;
+  for (const WeightedHeight& one : heights)
+    if (std::abs(one.height - height) <= kSameFloor) area += one.weight;
+  return area;
+}
+
+/// Whether a cut above the floor goes through one solid that leaves no room on it, as a thick roof.
+/// `floorArea`: square metres of floor at this height.
+bool isCutSolid(const scene::Scene& scene, double floor, double floorArea) {
   constexpr double kMaxSolidShare = 0.9;
   double solid = 0;
-  Aabb area;
-  for (const ObjectSection& section : cutStatic(scene, floor + kPlanCutHeight)) {
+  for (const ObjectSection& section : cutStatic(scene, floor + kPlanCutHeight))
     solid = std::max(solid, computeSolidArea(section));
-    for (const std::vector<Vec3>& loop : section.loops)
-      for (const Vec3& point : loop) area.include(point);
-  }
-  const Vec3 size = area.size();
-  return solid > 0 && solid > kMaxSolidShare * size.x() * size.z();
+  return solid > kMaxSolidShare * floorArea;
 }
 
 /// Parses the storey name from an object path: the text between `Ifc...Storey` and the next '/';
@@ -97,7 +102,7 @@ std::string parseStoreyName(const std::string& path) {
   if (word == std::string::npos) return "";
   std::string name = path.substr(word + 17, path.find('/', word) - word - 17);
   while (!name.empty() && (name.front() == '_' || name.front() == ':')) name.erase(0, 1);
-  name = makeLabelName(name);  // without the GlobalId that some readers append
+  name = removeGlobalId(name);
   return name == "Undefined" ? "" : name;
 }
 
@@ -213,7 +218,7 @@ std::vector<StoreyFloor> findStoreys(const scene::Scene& scene) {
   std::vector<StoreyFloor> storeys = findStatedStoreys(scene, heights);
   if (!storeys.empty()) return storeys;
   for (const double height : findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys)) {
-    if (hasWallsAbove(scene, height) && !isCutSolid(scene, height))
+    if (hasWallsAbove(scene, height) && !isCutSolid(scene, height, sumFloors(heights, height)))
       storeys.push_back({height, findStoreyName(scene, height)});
   }
   if (storeys.empty() && !scene.bounds().empty()) storeys.push_back({scene.bounds().min.y(), ""});

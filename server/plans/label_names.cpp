@@ -70,7 +70,7 @@ bool isPiece(const std::string& name) {
 }
 
 std::string cleanName(const std::string& whole) {
-  std::string name = whole.substr(0, findGlobalId(whole));
+  std::string name = removeGlobalId(whole);
   while (removeAppended(name)) {
   }
   const std::size_t last = name.rfind(':');
@@ -83,6 +83,10 @@ std::string cleanName(const std::string& whole) {
 }
 
 }  // namespace
+
+std::string removeGlobalId(const std::string& name) {
+  return name.substr(0, findGlobalId(name));
+}
 
 std::string makeLabelName(const std::string& path) {
   std::string rest = path, own;

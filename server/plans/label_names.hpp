@@ -9,4 +9,7 @@ namespace enfilade::server {
 /// the word for a piece ("frame", "mesh_3"), without GlobalIds and numbers that programs append.
 std::string makeLabelName(const std::string& path);
 
+/// A name up to the GlobalId that an IFC reader appended.
+std::string removeGlobalId(const std::string& name);
+
 }  // namespace enfilade::server

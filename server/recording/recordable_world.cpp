@@ -17,8 +17,13 @@ v1::TickEvents makeTickEvents(const scene::World& world,
   events.set_tick(snapshot.tick);
   events.set_time(snapshot.time);
   for (const scene::ContactEvent& event : contacts) *events.add_contacts() = toProto(world, event);
-  for (const scene::Notice& notice : notices)
-    *events.add_notices() = toProto(world, notice, snapshot.tick);
+  constexpr int kMaxSuggestions = 4;  // a tick: each may take 1 ms
+  int suggestions = 0;
+  for (const scene::Notice& notice : notices) {
+    v1::Notice& message = *events.add_notices() = toProto(world, notice, snapshot.tick);
+    if (notice.isAvatarUnknown && suggestions++ < kMaxSuggestions)
+      message.mutable_text()->append(suggestAvatar(world, notice.avatar));
+  }
   return events;
 }
 
@@ -51,7 +56,9 @@ std::optional<v1::Error> RecordableWorld::submit(const v1::Command& command) {
   if (auto* error = std::get_if<v1::Error>(&order)) return std::move(*error);
   if (const auto refusal =
           scene::submitAvatarCommand(world_, std::get<scene::Command>(std::move(order))))
-    return makeRefusalError(command, *refusal + suggestBodies(world_, command));
+    return makeRefusalError(command, *refusal + (refusal->find("no body named") == std::string::npos
+                                                     ? ""
+                                                     : suggestBodies(world_, command)));
   if (recorder_) recorder_->onCommand(command);
   return std::nullopt;
 }

@@ -124,6 +124,11 @@ bool WorldRegistry::postWork(std::function<void()> work) {
   return !stopping_;
 }
 
+void WorldRegistry::work(std::vector<std::function<void()>> received) {
+  const std::lock_guard lock(mutex_);
+  if (!stopping_) workers_.post(std::move(received));  // else the worlds' own threads answer
+}
+
 void WorldRegistry::create(CreateWorldRequest request,
                            std::function<void(std::variant<v1::World, v1::Error>)> done) {
   if (!postWork([this, request = std::move(request), done] { done(createNow(request)); }))

@@ -68,9 +68,7 @@ class WorldRegistry : public WorldDirectory {
   std::unique_ptr<WorldMembership> join(const std::string& world, const std::string& name,
                                         Role role, std::shared_ptr<OutgoingQueue> out,
                                         MessagePacker pack) override;
-  void work(std::vector<std::function<void()>> received) override {
-    workers_.post(std::move(received));
-  }
+  void work(std::vector<std::function<void()>> received) override;
 
   /// Ends all worlds. Later calls do nothing.
   void stop();

@@ -402,7 +402,7 @@ Faults oddWords(const Sources& sources) {
       "\\b([Tt]old|[Tt]ells|[Aa]new|[Ll]est|[Bb]esides?|[Ss]omebody|[Nn]obody|[Ww]hoever|[Tt]"
       "hereof|"
       "has the say|goes on|stands for|is none)\\b");
-  // A comment names its subject. The narrow phase has an old one left.
+  // A comment names its subject.
   static const std::regex subjects("^\\s*//+<? (What|Which|Who)\\b");
   Faults faults;
   for (const auto& [path, text] : sources) {
@@ -411,7 +411,7 @@ Faults oddWords(const Sources& sources) {
       for (std::sregex_iterator it(line.begin(), line.end(), words), end; it != end; ++it)
         faults.push_back(at(name, number) + ": " + (*it)[0].str());
       std::smatch match;
-      if (name.rfind("collision/narrow_phase/", 0) != 0 && std::regex_search(line, match, subjects))
+      if (std::regex_search(line, match, subjects))
         faults.push_back(at(name, number) + ": a comment about \"" + match[1].str() +
                          "\"; name the thing");
     });

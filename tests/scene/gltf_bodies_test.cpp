@@ -1,6 +1,8 @@
 // Tests of bodies declared in glTF: node extras and the physics extension.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "scene/import/bodies/collect_bodies.hpp"
 #include "scene/import/bodies/sidecar.hpp"
 #include "scene/import/import_model.hpp"
@@ -303,10 +305,8 @@ TEST(Sources, TheHigherOneHasTheSayAndTheLowerOneAddsTheRest) {
   EXPECT_EQ(bodyOf(model, "a").mass, 2.0) << "the physics extension before extras";
   EXPECT_EQ(bodyOf(model, "b-rigid").mass, 3.0) << "extras before names";
   EXPECT_EQ(countOf(model, "replaced_bodies"), 3u);
-  for (const Diagnostic& diagnostic : model.diagnostics)
-    if (diagnostic.kind == "replaced_bodies")
-      EXPECT_EQ(diagnostic.example,
-                "'c-rigid' of the suffix by 'mine' of the sidecar, object c-rigid");
+  const auto replaced = std::ranges::find(model.diagnostics, "replaced_bodies", &Diagnostic::kind);
+  EXPECT_EQ(replaced->example, "'a' of the extras by 'a' of the khr, object a");
   EXPECT_EQ(formatBodySources(model), "1 of sidecar, 1 of khr, 1 of extras");
 }
 

@@ -412,6 +412,22 @@ TEST(Walker, AFloorThatEndsAboveAStepsHeightIsNotWalkedDown) {
   }
 }
 
+TEST(Walker, AFaceThatIsTooSteepToStandOnIsNotWalkedDown) {
+  Model model =
+      boxModel({{"above", {-3, 1.8, -1}, {0, 2, 1}}, {"below", {-3, -0.2, -1}, {5, 0, 1}}});
+  Mesh face;  // 2 m down on 1.3 m: 57 degrees
+  for (const Vec3& corner : {Vec3(0, 2, -1), Vec3(0, 2, 1), Vec3(1.3, 0, 1), Vec3(1.3, 0, -1)})
+    face.positions.push_back(corner.cast<float>());
+  face.indices = {0, 1, 2, 0, 2, 3};
+  model.meshes.push_back(face);
+  model.objects.push_back({"face", "", {2}, Eigen::Affine3d::Identity()});
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  World world(scene);
+  Walker walker(world.data(), {});
+  ASSERT_FALSE(walker.place({-1, 2.01, 0}, 0.5));
+  EXPECT_EQ(walker.walkTo({4, 0, 0}).kind, WalkOutcome::Kind::fell);
+}
+
 TEST(Walker, ALongStepOfTheProofPassesNothingThatStopsAWalk) {
   // A pyramid that is in the way of the feet, and not of who stands a step higher.
   Model model = boxModel({{"floor", {0, -0.2, -3}, {8, 0, 3}}});

@@ -1,7 +1,8 @@
 #include "server/plans/floor_plan_section.hpp"
-#include "scene/model/box_mesh.hpp"
 
 #include <gtest/gtest.h>
+
+#include "scene/model/box_mesh.hpp"
 
 namespace enfilade::server {
 namespace {

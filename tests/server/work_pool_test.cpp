@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <barrier>
 
 namespace enfilade::server::testing {
 namespace {
@@ -19,6 +20,14 @@ TEST(WorkPool, RunsEachPieceOfWorkOnceBeforeItFinishes) {
   pool.post({});
   pool.finish();
   for (const std::atomic<int>& one : runs) EXPECT_EQ(one, 1);
+}
+
+TEST(WorkPool, SinglePiecesOfTwoCallersOverlap) {
+  if (std::thread::hardware_concurrency() < 2) GTEST_SKIP() << "needs two processors";
+  WorkPool pool;
+  std::barrier<> both(2);  // each waits for the other
+  for (int i = 0; i < 2; ++i) pool.post({[&both] { both.arrive_and_wait(); }});
+  pool.finish();
 }
 
 }  // namespace

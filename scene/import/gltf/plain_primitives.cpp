@@ -60,7 +60,9 @@ bool PlainPrimitives::isNormalised(const Json& accessor) const {
 }
 
 std::size_t PlainPrimitives::countElements(std::size_t accessor) const {
-  return readIndexMember(&gltf_.at("accessors").at(accessor), "count").value_or(0);
+  const Json& accessors = getArray(gltf_, "accessors");
+  if (accessor >= accessors.size()) return 0;  // its reader reports it
+  return readIndexMember(&accessors[accessor], "count").value_or(0);
 }
 
 /// Channels of the vertex colours: 3 or 4; 0 for none, or if they are not what glTF allows.

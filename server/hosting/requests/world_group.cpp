@@ -331,7 +331,11 @@ void WorldGroup::submit(const v1::StepMany& request, std::uint64_t requestId,
       member.answerRest();
     } else {
       std::vector<v1::ClientMessage> requests(world.requests().begin(), world.requests().end());
-      for (std::size_t k = 0; k < requests.size(); ++k) requests[k].set_request_id(k + 1);
+      for (std::size_t k = 0; k < requests.size(); ++k) {
+        requests[k].set_request_id(k + 1);
+        if (!world.packed_avatar().empty() && requests[k].has_step())
+          requests[k].mutable_step()->set_avatars(true);  // its feet are packed
+      }
       received.push_back(member.membership->receive(std::move(requests)));
     }
     member.collect();  // what was queued between rounds; ends the round if there are no requests
