@@ -169,7 +169,8 @@ void readWalk(const json& line, v1::Walk* walk) {
 void readGo(const json& line, v1::Go* go) {
   const json& to = requireKey(line, "to", R"("to":[x,y,z] or "to":"room:NAME")");
   if (to.is_string()) {
-    if (to.get<std::string>().empty()) refuse("to", "must name a room, a storey or an object");
+    if (to.get<std::string>().empty())
+      refuse("to", "must name a room, a storey, an object or a body");
     go->mutable_to()->set_name(to.get<std::string>());
   } else {
     readPoint(to, "to", go->mutable_to()->mutable_point());

@@ -44,6 +44,33 @@ std::vector<Vec3> listAims(const NamedPlace& named, const Vec3& middle) {
   return aims;
 }
 
+/// Calls `work` with 0 to `count` - 1. Progress is reported by the calling thread.
+void forEachInParallel(std::size_t count, int threads, const Navigation::Progress& progress,
+                       const std::function<void(std::size_t)>& work) {
+  std::atomic<std::size_t> next{0}, done{0};
+  std::exception_ptr failure;
+  std::mutex failureMutex;
+  const auto run = [&](bool reports) {
+    try {
+      for (std::size_t i = next++; i < count; i = next++) {
+        work(i);
+        ++done;
+        if (reports && progress) progress(static_cast<double>(done) / static_cast<double>(count));
+      }
+    } catch (...) {
+      const std::lock_guard lock(failureMutex);
+      failure = std::current_exception();
+      next = count;
+    }
+  };
+  {
+    std::vector<std::jthread> workers;
+    for (int i = 1; i < threads; ++i) workers.emplace_back(run, false);
+    run(true);
+  }
+  if (failure) std::rethrow_exception(failure);
+}
+
 }  // namespace
 
 Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
@@ -73,6 +100,7 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
     : agent_(agent),
       world_(std::move(scene), settings),
       grid_(makeTileGrid(world_.scene().bounds(), agent)) {
+  const auto start = std::chrono::steady_clock::now();
   SavedMeshes meshes = loadMeshes(world_.data(), agent, grid_, saved);
   bodies_ = world_.snapshot();
   for (std::size_t i = 0; i < meshes.bodies.size(); ++i)
@@ -80,6 +108,8 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
   ampleTiles_ = std::move(meshes.ample);
   scarceTiles_ = std::move(meshes.scarce);
   assembleMeshes();
+  const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+  report_.seconds = seconds.count();
 }
 
 Navigation::~Navigation() = default;
@@ -93,34 +123,13 @@ std::vector<std::uint8_t> Navigation::save() {
 }
 
 void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress) {
-  const std::vector<Clearance> clearances{Clearance::ample, Clearance::scarce};
-  std::atomic<std::size_t> next{0}, done{0};
-  std::exception_ptr failure;
-  std::mutex failureMutex;
-  const auto build = [&](bool reports) {
-    try {
-      for (std::size_t i = next++; i < tiles.size(); i = next++) {
-        const auto tile = static_cast<std::size_t>(tiles[i]);
-        auto built = buildTileMeshes(world_.data(), agent_, grid_, tiles[i] % grid_.tilesX,
-                                     tiles[i] / grid_.tilesX, clearances);
-        ampleTiles_[tile] = std::move(built[0]);
-        scarceTiles_[tile] = std::move(built[1]);
-        ++done;
-        if (reports && progress)
-          progress(static_cast<double>(done) / static_cast<double>(tiles.size()));
-      }
-    } catch (...) {
-      const std::lock_guard lock(failureMutex);
-      failure = std::current_exception();
-      next = tiles.size();
-    }
-  };
-  {
-    std::vector<std::jthread> workers;
-    for (int i = 1; i < threads; ++i) workers.emplace_back(build, false);
-    build(true);
-  }
-  if (failure) std::rethrow_exception(failure);
+  forEachInParallel(tiles.size(), threads, progress, [&](std::size_t i) {
+    const auto tile = static_cast<std::size_t>(tiles[i]);
+    auto built = buildTileMeshes(world_.data(), agent_, grid_, tiles[i] % grid_.tilesX,
+                                 tiles[i] / grid_.tilesX, {Clearance::ample, Clearance::scarce});
+    ampleTiles_[tile] = std::move(built[0]);
+    scarceTiles_[tile] = std::move(built[1]);
+  });
 }
 
 void Navigation::assembleMeshes() {
@@ -129,17 +138,23 @@ void Navigation::assembleMeshes() {
   unobstructed_.reset();
   ample_.emplace(grid_, ampleTiles_);
   scarce_.emplace(grid_, scarceTiles_);
-  islands_ = ample_->findIslands();
+  islands_ = collectIslands(*ample_, *walker_, world_.scene().bounds());
+  drawn_.clear();
   areaUpTo_.clear();
-  report_.islandAreas.clear();
-  double area = 0;
+  double drawnArea = 0;
   for (std::uint32_t i = 0; i < ample_->polygonCount(); ++i) {
-    areaUpTo_.push_back(area += ample_->polygonArea(i));
-    if (islands_[i] >= report_.islandAreas.size()) report_.islandAreas.resize(islands_[i] + 1);
-    report_.islandAreas[islands_[i]] += ample_->polygonArea(i);
+    if (islands_.numberOf[i] == kNoIsland || !islands_.islands[islands_.numberOf[i]].isDrawn)
+      continue;
+    drawn_.push_back(i);
+    areaUpTo_.push_back(drawnArea += ample_->polygonArea(i));
+  }
+  report_.islandAreas.clear();
+  report_.area = 0;
+  for (const Island& island : islands_.islands) {
+    report_.islandAreas.push_back(island.area);
+    report_.area += island.area;
   }
   report_.polygons = ample_->polygonCount();
-  report_.area = area;
   report_.bytes = 2 * (ample_->memoryBytes() + scarce_->memoryBytes());
 }
 
@@ -183,19 +198,20 @@ NavigationReport Navigation::report() {
   return report_;
 }
 
-NavigationMesh Navigation::buildMesh(Clearance clearance) const {
-  std::vector<TileMesh> tiles;
-  for (int z = 0; z < grid_.tilesZ; ++z)
-    for (int x = 0; x < grid_.tilesX; ++x)
-      tiles.push_back(
-          std::move(buildTileMeshes(world_.data(), agent_, grid_, x, z, {clearance})[0]));
+NavigationMesh Navigation::buildUnobstructed(int threads) const {
+  std::vector<TileMesh> tiles(ampleTiles_.size());
+  forEachInParallel(tiles.size(), threads, {}, [&](std::size_t i) {
+    const int tile = static_cast<int>(i);
+    tiles[i] = std::move(buildTileMeshes(world_.data(), agent_, grid_, tile % grid_.tilesX,
+                                         tile / grid_.tilesX, {Clearance::none})[0]);
+  });
   return {grid_, std::move(tiles)};
 }
 
 NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const PathOptions& options) {
   const std::lock_guard lock(mutex_);
   const auto unobstructed = [this]() -> const NavigationMesh& {
-    if (!unobstructed_) unobstructed_.emplace(buildMesh(Clearance::none));
+    if (!unobstructed_) unobstructed_.emplace(buildUnobstructed(2));
     return *unobstructed_;
   };
   const PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};
@@ -217,16 +233,23 @@ std::optional<NarrowPlace> Navigation::findNarrowest(const std::vector<Vec3>& po
   return narrowest.clearWidth < kMaxSideWidth ? std::optional(narrowest) : std::nullopt;
 }
 
-std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named) {
-  const std::lock_guard lock(mutex_);
-  const Aabb& box = named.box;
-  const Vec3 centre(named.middle.x(), box.min.y(), named.middle.z());
+Aabb Navigation::computeBox(const NamedPlace& named) const {
+  return named.body == kNoBody
+             ? named.box
+             : inflateAround(world_.data().bodies[named.body].boxes.whole, named.reach);
+}
+
+std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
+                                            const std::optional<std::uint32_t>& island) {
+  const Aabb box = computeBox(named);
+  const Vec3 middle = named.body == kNoBody ? named.middle : box.centre();
+  const Vec3 centre(middle.x(), box.min.y(), middle.z());
   const auto isInside = [&](const Vec3& place) {
     return collision::contains(inflated(box, kHeightError), {place, place}) &&
-           (!named.space || isInSpace(*named.space, {place.x(), named.middle.y(), place.z()}));
+           (!named.space || isInSpace(*named.space, {place.x(), middle.y(), place.z()}));
   };
   if (const auto place = standAt(*walker_, centre + Vec3(0, kHeightError, 0), 2 * kHeightError);
-      place && isInside(*place))
+      place && isInside(*place) && (!island || islandAt(*place) == island))
     return place;
   std::vector<std::pair<double, Vec3>> candidates;
   const auto addCandidate = [&](const Vec3& point) {
@@ -234,6 +257,7 @@ std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named) {
   };
   const std::vector<Vec3> aims = listAims(named, centre);
   for (const std::uint32_t polygon : ample_->findPolygons(box.centre(), 0.5 * box.size())) {
+    if (island && islands_.numberOf[polygon] != *island) continue;
     addCandidate(ample_->centre(polygon));
     for (const Vec3& aim : aims) addCandidate(ample_->closestPoint(polygon, aim));
   }
@@ -241,6 +265,14 @@ std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named) {
   for (const auto& [distance, point] : candidates)
     if (const auto place = standNear(*walker_, point); place && isInside(*place)) return place;
   return std::nullopt;
+}
+
+std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named,
+                                            const std::optional<Vec3>& start) {
+  const std::lock_guard lock(mutex_);
+  if (const auto island = start ? islandAt(*start) : std::nullopt)
+    if (const auto place = findPlaceOn(named, island)) return place;
+  return findPlaceOn(named, std::nullopt);
 }
 
 std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance) {
@@ -282,17 +314,44 @@ NavigationMap Navigation::drawMap(double cell, double height) {
                     static_cast<std::uint32_t>(std::max(1.0, depth)),
                     {}};
   map.cells.assign(std::size_t{map.width} * map.height, 0);
-  ample_->rasterize(height - kFloorDistance, height + kFloorDistance, bounds.min.x(),
-                    bounds.min.z(), cell, map.width, map.height, map.cells);
+  for (std::uint32_t polygon = 0; polygon < ample_->polygonCount(); ++polygon)
+    if (islands_.numberOf[polygon] != kNoIsland &&
+        std::abs(ample_->centre(polygon).y() - height) <= kFloorDistance)
+      ample_->rasterize(polygon, bounds.min.x(), bounds.min.z(), cell, map.width, map.height,
+                        map.cells);
   return map;
+}
+
+std::optional<std::uint32_t> Navigation::islandAt(const Vec3& point) const {
+  const auto nearest = ample_->findNearest(
+      point, Vec3(2 * agent_.radius, 0.5 + world_.settings().stepHeight, 2 * agent_.radius));
+  if (!nearest || islands_.numberOf[nearest->polygon] == kNoIsland) return std::nullopt;
+  return islands_.numberOf[nearest->polygon];
 }
 
 std::optional<std::uint32_t> Navigation::islandOf(const Vec3& point) {
   const std::lock_guard lock(mutex_);
-  const auto nearest = ample_->findNearest(
-      point, Vec3(2 * agent_.radius, 0.5 + world_.settings().stepHeight, 2 * agent_.radius));
-  if (!nearest) return std::nullopt;
-  return islands_[nearest->polygon];
+  return islandAt(point);
+}
+
+std::vector<Island> Navigation::islands() {
+  const std::lock_guard lock(mutex_);
+  return islands_.islands;
+}
+
+std::vector<IslandNeighbour> Navigation::findIslandNeighbours(std::uint32_t island) {
+  constexpr double kWallAndDoor = 1.5;  // metres between floors on both sides of a thick wall
+  const std::lock_guard lock(mutex_);
+  std::vector<IslandNeighbour> neighbours =
+      findNeighbours(*ample_, islands_, island, kWallAndDoor + 2 * agent_.radius,
+                     0.5 + world_.settings().stepHeight);
+  std::erase_if(neighbours, [&](IslandNeighbour& near) {
+    const auto from = standNear(*walker_, near.from), to = standNear(*walker_, near.to);
+    near.from = from.value_or(near.from);
+    near.to = to.value_or(near.to);
+    return !from || !to;
+  });
+  return neighbours;
 }
 
 std::optional<Vec3> Navigation::findRandomPlace(std::mt19937_64& random,
@@ -310,7 +369,9 @@ std::optional<Vec3> Navigation::findRandomPlace(std::mt19937_64& random,
       std::iota(candidates.begin(), candidates.end(), 0u);
     }
     for (const std::uint32_t polygon : candidates) {
-      if (wanted.island && islands_[polygon] != *wanted.island) continue;
+      if (islands_.numberOf[polygon] == kNoIsland ||
+          (wanted.island && islands_.numberOf[polygon] != *wanted.island))
+        continue;
       polygons.push_back(polygon);
       areas.push_back(area += ample_->polygonArea(polygon));
     }
@@ -324,7 +385,7 @@ std::optional<Vec3> Navigation::findRandomPlace(std::mt19937_64& random,
     const auto at = static_cast<std::size_t>(
         std::upper_bound(upTo.begin(), upTo.end(), draw() * upTo.back()) - upTo.begin());
     const auto index = std::min(at, upTo.size() - 1);
-    const std::uint32_t polygon = isPart ? polygons[index] : static_cast<std::uint32_t>(index);
+    const std::uint32_t polygon = isPart ? polygons[index] : drawn_[index];
     const double s = draw(), t = draw();
     const Vec3 point = ample_->pointInPolygon(polygon, s, t) + Vec3(0, kHeightError, 0);
     const auto place = standAt(*walker_, point, 2 * kHeightError + kMaxStandDrop);

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "scene/navigation/clear_width.hpp"
+#include "scene/navigation/island_list.hpp"
 #include "scene/navigation/links.hpp"
 #include "scene/navigation/mesh/navigation_mesh.hpp"
 #include "scene/navigation/path_finder.hpp"
@@ -23,10 +24,10 @@ namespace enfilade::scene {
 
 struct NavigationReport {
   std::size_t polygons = 0;         ///< of the mesh for ample clearance
-  double area = 0;                  ///< square metres
+  double area = 0;                  ///< square metres, of all islands
   std::vector<double> islandAreas;  ///< square metres, by number: descending
   std::size_t bytes = 0;
-  double seconds = 0;  ///< for the meshes
+  double seconds = 0;  ///< to build or load the meshes
 };
 
 /// The walkable cells of a map seen from above.
@@ -37,7 +38,8 @@ struct NavigationMap {
   std::vector<std::uint8_t> cells;      ///< row by row along x; 1: walkable
 };
 
-/// Restricts the places that are drawn at random.
+/// Restricts the places that are drawn at random. Without `near` and `island`: those of the islands
+/// with Island::isDrawn.
 struct RandomPlace {
   std::optional<Vec3> near = {};  ///< within `maxDistance` metres in space
   double maxDistance = 0;
@@ -79,8 +81,10 @@ class Navigation {
   NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {});
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
   std::optional<NarrowPlace> findNarrowest(const std::vector<Vec3>& points);
-  /// The standing place in a named place that is horizontally closest to its middle.
-  std::optional<Vec3> findPlaceIn(const NamedPlace& named);
+  /// The standing place in a named place that is horizontally closest to its middle. `start`: a
+  /// place on the island that has such places is preferred, if it has any.
+  std::optional<Vec3> findPlaceIn(const NamedPlace& named,
+                                  const std::optional<Vec3>& start = std::nullopt);
   /// The standing place at `point`, or else the closest one within `maxDistance` metres.
   std::optional<Vec3> snap(const Vec3& point, double maxDistance);
   /// A place that is uniform in area; nullopt: none was found.
@@ -95,11 +99,20 @@ class Navigation {
   NavigationMap drawMap(double cell, double height);
   /// Number of the island at a point, 0 for the largest; nullopt: no polygon is near.
   std::optional<std::uint32_t> islandOf(const Vec3& point);
+  /// By number.
+  std::vector<Island> islands();
+  /// Islands next to an island, the closest first, with places to stand near the gap between both.
+  std::vector<IslandNeighbour> findIslandNeighbours(std::uint32_t island);
 
  private:
   void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
   void assembleMeshes();
-  NavigationMesh buildMesh(Clearance clearance) const;
+  NavigationMesh buildUnobstructed(int threads) const;
+  std::optional<std::uint32_t> islandAt(const Vec3& point) const;
+  Aabb computeBox(const NamedPlace& named) const;
+  /// As findPlaceIn(), on an island, or anywhere.
+  std::optional<Vec3> findPlaceOn(const NamedPlace& named,
+                                  const std::optional<std::uint32_t>& island);
   const NavigationAgent agent_;
   World world_;  ///< never ticks
   TileGrid grid_;
@@ -109,8 +122,9 @@ class Navigation {
   std::optional<NavigationMesh> ample_, scarce_, unobstructed_;
   std::optional<Links> links_;              ///< of the options that were asked for last
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
-  std::vector<std::uint32_t> islands_;      ///< by polygon of `ample_`
-  std::vector<double> areaUpTo_;            ///< by polygon of `ample_`, cumulative
+  IslandList islands_;                      ///< of `ample_`
+  std::vector<std::uint32_t> drawn_;        ///< polygons of islands with Island::isDrawn
+  std::vector<double> areaUpTo_;            ///< of `drawn_`, cumulative
   NavigationReport report_;
 };
 

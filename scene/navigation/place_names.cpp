@@ -12,7 +12,7 @@ namespace {
 constexpr double kStoreyDepth = 0.3, kStoreyHeight = 2;  // metres below and above its floor
 
 NamedPlace makePlace(const Aabb& box) {
-  return {box, box.centre(), nullptr};
+  return {.box = box, .middle = box.centre()};
 }
 
 std::optional<NamedPlace> findRoom(const Model& model, std::string_view name) {
@@ -22,7 +22,7 @@ std::optional<NamedPlace> findRoom(const Model& model, std::string_view name) {
     const Vec3 middle = findSpaceMiddle(space, space.box).point;
     // An open surface has no inside: the box alone says where the room is.
     const bool solid = !space.surface.empty() && isInSpace(space, middle);
-    return NamedPlace{space.box, middle, solid ? &space : nullptr};
+    return NamedPlace{.box = space.box, .middle = middle, .space = solid ? &space : nullptr};
   }
   return std::nullopt;
 }
@@ -38,22 +38,57 @@ std::optional<NamedPlace> findStorey(const Scene& scene, std::string_view name) 
   return std::nullopt;
 }
 
+void includeObject(const Model& model, const Object& object, Aabb& box) {
+  for (const std::uint32_t mesh : object.meshes)
+    for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
+      box.include(computeWorldPosition(object, model.meshes[mesh], i));
+}
+
+std::uint32_t findBodyOf(const Model& model, std::uint32_t object) {
+  for (std::uint32_t body = 0; body < model.bodies.size(); ++body)
+    if (std::ranges::count(model.bodies[body].objects, object) > 0) return body;
+  return kNoBody;
+}
+
+std::optional<NamedPlace> placeAround(const Aabb& box, std::uint32_t body, double reach) {
+  if (box.empty()) return std::nullopt;
+  NamedPlace place = makePlace(inflateAround(box, reach));
+  place.body = body;
+  place.reach = reach;
+  return place;
+}
+
 std::optional<NamedPlace> findObject(const Model& model, std::string_view name, double reach) {
-  for (const Object& object : model.objects) {
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
+    const Object& object = model.objects[i];
     if (object.path != name && (object.globalId != name || name.empty())) continue;
     Aabb box;
-    for (const std::uint32_t mesh : object.meshes)
-      for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
-        box.include(computeWorldPosition(object, model.meshes[mesh], i));
-    if (box.empty()) return std::nullopt;
-    box.min -= Vec3(reach, kStoreyHeight, reach);
-    box.max += Vec3(reach, 0, reach);
-    return makePlace(box);
+    includeObject(model, object, box);
+    return placeAround(box, findBodyOf(model, i), reach);
+  }
+  return std::nullopt;
+}
+
+std::optional<NamedPlace> findBody(const Model& model, std::string_view name, double reach) {
+  for (std::uint32_t i = 0; i < model.bodies.size(); ++i) {
+    const BodySpec& body = model.bodies[i];
+    if (body.name != name) continue;
+    Aabb box;
+    for (const std::uint32_t object : body.objects)
+      includeObject(model, model.objects[object], box);
+    return placeAround(box, i, reach);
   }
   return std::nullopt;
 }
 
 }  // namespace
+
+Aabb inflateAround(const Aabb& object, double reach) {
+  Aabb box = object;
+  box.min -= Vec3(reach, kStoreyHeight, reach);
+  box.max += Vec3(reach, 0, reach);
+  return box;
+}
 
 std::optional<NamedPlace> findNamedPlace(const Scene& scene, const std::string& name,
                                          double reach) {
@@ -64,9 +99,11 @@ std::optional<NamedPlace> findNamedPlace(const Scene& scene, const std::string& 
   if (const auto room = after("room:")) return findRoom(scene.model(), *room);
   if (const auto storey = after("storey:")) return findStorey(scene, *storey);
   if (const auto object = after("object:")) return findObject(scene.model(), *object, reach);
+  if (const auto body = after("body:")) return findBody(scene.model(), *body, reach);
   if (const auto room = findRoom(scene.model(), name)) return room;
   if (const auto storey = findStorey(scene, name)) return storey;
-  return findObject(scene.model(), name, reach);
+  if (const auto object = findObject(scene.model(), name, reach)) return object;
+  return findBody(scene.model(), name, reach);
 }
 
 }  // namespace enfilade::scene

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "scene/world/data/body.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::scene {
@@ -13,11 +14,16 @@ struct NamedPlace {
   Aabb box;                      ///< of a room or a storey, or around an object
   Vec3 middle = Vec3::Zero();    ///< the place closest to it is wanted, horizontally
   const Space* space = nullptr;  ///< the room whose solid, at the middle's height, is above it
+  std::uint32_t body = kNoBody;  ///< of an object: the box moves with it
+  double reach = 0;              ///< metres from the body
 };
 
+/// The box of places next to an object: `reach` metres to the sides, and on floors below.
+Aabb inflateAround(const Aabb& object, double reach);
+
 /// `name`: a space's name, long name or GlobalId, a storey's, then an object's path or GlobalId,
-/// with the prefix "room:", "storey:" or "object:" only one of these. `reach`: how far from an
-/// object. nullopt: the name is unknown, or its extent is.
+/// or a body's name; with the prefix "room:", "storey:", "object:" or "body:" only one of these.
+/// `reach`: how far from an object or a body. nullopt: the name is unknown, or its extent is.
 std::optional<NamedPlace> findNamedPlace(const Scene& scene, const std::string& name, double reach);
 
 }  // namespace enfilade::scene

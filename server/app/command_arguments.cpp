@@ -382,8 +382,9 @@ void addRouteOptions(CLI::App& verb, CommandArguments& into) {
   addModel(verb, into.model);
   setGroup(verb, "Options");
   constexpr const char* kPlaces =
-      ": X,Y,Z in metres, or the name of a room, a storey or an object (room:NAME, storey:NAME, "
-      "object:PATH)";
+      ": X,Y,Z in metres, or the name of a room, a storey, an object or a body (room:NAME, "
+      "storey:NAME, "
+      "object:PATH, body:NAME)";
   verb.add_option("FROM", into.route.from, std::string("Start") + kPlaces)->required();
   verb.add_option("TO", into.route.to, std::string("Goal") + kPlaces)->required();
   verb.add_option("--radius", into.route.agent.radius, "Radius of the walker")

@@ -33,7 +33,8 @@ void addModel(CLI::App& verb, ModelArguments& into) {
       ->type_name("X,Y,Z")
       ->expected(3)
       ->check(CLI::Validator(validateAnyNumber, ""));
-  verb.add_flag("--no-cache", into.noCache, "Import the model again and ignore the cached import");
+  verb.add_flag("--no-cache", into.noCache,
+                "Import the model again; ignore cached imports and navigation meshes");
   verb.add_option(
           "--ifc-reader", into.ifcReader,
           "IFC reader. auto: web-ifc, else ifcplusplus (also for products that web-ifc omits), "

@@ -3,6 +3,8 @@
 #include <spdlog/spdlog.h>
 
 #include <chrono>
+#include <mutex>
+#include <vector>
 
 #include "scene/import/bodies/collect_bodies.hpp"
 #include "scene/import/cache/model_cache.hpp"
@@ -22,14 +24,44 @@ void logLoadedScene(const scene::Scene& scene, const std::string& name, const Lo
       model.reader, loaded.fromCache ? "from the cache" : "imported", loaded.loadSeconds);
 }
 
+struct CachedScene {
+  std::weak_ptr<const scene::Scene> scene;
+  scene::ModelCache cache;
+};
+
+struct CachedScenes {
+  std::mutex mutex;
+  std::vector<CachedScene> list;
+};
+
+CachedScenes& cachedScenes() {
+  static CachedScenes scenes;
+  return scenes;
+}
+
+void keepCache(const std::shared_ptr<const scene::Scene>& loaded, const scene::ModelCache& cache) {
+  CachedScenes& scenes = cachedScenes();
+  const std::lock_guard lock(scenes.mutex);
+  std::erase_if(scenes.list, [](const CachedScene& one) { return one.scene.expired(); });
+  scenes.list.push_back({loaded, cache});
+}
+
 }  // namespace
+
+std::optional<scene::ModelCache> findCache(const std::shared_ptr<const scene::Scene>& scene) {
+  CachedScenes& scenes = cachedScenes();
+  const std::lock_guard lock(scenes.mutex);
+  for (const CachedScene& one : scenes.list)
+    if (one.scene.lock() == scene) return one.cache;
+  return std::nullopt;
+}
 
 LoadedScene loadSceneTimed(const ModelOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   Progress bar;
+  const auto cache = options.cache ? scene::modelCacheFromEnvironment() : std::nullopt;
   scene::LoadedModel model = scene::loadModel(
-      options.file, options.import,
-      options.cache ? scene::modelCacheFromEnvironment() : std::nullopt,
+      options.file, options.import, cache,
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
   for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);
@@ -39,6 +71,7 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
                  scene::formatBodySources(model.model));
   LoadedScene loaded{nullptr, model.fromCache, model.importSeconds, 0};
   loaded.scene = std::make_shared<const scene::Scene>(std::move(model.model));
+  if (cache) keepCache(loaded.scene, *cache);
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   loaded.loadSeconds = elapsed.count();
   logLoadedScene(*loaded.scene, options.file.filename().string(), loaded);

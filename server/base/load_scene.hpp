@@ -3,8 +3,10 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
 
 #include "scene/import/bodies/collect_bodies.hpp"
+#include "scene/import/cache/model_cache.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/world/data/scene.hpp"
 
@@ -29,5 +31,9 @@ struct LoadedScene {
 LoadedScene loadSceneTimed(const ModelOptions& options);
 /// Like loadSceneTimed(), and logs the diagnostics of the import.
 std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options);
+
+/// The cache with which a scene was loaded, for what is derived from it; nullopt: without, or it
+/// was not loaded from a file. Thread-safe.
+std::optional<scene::ModelCache> findCache(const std::shared_ptr<const scene::Scene>& scene);
 
 }  // namespace enfilade::server

@@ -17,6 +17,7 @@
 #include "scene/navigation/place_names.hpp"
 #include "server/base/progress.hpp"
 #include "server/base/standard_output.hpp"
+#include "server/navigation/shared_meshes.hpp"
 #include "server/plans/path_map.hpp"
 
 namespace enfilade::server {
@@ -47,16 +48,18 @@ Place parsePlace(const std::string& text, const char* argument, const scene::Sce
   if (const auto point = parsePoint(text)) return *point;
   if (const auto named = scene::findNamedPlace(scene, text, radius + kNextTo)) return *named;
   throw std::runtime_error(fmt::format(
-      "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey or an object; "
+      "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey, an object or a body; "
       "`enfilade inspect --objects` lists the names",
       argument, text));
 }
 
-/// A point of the place. Throws std::runtime_error, which names the argument.
+/// A point of the place, on the island of `from` if it has any. Throws std::runtime_error, which
+/// names the argument.
 Vec3 resolvePlace(const Place& place, const std::string& text, const char* argument,
-                  scene::Navigation& navigation) {
+                  scene::Navigation& navigation, const std::optional<Vec3>& from) {
   if (const auto* point = std::get_if<Vec3>(&place)) return *point;
-  if (const auto free = navigation.findPlaceIn(std::get<scene::NamedPlace>(place))) return *free;
+  if (const auto free = navigation.findPlaceIn(std::get<scene::NamedPlace>(place), from))
+    return *free;
   throw std::runtime_error(
       fmt::format("{}: there is no free place to stand at '{}'", argument, text));
 }
@@ -200,11 +203,13 @@ ExitCode route(const RouteCommand& command) {
                             : scene::makeSnapshotWithOpenDoors(scene, command.settings);
   Progress bar;
   const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  scene::Navigation navigation(scene, command.settings, command.agent, snapshot.get(), threads,
-                               [&](double done) { bar.show(done, "navigation mesh"); });
+  const auto made = makeNavigation(
+      {scene, command.settings, command.agent, !command.doorsAsTheyAre, snapshot, threads},
+      [&](double done) { bar.show(done, "navigation mesh"); });
+  scene::Navigation& navigation = *made;
   bar.clear();
-  const Vec3 from = resolvePlace(start, command.from, "FROM", navigation);
-  const Vec3 to = resolvePlace(goal, command.to, "TO", navigation);
+  const Vec3 from = resolvePlace(start, command.from, "FROM", navigation, std::nullopt);
+  const Vec3 to = resolvePlace(goal, command.to, "TO", navigation, from);
   const scene::NavigationPath path = navigation.findPath(from, to, command.links);
   const auto narrowest =
       path.found() ? navigation.findNarrowest(path.points) : std::optional<scene::NarrowPlace>();

@@ -13,7 +13,7 @@ namespace enfilade::server {
 
 struct RouteCommand {
   ModelOptions model;
-  std::string from, to;  ///< "x,y,z" in metres, or the name of a room, a storey or an object
+  std::string from, to;  ///< "x,y,z" in metres, or the name of a room, storey, object or body
   scene::NavigationAgent agent;
   scene::WorldSettings settings;
   scene::PathOptions links;

@@ -14,6 +14,9 @@
 #include "scene/navigation/ghost.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
 #include "server/messages/world_messages.hpp"
+#include "server/navigation/island_answer.hpp"
+#include "server/navigation/map_format.hpp"
+#include "server/navigation/path_answer.hpp"
 #include "server/navigation/query_fields.hpp"
 #include "server/navigation/shared_meshes.hpp"
 
@@ -45,9 +48,10 @@ struct Answer {
   }
 
   std::variant<Vec3, v1::Error> resolve(const QueryPlace& place, const v1::NavigationPlace& given,
-                                        const std::string& field) const {
+                                        const std::string& field,
+                                        const std::optional<Vec3>& start = std::nullopt) const {
     if (const auto* point = std::get_if<Vec3>(&place)) return *point;
-    if (const auto found = navigation.findPlaceIn(std::get<scene::NamedPlace>(place)))
+    if (const auto found = navigation.findPlaceIn(std::get<scene::NamedPlace>(place), start))
       return *found;
     return makeNavigationError(field + ".name", "there is no free place at '" + given.name() + "'",
                                v1::ERROR_REFUSED_COMMAND);
@@ -61,134 +65,14 @@ struct Answer {
     if (const auto island = navigation.islandOf(*place)) spot.set_island(*island);
   }
 
-  std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& ways,
-                                           const std::vector<Vec3>& points) const {
-    return scene::findDoorsOnPath(index(), state.settings, *state.snapshot, ways.agent(), points);
-  }
-
-  /// The closed doors that stand on a path through open ones.
-  void addDoors(const std::vector<scene::DoorOnPath>& doors, v1::NavigationPath& message) const {
-    for (const scene::DoorOnPath& found : doors) {
-      if (!found.isInTheWay) continue;
-      const scene::BodySpec& spec = scene.model().bodies[found.body];
-      v1::NavigationDoor& door = *message.add_doors();
-      door.set_id(spec.objects.front() + 1);
-      door.set_name(spec.name);
-      door.set_distance(found.distance);
-      door.set_seconds(found.secondsToOpen);
-      door.set_by_touch(spec.openedBy == scene::OpenedBy::touch);
-    }
-  }
-
-  void addLeg(v1::NavigationLeg::Kind kind, std::size_t first, double length, double seconds,
-              std::optional<std::uint32_t> body, v1::NavigationPath& message) const {
-    v1::NavigationLeg& leg = *message.add_legs();
-    leg.set_kind(kind);
-    leg.set_first(static_cast<std::uint32_t>(first));
-    leg.set_length(length);
-    leg.set_seconds(seconds);
-    message.set_seconds(message.seconds() + seconds);
-    if (!body) return;
-    const scene::BodySpec& spec = scene.model().bodies[*body];
-    leg.set_id(spec.objects.front() + 1);
-    leg.set_name(spec.name);
-    leg.set_by_touch(spec.openedBy == scene::OpenedBy::touch);
-  }
-
-  /// The parts of a walk before, at and after its doors.
-  void addWalk(const scene::NavigationPath& path, const scene::PathLeg& walk, std::size_t end,
-               const std::vector<scene::DoorOnPath>& doors, v1::NavigationPath& message) const {
-    const double speed = navigation.agent().speed;
-    const auto lengthOf = [&](std::size_t from, std::size_t to) {
-      double length = 0;
-      for (std::size_t i = from; i < to; ++i)
-        length += (path.points[i + 1] - path.points[i]).norm();
-      return length;
-    };
-    std::size_t at = walk.first;
-    const auto walkTo = [&](std::size_t point) {
-      if (point == at) return;
-      const double length = lengthOf(at, point);
-      addLeg(v1::NavigationLeg::KIND_WALK, at, length, length / speed, std::nullopt, message);
-      at = point;
-    };
-    for (std::size_t i = 0; i < doors.size(); ++i) {
-      const scene::DoorOnPath& door = doors[i];
-      if (door.point < at || door.point >= end) continue;
-      walkTo(door.point);
-      // Doors on the same line, as the leaves of one, are legs without a length but for the last.
-      const bool isLast = i + 1 == doors.size() || doors[i + 1].point != door.point;
-      const double length = isLast ? lengthOf(door.point, door.point + 1) : 0;
-      addLeg(v1::NavigationLeg::KIND_DOOR, door.point, length,
-             length / speed + (isLast ? door.secondsToOpen : 0), door.body, message);
-      if (isLast) at = door.point + 1;
-    }
-    walkTo(end);
-  }
-
-  void addLegs(const scene::NavigationPath& path, const std::vector<scene::DoorOnPath>& doors,
-               v1::NavigationPath& message) const {
-    for (std::size_t i = 0; i < path.legs.size(); ++i) {
-      const scene::PathLeg& leg = path.legs[i];
-      const std::size_t end =
-          i + 1 < path.legs.size() ? path.legs[i + 1].first : path.points.size() - 1;
-      switch (leg.kind) {
-        case scene::PathLeg::Kind::walk:
-          addWalk(path, leg, end, doors, message);
-          break;
-        case scene::PathLeg::Kind::drop:
-          addLeg(v1::NavigationLeg::KIND_DROP, leg.first, leg.length, leg.seconds, std::nullopt,
-                 message);
-          break;
-        case scene::PathLeg::Kind::lift:
-          addLeg(v1::NavigationLeg::KIND_LIFT, leg.first, leg.length, leg.seconds, leg.body,
-                 message);
-          message.mutable_legs()->rbegin()->set_from_level(leg.fromLevel);
-          message.mutable_legs()->rbegin()->set_to_level(leg.toLevel);
-          break;
-      }
-    }
-  }
-
-  /// Gives a closed door as the reason, if a path leads through it when it is open.
-  void explainByDoors(const Vec3& from, const Vec3& to, const scene::PathOptions& options,
-                      v1::NavigationPath& message) const {
-    if (doorsOpen || !withOpenDoors) return;
-    scene::Navigation& open = withOpenDoors();
-    const scene::NavigationPath through = open.findPath(from, to, options);
-    if (!through.found()) return;
-    const auto doors = findDoors(open, through.points);
-    const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
-    if (first == doors.end()) return;
-    const scene::BodySpec& spec = scene.model().bodies[first->body];
-    message.set_reason("the door '" + spec.name + "' is closed: open it, or ask with open doors");
-    message.set_obstacle(spec.objects.front() + 1);
-    message.set_obstacle_name(spec.name);
-  }
-
-  void writePath(const Vec3& from, const Vec3& to, const scene::PathOptions& options,
-                 bool measuresWidth, v1::NavigationPath& message) const {
-    const scene::NavigationPath path = navigation.findPath(from, to, options);
-    message.set_found(path.found());
-    for (const Vec3& point : path.points) *message.add_points() = toProto(point);
-    message.set_length(path.length);
-    message.set_reason(path.reason);
-    if (path.obstruction) {
-      message.set_obstacle(path.obstruction->entity);
-      message.set_obstacle_name(navigation.findEntityName(path.obstruction->entity));
-      *message.mutable_obstacle_at() = toProto(path.obstruction->position);
-      message.set_clear_width(path.obstruction->clearWidth);
-    }
-    if (!path.found()) return explainByDoors(from, to, options, message);
-    const auto doors =
-        doorsOpen ? findDoors(navigation, path.points) : std::vector<scene::DoorOnPath>();
-    addDoors(doors, message);
-    addLegs(path, doors, message);
-    if (!measuresWidth) return;
-    const auto narrowest = navigation.findNarrowest(path.points);
-    if (!narrowest) return;
-    message.set_clear_width(narrowest->clearWidth);
-    *message.mutable_narrowest_at() = toProto(narrowest->position);
+  PathAnswer paths() const {
+    return {scene,
+            navigation,
+            *state.snapshot,
+            state.settings,
+            doorsOpen,
+            withOpenDoors,
+            [this]() -> scene::EntityIndex& { return index(); }};
   }
 
   std::optional<v1::Error> operator()(const v1::NavigationQuery::Path& query) const {
@@ -197,9 +81,9 @@ struct Answer {
     if (const auto* error = std::get_if<v1::Error>(&from)) return *error;
     for (int i = 0; i < query.to_size(); ++i) {
       const auto to = resolve(places.to[static_cast<std::size_t>(i)], query.to(i),
-                              "path.to[" + std::to_string(i) + "]");
+                              "path.to[" + std::to_string(i) + "]", std::get<Vec3>(from));
       if (const auto* error = std::get_if<v1::Error>(&to)) return *error;
-      writePath(std::get<Vec3>(from), std::get<Vec3>(to), options, query.narrowest(),
+      writePath(paths(), std::get<Vec3>(from), std::get<Vec3>(to), options, query.narrowest(),
                 *reply.add_paths());
     }
     return std::nullopt;
@@ -286,21 +170,7 @@ struct Answer {
 
   std::optional<v1::Error> operator()(const v1::NavigationQuery::Islands& query) const {
     if (auto error = validateCount("islands.count", query.count(), 50)) return error;
-    const std::vector<double> areas = navigation.report().islandAreas;
-    const auto count = std::min(static_cast<std::size_t>(query.count()), areas.size());
-    std::optional<Vec3> largest;
-    for (std::size_t i = 0; i < count; ++i) {
-      std::mt19937_64 random(i);
-      scene::RandomPlace wanted;
-      wanted.island = static_cast<std::uint32_t>(i);
-      const auto place = navigation.findRandomPlace(random, wanted);
-      v1::NavigationIsland& island = *reply.add_islands();
-      island.set_area(areas[i]);
-      if (!place) continue;
-      *island.mutable_at() = toProto(*place);
-      if (i == 0) largest = place;
-      if (i > 0 && largest) writePath(*place, *largest, {}, false, *island.mutable_path());
-    }
+    writeIslands(paths(), query.count(), reply);
     return std::nullopt;
   }
 
@@ -308,12 +178,14 @@ struct Answer {
                                     std::vector<std::uint8_t>& attachment) const {
     if (auto error = validateNumber("map.cell", query.cell(), 0.01, 10)) return error;
     if (auto error = validateNumber("map.height", query.height(), -1e7, 1e7)) return error;
+    if (!v1::NavigationQuery::Map::Format_IsValid(query.format()))
+      return makeNavigationError("map.format", "give BYTES, BITS or PNG");
     try {
       scene::NavigationMap map = navigation.drawMap(query.cell(), query.height());
       *reply.mutable_map_corner() = toProto(map.corner);
       reply.set_map_width(map.width);
       reply.set_map_height(map.height);
-      attachment = std::move(map.cells);
+      attachment = encodeMap(std::move(map), query.format());
     } catch (const std::invalid_argument& error) {
       return makeNavigationError("map.cell", error.what(), v1::ERROR_TOO_LARGE);
     }
@@ -347,10 +219,7 @@ NavigationService::Entry& NavigationService::prepare(const scene::NavigationAgen
   }
   const auto snapshot =
       doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
-  auto navigation = makeNavigation(scene_, state.settings, agent, *snapshot);
-  const scene::NavigationReport report = navigation->report();
-  spdlog::info("navigation: radius {} m, height {} m: {:.1f} m2 in {} islands, built in {:.2f} s",
-               agent.radius, agent.height, report.area, report.islandAreas.size(), report.seconds);
+  auto navigation = makeNavigation({scene_, state.settings, agent, doorsOpen, snapshot});
   keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
   return entries_.front();
 }

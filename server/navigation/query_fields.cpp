@@ -29,7 +29,7 @@ std::variant<QueryPlace, v1::Error> findQueryPlace(const v1::NavigationPlace& pl
     return *named;
   return makeNavigationError(
       field + ".name",
-      "no room, storey or object is named '" + place.name() + "', or its extent is not known",
+      "no room, storey, object or body is named '" + place.name() + "', or its extent is not known",
       v1::ERROR_UNKNOWN_ENTITY);
 }
 

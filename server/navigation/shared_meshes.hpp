@@ -1,4 +1,5 @@
-// Navigation meshes that the worlds of a scene share.
+// Navigation meshes that the worlds of a scene share, and that the next start of the program finds
+// in the model cache.
 #pragma once
 
 #include <memory>
@@ -7,12 +8,21 @@
 
 namespace enfilade::server {
 
-/// A navigation of a size. The first world of a scene builds its meshes; others load these, and
-/// build the tiles around bodies that stand elsewhere. Thread-safe: a second caller for the same
-/// meshes waits for the first, others do not.
-std::unique_ptr<scene::Navigation> makeNavigation(const std::shared_ptr<const scene::Scene>& scene,
-                                                  const scene::WorldSettings& settings,
-                                                  const scene::NavigationAgent& agent,
-                                                  const scene::Snapshot& snapshot);
+/// Which meshes are wanted.
+struct MeshRequest {
+  std::shared_ptr<const scene::Scene> scene;
+  scene::WorldSettings settings;
+  scene::NavigationAgent agent;
+  bool doorsOpen = false;                           ///< in `snapshot`; decides what is shared
+  std::shared_ptr<const scene::Snapshot> snapshot;  ///< poses of the bodies
+  int threads = 2;
+};
+
+/// A navigation of a size. The first world of a scene builds its meshes, or reads them from the
+/// cache with which the scene was loaded; others share these, and build the tiles around bodies
+/// that stand elsewhere. Thread-safe: a second caller for the same meshes waits for the first,
+/// others do not.
+std::unique_ptr<scene::Navigation> makeNavigation(const MeshRequest& request,
+                                                  const scene::Navigation::Progress& progress = {});
 
 }  // namespace enfilade::server

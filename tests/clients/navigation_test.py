@@ -95,6 +95,19 @@ class NavigationTest(RoomCase):
         self.assertFalse(top.cells[row(0), column(5.1)])
         self.assertAlmostEqual(top.cells.sum() * 0.01, self.navigation.navigable_area, delta=8)
 
+    def test_a_map_is_a_picture(self):
+        png = self.navigation.top_down_png(0.0, 0.1)
+        self.assertEqual(png[:8], b"\x89PNG\r\n\x1a\n")
+        rows, columns = self.navigation.top_down(0.0, 0.1).cells.shape
+        self.assertEqual(png[16:24], columns.to_bytes(4, "big") + rows.to_bytes(4, "big"))
+
+    def test_islands_tell_where_places_are_drawn(self):
+        floor = self.navigation.islands()[0]
+        self.assertTrue(floor.drawn)
+        self.assertFalse(floor.roof)
+        self.assertIsNone(floor.path)
+        self.assertEqual({place.island for place in self.navigation.random_places(50, 3)}, {0})
+
     def test_wrong_fields_are_named(self):
         with self.assertRaises(enfilade.ServerError) as raised:
             self.client.navigation(radius=50).path((0, 0, 0), (1, 0, 0))

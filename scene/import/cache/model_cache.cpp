@@ -333,15 +333,18 @@ LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
   return loaded;
 }
 
-std::optional<std::string> loadCachedText(const ModelCache& cache, const std::string& key) {
+std::optional<std::string> loadCachedText(const ModelCache& cache, const std::string& key,
+                                          std::string* damage) {
   const fs::path path = makeTextPath(cache, key);
   const MappedFile mapped(path);
   const std::string_view whole(reinterpret_cast<const char*>(mapped.bytes().data()),
                                mapped.bytes().size());
   const std::size_t checksumSize = computeTextChecksum(key, "").size();
   if (whole.size() < checksumSize ||
-      whole.substr(0, checksumSize) != computeTextChecksum(key, whole.substr(checksumSize)))
+      whole.substr(0, checksumSize) != computeTextChecksum(key, whole.substr(checksumSize))) {
+    if (damage && mapped.exists()) *damage = path.string() + ": damaged (its checksum differs)";
     return std::nullopt;
+  }
   utimensat(AT_FDCWD, path.c_str(), nullptr, 0);
   return std::string(whole.substr(checksumSize));
 }

@@ -42,9 +42,11 @@ struct LoadedModel {
 LoadedModel loadModel(const std::filesystem::path& file, const ImportOptions& options,
                       const std::optional<ModelCache>& cache, const ImportProgress& progress = {});
 
-/// Returns the text cached under `key`; nullopt if it is missing or damaged. The key must contain
-/// all inputs of the text; the program's version is added.
-std::optional<std::string> loadCachedText(const ModelCache& cache, const std::string& key);
+/// Returns the text, or bytes, cached under `key`; nullopt if it is missing or damaged. The key
+/// must contain all inputs of the text; the program's version is added. `damage`: set to what is
+/// wrong with the file.
+std::optional<std::string> loadCachedText(const ModelCache& cache, const std::string& key,
+                                          std::string* damage = nullptr);
 
 /// Stores a text for the next start. Returns the error, or "".
 std::string storeCachedText(const ModelCache& cache, const std::string& key,

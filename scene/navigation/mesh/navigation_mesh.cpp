@@ -105,6 +105,7 @@ void NavigationMesh::collectPortals() {
         twice += std::abs(a.x() * b.z() - a.z() * b.x());
       }
       areas_.push_back(0.5 * twice);
+      isUnderSky_.push_back((polygon.flags & kUnderSkyFlag) != 0);
     }
   }
   for (const dtPolyRef reference : references_) {
@@ -319,30 +320,27 @@ Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) con
   return toVec3(point.data());
 }
 
-void NavigationMesh::rasterize(double low, double high, double x, double z, double cell,
+void NavigationMesh::rasterize(std::uint32_t index, double x, double z, double cell,
                                std::uint32_t width, std::uint32_t height,
                                std::vector<std::uint8_t>& cells) const {
-  for (std::uint32_t index = 0; index < polygonCount(); ++index) {
-    const dtPoly* polygon = nullptr;
-    const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
-    if (centres_[index].y() < low || centres_[index].y() > high) continue;
-    std::array<float, 3 * DT_VERTS_PER_POLYGON> corners{};
-    Aabb box;
-    for (int i = 0; i < polygon->vertCount; ++i) {
-      std::copy_n(&tile.verts[polygon->verts[i] * 3], 3, &corners[static_cast<std::size_t>(3 * i)]);
-      box.include(toVec3(&corners[static_cast<std::size_t>(3 * i)]));
-    }
-    const auto first = [&](double least, double origin) {
-      return static_cast<std::uint32_t>(std::max(0.0, std::floor((least - origin) / cell)));
-    };
-    for (std::uint32_t row = first(box.min.z(), z); row < height && z + row * cell <= box.max.z();
-         ++row) {
-      for (std::uint32_t column = first(box.min.x(), x);
-           column < width && x + column * cell <= box.max.x(); ++column) {
-        const Float3 middle = toFloats({x + (column + 0.5) * cell, 0, z + (row + 0.5) * cell});
-        if (dtPointInPolygon(middle.data(), corners.data(), polygon->vertCount))
-          cells[std::size_t{row} * width + column] = 1;
-      }
+  const dtPoly* polygon = nullptr;
+  const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
+  std::array<float, 3 * DT_VERTS_PER_POLYGON> corners{};
+  Aabb box;
+  for (int i = 0; i < polygon->vertCount; ++i) {
+    std::copy_n(&tile.verts[polygon->verts[i] * 3], 3, &corners[static_cast<std::size_t>(3 * i)]);
+    box.include(toVec3(&corners[static_cast<std::size_t>(3 * i)]));
+  }
+  const auto first = [&](double least, double origin) {
+    return static_cast<std::uint32_t>(std::max(0.0, std::floor((least - origin) / cell)));
+  };
+  for (std::uint32_t row = first(box.min.z(), z); row < height && z + row * cell <= box.max.z();
+       ++row) {
+    for (std::uint32_t column = first(box.min.x(), x);
+         column < width && x + column * cell <= box.max.x(); ++column) {
+      const Float3 middle = toFloats({x + (column + 0.5) * cell, 0, z + (row + 0.5) * cell});
+      if (dtPointInPolygon(middle.data(), corners.data(), polygon->vertCount))
+        cells[std::size_t{row} * width + column] = 1;
     }
   }
 }

@@ -55,6 +55,7 @@ class NavigationMesh {
   double area() const;  ///< square metres, horizontal, of all polygons
   double polygonArea(std::uint32_t polygon) const { return areas_[polygon]; }
   const Vec3& centre(std::uint32_t polygon) const { return centres_[polygon]; }
+  bool isUnderSky(std::uint32_t polygon) const { return isUnderSky_[polygon]; }
   /// The point of a polygon that is closest to `point`.
   Vec3 closestPoint(std::uint32_t polygon, const Vec3& point) const;
   std::size_t memoryBytes() const { return bytes_; }
@@ -81,9 +82,9 @@ class NavigationMesh {
   void openPortal(std::uint32_t from, std::uint32_t to);
   /// A point of a polygon for two numbers of 0..1, uniform in area.
   Vec3 pointInPolygon(std::uint32_t polygon, double s, double t) const;
-  /// Sets the cells to 1 whose middle lies over a polygon of a height within low..high. Cell 0 has
-  /// its corner at (x, z); rows run along x.
-  void rasterize(double low, double high, double x, double z, double cell, std::uint32_t width,
+  /// Sets the cells to 1 whose middle lies over a polygon. Cell 0 has its corner at (x, z); rows
+  /// run along x.
+  void rasterize(std::uint32_t polygon, double x, double z, double cell, std::uint32_t width,
                  std::uint32_t height, std::vector<std::uint8_t>& cells) const;
   /// For each polygon the number of its island: polygons joined by open portals. The largest island
   /// has number 0.
@@ -102,6 +103,7 @@ class NavigationMesh {
   std::vector<std::uint32_t> references_;          ///< Detour's, by polygon
   std::vector<Vec3> centres_;
   std::vector<double> areas_;
+  std::vector<bool> isUnderSky_;
   std::vector<std::uint32_t> firstPortal_;  ///< by polygon, and the end
   std::vector<Portal> portals_;
   std::size_t bytes_ = 0;

@@ -122,9 +122,44 @@ PolyMesh buildPolygons(TileBuild& build, rcHeightfield& field, const CellSizes& 
   return polygons;
 }
 
+/// Whether nothing solid is above the floor of a polygon at a place. The polygon is flat: the floor
+/// may be higher or lower.
+bool isUnderSky(const rcHeightfield& field, const Vec3& place) {
+  const auto cellOf = [&](int axis) {
+    return static_cast<int>((place[axis] - field.bmin[axis]) / field.cs);
+  };
+  const int x = cellOf(0), z = cellOf(2);
+  if (x < 0 || z < 0 || x >= field.width || z >= field.height) return false;
+  const double height = (place.y() - field.bmin[1]) / field.ch;
+  const rcSpan* floor = nullptr;
+  const auto distance = [&](const rcSpan* span) { return std::abs(span->smax - height); };
+  for (const rcSpan* span = field.spans[x + z * field.width]; span; span = span->next)
+    if (span->area != RC_NULL_AREA && (!floor || distance(span) < distance(floor))) floor = span;
+  return floor && !floor->next;
+}
+
+/// Marks polygons that are mostly under the sky, judged at their centre and around it.
+void setFlags(const rcHeightfield& field, rcPolyMesh& mesh) {
+  for (int i = 0; i < mesh.npolys; ++i) {
+    const unsigned short* polygon = &mesh.polys[i * 2 * mesh.nvp];
+    std::vector<Vec3> corners;
+    Vec3 centre = Vec3::Zero();
+    for (int k = 0; k < mesh.nvp && polygon[k] != RC_MESH_NULL_IDX; ++k) {
+      const unsigned short* v = &mesh.verts[3 * polygon[k]];
+      corners.emplace_back(mesh.bmin[0] + v[0] * mesh.cs, mesh.bmin[1] + v[1] * mesh.ch,
+                           mesh.bmin[2] + v[2] * mesh.cs);
+      centre += corners.back();
+    }
+    centre /= static_cast<double>(std::max<std::size_t>(1, corners.size()));
+    int open = isUnderSky(field, centre) ? 1 : -1;
+    for (const Vec3& corner : corners) open += isUnderSky(field, 0.5 * (centre + corner)) ? 1 : -1;
+    mesh.flags[i] =
+        static_cast<unsigned short>(kWalkableFlag | (open > 0 ? kUnderSkyFlag : std::uint16_t{0}));
+  }
+}
+
 std::vector<std::uint8_t> serialize(TileBuild& build, rcPolyMesh& mesh) {
   if (mesh.npolys == 0) return {};
-  std::fill_n(mesh.flags, mesh.npolys, static_cast<unsigned short>(1));
   dtNavMeshCreateParams params{};
   params.verts = mesh.verts;
   params.vertCount = mesh.nverts;
@@ -267,7 +302,9 @@ std::vector<TileMesh> buildTileMeshes(const WorldData& world, const NavigationAg
     if (clearances[i] == Clearance::ample)
       rcFilterLedgeSpans(&build.context, sizes.height, sizes.climb, *field);
     rcFilterWalkableLowHeightSpans(&build.context, sizes.height, *field);
-    tiles[i] = serialize(build, *buildPolygons(build, *field, sizes));
+    const PolyMesh polygons = buildPolygons(build, *field, sizes);
+    setFlags(*field, *polygons);
+    tiles[i] = serialize(build, *polygons);
   }
   return tiles;
 }

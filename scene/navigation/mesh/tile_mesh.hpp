@@ -33,6 +33,10 @@ TileGrid makeTileGrid(const Aabb& bounds, const NavigationAgent& agent);
 /// Triangles of the solids in a box: three floats per vertex, three vertices per triangle.
 std::vector<float> collectSolidTriangles(const WorldData& world, const Aabb& box, bool withBodies);
 
+/// Flags of polygons in a tile.
+inline constexpr std::uint16_t kWalkableFlag = 1;
+inline constexpr std::uint16_t kUnderSkyFlag = 2;  ///< nothing solid is above most of it
+
 /// A tile of a Detour navigation mesh, serialised; empty: nothing to walk on.
 using TileMesh = std::vector<std::uint8_t>;
 

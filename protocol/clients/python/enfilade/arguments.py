@@ -12,7 +12,7 @@ UINT32, UINT64 = 2**32 - 1, 2**64 - 1  # largest values
 def numbers(given: Any, name: str, counts: Sequence[int]) -> Tuple[float, ...]:
     """Returns finite numbers, as many as one of `counts`."""
     try:
-        found = tuple(map(float, given))
+        found = () if isinstance(given, str) else tuple(map(float, given))
     except (TypeError, ValueError):
         found = ()
     if len(found) not in counts or not all(map(math.isfinite, found)):
@@ -24,7 +24,7 @@ def number(given: Any, name: str, low: float = -math.inf, high: float = math.inf
            above: float = -math.inf, below: float = math.inf) -> float:
     """Returns a finite number from `low` to `high`, and above and below limits that it must not reach."""
     try:
-        found = float(given)
+        found = math.nan if isinstance(given, str) else float(given)
     except (TypeError, ValueError):
         found = math.nan
     if math.isfinite(found) and low <= found <= high and above < found < below:

@@ -55,7 +55,7 @@ class Avatar:
 
     def go(self, to: Union[Point, str], *, speed: Optional[float] = None,
            doors: str = "as_they_are", max_drop: float = 0.0, lifts: bool = False) -> int:
-        """Walks along a path to a point, or to a room, a storey or an object by name. With doors="open" it
+        """Walks along a path to a point, or to a room, storey, object or body by name. With doors="open" it
         opens those on the path. It may jump down by `max_drop` metres, and ride `lifts`. Raises ServerError
         with the reason if there is no path."""
         place = messages.NavigationPlace(name=to) if isinstance(to, str) else \

@@ -43,12 +43,12 @@ class Camera:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise ValueError(f"name: give text, not {self.name!r}")
-        if isinstance(self.channels, str) or set(self.channels) - set(_CHANNELS):
+        if not isinstance(self.channels, (list, tuple, set)) or set(self.channels) - set(_CHANNELS):
             raise ValueError(f"channels: give some of {_CHANNELS}, not {self.channels!r}")
         try:
             width, height = self.size
             good = width == int(width) >= 1 and height == int(height) >= 1
-        except (TypeError, ValueError):
+        except (OverflowError, TypeError, ValueError):
             good = False
         if not good:
             raise ValueError(f"size: give two whole numbers of pixels, at least 1, not {self.size!r}")
@@ -64,7 +64,7 @@ def chosen_cameras(cameras: Sequence[Camera], **one: Any) -> List[Camera]:
     """Returns the cameras that have channels: those given, or a single one with the options `one`, of
     which None is the default. Raises ValueError for both, and for two cameras of one name."""
     given = {name: value for name, value in one.items() if value is not None}
-    if isinstance(cameras, Camera):
+    if not isinstance(cameras, (list, tuple)):
         raise ValueError("cameras: give a list of Cameras")
     if not len(cameras):
         cameras = [Camera("", **given)]

@@ -166,7 +166,8 @@ class PathFinder:
             if wanted is not None and not math.isclose(wanted, given, abs_tol=1e-6):
                 raise ValueError(f"{name} is {given:g} in this world, not {wanted:g}: start the server with "
                                  f"{option} {wanted:g}")
-        self.navigation = client.navigation(settings.agent_radius, settings.agent_height)
+        self.navigation = client.navigation(settings.agent_radius, settings.agent_height,
+                                            speed=self.navigation.speed, doors=self.navigation.doors)
         return self.navigation.build_seconds >= 0
 
     @property

@@ -48,7 +48,7 @@ def _places(given: Any, name: str, counts: Sequence[int]) -> List[Tuple[float, .
 
 
 def _checked_episodes(given: Sequence[Episode]) -> List[Episode]:
-    if not len(given):
+    if not isinstance(given, (list, tuple)) or not given:
         raise ValueError("episodes: give at least one")
     for i, one in enumerate(given):
         if not isinstance(one, Episode):
@@ -130,19 +130,19 @@ class WalkEnv(spaces.EnvBase):
         self.is_geodesic = goals is not None or episodes is not None
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise ValueError(f"render_mode: give None or 'rgb_array', not {render_mode!r}")
-        number(goal_radius, "goal_radius", above=0)
-        number(speed, "speed", above=0)
-        number(turn_speed, "turn_speed", 0)
+        if eye_height is not None:
+            number(eye_height, "eye_height")
         if isinstance(server_arguments, str):
             raise ValueError("server_arguments: give a list of strings")
         if sum(one is not None for one in (scene, address or None, client)) != 1:
             raise ValueError("give one of scene, address and client")
-        self.goal_radius = goal_radius
+        self.goal_radius = number(goal_radius, "goal_radius", above=0)
         self.cameras = [CameraRequest(one, self._name) for one in chosen_cameras(
             cameras, size=size, channels=channels, fov_y=fov_y, pitch=pitch, height=eye_height)]
         self._picture_key = next((one.prefix + "rgb" for one in self.cameras if "rgb" in one.channels),
                                  "rgb")
-        self.ticks_per_step, self.speed, self.turn_speed = ticks_per_step, speed, turn_speed
+        self.ticks_per_step = ticks_per_step
+        self.speed, self.turn_speed = number(speed, "speed", above=0), number(turn_speed, "turn_speed", 0)
         self.max_steps, self.discrete = max_steps, discrete
         self.render_mode = render_mode
         self.observation_space = self._observation_space()
@@ -338,7 +338,7 @@ class WalkEnv(spaces.EnvBase):
         return replace(episode, geodesic_distance=path.length)
 
     def _anywhere(self) -> Sequence[float]:
-        spot = self.navigation.random_place(int(self.np_random.integers(0, 2 ** 63)), island=0)
+        spot = self.navigation.random_place(int(self.np_random.integers(0, 2 ** 63)))
         if spot is None:
             raise OrderFailed("starts: no place to stand was found in this scene")
         return tuple(map(float, spot.at))
@@ -471,8 +471,9 @@ class WalkEnv(spaces.EnvBase):
         left = path.length if path.found else self._left
         shortest = self.episode.geodesic_distance
         success = left <= self.goal_radius
+        walked = self._walked + left
         info.update(progress=self._left - left, geodesic_distance=left, success=success,
-                    spl=shortest / max(self._walked + left, shortest) if success else 0.0,
+                    spl=1.0 if success and walked <= shortest else shortest / walked if success else 0.0,
                     collided=bool(info["stopped_by"]))
         self._left = left
 

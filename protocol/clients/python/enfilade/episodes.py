@@ -17,6 +17,7 @@ from .errors import EnfiladeError
 from .navigation import Navigation
 
 MAX_DRAWS = 64  # of a start and a goal, for one episode
+NEAR_START = 2.0  # metres: where a given start is looked for on the mesh
 
 Point3 = Tuple[float, float, float]
 
@@ -44,22 +45,27 @@ def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_dis
                  goal: Optional[Sequence[float]] = None, starts: Sequence[Sequence[float]] = (),
                  goals: Sequence[Sequence[float]] = ()) -> Episode:
     """Draws a start and a goal between which there is a path: the one given, or one of those given, or else
-    a place on the largest island. Distances are geodesic. Raises EnfiladeError with the reason of the last
-    draw if none is found."""
+    a place on any island that is no roof, and a goal on the start's island. Distances are geodesic. Raises
+    EnfiladeError with the reason of the last draw if none is found."""
     starts = starts if start is None else [start]
     goals = goals if goal is None else [goal]
 
-    def place(given: Sequence[Sequence[float]]) -> Sequence[float]:
+    def place(given: Sequence[Sequence[float]], island: Optional[int] = None) -> Sequence[float]:
         if len(given):
             return tuple(map(float, given[int(random.integers(len(given)))]))
-        spot = navigation.random_place(int(random.integers(0, 2 ** 63)), island=0)
+        spot = navigation.random_place(int(random.integers(0, 2 ** 63)), island=island)
         if spot is None:
             raise EnfiladeError("no place to stand was found in this scene: is the unit right, and the radius?")
         return tuple(map(float, spot.at))
 
+    def island_of(point: Sequence[float]) -> Optional[int]:
+        spot = navigation.snap(point[:3], NEAR_START)
+        return None if spot is None else spot.island
+
     draws = 1 if len(starts) == 1 and len(goals) == 1 else MAX_DRAWS
     for _ in range(draws):
-        first, last = place(starts), place(goals)[:3]
+        first = place(starts)
+        last = place(goals, None if len(goals) else island_of(first))[:3]
         path = navigation.path(first[:3], last)
         if path.found and min_distance <= path.length <= max_distance:
             facing = first[3] if len(first) > 3 else random.uniform(0, 360)
@@ -96,8 +102,9 @@ def write_episodes(file: Union[str, Path], episodes: Sequence[Episode], scene: s
     for i, one in enumerate(episodes):
         check_episode(one, f"episodes[{i}]")
     data = {"episodes": [_to_habitat(one, i, scene) for i, one in enumerate(episodes)]}
+    written = json.dumps(data, allow_nan=False)  # before the file is opened
     with (gzip.open if str(file).endswith(".gz") else open)(file, "wt", encoding="utf-8") as text:
-        json.dump(data, text, allow_nan=False)
+        text.write(written)
 
 
 # habitat's agent looks along -Z; its rotation about +Y is (x, y, z, w). `facing` 90 looks along -Z.
@@ -115,6 +122,8 @@ def _from_habitat(one: Dict[str, Any]) -> Episode:
     goal = numbers(one["goals"][0]["position"], "goals[0].position", (3,))
     distance = (one.get("info") or {}).get("geodesic_distance")
     distance = math.nan if distance is None else float(distance)
+    if distance < 0:
+        raise ValueError(f"geodesic_distance: give at least 0, not {distance:g}")
     return Episode(start, facing % 360, goal, distance, str(one.get("episode_id", "")))  # type: ignore[arg-type]
 
 

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .avatar import Avatar
     from .client import Client
 
-# A point of the feet, an Avatar, or the name of a room, a storey or an object.
+# A point of the feet, an Avatar, or the name of a room, a storey, an object or a body.
 Place = Union[Point, str, "Avatar"]
 
 _MOST_POINTS = 10_000  # of one query
@@ -67,11 +67,14 @@ class Leg:
 
 @dataclass(frozen=True)
 class Island:
-    """A part of the navigable floor. `path` is one to the largest island, mostly without way points: its
-    reason, obstacle and clear width say why not. None for the largest."""
+    """A part of the navigable floor. `path` is one to the island `to`, a neighbour or the largest, mostly
+    without way points: its reason, obstacle and clear width say why not. None for the largest."""
     area: float  # square metres
     at: Tuple[float, float, float]  # a place on it
     path: Optional[Path]
+    to: int = 0
+    roof: bool = False  # under the sky, and above floors of other islands
+    drawn: bool = True  # random_places() without `near` and `island` draws there: no roof, not tiny
 
 
 @dataclass(frozen=True)
@@ -142,6 +145,7 @@ class Navigation:
         self.height = 1.75 if height is None else height
         self._options = {"radius": radius, "height": height, "speed": speed,
                          "doors": doors_value(doors)}
+        self.speed, self.doors = speed, doors
         self._report: Any = None  # the last reply
 
     def _ask(self, **query: Any) -> Tuple[Any, memoryview]:
@@ -184,7 +188,8 @@ class Navigation:
                       max_distance: float = 0.0, away_from: Optional[Point] = None,
                       min_distance: float = 0.0, island: Optional[int] = None) -> List[Optional[Spot]]:
         """Draws places that are uniform in area; None where none was found. The same seed gives the same
-        places. `near` with `max_distance`, and `away_from` with `min_distance`, are metres in space."""
+        places. Without `near` and `island` they are on islands that are `drawn`, no roofs. `near` with
+        `max_distance`, and `away_from` with `min_distance`, are metres in space."""
         for point, has_point, metres, has_metres in (
                 ("near", near is not None, "max_distance", max_distance != 0),
                 ("away_from", away_from is not None, "min_distance", min_distance != 0)):
@@ -236,16 +241,24 @@ class Navigation:
                         _xyz(one.normal) if one.HasField("normal") else None)
 
     def islands(self, count: int = 10) -> List[Island]:
-        """Returns the largest islands, and why no path leads from each to the largest."""
+        """Returns the largest islands, and what separates each from another."""
         query = messages.NavigationQuery.Islands(count=whole(count, "count"))
-        return [Island(one.area, _xyz(one.at), _path(one.path) if one.HasField("path") else None)
+        return [Island(one.area, _xyz(one.at), _path(one.path) if one.HasField("path") else None,
+                       one.to, one.roof, one.drawn)
                 for one in self._ask(islands=query)[0].islands]
 
     def top_down(self, height: float, cell: float = 0.05) -> Map:
         """Returns a map of the floors within 0.5 m of a height."""
-        reply, attachment = self._ask(map=messages.NavigationQuery.Map(cell=cell, height=height))
-        cells = np.frombuffer(attachment, np.uint8).reshape(reply.map_height, reply.map_width)
+        query = messages.NavigationQuery.Map(cell=cell, height=height, format="FORMAT_BITS")
+        reply, attachment = self._ask(map=query)
+        rows = np.frombuffer(attachment, np.uint8).reshape(reply.map_height, -1)
+        cells = np.unpackbits(rows, axis=1, count=reply.map_width)
         return Map(cells.astype(bool), _xyz(reply.map_corner), cell)
+
+    def top_down_png(self, height: float, cell: float = 0.05) -> bytes:
+        """Returns the map as a PNG: white cells are walkable."""
+        query = messages.NavigationQuery.Map(cell=cell, height=height, format="FORMAT_PNG")
+        return bytes(self._ask(map=query)[1])
 
     def save(self, path: Union[str, pathlib.Path]) -> None:
         """Writes the meshes of this size to a file, for load()."""

@@ -15,7 +15,7 @@ Point = Sequence[float]
 
 def avatar_ids(ids: Iterable[int]) -> List[int]:
     found = list(ids) if isinstance(ids, Iterable) else []
-    if not found or not all(isinstance(one, int) for one in found):  # none would mean all of them
+    if not found:  # none would mean all of them
         raise ValueError("contact_horizon: give ids of avatars, or True for all of them")
     return [whole(one, "contact_horizon") for one in found]
 
@@ -52,6 +52,8 @@ def entity(which: Any) -> Any:
         return messages.EntityRef(name=which)
     if isinstance(getattr(which, "name", None), str):
         return messages.EntityRef(name=which.name)
+    if which is None:
+        raise ValueError("entity: give an id, a name, a path or an avatar")
     return messages.EntityRef(id=whole(which, "entity"))
 
 

@@ -170,10 +170,10 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
         self._over = None
         taken, failures = self._each(post, take)
+        self._last = batch  # those that failed restart: theirs are not read
         if failures:
             self._over = np.array([one is None or one[1] or one[2] for one in taken])
             raise self._numbered(failures)
-        self._last = batch
         rewards, terminated, truncated, infos = zip(*taken)
         self._over = np.array(terminated, bool) | np.array(truncated, bool)
         return (batch.observations, np.array(rewards), np.array(terminated),

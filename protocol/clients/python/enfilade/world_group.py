@@ -313,5 +313,5 @@ class Member(Client):
         return ids
 
     def close(self) -> None:
-        """Leaves the world with the group's next round, or with its connection."""
+        """The client leaves the world when the group's connection ends."""
         self._connection.close()

@@ -1,0 +1,160 @@
+#include "scene/navigation/island_list.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <optional>
+#include <random>
+#include <utility>
+
+#include "scene/navigation/stand.hpp"
+#include "scene/world/avatars/walk_velocity.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr std::size_t kMaxCentres = 8;        // polygons of an island whose centre is tried
+constexpr int kMaxTrials = 64;                // further places of an island that are tried
+constexpr double kLeastDrawnArea = 1;         // square metres
+constexpr double kBelowRoof = 1;              // metres: a floor below is lower by more
+constexpr double kBesideFloor = 1;            // metres: walls and furniture interrupt floors below
+constexpr std::size_t kMaxSearchFrom = 2000;  // polygons of an island whose neighbours are sought
+
+using Polygons = std::vector<std::uint32_t>;
+
+/// The polygons of each island, the largest polygon first.
+std::vector<Polygons> listPolygons(const NavigationMesh& mesh,
+                                   const std::vector<std::uint32_t>& numberOf) {
+  std::vector<Polygons> lists;
+  for (std::uint32_t polygon = 0; polygon < numberOf.size(); ++polygon) {
+    if (numberOf[polygon] >= lists.size()) lists.resize(numberOf[polygon] + 1);
+    lists[numberOf[polygon]].push_back(polygon);
+  }
+  for (Polygons& list : lists)
+    std::ranges::stable_sort(list, std::greater(),
+                             [&](std::uint32_t polygon) { return mesh.polygonArea(polygon); });
+  return lists;
+}
+
+/// A place on an island where an agent stands: at the centre of a large polygon, or else anywhere,
+/// uniform in area.
+std::optional<Vec3> findStand(const NavigationMesh& mesh, Walker& walker,
+                              const Polygons& polygons) {
+  const auto stand = [&](const Vec3& point) {
+    return standAt(walker, point + Vec3(0, kHeightError, 0), 2 * kHeightError);
+  };
+  for (std::size_t i = 0; i < std::min(kMaxCentres, polygons.size()); ++i)
+    if (const auto place = stand(mesh.centre(polygons[i]))) return place;
+  std::vector<double> upTo;
+  for (const std::uint32_t polygon : polygons)
+    upTo.push_back((upTo.empty() ? 0 : upTo.back()) + mesh.polygonArea(polygon));
+  std::mt19937_64 random(1);
+  const auto draw = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  for (int i = 0; i < kMaxTrials; ++i) {
+    const auto at = std::ranges::upper_bound(upTo, draw() * upTo.back()) - upTo.begin();
+    const auto index = std::min(static_cast<std::size_t>(at), upTo.size() - 1);
+    const double s = draw(), t = draw();
+    if (const auto place = stand(mesh.pointInPolygon(polygons[index], s, t))) return place;
+  }
+  return std::nullopt;
+}
+
+/// Whether a floor of another island lies below a polygon, or close to that, which is not under the
+/// sky itself.
+bool isAboveFloor(const NavigationMesh& mesh, const std::vector<std::uint32_t>& numberOf,
+                  std::uint32_t polygon, double bottom) {
+  const Vec3& centre = mesh.centre(polygon);
+  const double half = 0.5 * (centre.y() - kBelowRoof - bottom);
+  if (!(half > 0)) return false;
+  return std::ranges::any_of(mesh.findPolygons({centre.x(), bottom + half, centre.z()},
+                                               {kBesideFloor, half, kBesideFloor}),
+                             [&](std::uint32_t below) {
+                               return numberOf[below] != kNoIsland &&
+                                      numberOf[below] != numberOf[polygon] &&
+                                      !mesh.isUnderSky(below) &&
+                                      mesh.centre(below).y() < centre.y() - kBelowRoof;
+                             });
+}
+
+bool isRoof(const NavigationMesh& mesh, const std::vector<std::uint32_t>& numberOf,
+            const Polygons& polygons, double area, double bottom) {
+  double open = 0, aboveFloor = 0;
+  for (const std::uint32_t polygon : polygons)
+    if (mesh.isUnderSky(polygon)) open += mesh.polygonArea(polygon);
+  if (!(open > 0.5 * area)) return false;
+  for (const std::uint32_t polygon : polygons)
+    if (mesh.isUnderSky(polygon) && isAboveFloor(mesh, numberOf, polygon, bottom))
+      aboveFloor += mesh.polygonArea(polygon);
+  return aboveFloor > 0.5 * area;
+}
+
+/// Prefers islands that are large and no roofs, but always takes some.
+void chooseDrawn(std::vector<Island>& islands) {
+  const auto choose = [&](const auto& isWanted) {
+    bool any = false;
+    for (Island& island : islands) any |= island.isDrawn = isWanted(island);
+    return any;
+  };
+  if (choose([](const Island& one) { return !one.isRoof && one.area >= kLeastDrawnArea; })) return;
+  if (choose([](const Island& one) { return !one.isRoof; })) return;
+  choose([](const Island&) { return true; });
+}
+
+}  // namespace
+
+IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb& bounds) {
+  IslandList list;
+  list.numberOf = mesh.findIslands();
+  std::vector<Polygons> kept;
+  for (Polygons& polygons : listPolygons(mesh, list.numberOf)) {
+    const auto place = findStand(mesh, walker, polygons);
+    const auto number = place ? static_cast<std::uint32_t>(kept.size()) : kNoIsland;
+    double area = 0;
+    for (const std::uint32_t polygon : polygons) {
+      list.numberOf[polygon] = number;
+      area += mesh.polygonArea(polygon);
+    }
+    if (!place) continue;
+    list.islands.push_back({.area = area, .place = *place});
+    kept.push_back(std::move(polygons));
+  }
+  for (std::size_t i = 0; i < kept.size(); ++i)
+    list.islands[i].isRoof =
+        isRoof(mesh, list.numberOf, kept[i], list.islands[i].area, bounds.min.y());
+  chooseDrawn(list.islands);
+  return list;
+}
+
+std::vector<IslandNeighbour> findNeighbours(const NavigationMesh& mesh, const IslandList& list,
+                                            std::uint32_t number, double reach,
+                                            double heightReach) {
+  Polygons own;
+  for (std::uint32_t polygon = 0; polygon < list.numberOf.size(); ++polygon)
+    if (list.numberOf[polygon] == number) own.push_back(polygon);
+  std::map<std::uint32_t, IslandNeighbour> found;
+  const std::size_t stride = 1 + own.size() / kMaxSearchFrom;
+  for (std::size_t i = 0; i < own.size(); i += stride) {
+    const Vec3& centre = mesh.centre(own[i]);
+    double radius = 0;
+    for (const Portal& portal : mesh.portals(own[i]))
+      radius = std::max(radius, computeGroundDistance(centre, portal.middle()));
+    radius = std::max(radius, std::sqrt(mesh.polygonArea(own[i])));
+    const Vec3 extent(radius + reach, heightReach, radius + reach);
+    for (const std::uint32_t other : mesh.findPolygons(centre, extent)) {
+      const std::uint32_t to = list.numberOf[other];
+      if (to == number || to == kNoIsland) continue;
+      IslandNeighbour near{to, 0, mesh.closestPoint(own[i], mesh.closestPoint(other, centre)), {}};
+      near.to = mesh.closestPoint(other, near.from);
+      near.distance = computeGroundDistance(near.from, near.to);
+      if (near.distance > reach || std::abs(near.from.y() - near.to.y()) > heightReach) continue;
+      const auto [known, isNew] = found.try_emplace(to, near);
+      if (!isNew && near.distance < known->second.distance) known->second = near;
+    }
+  }
+  std::vector<IslandNeighbour> neighbours;
+  for (const auto& [to, near] : found) neighbours.push_back(near);
+  std::ranges::stable_sort(neighbours, {}, &IslandNeighbour::distance);
+  return neighbours;
+}
+
+}  // namespace enfilade::scene

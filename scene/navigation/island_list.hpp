@@ -1,0 +1,47 @@
+// The islands of a navigation mesh: parts that no open portal joins. Lists those on which an agent
+// can stand, and finds out which of them are roofs.
+#pragma once
+
+#include <cstdint>
+#include <limits>
+#include <span>
+#include <vector>
+
+#include "scene/navigation/mesh/navigation_mesh.hpp"
+#include "scene/navigation/walker.hpp"
+
+namespace enfilade::scene {
+
+inline constexpr std::uint32_t kNoIsland = std::numeric_limits<std::uint32_t>::max();
+
+struct Island {
+  double area = 0;            ///< square metres
+  Vec3 place = Vec3::Zero();  ///< where an agent stands on it: feet, scene frame, metres
+  /// Most of it has nothing above it, and floors of other islands below.
+  bool isRoof = false;
+  /// Random places without an island are drawn here: no roof, and not tiny.
+  bool isDrawn = false;
+};
+
+struct IslandList {
+  std::vector<std::uint32_t> numberOf;  ///< by polygon; kNoIsland: an agent cannot stand there
+  std::vector<Island> islands;          ///< by number: the largest first
+};
+
+/// Leaves out islands on which no place to stand is found, as those in the inside of solids.
+/// `bounds`: of the scene.
+IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb& bounds);
+
+/// Another island that is close, and the points of both that are closest, about.
+struct IslandNeighbour {
+  std::uint32_t number = 0;
+  double distance = 0;  ///< metres, horizontal
+  Vec3 from = Vec3::Zero(), to = Vec3::Zero();
+};
+
+/// The islands within `reach` metres of an island, horizontally, on about its height: the closest
+/// first.
+std::vector<IslandNeighbour> findNeighbours(const NavigationMesh& mesh, const IslandList& list,
+                                            std::uint32_t number, double reach, double heightReach);
+
+}  // namespace enfilade::scene

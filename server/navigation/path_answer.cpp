@@ -1,0 +1,155 @@
+#include "server/navigation/path_answer.hpp"
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "scene/navigation/doors.hpp"
+#include "server/messages/world_messages.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using scene::Vec3;
+
+struct PathWriter {
+  const PathAnswer& answer;
+
+  std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& ways,
+                                           const std::vector<Vec3>& points) const {
+    return scene::findDoorsOnPath(answer.index(), answer.settings, answer.snapshot, ways.agent(),
+                                  points);
+  }
+
+  /// The closed doors that stand on a path through open ones.
+  void addDoors(const std::vector<scene::DoorOnPath>& doors, v1::NavigationPath& message) const {
+    for (const scene::DoorOnPath& found : doors) {
+      if (!found.isInTheWay) continue;
+      const scene::BodySpec& spec = answer.scene.model().bodies[found.body];
+      v1::NavigationDoor& door = *message.add_doors();
+      door.set_id(spec.objects.front() + 1);
+      door.set_name(spec.name);
+      door.set_distance(found.distance);
+      door.set_seconds(found.secondsToOpen);
+      door.set_by_touch(spec.openedBy == scene::OpenedBy::touch);
+    }
+  }
+
+  void addLeg(v1::NavigationLeg::Kind kind, std::size_t first, double length, double seconds,
+              std::optional<std::uint32_t> body, v1::NavigationPath& message) const {
+    v1::NavigationLeg& leg = *message.add_legs();
+    leg.set_kind(kind);
+    leg.set_first(static_cast<std::uint32_t>(first));
+    leg.set_length(length);
+    leg.set_seconds(seconds);
+    message.set_seconds(message.seconds() + seconds);
+    if (!body) return;
+    const scene::BodySpec& spec = answer.scene.model().bodies[*body];
+    leg.set_id(spec.objects.front() + 1);
+    leg.set_name(spec.name);
+    leg.set_by_touch(spec.openedBy == scene::OpenedBy::touch);
+  }
+
+  /// The parts of a walk before, at and after its doors.
+  void addWalk(const scene::NavigationPath& path, const scene::PathLeg& walk, std::size_t end,
+               const std::vector<scene::DoorOnPath>& doors, v1::NavigationPath& message) const {
+    const double speed = answer.navigation.agent().speed;
+    const auto lengthOf = [&](std::size_t from, std::size_t to) {
+      double length = 0;
+      for (std::size_t i = from; i < to; ++i)
+        length += (path.points[i + 1] - path.points[i]).norm();
+      return length;
+    };
+    std::size_t at = walk.first;
+    const auto walkTo = [&](std::size_t point) {
+      if (point == at) return;
+      const double length = lengthOf(at, point);
+      addLeg(v1::NavigationLeg::KIND_WALK, at, length, length / speed, std::nullopt, message);
+      at = point;
+    };
+    for (std::size_t i = 0; i < doors.size(); ++i) {
+      const scene::DoorOnPath& door = doors[i];
+      if (door.point < at || door.point >= end) continue;
+      walkTo(door.point);
+      // Doors on the same line, as the leaves of one, are legs without a length but for the last.
+      const bool isLast = i + 1 == doors.size() || doors[i + 1].point != door.point;
+      const double length = isLast ? lengthOf(door.point, door.point + 1) : 0;
+      addLeg(v1::NavigationLeg::KIND_DOOR, door.point, length,
+             length / speed + (isLast ? door.secondsToOpen : 0), door.body, message);
+      if (isLast) at = door.point + 1;
+    }
+    walkTo(end);
+  }
+
+  void addLegs(const scene::NavigationPath& path, const std::vector<scene::DoorOnPath>& doors,
+               v1::NavigationPath& message) const {
+    for (std::size_t i = 0; i < path.legs.size(); ++i) {
+      const scene::PathLeg& leg = path.legs[i];
+      const std::size_t end =
+          i + 1 < path.legs.size() ? path.legs[i + 1].first : path.points.size() - 1;
+      switch (leg.kind) {
+        case scene::PathLeg::Kind::walk:
+          addWalk(path, leg, end, doors, message);
+          break;
+        case scene::PathLeg::Kind::drop:
+          addLeg(v1::NavigationLeg::KIND_DROP, leg.first, leg.length, leg.seconds, std::nullopt,
+                 message);
+          break;
+        case scene::PathLeg::Kind::lift:
+          addLeg(v1::NavigationLeg::KIND_LIFT, leg.first, leg.length, leg.seconds, leg.body,
+                 message);
+          message.mutable_legs()->rbegin()->set_from_level(leg.fromLevel);
+          message.mutable_legs()->rbegin()->set_to_level(leg.toLevel);
+          break;
+      }
+    }
+  }
+
+  /// Gives a closed door as the reason, if a path leads through it when it is open.
+  void explainByDoors(const Vec3& from, const Vec3& to, const scene::PathOptions& options,
+                      v1::NavigationPath& message) const {
+    if (answer.doorsOpen || !answer.withOpenDoors) return;
+    scene::Navigation& open = answer.withOpenDoors();
+    const scene::NavigationPath through = open.findPath(from, to, options);
+    if (!through.found()) return;
+    const auto doors = findDoors(open, through.points);
+    const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
+    if (first == doors.end()) return;
+    const scene::BodySpec& spec = answer.scene.model().bodies[first->body];
+    message.set_reason("the door '" + spec.name + "' is closed: open it, or ask with open doors");
+    message.set_obstacle(spec.objects.front() + 1);
+    message.set_obstacle_name(spec.name);
+    message.clear_obstacle_at();  // these are about what an agent meets on other ways
+    message.clear_clear_width();
+  }
+};
+
+}  // namespace
+
+void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
+               const scene::PathOptions& options, bool measuresWidth, v1::NavigationPath& message) {
+  const PathWriter writer{answer};
+  const scene::NavigationPath path = answer.navigation.findPath(from, to, options);
+  message.set_found(path.found());
+  for (const Vec3& point : path.points) *message.add_points() = toProto(point);
+  message.set_length(path.length);
+  message.set_reason(path.reason);
+  if (path.obstruction) {
+    message.set_obstacle(path.obstruction->entity);
+    message.set_obstacle_name(answer.navigation.findEntityName(path.obstruction->entity));
+    *message.mutable_obstacle_at() = toProto(path.obstruction->position);
+    message.set_clear_width(path.obstruction->clearWidth);
+  }
+  if (!path.found()) return writer.explainByDoors(from, to, options, message);
+  const auto doors = answer.doorsOpen ? writer.findDoors(answer.navigation, path.points)
+                                      : std::vector<scene::DoorOnPath>();
+  writer.addDoors(doors, message);
+  writer.addLegs(path, doors, message);
+  if (!measuresWidth) return;
+  const auto narrowest = answer.navigation.findNarrowest(path.points);
+  if (!narrowest) return;
+  message.set_clear_width(narrowest->clearWidth);
+  *message.mutable_narrowest_at() = toProto(narrowest->position);
+}
+
+}  // namespace enfilade::server

@@ -1,0 +1,30 @@
+// Writes paths of navigation into replies: doors and legs of those that were found, the reason of
+// others.
+#pragma once
+
+#include <functional>
+#include <optional>
+
+#include "protocol/enfilade.pb.h"
+#include "scene/navigation/navigation.hpp"
+#include "scene/world/queries/entity_index.hpp"
+
+namespace enfilade::server {
+
+/// What the paths of a query are found with.
+struct PathAnswer {
+  const scene::Scene& scene;
+  scene::Navigation& navigation;
+  const scene::Snapshot& snapshot;  ///< of the world at the tick of the reply
+  const scene::WorldSettings& settings;
+  bool doorsOpen = false;  ///< of `navigation`
+  /// The same with open doors; builds meshes at the first call. Only if there are doors.
+  std::function<scene::Navigation&()> withOpenDoors;
+  std::function<scene::EntityIndex&()> index;  ///< built at the first call
+};
+
+/// The path from one place to another. `measuresWidth`: also its narrowest place.
+void writePath(const PathAnswer& answer, const scene::Vec3& from, const scene::Vec3& to,
+               const scene::PathOptions& options, bool measuresWidth, v1::NavigationPath& message);
+
+}  // namespace enfilade::server

@@ -1,0 +1,199 @@
+// Replies of the navigation service: the reasons that separate islands, formats of maps, goals on
+// the start's island, and meshes that the next start of the program finds in the cache.
+#include "server/navigation/navigation_service.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+
+#include "server/base/load_scene.hpp"
+#include "tests/scene/body_fixture.hpp"
+#include "tests/server/program_fixture.hpp"
+
+namespace enfilade::server::testing {
+namespace {
+
+using scene::Vec3;
+
+struct Answered {
+  v1::NavigationReply reply;
+  v1::Error error;
+  std::vector<std::uint8_t> attachment;
+};
+
+Answered ask(const std::shared_ptr<const scene::Scene>& scene, const v1::NavigationQuery& query) {
+  NavigationService service(scene);
+  Answered answered;
+  auto answer = service.answer(query, {scene::World(scene).snapshot(), {}}, answered.attachment);
+  if (auto* error = std::get_if<v1::Error>(&answer))
+    answered.error = *error;
+  else
+    answered.reply = std::get<v1::NavigationReply>(std::move(answer));
+  return answered;
+}
+
+/// Two rooms below a roof; a wall between them has a gap, in which a door leaf may stand.
+scene::Model roofedRooms(double gap, bool hasDoor) {
+  std::vector<scene::testing::NamedBox> boxes{{"floor", {0, -0.2, -3}, {10, 0, 3}},
+                                              {"wall/west", {0, 0, -3}, {0.2, 3, 3}},
+                                              {"wall/east", {9.8, 0, -3}, {10, 3, 3}},
+                                              {"wall/north", {0, 0, -3}, {10, 3, -2.8}},
+                                              {"wall/south", {0, 0, 2.8}, {10, 3, 3}},
+                                              {"wall/left", {5.9, 0, -3}, {6.1, 3, -0.5 * gap}},
+                                              {"wall/right", {5.9, 0, 0.5 * gap}, {6.1, 3, 3}},
+                                              {"roof", {0, 3, -3}, {10, 3.2, 3}}};
+  if (hasDoor)
+    boxes.push_back({"leaf", {5.98, 0.01, -0.5 * gap + 0.01}, {6.02, 2.9, 0.5 * gap - 0.01}});
+  scene::Model model = scene::testing::boxModel(boxes);
+  if (!hasDoor) return model;
+  scene::BodySpec door = scene::testing::bodySpec("door", scene::BodyKind::hinged, {8});
+  door.anchor = {6, 0, -0.5 * gap + 0.01};
+  door.low = -1.5;
+  model.bodies.push_back(door);
+  return model;
+}
+
+v1::NavigationQuery islandsQuery() {
+  v1::NavigationQuery query;
+  query.mutable_islands()->set_count(10);
+  return query;
+}
+
+TEST(NavigationService, IslandsNameTheGapThatSeparatesThem) {
+  const auto scene = std::make_shared<const scene::Scene>(roofedRooms(0.58, false));
+  const v1::NavigationReply reply = ask(scene, islandsQuery()).reply;
+  ASSERT_EQ(reply.islands_size(), 3);
+  EXPECT_TRUE(reply.islands(0).roof());
+  EXPECT_FALSE(reply.islands(0).drawn());
+  EXPECT_FALSE(reply.islands(0).has_path());
+  const std::uint32_t others[] = {0, 2, 1};
+  for (int i = 1; i < 3; ++i) {
+    const v1::NavigationIsland& room = reply.islands(i);
+    EXPECT_TRUE(room.drawn());
+    EXPECT_EQ(room.to(), others[i]);
+    EXPECT_FALSE(room.path().found());
+    EXPECT_TRUE(room.path().obstacle_name().starts_with("wall/")) << room.path().reason();
+    EXPECT_NEAR(room.path().clear_width(), 0.58, 0.02) << room.path().reason();
+  }
+}
+
+TEST(NavigationService, IslandsNameTheClosedDoorBetweenThem) {
+  const auto scene = std::make_shared<const scene::Scene>(roofedRooms(1, true));
+  const v1::NavigationReply reply = ask(scene, islandsQuery()).reply;
+  ASSERT_EQ(reply.islands_size(), 3);
+  for (int i = 1; i < 3; ++i) {
+    EXPECT_EQ(reply.islands(i).path().obstacle_name(), "door") << reply.islands(i).path().reason();
+    EXPECT_NE(reply.islands(i).path().reason().find("'door' is closed"), std::string::npos);
+  }
+}
+
+TEST(NavigationService, AStoreyIsReachedFromBothSidesOfAClosedDoor) {
+  scene::Model model = roofedRooms(1, true);
+  model.storeys.push_back({"Ground", "", 0});
+  const auto scene = std::make_shared<const scene::Scene>(std::move(model));
+  for (const double x : {2.0, 8.0}) {
+    v1::NavigationQuery query;
+    query.mutable_path()->mutable_from()->mutable_point()->set_x(x);
+    query.mutable_path()->add_to()->set_name("storey:Ground");
+    const Answered answered = ask(scene, query);
+    ASSERT_EQ(answered.reply.paths_size(), 1) << answered.error.message();
+    EXPECT_TRUE(answered.reply.paths(0).found()) << answered.reply.paths(0).reason();
+  }
+}
+
+TEST(NavigationService, MapsAreBytesBitsOrAPicture) {
+  const auto scene = std::make_shared<const scene::Scene>(roofedRooms(1, false));
+  v1::NavigationQuery query;
+  query.mutable_map()->set_cell(0.3);
+  const Answered bytes = ask(scene, query);
+  const std::size_t width = bytes.reply.map_width(), height = bytes.reply.map_height();
+  ASSERT_EQ(bytes.attachment.size(), width * height);
+  ASSERT_NE(width % 8, 0u) << "the last byte of a row is not full";
+  query.mutable_map()->set_format(v1::NavigationQuery::Map::FORMAT_BITS);
+  const std::vector<std::uint8_t> bits = ask(scene, query).attachment;
+  ASSERT_EQ(bits.size(), (width + 7) / 8 * height);
+  std::size_t walkable = 0;
+  for (std::size_t row = 0; row < height; ++row)
+    for (std::size_t column = 0; column < width; ++column) {
+      const int bit = bits[row * ((width + 7) / 8) + column / 8] >> (7 - column % 8) & 1;
+      EXPECT_EQ(bit, bytes.attachment[row * width + column]);
+      walkable += static_cast<std::size_t>(bit);
+    }
+  EXPECT_GT(walkable, 100u);
+  query.mutable_map()->set_format(v1::NavigationQuery::Map::FORMAT_PNG);
+  const std::vector<std::uint8_t> png = ask(scene, query).attachment;
+  ASSERT_GT(png.size(), 24u);
+  EXPECT_EQ(std::string(png.begin() + 1, png.begin() + 4), "PNG");
+  EXPECT_EQ(png[19], width);  // low bytes of the sizes in the header
+  EXPECT_EQ(png[23], height);
+  query.mutable_map()->set_format(static_cast<v1::NavigationQuery::Map::Format>(9));
+  EXPECT_EQ(ask(scene, query).error.field(), "navigation.map.format");
+}
+
+/// Starts of the program that share a cache folder.
+class MeshCache : public ProgramFixture {
+ protected:
+  void SetUp() override {
+    ProgramFixture::SetUp();
+    setenv("ENFILADE_CACHE", path("cache").c_str(), 1);
+  }
+  void TearDown() override { setenv("ENFILADE_CACHE", "off", 1); }
+
+  Ended route(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments{"route", path("room.obj"), "2,0,0", "8,0,0", "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    Ended ended = run(arguments);
+    EXPECT_EQ(ended.code, 0) << ended.err;
+    return ended;
+  }
+  static bool hasBuilt(const Ended& ended) {
+    return ended.err.find("built in") != std::string::npos;
+  }
+  std::vector<std::filesystem::path> meshFiles() const {
+    std::vector<std::filesystem::path> files;
+    for (const auto& file : std::filesystem::directory_iterator(path("cache")))
+      if (file.path().extension() == ".text") files.push_back(file.path());
+    return files;
+  }
+  static nlohmann::json pointsOf(const Ended& ended) {
+    return nlohmann::json::parse(ended.out).at("points");
+  }
+};
+
+TEST_F(MeshCache, TheNextStartReadsTheMeshes) {
+  const Ended first = route();
+  EXPECT_TRUE(hasBuilt(first)) << first.err;
+  const Ended second = route();
+  EXPECT_FALSE(hasBuilt(second)) << second.err;
+  EXPECT_EQ(pointsOf(second), pointsOf(first));
+  EXPECT_TRUE(hasBuilt(route({"--radius", "0.2"}))) << "another size";
+  EXPECT_TRUE(hasBuilt(route({"--no-cache"})));
+  setenv("ENFILADE_CACHE", "off", 1);
+  EXPECT_TRUE(hasBuilt(route()));
+}
+
+TEST_F(MeshCache, ADamagedFileIsReportedAndBuiltAgain) {
+  const Ended first = route();
+  ASSERT_EQ(meshFiles().size(), 1u);
+  std::string bytes = textOf(meshFiles()[0]);
+  bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
+  write(meshFiles()[0], bytes);
+  const Ended second = route();
+  EXPECT_TRUE(hasBuilt(second));
+  EXPECT_NE(second.err.find("damaged"), std::string::npos) << second.err;
+  EXPECT_EQ(pointsOf(second), pointsOf(first));
+  EXPECT_FALSE(hasBuilt(route())) << "it was written again";
+}
+
+TEST_F(MeshCache, OpenDoorsHaveMeshesOfTheirOwnAndThePolicyOfSizeHolds) {
+  route();
+  route({"--doors-as-they-are"});
+  EXPECT_EQ(meshFiles().size(), 2u);
+  setenv("ENFILADE_CACHE_MB", "0", 1);
+  const Ended full = route({"--radius", "0.25"});
+  unsetenv("ENFILADE_CACHE_MB");
+  EXPECT_NE(full.err.find("the navigation meshes are not kept"), std::string::npos) << full.err;
+}
+
+}  // namespace
+}  // namespace enfilade::server::testing
