@@ -20,7 +20,7 @@ constexpr std::size_t kMaxNeighbourhoods = 512;  // remembered; above, all are f
 constexpr double kLongStep = 0.1, kMaxStep = 1;
 /// metres: more than the arrival distance, by which the walk of an avatar may differ
 constexpr double kMargin = 3e-3;
-constexpr double kMiddle = 0.25;       // of the radius: what must be above a floor on a stair
+constexpr double kMiddle = 0.75;       // of the radius: beyond the edge of the tread that was left
 constexpr double kMinStepRise = 0.01;  // metres in a tick
 constexpr double kTickedLength = 0.5;  // metres, through a place that is too narrow for the margin
 constexpr double kEvenHeight = 1e-3;   // metres: a step that rises or sinks more is not even

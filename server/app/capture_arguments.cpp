@@ -196,7 +196,7 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
   verb.add_option("--rgb", into.rgb, "File format of rgb")
       ->capture_default_str()
       ->check(makeChoiceValidator({"png", "jpeg"}));
-  verb.add_option("--quality", into.quality, "JPEG quality")
+  verb.add_option("--quality", into.quality, "JPEG quality, 1 to 100")
       ->capture_default_str()
       ->check(makeWholeRangeValidator(1, 100, "N"));
   verb.add_option("--depth", into.depth,

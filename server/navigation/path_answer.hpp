@@ -11,7 +11,7 @@
 
 namespace enfilade::server {
 
-/// What the paths of a query are found with.
+/// The means to find the paths of a query.
 struct PathAnswer {
   const scene::Scene& scene;
   scene::Navigation& navigation;

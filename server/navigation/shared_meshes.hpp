@@ -8,7 +8,7 @@
 
 namespace enfilade::server {
 
-/// Which meshes are wanted.
+/// Names the wanted meshes.
 struct MeshRequest {
   std::shared_ptr<const scene::Scene> scene;
   scene::WorldSettings settings;

@@ -7,13 +7,13 @@
 #include <string>
 #include <vector>
 
-#include "server/base/work_pool.hpp"
 #include "server/base/work_thread.hpp"
 #include "server/hosting/frame_service.hpp"
 #include "server/hosting/query_service.hpp"
 #include "server/hosting/scene_file_service.hpp"
 #include "server/hosting/world_directory.hpp"
 #include "server/worlds/tick_loop.hpp"
+#include "server/worlds/work_pool.hpp"
 
 namespace enfilade::server {
 

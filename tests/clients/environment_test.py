@@ -105,8 +105,8 @@ class Environments(RoomCase):
         np.testing.assert_array_equal(infos["tick"], [1, 1])
 
     def vector(self, count, is_packing=True, **options):
-        vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=count,
-                                        **{"starts": _STARTS, "channels": (), **options})
+        default = {"starts": _STARTS} if "cameras" in options else {"starts": _STARTS, "channels": ()}
+        vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=count, **{**default, **options})
         self.addCleanup(vector.close)
         self.assertEqual(vector._is_packing, [True] * count)
         if not is_packing:

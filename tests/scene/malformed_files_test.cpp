@@ -96,7 +96,7 @@ std::vector<Damage> damagedFiles() {
       {"TooDeep",
        "a.gltf",
        tests::gltf(BoxMesh({1, 1, 1}), "0", deep),
-       {"2000 levels", "(convert)"}},
+       {"2000 levels", "flatter tree"}},
       {"GlbCalledGltf", "a.gltf", glb, {"rename it to .glb"}},
       {"GltfCalledGlb", "a.glb", box, {"rename", ".gltf"}},
       {"NoJsonAtAll", "a.gltf", std::string(4000, '['), {}},

@@ -39,7 +39,7 @@ def whole(given: Any, name: str, low: int = 0, high: int = UINT32) -> int:
     try:
         found = operator.index(given)
     except TypeError:
-        raise TypeError(f"{name}: give a whole number, not {given!r}") from None
+        raise ValueError(f"{name}: give a whole number, not {given!r}") from None
     if not low <= found <= high:
         raise ValueError(f"{name}: give a whole number from {low} to {high}, not {given!r}")
     return found

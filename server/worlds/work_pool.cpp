@@ -1,4 +1,4 @@
-#include "server/base/work_pool.hpp"
+#include "server/worlds/work_pool.hpp"
 
 #include <algorithm>
 #include <atomic>
