@@ -21,7 +21,9 @@ constexpr std::size_t kMaxRepairWalks = 100'000;              // of a path: some
 constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  // metres
 constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way around it begins
 constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
-constexpr int kRefutations = 4;            // failures at a portal after which it is not tried again
+// Failures at a portal, without a proved path through it meanwhile, after which it is not tried
+// again.
+constexpr int kRefutations = 4;
 constexpr int kMaxRepairs = 12;            // of a leg
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
@@ -109,7 +111,8 @@ bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance cl
   return true;
 }
 
-/// Closes portals of a mesh during a search. Those that failed often stay closed: they are refuted.
+/// Closes portals of a mesh during a search. Those that failed often, and never led to a proved
+/// path meanwhile, stay closed: they are refuted.
 class PortalClosures {
  public:
   explicit PortalClosures(NavigationMesh& mesh) : mesh_(mesh) {}
@@ -195,8 +198,11 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
       path.points = shortenPath(finder.walker, path.points,
                                 proof.isRepaired ? Shortcuts::all : Shortcuts::free);
       path.length = computeLength(path.points);
-      if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof))
+      if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof)) {
+        for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
+          mesh.forgetFailures(corridor->polygons[i - 1], corridor->polygons[i]);
         return path;
+      }
     }
     path.points.clear();
     if (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0) return path;  // proves nothing

@@ -307,6 +307,12 @@ void NavigationMesh::openPortal(std::uint32_t from, std::uint32_t to) {
       if (portals_[p].to == b) portals_[p].closed = false;
 }
 
+void NavigationMesh::forgetFailures(std::uint32_t from, std::uint32_t to) {
+  for (const auto& [a, b] : {std::pair(from, to), std::pair(to, from)})
+    for (std::uint32_t p = firstPortal_[a]; p < firstPortal_[a + 1]; ++p)
+      if (portals_[p].to == b) portals_[p].failures = 0;
+}
+
 Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) const {
   const dtPoly* polygon = nullptr;
   const dtMeshTile& tile = detour_->tile(references_[index], &polygon);

@@ -80,6 +80,8 @@ class NavigationMesh {
   /// their failures.
   int closePortal(std::uint32_t from, std::uint32_t to);
   void openPortal(std::uint32_t from, std::uint32_t to);
+  /// Forgets the failures of the portals between two polygons: a proved path leads through them.
+  void forgetFailures(std::uint32_t from, std::uint32_t to);
   /// A point of a polygon for two numbers of 0..1, uniform in area.
   Vec3 pointInPolygon(std::uint32_t polygon, double s, double t) const;
   /// Sets the cells to 1 whose middle lies over a polygon. Cell 0 has its corner at (x, z); rows
