@@ -143,7 +143,10 @@ TEST(ShortestCorridor, AClosedPortalIsNotPassed) {
         EXPECT_FALSE(portal.closed && portal.to == polygons[i]);
     }
     const std::size_t middle = polygons.size() / 2;
-    mesh.closePortal(polygons[middle - 1], polygons[middle]);
+    EXPECT_EQ(mesh.closePortal(polygons[middle - 1], polygons[middle]), 1);
+    EXPECT_EQ(mesh.closePortal(polygons[middle - 1], polygons[middle]), 2);
+    mesh.forgetFailures(polygons[middle - 1], polygons[middle]);
+    EXPECT_EQ(mesh.closePortal(polygons[middle - 1], polygons[middle]), 1);
   }
 }
 
