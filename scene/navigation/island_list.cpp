@@ -7,6 +7,7 @@
 #include <random>
 #include <utility>
 
+#include "scene/navigation/mesh/polygon_sampler.hpp"
 #include "scene/navigation/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -45,17 +46,11 @@ std::optional<Vec3> findStand(const NavigationMesh& mesh, Walker& walker,
   };
   for (std::size_t i = 0; i < std::min(kMaxCentres, polygons.size()); ++i)
     if (const auto place = stand(mesh.centre(polygons[i]))) return place;
-  std::vector<double> upTo;
-  for (const std::uint32_t polygon : polygons)
-    upTo.push_back((upTo.empty() ? 0 : upTo.back()) + mesh.polygonArea(polygon));
+  PolygonSampler sampler;
+  for (const std::uint32_t polygon : polygons) sampler.add(mesh, polygon);
   std::mt19937_64 random(1);
-  const auto draw = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
-  for (int i = 0; i < kMaxTrials; ++i) {
-    const auto at = std::ranges::upper_bound(upTo, draw() * upTo.back()) - upTo.begin();
-    const auto index = std::min(static_cast<std::size_t>(at), upTo.size() - 1);
-    const double s = draw(), t = draw();
-    if (const auto place = stand(mesh.pointInPolygon(polygons[index], s, t))) return place;
-  }
+  for (int i = 0; i < kMaxTrials; ++i)
+    if (const auto place = stand(sampler.draw(mesh, random))) return place;
   return std::nullopt;
 }
 

@@ -139,14 +139,11 @@ void Navigation::assembleMeshes() {
   ample_.emplace(grid_, ampleTiles_);
   scarce_.emplace(grid_, scarceTiles_);
   islands_ = collectIslands(*ample_, *walker_, world_.scene().bounds());
-  drawn_.clear();
-  areaUpTo_.clear();
-  double drawnArea = 0;
+  drawn_ = {};
   for (std::uint32_t i = 0; i < ample_->polygonCount(); ++i) {
     if (islands_.numberOf[i] == kNoIsland || !islands_.islands[islands_.numberOf[i]].isDrawn)
       continue;
-    drawn_.push_back(i);
-    areaUpTo_.push_back(drawnArea += ample_->polygonArea(i));
+    drawn_.add(*ample_, i);
   }
   report_.islandAreas.clear();
   report_.area = 0;
@@ -357,10 +354,9 @@ std::vector<IslandNeighbour> Navigation::findIslandNeighbours(std::uint32_t isla
 std::optional<Vec3> Navigation::findRandomPlace(std::mt19937_64& random,
                                                 const RandomPlace& wanted) {
   const std::lock_guard lock(mutex_);
-  std::vector<std::uint32_t> polygons;
-  std::vector<double> areas;
-  if (wanted.near || wanted.island) {
-    double area = 0;
+  const bool isPart = wanted.near || wanted.island;
+  PolygonSampler part;
+  if (isPart) {
     std::vector<std::uint32_t> candidates;
     if (wanted.near) {
       candidates = ample_->findPolygons(*wanted.near, Vec3::Constant(wanted.maxDistance));
@@ -372,22 +368,13 @@ std::optional<Vec3> Navigation::findRandomPlace(std::mt19937_64& random,
       if (islands_.numberOf[polygon] == kNoIsland ||
           (wanted.island && islands_.numberOf[polygon] != *wanted.island))
         continue;
-      polygons.push_back(polygon);
-      areas.push_back(area += ample_->polygonArea(polygon));
+      part.add(*ample_, polygon);
     }
   }
-  const bool isPart = wanted.near || wanted.island;
-  const std::vector<double>& upTo = isPart ? areas : areaUpTo_;
-  if (upTo.empty()) return std::nullopt;
-  // 53 bits: the same numbers on every platform, unlike std::uniform_real_distribution.
-  const auto draw = [&] { return static_cast<double>(random() >> 11) * 0x1p-53; };
+  const PolygonSampler& sampler = isPart ? part : drawn_;
+  if (sampler.empty()) return std::nullopt;
   for (int i = 0; i < kMaxRandomTries; ++i) {
-    const auto at = static_cast<std::size_t>(
-        std::upper_bound(upTo.begin(), upTo.end(), draw() * upTo.back()) - upTo.begin());
-    const auto index = std::min(at, upTo.size() - 1);
-    const std::uint32_t polygon = isPart ? polygons[index] : drawn_[index];
-    const double s = draw(), t = draw();
-    const Vec3 point = ample_->pointInPolygon(polygon, s, t) + Vec3(0, kHeightError, 0);
+    const Vec3 point = sampler.draw(*ample_, random) + Vec3(0, kHeightError, 0);
     const auto place = standAt(*walker_, point, 2 * kHeightError + kMaxStandDrop);
     if (!place) continue;
     if (wanted.near && (*place - *wanted.near).norm() > wanted.maxDistance) continue;

@@ -15,6 +15,7 @@
 #include "scene/navigation/island_list.hpp"
 #include "scene/navigation/links.hpp"
 #include "scene/navigation/mesh/navigation_mesh.hpp"
+#include "scene/navigation/mesh/polygon_sampler.hpp"
 #include "scene/navigation/path_finder.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "scene/navigation/walker.hpp"
@@ -123,8 +124,7 @@ class Navigation {
   std::optional<Links> links_;              ///< of the options that were asked for last
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
   IslandList islands_;                      ///< of `ample_`
-  std::vector<std::uint32_t> drawn_;        ///< polygons of islands with Island::isDrawn
-  std::vector<double> areaUpTo_;            ///< of `drawn_`, cumulative
+  PolygonSampler drawn_;                    ///< of islands with Island::isDrawn
   NavigationReport report_;
 };
 

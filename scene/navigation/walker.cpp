@@ -124,6 +124,13 @@ bool Walker::hasFloorBelow() {
   return hit.entity != 0 && hit.normal.y() >= world_.settings.walkableNormalY;
 }
 
+/// Call it in each tick in the air. Where drops of a step are allowed, a stair may be descended in
+/// longer falls, onto the tread after the next.
+bool Walker::hasFallen(LastFloor& floor, double maxDrop) {
+  floor.isOnStair = floor.isOnStair && maxDrop <= world_.settings.stepHeight && hasFloorBelow();
+  return avatar_.footPosition.y() < floor.height - maxDrop && !floor.isOnStair;
+}
+
 std::optional<std::string> Walker::place(const Vec3& footPosition, double maxDrop) {
   if (auto error = placeStanding(world_, footPosition, avatar_, count_)) return error;
   avatar_.grounded = false;
@@ -201,8 +208,8 @@ bool Walker::isRideFree(const Vec3& from, const Vec3& to, EntityId body) {
 /// that is too narrow for it.
 WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
   const double tick = world_.settings.tickDuration;
-  double shortDistance = 0, stepLimit = kMaxStep, lastFloor = avatar_.footPosition.y();
-  bool isOnStair = true;
+  double shortDistance = 0, stepLimit = kMaxStep;
+  LastFloor floor{avatar_.footPosition.y()};
   Vec3 stood = avatar_.footPosition;
   const auto end = [&](WalkOutcome::Kind kind) {
     const WalkOutcome outcome{kind, avatar_.footPosition, avatar_.blockedBy};
@@ -219,7 +226,7 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
       const double length = std::min({distance, stepLimit, std::max(kLongStep, even)});
       const Vec3 displacement = projectToGround(goal - before) * (length / distance);
       if (stepEvenly(displacement, length <= even)) {
-        lastFloor = avatar_.footPosition.y();
+        floor = {avatar_.footPosition.y()};
         stepLimit = std::min(kMaxStep, 2 * stepLimit);
         continue;
       }
@@ -234,15 +241,12 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
     step(computeWalkVelocity(before, goal, false, agent_.speed, tick));
     if (!avatar_.grounded) {  // falls from tread to tread of a steep stair
       shortDistance = 2 * kLongStep;
-      isOnStair = isOnStair && hasFloorBelow();
-      if (avatar_.footPosition.y() < lastFloor - world_.settings.stepHeight && !isOnStair)
-        return end(WalkOutcome::Kind::fell);
+      if (hasFallen(floor, world_.settings.stepHeight)) return end(WalkOutcome::Kind::fell);
       if ((avatar_.footPosition - before).squaredNorm() < kMinGain * kMinGain)
         return end(WalkOutcome::Kind::blocked);
       continue;
     }
-    lastFloor = avatar_.footPosition.y();
-    isOnStair = true;
+    floor = {avatar_.footPosition.y()};
     const double across = computeGroundDistance(before, avatar_.footPosition);
     if (isStep(before, avatar_.footPosition)) hasStepped_ = crossedSteps_ = true;
     if (avatar_.blockedBy != 0) return end(WalkOutcome::Kind::blocked);
@@ -255,9 +259,9 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
 /// or, if it may slide, nothing for long.
 WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, double maxDrop) {
   const Vec3 start = avatar_.footPosition;
-  double lastFloor = start.y(), least = computeGroundDistance(start, goal);
+  LastFloor floor{start.y()};
+  double least = computeGroundDistance(start, goal);
   int ticksWithoutGain = 0;
-  bool isOnStair = maxDrop <= world_.settings.stepHeight;
   for (int ticks = 0;; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (avatar_.grounded && (distance <= kArrivalDistance ||
@@ -271,14 +275,12 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
     step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));
     if (isStep(before, avatar_.footPosition)) hasStepped_ = crossedSteps_ = true;
     if (!avatar_.grounded) {
-      isOnStair = isOnStair && hasFloorBelow();
-      if (avatar_.footPosition.y() < lastFloor - maxDrop && !isOnStair)
+      if (hasFallen(floor, maxDrop))
         return {WalkOutcome::Kind::fell, avatar_.footPosition, 0, ticks};
       if (before.y() - avatar_.footPosition.y() > kMinStepRise) ticksWithoutGain = 0;
       continue;
     }
-    lastFloor = avatar_.footPosition.y();
-    isOnStair = maxDrop <= world_.settings.stepHeight;
+    floor = {avatar_.footPosition.y()};
     if (avatar_.blockedBy != 0 && !maySlide)
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy, ticks};
   }

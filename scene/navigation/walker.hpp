@@ -72,7 +72,13 @@ class Walker {
  private:
   WalkOutcome walkWithMargin(const Vec3& goal);
   WalkOutcome walkByTicks(const Vec3& goal, double length, bool maySlide, double maxDrop);
+  /// The floor that the walker stood on last.
+  struct LastFloor {
+    double height = 0;
+    bool isOnStair = true;  ///< since then, a floor was always within a step below
+  };
   bool hasFloorBelow();
+  bool hasFallen(LastFloor& floor, double maxDrop);
   void prepareStep(const Vec3& velocity);
   void step(const Vec3& velocity);
   void collectNearObstacles();

@@ -6,10 +6,10 @@
 
 namespace enfilade::server {
 
-WorkPool::WorkPool() {
-  constexpr unsigned kMaxThreads = 16;
-  const unsigned count = std::clamp(std::thread::hardware_concurrency(), 1u, kMaxThreads);
-  for (unsigned i = 0; i < count; ++i) threads_.push_back(std::make_unique<WorkThread>());
+WorkPool::WorkPool() : WorkPool(std::clamp(std::thread::hardware_concurrency(), 1u, 16u)) {}
+
+WorkPool::WorkPool(unsigned threads) {
+  for (unsigned i = 0; i < threads; ++i) threads_.push_back(std::make_unique<WorkThread>());
 }
 
 void WorkPool::post(std::vector<std::function<void()>> work) {

@@ -1,4 +1,4 @@
-// Threads, one per processor, that share short pieces of work.
+// Threads that share short pieces of work.
 #pragma once
 
 #include <atomic>
@@ -13,7 +13,9 @@ namespace enfilade::server {
 
 class WorkPool {
  public:
+  /// With a thread per processor, up to 16.
   WorkPool();
+  explicit WorkPool(unsigned threads);
 
   /// Runs all of it, in any order and on several threads. Does not wait. No work may throw.
   /// Callable from any thread, until finish().

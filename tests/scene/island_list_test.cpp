@@ -8,21 +8,10 @@
 
 #include "scene/navigation/navigation.hpp"
 #include "tests/scene/body_fixture.hpp"
+#include "tests/scene/roofed_rooms.hpp"
 
 namespace enfilade::scene::testing {
 namespace {
-
-/// Two rooms of 5 x 6 m below a flat roof. A wall at x = 5 has a gap around z = 0.
-std::vector<NamedBox> roofedRooms(double gap) {
-  return {{"floor", {0, -0.2, -3}, {10, 0, 3}},
-          {"wall/west", {0, 0, -3}, {0.2, 3, 3}},
-          {"wall/east", {9.8, 0, -3}, {10, 3, 3}},
-          {"wall/north", {0, 0, -3}, {10, 3, -2.8}},
-          {"wall/south", {0, 0, 2.8}, {10, 3, 3}},
-          {"wall/left", {4.9, 0, -3}, {5.1, 3, -0.5 * gap}},
-          {"wall/right", {4.9, 0, 0.5 * gap}, {5.1, 3, 3}},
-          {"roof", {0, 3, -3}, {10, 3.2, 3}}};
-}
 
 TEST(Islands, ARoofIsFoundAndNoPlacesAreDrawnOnIt) {
   Navigation navigation(boxScene(roofedRooms(0.5)), {}, {});

@@ -12,13 +12,14 @@
 #include <vector>
 
 #include "scene/navigation/mesh/tile_mesh.hpp"
+#include "scene/navigation/path_finder.hpp"
 #include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene::testing {
 namespace {
 
-/// The mesh of a floor of 12 x 12 m with pillars and walls.
-NavigationMesh makeRoomMesh(std::mt19937& random) {
+/// A floor of 12 x 12 m with pillars and walls.
+std::vector<NamedBox> makeRoom(std::mt19937& random) {
   std::uniform_real_distribution<double> place(0, 12), size(0.2, 3);
   std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {12, 0, 12}}};
   for (int i = 0; i < 14; ++i) {
@@ -27,8 +28,10 @@ NavigationMesh makeRoomMesh(std::mt19937& random) {
                      {x, 0, z},
                      {x + size(random) / (i % 3 + 1), 2.5, z + size(random) / (3 - i % 3)}});
   }
-  const World world(boxScene(boxes));
-  const NavigationAgent agent;
+  return boxes;
+}
+
+NavigationMesh makeMesh(const World& world, const NavigationAgent& agent) {
   const TileGrid grid = makeTileGrid(Aabb{{0, -0.2, 0}, {12, 2.5, 12}}, agent);
   std::vector<TileMesh> tiles;
   for (int z = 0; z < grid.tilesZ; ++z)
@@ -36,6 +39,10 @@ NavigationMesh makeRoomMesh(std::mt19937& random) {
       tiles.push_back(
           std::move(buildTileMeshes(world.data(), agent, grid, x, z, {Clearance::ample})[0]));
   return {grid, std::move(tiles)};
+}
+
+NavigationMesh makeRoomMesh(std::mt19937& random) {
+  return makeMesh(World(boxScene(makeRoom(random))), {});
 }
 
 double horizontal(const Vec3& a, const Vec3& b) {
@@ -148,6 +155,32 @@ TEST(ShortestCorridor, AClosedPortalIsNotPassed) {
     mesh.forgetFailures(polygons[middle - 1], polygons[middle]);
     EXPECT_EQ(mesh.closePortal(polygons[middle - 1], polygons[middle]), 1);
   }
+}
+
+TEST(ShortestCorridor, AProvedPathForgetsTheFailuresOfItsPortals) {
+  std::mt19937 random(3);
+  const World world(boxScene(makeRoom(random)));
+  const NavigationAgent agent;
+  NavigationMesh mesh = makeMesh(world, agent), scarce = makeMesh(world, agent);
+  const Vec3 from(0.6, 0.01, 0.6), to(11.4, 0.01, 11.4);
+  const auto start = mesh.findNearest(from, {1, 0.5, 1}), goal = mesh.findNearest(to, {1, 0.5, 1});
+  ASSERT_TRUE(start && goal);
+  const auto corridor =
+      findShortestCorridor(mesh, *start, *goal, std::numeric_limits<double>::infinity());
+  ASSERT_TRUE(corridor && corridor->polygons.size() > 2);
+  const auto& polygons = corridor->polygons;
+  for (std::size_t i = 1; i < polygons.size(); ++i) {
+    for (int failures = 1; failures < 4; ++failures) mesh.closePortal(polygons[i - 1], polygons[i]);
+    mesh.openPortal(polygons[i - 1], polygons[i]);
+  }
+  Walker walker(world.data(), agent);
+  const PathFinder finder{world.data(), agent,  walker,
+                          mesh,         scarce, [&]() -> const NavigationMesh& { return mesh; }};
+  ASSERT_TRUE(findPath(finder, from, to).found());
+  int forgotten = 0;
+  for (std::size_t i = 1; i < polygons.size(); ++i)
+    forgotten += mesh.closePortal(polygons[i - 1], polygons[i]) == 1;
+  EXPECT_GT(forgotten, 0);
 }
 
 }  // namespace

@@ -8,6 +8,7 @@
 
 #include "server/base/load_scene.hpp"
 #include "tests/scene/body_fixture.hpp"
+#include "tests/scene/roofed_rooms.hpp"
 #include "tests/server/program_fixture.hpp"
 
 namespace enfilade::server::testing {
@@ -32,16 +33,9 @@ Answered ask(const std::shared_ptr<const scene::Scene>& scene, const v1::Navigat
   return answered;
 }
 
-/// Two rooms below a roof; a wall between them has a gap, in which a door leaf may stand.
-scene::Model roofedRooms(double gap, bool hasDoor) {
-  std::vector<scene::testing::NamedBox> boxes{{"floor", {0, -0.2, -3}, {10, 0, 3}},
-                                              {"wall/west", {0, 0, -3}, {0.2, 3, 3}},
-                                              {"wall/east", {9.8, 0, -3}, {10, 3, 3}},
-                                              {"wall/north", {0, 0, -3}, {10, 3, -2.8}},
-                                              {"wall/south", {0, 0, 2.8}, {10, 3, 3}},
-                                              {"wall/left", {5.9, 0, -3}, {6.1, 3, -0.5 * gap}},
-                                              {"wall/right", {5.9, 0, 0.5 * gap}, {6.1, 3, 3}},
-                                              {"roof", {0, 3, -3}, {10, 3.2, 3}}};
+/// Roofed rooms with a gap, in which a door leaf may stand.
+scene::Model roomsWithDoor(double gap, bool hasDoor) {
+  std::vector<scene::testing::NamedBox> boxes = scene::testing::roofedRooms(gap, 6);
   if (hasDoor)
     boxes.push_back({"leaf", {5.98, 0.01, -0.5 * gap + 0.01}, {6.02, 2.9, 0.5 * gap - 0.01}});
   scene::Model model = scene::testing::boxModel(boxes);
@@ -60,7 +54,7 @@ v1::NavigationQuery islandsQuery() {
 }
 
 TEST(NavigationService, IslandsNameTheGapThatSeparatesThem) {
-  const auto scene = std::make_shared<const scene::Scene>(roofedRooms(0.58, false));
+  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(0.58, false));
   const v1::NavigationReply reply = ask(scene, islandsQuery()).reply;
   ASSERT_EQ(reply.islands_size(), 3);
   EXPECT_TRUE(reply.islands(0).roof());
@@ -78,7 +72,7 @@ TEST(NavigationService, IslandsNameTheGapThatSeparatesThem) {
 }
 
 TEST(NavigationService, IslandsNameTheClosedDoorBetweenThem) {
-  const auto scene = std::make_shared<const scene::Scene>(roofedRooms(1, true));
+  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, true));
   const v1::NavigationReply reply = ask(scene, islandsQuery()).reply;
   ASSERT_EQ(reply.islands_size(), 3);
   for (int i = 1; i < 3; ++i) {
@@ -88,7 +82,7 @@ TEST(NavigationService, IslandsNameTheClosedDoorBetweenThem) {
 }
 
 TEST(NavigationService, AStoreyIsReachedFromBothSidesOfAClosedDoor) {
-  scene::Model model = roofedRooms(1, true);
+  scene::Model model = roomsWithDoor(1, true);
   model.storeys.push_back({"Ground", "", 0});
   const auto scene = std::make_shared<const scene::Scene>(std::move(model));
   for (const double x : {2.0, 8.0}) {
@@ -102,7 +96,7 @@ TEST(NavigationService, AStoreyIsReachedFromBothSidesOfAClosedDoor) {
 }
 
 TEST(NavigationService, MapsAreBytesBitsOrAPicture) {
-  const auto scene = std::make_shared<const scene::Scene>(roofedRooms(1, false));
+  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, false));
   v1::NavigationQuery query;
   query.mutable_map()->set_cell(0.3);
   const Answered bytes = ask(scene, query);

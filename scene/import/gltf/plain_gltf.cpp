@@ -73,13 +73,6 @@ void requireVersion2(const Json& gltf, const std::filesystem::path& file) {
 
 // ---- does the file need rewriting? --------------------------------------------------------------
 
-/// Entry of an array; null without one.
-const Json* findEntry(const Json& array, const Json* index) {
-  const bool exists =
-      index != nullptr && index->is_number_unsigned() && index->get<std::size_t>() < array.size();
-  return exists ? &array[index->get<std::size_t>()] : nullptr;
-}
-
 /// Whether assimp reads the accessor of an attribute right: `width` floats each in a buffer view.
 /// It does not check the type and the stride.
 bool isPlainAttribute(const Json& sections, const Json* accessor, std::size_t width) {

@@ -51,11 +51,8 @@ std::vector<std::uint32_t> unrollTriangles(const std::vector<std::uint32_t>& cor
 }
 
 bool PlainPrimitives::isNormalised(const Json& accessor) const {
-  const Json* accessors = findMember(&gltf_, "accessors");
-  if (accessors == nullptr || !accessor.is_number_unsigned() ||
-      accessor.get<std::size_t>() >= accessors->size())
-    return false;
-  const Json* normalised = findMember(&(*accessors)[accessor.get<std::size_t>()], "normalized");
+  const Json* normalised =
+      findMember(findEntry(getArray(gltf_, "accessors"), &accessor), "normalized");
   return normalised != nullptr && *normalised == true;
 }
 
@@ -68,19 +65,16 @@ std::size_t PlainPrimitives::countElements(std::size_t accessor) const {
 /// Channels of the vertex colours: 3 or 4; 0 for none, or if they are not what glTF allows.
 std::size_t PlainPrimitives::findColourWidth(const Json& attributes, const std::string& name) {
   if (!attributes.contains(kColours)) return 0;
-  const auto accessor = readIndexMember(&attributes, kColours);
   const Json& accessors = getArray(gltf_, "accessors");
-  const Json none;
-  const Json& colours = accessor && *accessor < accessors.size() ? accessors[*accessor] : none;
-  const Json* type = findMember(&colours, "type");
+  const Json* colours = findEntry(accessors, findMember(&attributes, kColours));
+  const Json* type = findMember(colours, "type");
   const bool isRgb = type != nullptr && *type == "VEC3",
              isRgba = type != nullptr && *type == "VEC4";
-  const std::size_t component = readIndexMember(&colours, "componentType").value_or(0);
+  const std::size_t component = readIndexMember(colours, "componentType").value_or(0);
   const bool isNumber = component == 5121 || component == 5123 || component == 5126;
-  const auto positions = readIndexMember(&attributes, "POSITION");
-  const bool matches =
-      positions && *positions < accessors.size() &&
-      readIndexMember(&colours, "count") == readIndexMember(&accessors[*positions], "count");
+  const Json* positions = findEntry(accessors, findMember(&attributes, "POSITION"));
+  const bool matches = positions != nullptr &&
+                       readIndexMember(colours, "count") == readIndexMember(positions, "count");
   if ((isRgb || isRgba) && isNumber && matches) return isRgb ? 3 : 4;
   addDiagnostic(
       problems_, "vertex_colours_ignored",

@@ -43,6 +43,12 @@ const nlohmann::json& getArray(const nlohmann::json& json, const char* key) {
   return found != nullptr && found->is_array() ? *found : kEmpty;
 }
 
+const nlohmann::json* findEntry(const nlohmann::json& array, const nlohmann::json* index) {
+  const bool exists =
+      index != nullptr && index->is_number_unsigned() && index->get<std::size_t>() < array.size();
+  return exists ? &array[index->get<std::size_t>()] : nullptr;
+}
+
 std::optional<std::size_t> readIndexMember(const nlohmann::json* json, const char* key) {
   const nlohmann::json* value = findMember(json, key);
   if (value == nullptr || !value->is_number_unsigned()) return std::nullopt;

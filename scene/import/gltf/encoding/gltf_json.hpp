@@ -29,6 +29,8 @@ bool mentions(const std::string& text, std::string_view words);
 const nlohmann::json* findMember(const nlohmann::json* json, const char* key);
 /// Returns a member that is an array; an empty array in place of anything else.
 const nlohmann::json& getArray(const nlohmann::json& json, const char* key);
+/// Returns the entry of an array at an index; null if `index` is null, no number or too large.
+const nlohmann::json* findEntry(const nlohmann::json& array, const nlohmann::json* index);
 /// Returns a member that is a number of an entry; nullopt for anything else.
 std::optional<std::size_t> readIndexMember(const nlohmann::json* json, const char* key);
 

@@ -1,0 +1,41 @@
+// The storeys that plans are drawn for, of files that state none.
+#include <gtest/gtest.h>
+
+#include "server/plans/floor_plans.hpp"
+#include "tests/scene/roofed_rooms.hpp"
+
+namespace enfilade::server {
+namespace {
+
+using scene::testing::boxScene;
+using scene::testing::NamedBox;
+using scene::testing::roofedRooms;
+
+TEST(StoreyPlans, ASolidOnTheRoofMakesNoStorey) {
+  const auto heightsOf = [](const std::vector<NamedBox>& boxes) {
+    std::vector<double> heights;
+    for (const StoreyFloor& storey : findStoreys(*boxScene(boxes)))
+      heights.push_back(storey.height);
+    return heights;
+  };
+  std::vector<NamedBox> boxes = roofedRooms(1);
+  boxes.push_back({"parapet", {0, 3.2, -3}, {0.2, 5, 3}});  // walls above the roof: a storey
+  ASSERT_EQ(heightsOf(boxes).size(), 2u);
+  EXPECT_NEAR(heightsOf(boxes)[1], 3.2, 1e-6);
+  boxes.back() = {"block", {0, 3.2, -3}, {10, 6, 3}};  // fills what is above the roof
+  EXPECT_EQ(heightsOf(boxes), (std::vector<double>{0}));
+}
+
+TEST(StoreyPlans, NamesComeFromPathsWithoutGlobalIdsAndPlaceholders) {
+  const auto nameOf = [](const std::string& storey) {
+    std::vector<NamedBox> boxes = roofedRooms(1);
+    for (NamedBox& box : boxes) box.path = storey + "/" + box.path;
+    return findStoreys(*boxScene(boxes)).at(0).name;
+  };
+  EXPECT_EQ(nameOf("IfcBuildingStorey_Ebene:2_0hEsDgzvbFtOVSvLpJ1fVP_node"), "Ebene:2");
+  EXPECT_EQ(nameOf("IfcBuildingStorey_Undefined_0hEsDgzvbFtOVSvLpJ1fVP_node"), "");
+  EXPECT_EQ(nameOf("house"), "");
+}
+
+}  // namespace
+}  // namespace enfilade::server
