@@ -146,9 +146,11 @@ TEST(BoxTable, FindsThePairsOfBoxesOfHundredsOfSizes) {
   std::vector<Aabb> boxes;  // no two have sizes of one level
   for (int k = -150; k < 150; ++k)
     boxes.push_back(boxAt(Vec3::Zero(), Vec3::Constant(std::ldexp(1.0, 2 * k))));
-  const double size = std::ldexp(1.0, 299);  // two of the largest level, side by side
-  boxes.push_back(boxAt(Vec3::Constant(0.9 * size), Vec3::Constant(size)));
-  boxes.push_back(boxAt(Vec3::Constant(1.8 * size), Vec3::Constant(size)));
+  const double size = std::ldexp(1.0, 299);  // many of the largest level, which all overlap
+  Random random(7);
+  for (int k = 0; k < 20; ++k)
+    boxes.push_back(boxAt(uniform3(random, Vec3::Constant(-0.5 * size), Vec3::Constant(0.5 * size)),
+                          Vec3::Constant(size)));
   EXPECT_GT(checkPairs(boxes, boxes[299]), 40000u);
 }
 

@@ -415,8 +415,8 @@ TEST(Walker, AFloorThatEndsAboveAStepsHeightIsNotWalkedDown) {
 TEST(Walker, AFaceThatIsTooSteepToStandOnIsNotWalkedDown) {
   Model model =
       boxModel({{"above", {-3, 1.8, -1}, {0, 2, 1}}, {"below", {-3, -0.2, -1}, {5, 0, 1}}});
-  Mesh face;  // 2 m down on 1.3 m: 57 degrees
-  for (const Vec3& corner : {Vec3(0, 2, -1), Vec3(0, 2, 1), Vec3(1.3, 0, 1), Vec3(1.3, 0, -1)})
+  Mesh face;  // 2 m down on 1.6 m: 51 degrees; an avatar slides down with its floor close below
+  for (const Vec3& corner : {Vec3(0, 2, -1), Vec3(0, 2, 1), Vec3(1.6, 0, 1), Vec3(1.6, 0, -1)})
     face.positions.push_back(corner.cast<float>());
   face.indices = {0, 1, 2, 0, 2, 3};
   model.meshes.push_back(face);
