@@ -69,6 +69,7 @@ void forEachInParallel(std::size_t count, int threads, const Navigation::Progres
     run(true);
   }
   if (failure) std::rethrow_exception(failure);
+  if (progress) progress(1);  // other threads may have finished last
 }
 
 }  // namespace

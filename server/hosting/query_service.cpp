@@ -1,12 +1,11 @@
 #include "server/hosting/query_service.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <chrono>
 #include <optional>
 
 #include "collision/assert.hpp"
 #include "server/base/work_thread.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/proximity_messages.hpp"
 #include "server/messages/ray_messages.hpp"
 #include "server/messages/world_messages.hpp"
@@ -40,7 +39,7 @@ const scene::RayCaster& QueryService::State::casterAt(
     const auto start = std::chrono::steady_clock::now();
     caster.emplace(scene);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-    spdlog::info("rays: built the scene's BVH in {:.2f} s", seconds.count());
+    logInfo("rays: built the scene's BVH in {:.2f} s", seconds.count());
   }
   if (casterSnapshot != snapshot) {
     casterSnapshot.reset();  // invalid while the caster updates
@@ -65,8 +64,8 @@ std::variant<v1::RayReply, v1::Error> QueryService::State::answerRays(
 
 std::variant<v1::NavigationReply, v1::Error> QueryService::State::answerNavigation(
     const SceneQuery& query, std::vector<std::uint8_t>& attachment) {
-  return navigation.answer(query.message.navigation(), {query.snapshot, query.settings},
-                           attachment);
+  return navigation.answer(query.message.navigation(),
+                           {query.snapshot, query.settings, query.progress}, attachment);
 }
 
 namespace {
@@ -109,7 +108,7 @@ EncodedMessage QueryService::State::answerSafely(const SceneQuery& query) {
   try {
     return answerQuery(query);
   } catch (const std::exception& error) {
-    spdlog::error("a query failed: {}", error.what());
+    logError("a query failed: {}", error.what());
     return makeErrorReply(query.message.request_id(), makeError(v1::ERROR_INTERNAL, error.what()));
   }
 }
@@ -141,7 +140,7 @@ void QueryService::submitPath(
     try {
       done(state->answerNavigation(*shared, attachment));
     } catch (const std::exception& error) {
-      spdlog::error("a query failed: {}", error.what());
+      logError("a query failed: {}", error.what());
       done(makeError(v1::ERROR_INTERNAL, error.what()));
     }
   });

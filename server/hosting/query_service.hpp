@@ -21,6 +21,9 @@ struct SceneQuery {
   v1::ClientMessage message;  ///< a query about the scene at a tick
   scene::WorldSettings settings;
   ServerLimits limits;
+  /// Of a navigation query: the share of the meshes that it has built, 0..1. Called on a thread of
+  /// the service.
+  std::function<void(double)> progress = {};
 };
 
 class QueryService {

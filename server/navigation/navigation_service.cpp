@@ -1,7 +1,5 @@
 #include "server/navigation/navigation_service.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
@@ -13,6 +11,7 @@
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/ghost.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/navigation/island_answer.hpp"
 #include "server/navigation/map_format.hpp"
@@ -219,7 +218,8 @@ NavigationService::Entry& NavigationService::prepare(const scene::NavigationAgen
   }
   const auto snapshot =
       doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
-  auto navigation = makeNavigation({scene_, state.settings, agent, doorsOpen, snapshot});
+  auto navigation =
+      makeNavigation({scene_, state.settings, agent, doorsOpen, snapshot}, state.progress);
   keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
   return entries_.front();
 }
@@ -239,8 +239,8 @@ std::optional<v1::Error> NavigationService::load(const scene::NavigationAgent& a
     const auto snapshot =
         doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
     const std::size_t rebuilt = navigation->update(*snapshot);
-    spdlog::info("navigation: loaded meshes for radius {} m, height {} m; {} tiles built again",
-                 agent.radius, agent.height, rebuilt);
+    logInfo("navigation: loaded meshes for radius {} m, height {} m; {} tiles built again",
+            agent.radius, agent.height, rebuilt);
     std::erase_if(entries_, [&](const Entry& entry) {
       return entry.agent == agent && entry.doorsOpen == doorsOpen &&
              entry.settings == state.settings;

@@ -20,6 +20,7 @@ namespace enfilade::server {
 struct NavigationState {
   std::shared_ptr<const scene::Snapshot> snapshot;
   scene::WorldSettings settings;
+  scene::Navigation::Progress progress = {};  ///< of building meshes; may be empty
 };
 
 class NavigationService {

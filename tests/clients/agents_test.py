@@ -89,7 +89,9 @@ class GroupTest(RoomCase):
         for many, words in ((m.StepMany(), "worlds"),
                             (m.StepMany(worlds=[m.StepMany.World(world="main")] * 2), "twice"),
                             (m.StepMany(worlds=[m.StepMany.World(world="main", requests=[
-                                m.ClientMessage(step_many=m.StepMany())])]), "step_many")):
+                                m.ClientMessage(step_many=m.StepMany())])]), "step_many"),
+                            (m.StepMany(worlds=[m.StepMany.World(world="main")],
+                                        memory_socket="enfilade-/tmp/x"), "memory_socket")):
             with self.assertRaisesRegex(enfilade.ServerError, words):
                 self.client.request(step_many=many)
         reply, _ = self.client.request(step_many=m.StepMany(worlds=[
@@ -113,7 +115,7 @@ class GroupTest(RoomCase):
                 replies = [one.take(ids)[0] for one, ids in zip(group.members, posted)]
                 taken.append([enfilade.results.frame(reply.frame, attachment)
                               for reply, attachment in replies])
-            self.assertEqual(group._is_shared, shared)
+            self.assertEqual(group._memory is not None, shared)
             self.assertEqual(taken[2][0].depth.flags.writeable, not shared)
             pictures[shared] = taken
         for before, after in zip(pictures[False][2], pictures[True][2]):
@@ -122,17 +124,42 @@ class GroupTest(RoomCase):
         # The round before is still there.
         np.testing.assert_array_equal(pictures[True][1][1].depth, pictures[True][2][1].depth)
 
-    def test_memory_that_cannot_be_opened_is_done_without(self):
+    def test_larger_memory_replaces_the_first(self):
         names = [self.client.create_world(drop_when_empty=True).name]
         base = self.server.connect()
         self.addCleanup(base.close)
-        with unittest.mock.patch("builtins.open", side_effect=OSError):
+        group = enfilade.WorldGroup(base, names, shared_memory=True)
+        member, view = group.members[0], dict(eye=(0, 1, 0), forward=(1, 0, 0.2), channels=("depth",))
+        small = member.frame(width=8, height=8, **view).depth
+        seen = small.copy()
+        large = member.frame(width=320, height=240, **view).depth
+        self.assertFalse(large.flags.writeable)
+        np.testing.assert_array_equal(small, seen)
+        np.testing.assert_array_equal(
+            large, self.client.frame(width=320, height=240, **view).depth)
+
+    def test_a_server_without_the_socket_sends_pictures_in_its_replies(self):
+        names = [self.client.create_world(drop_when_empty=True).name]
+        base = self.server.connect()
+        self.addCleanup(base.close)
+        elsewhere = enfilade.world_group._SharedMemory()
+        elsewhere.name = "enfilade-nowhere"
+        with unittest.mock.patch("enfilade.world_group._SharedMemory", return_value=elsewhere):
             group = enfilade.WorldGroup(base, names, shared_memory=True)
         member = group.members[0]
-        self.assertFalse(group._is_shared)
+        self.assertIsNone(group._memory)
         frame = member.frame(eye=(0, 1, 0), forward=(1, 0, 0), width=8, height=8)
         self.assertEqual(frame.rgb.shape, (8, 8, 3))
         self.assertTrue(frame.rgb.flags.writeable)
+
+    def test_memory_of_another_user_is_not_read(self):
+        module = enfilade.world_group
+        with unittest.mock.patch.object(module, "_CREDENTIALS") as credentials, \
+                unittest.mock.patch.object(module, "_PASSING_SECONDS", 0.2):
+            credentials.unpack.return_value = (1, 4242, 4242)
+            credentials.size = 12
+            with self.assertRaisesRegex(enfilade.ConnectionFailed, "as this user or as root"):
+                enfilade.WorldGroup(self.client, ["main"], shared_memory=True)
 
     def test_a_hundred_environments(self):
         vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=100, starts=_STARTS,

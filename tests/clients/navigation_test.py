@@ -213,6 +213,16 @@ class CompatTest(RoomCase):
             NavMeshSettings(cellsize=0.1)
 
 
+    def test_progress_is_shown_while_meshes_are_built(self):
+        shown = []
+        navigation = self.client.navigation(radius=0.37, progress=shown.append)
+        self.assertIsNotNone(navigation.snap((2, 0, 0)))
+        self.assertEqual(shown, sorted(shown))
+        self.assertEqual(shown[-1], 1)
+        before = len(shown)
+        navigation.snap((2, 0, 0))  # the meshes are there
+        self.assertEqual(len(shown), before)
+
     def test_meshes_are_saved_and_loaded(self):
         with tempfile.TemporaryDirectory() as folder:
             file = str(Path(folder) / "room.mesh")

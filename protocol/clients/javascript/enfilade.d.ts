@@ -20,6 +20,7 @@ export interface Listeners {
   frame?(body: any, attachment: Uint8Array): void;
   replay?(body: any): void;
   clock?(body: any): void;
+  navigationProgress?(body: any): void;
   bye?(body: any): void;
   error?(body: any): void;
   closed?(why: Error): void;

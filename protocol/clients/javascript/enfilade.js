@@ -47,7 +47,8 @@ async function webSocketClass() {
 
 /**
  * Connects, for example to "ws://127.0.0.1:7878", and enters a world. Events go to
- * `on.events`, `on.state`, `on.frame` (with its attachment), `on.replay`, `on.clock` and `on.bye`, in their order.
+ * `on.events`, `on.state`, `on.frame` (with its attachment), `on.replay`, `on.clock`, `on.navigationProgress` and
+ * `on.bye`, in their order.
  * `on.closed` gets the reason once the connection has ended.
  */
 export async function connect(

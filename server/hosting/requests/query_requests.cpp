@@ -1,6 +1,8 @@
 #include "server/hosting/requests/query_requests.hpp"
 
 #include <algorithm>
+#include <functional>
+#include <utility>
 
 #include "server/hosting/requests/checkpoint_requests.hpp"
 #include "server/messages/world_messages.hpp"
@@ -10,15 +12,30 @@ namespace {
 
 /// Forwards a query about the last tick to the query service.
 template <class Query>
-void forwardQuery(const RequestContext& context, const Query& query, const char* tickField) {
+void forwardQuery(const RequestContext& context, const Query& query, const char* tickField,
+                  std::function<void(double)> progress = {}) {
   HostedWorld& hosted = context.hosted;
   if (query.has_tick()) {
     if (auto error = validateTick(hosted, query.tick(), tickField))
       return replyError(context, std::move(*error));
   }
-  hosted.queries.submit(
-      {hosted.world.snapshot(), context.message, hosted.world.settings(), hosted.limits},
-      deferReply(context));
+  hosted.queries.submit({hosted.world.snapshot(), context.message, hosted.world.settings(),
+                         hosted.limits, std::move(progress)},
+                        deferReply(context));
+}
+
+/// Sends a message to the client with each further per cent.
+std::function<void(double)> makeProgress(const RequestContext& context) {
+  return [out = context.client.out, id = context.message.request_id(),
+          last = 0](double share) mutable {
+    const int percent = static_cast<int>(100 * share);
+    if (percent <= last) return;
+    last = percent;
+    v1::ServerMessage message;
+    message.mutable_navigation_progress()->set_request_id(id);
+    message.mutable_navigation_progress()->set_share(share);
+    out->push(encodeShared(message));
+  };
 }
 
 /// Passes the bytes of meshes on, also those of an upload.
@@ -87,7 +104,8 @@ void handleRays(const RequestContext& context, const v1::RayQuery& query) {
 }
 void handleNavigation(const RequestContext& context, const v1::NavigationQuery& query) {
   if (query.has_load_mesh()) return loadMesh(context, query);
-  forwardQuery(context, query, "navigation.tick");
+  forwardQuery(context, query, "navigation.tick",
+               query.progress() ? makeProgress(context) : std::function<void(double)>());
 }
 void handleDistances(const RequestContext& context, const v1::DistanceQuery& query) {
   forwardQuery(context, query, "distances.tick");

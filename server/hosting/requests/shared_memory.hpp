@@ -1,9 +1,10 @@
-// Memory that other processes of the same user can read.
+// Memory that another process of this machine can read.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <string>
 
 namespace enfilade::server {
 
@@ -16,8 +17,9 @@ class SharedMemory {
   SharedMemory(const SharedMemory&) = delete;
   SharedMemory& operator=(const SharedMemory&) = delete;
 
-  /// Of this process: readers open /proc/PID/fd/DESCRIPTOR.
-  int descriptor() const { return descriptor_; }
+  /// Sends the file and `number` to the process that listens on the Unix socket of this abstract
+  /// name (unix(7), SCM_RIGHTS). Does not wait. False: nobody listens there, or its queue is full.
+  bool passTo(const std::string& socketName, std::uint64_t number) const;
   std::span<std::uint8_t> bytes() const { return bytes_; }
 
  private:

@@ -3,17 +3,18 @@
 // in the queues, whose limits hold as for a connection that does not read.
 #include "server/hosting/requests/world_group.hpp"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <array>
 #include <atomic>
 #include <bit>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <set>
 #include <span>
+#include <string_view>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 #include "collision/assert.hpp"
@@ -52,6 +53,17 @@ v1::Error makeGoneError(const std::string& world) {
   return makeError(v1::ERROR_UNKNOWN_WORLD,
                    "there is no world '" + world + "', or it has ended: create it first",
                    "step_many.worlds.world");
+}
+
+/// The server connects to sockets of such names alone, whatever a client asks for.
+bool isMemorySocket(std::string_view name) {
+  constexpr std::string_view kPrefix = "enfilade-";
+  if (!name.starts_with(kPrefix)) return false;
+  name.remove_prefix(kPrefix.size());
+  const auto isLetterOrDigit = [](char c) {
+    return (c >= '0' && c <= '9') || (c >= 'A' && c <= 'Z') || (c >= 'a' && c <= 'z');
+  };
+  return !name.empty() && name.size() <= 64 && std::ranges::all_of(name, isLetterOrDigit);
 }
 
 /// A world's entry in PackedSteps.
@@ -97,22 +109,26 @@ struct WorldGroup::Member : std::enable_shared_from_this<Member> {
   void answerRest();
 };
 
-/// The shared memory of a group: two halves that take turns.
+/// The memory that a group shares with the client: two halves that take turns.
 struct WorldGroup::Memory {
-  std::unique_ptr<SharedMemory> current, last;  ///< `last`: replaced, but may still be read
+  const std::string socketName;                      ///< of the client
+  std::unique_ptr<SharedMemory> current, last = {};  ///< `last`: replaced, but may still be read
+  std::uint64_t number = 0;                          ///< of `current`
   std::uint64_t rounds = 0;
 
-  /// Space for an attachment, and where it is. Throws std::system_error.
-  std::span<std::uint8_t> reserve(std::size_t bytes, v1::SharedMemory& place) {
+  /// Space for an attachment, and where it is; nullopt if a new file cannot be passed to the
+  /// client. Throws std::system_error.
+  std::optional<std::span<std::uint8_t>> reserve(std::size_t bytes, v1::SharedMemory& place) {
     constexpr std::size_t kMinHalf = 1 << 16;
     const std::size_t half = current ? current->bytes().size() / 2 : 0;
     if (!current || bytes > half) {
-      last = std::move(current);
-      current = std::make_unique<SharedMemory>(2 * std::bit_ceil(std::max(kMinHalf, bytes)));
+      auto larger = std::make_unique<SharedMemory>(2 * std::bit_ceil(std::max(kMinHalf, bytes)));
+      if (!larger->passTo(socketName, number + 1)) return std::nullopt;
+      ++number;
+      last = std::exchange(current, std::move(larger));
     }
     const std::size_t offset = ++rounds % 2 * (current->bytes().size() / 2);
-    place.set_process(static_cast<std::uint32_t>(::getpid()));
-    place.set_file(static_cast<std::uint32_t>(current->descriptor()));
+    place.set_number(number);
     place.set_bytes(current->bytes().size());
     place.set_offset(offset);
     return current->bytes().subspan(offset, bytes);
@@ -223,14 +239,11 @@ EncodedMessage WorldGroup::Round::encodeReply() {
                              "worlds at a time; this connection has left them",
                              "step_many.worlds"));
   }
-  std::vector<std::uint8_t> own;
-  std::span<std::uint8_t> target;
-  if (memory) {
-    target = memory->reserve(bytes, *reply.mutable_step_many()->mutable_memory());
-  } else {
-    own.resize(bytes);
-    target = own;
-  }
+  v1::SharedMemory place;
+  const auto shared = memory ? memory->reserve(bytes, place) : std::nullopt;
+  if (shared) *reply.mutable_step_many()->mutable_memory() = std::move(place);
+  std::vector<std::uint8_t> own(shared ? 0 : bytes);
+  const std::span<std::uint8_t> target = shared.value_or(own);
   std::size_t at = 0;
   for (const auto& attachment : attachments) {
     if (attachment.empty()) continue;
@@ -269,6 +282,10 @@ std::optional<v1::Error> WorldGroup::validate(const v1::StepMany& request,
         v1::ERROR_BAD_MESSAGE,
         "worlds: give 1 to " + std::to_string(maxWorlds) + ", not " + std::to_string(count),
         "step_many.worlds");
+  if (!request.memory_socket().empty() && !isMemorySocket(request.memory_socket()))
+    return makeError(v1::ERROR_BAD_MESSAGE,
+                     "memory_socket: give 'enfilade-' and 1 to 64 letters and digits",
+                     "step_many.memory_socket");
   std::set<std::string_view> names;
   for (int i = 0; i < request.worlds_size(); ++i) {
     const v1::StepMany::World& world = request.worlds(i);
@@ -312,8 +329,9 @@ void WorldGroup::submit(const v1::StepMany& request, std::uint64_t requestId,
   const auto round = std::make_shared<Round>();
   round->requestId = requestId;
   round->done = std::move(done);
-  if (request.shared_memory()) {
-    if (!memory_) memory_ = std::make_shared<Memory>();
+  if (!request.memory_socket().empty()) {
+    if (!memory_ || memory_->socketName != request.memory_socket())
+      memory_ = std::make_shared<Memory>(Memory{request.memory_socket(), nullptr});
     round->memory = memory_;
   }
   round->unfinished = static_cast<std::size_t>(request.worlds_size()) + 1;

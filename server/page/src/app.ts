@@ -1,8 +1,8 @@
 // The state that the parts of the page share, and the news by which they learn of changes.
 import { EntityTable } from "./entities";
 import {
-  Role, type AvatarState, type Clock, type ContactEvent, type Notice, type Replay, type State, type TickEvents,
-  type Welcome,
+  Role, type AvatarState, type Clock, type ContactEvent, type NavigationProgress, type Notice, type Replay, type State,
+  type TickEvents, type Welcome,
 } from "./generated/enfilade_pb";
 import { SceneModel } from "./scene";
 import { parseScene, readEntities } from "./scene_file";
@@ -41,6 +41,7 @@ export class App {
   readonly visibilityChanged = new Signal();
   readonly said = new Signal<string>();
   #sceneHash = 0n;
+  #preparing = 0n; // the request for whose meshes the user waits
 
   constructor(makeSource: MakeSource) {
     this.connection = makeSource({
@@ -50,7 +51,15 @@ export class App {
       state: (state) => this.#takeState(state),
       replay: (replay) => this.#takeReplay(replay),
       clock: ({ clock, tick }) => this.setClock(clock, Number(tick)),
+      navigationProgress: (progress) => this.#takeProgress(progress),
     });
+  }
+
+  /** Says once per request that the user has to wait. */
+  #takeProgress({ requestId, share }: NavigationProgress): void {
+    if (requestId === this.#preparing || share === 1) return;
+    this.#preparing = requestId;
+    this.say("The server prepares the paths of this scene; the walk begins in a moment.");
   }
 
   get mayDrive(): boolean {

@@ -42,6 +42,7 @@ export class Connection implements WorldSource {
           state: (body) => this.#listener.state(body),
           replay: (body) => this.#listener.replay(body),
           clock: (body) => this.#listener.clock(body),
+          navigationProgress: (body) => this.#listener.navigationProgress(body),
           closed: (why) => this.#lost(why),
         },
       });

@@ -1,7 +1,7 @@
 // The source of the page's world: a server, or a recording in the page's own file.
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import type {
-  ClientMessageSchema, ClockChange, ContactEvent, Replay, ServerMessage, State, TickEvents, Welcome,
+  ClientMessageSchema, ClockChange, ContactEvent, NavigationProgress, Replay, ServerMessage, State, TickEvents, Welcome,
 } from "./generated/enfilade_pb";
 
 type RequestBody = NonNullable<MessageInitShape<typeof ClientMessageSchema>["body"]>;
@@ -25,6 +25,7 @@ export interface Listener {
   state(state: State): void;
   replay(replay: Replay): void;
   clock(change: ClockChange): void;
+  navigationProgress(progress: NavigationProgress): void;
 }
 
 export interface WorldSource {

@@ -176,7 +176,7 @@ export class Walk {
     const point = plain(place);
     try {
       const query = { case: "snap" as const, value: { points: [point], maxDistance: SNAP_DISTANCE } };
-      const [spot] = (await this.#app.connection.request("navigation", { query })).spots;
+      const [spot] = (await this.#app.connection.request("navigation", { query, progress: true })).spots;
       const to = { by: { case: "point" as const, value: spot?.found && spot.at ? spot.at : point } };
       return await this.#order({ case: "go", value: { to } }, 600);
     } catch (error) {

@@ -7,7 +7,7 @@ import itertools
 import time
 import warnings
 from collections import deque
-from typing import Any, Deque, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Deque, Dict, Iterable, Iterator, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -78,6 +78,7 @@ class Client:
         self._subscribed: Any = messages.Subscribe()
         self._sequence = 0  # of the last events
         self._answered = 0  # the request of the last reply taken
+        self._show_progress: Callable[[float], None] = lambda share: None  # of navigation meshes
 
     # ---- the server --------------------------------------------------------------------------
 
@@ -186,6 +187,8 @@ class Client:
             self._states.append(results.state(message.state))
         elif body == "replay":
             self._replay = results.replay(message.replay)
+        elif body == "navigation_progress":
+            self._show_progress(message.navigation_progress.share)
         elif body == "frame":
             if not self._frames or self._frames[-1].message != message.frame:
                 self._frames.append(results.frame(message.frame, received.attachment))
@@ -616,10 +619,12 @@ class Client:
         return results.apart(reply.cannot_touch)
 
     def navigation(self, radius: Optional[float] = None, height: Optional[float] = None, *,
-                   speed: Optional[float] = None, doors: str = "as_they_are") -> Navigation:
+                   speed: Optional[float] = None, doors: str = "as_they_are",
+                   progress: Optional[Callable[[float], None]] = None) -> Navigation:
         """Returns paths and places for an upright avatar of a size in metres (default: as an avatar's).
-        `doors`: "as_they_are" at the tick of each query, or "open". The first query builds meshes."""
-        return Navigation(self, radius, height, speed, doors)
+        `doors`: "as_they_are" at the tick of each query, or "open". The first query builds meshes, and
+        calls `progress` with the share that is done, 0 to 1."""
+        return Navigation(self, radius, height, speed, doors, progress)
 
     def names(self, ids: Union[np.ndarray, Iterable[int]]) -> Dict[int, str]:
         """Returns the path of an object or the name of an avatar, by entity id; "" for an unknown

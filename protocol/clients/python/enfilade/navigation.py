@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import pathlib
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, List, Optional, Sequence, Tuple, Union
+from typing import TYPE_CHECKING, Any, Callable, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -139,16 +139,21 @@ class Navigation:
     """Made by Client.navigation(). The step height is that of the world's policies."""
 
     def __init__(self, client: "Client", radius: Optional[float], height: Optional[float],
-                 speed: Optional[float], doors: str) -> None:
+                 speed: Optional[float], doors: str,
+                 progress: Optional[Callable[[float], None]] = None) -> None:
         self._client = client
         self.radius = 0.3 if radius is None else radius  # metres
         self.height = 1.75 if height is None else height
         self._options = {"radius": radius, "height": height, "speed": speed,
                          "doors": doors_value(doors)}
+        self._progress = progress
         self.speed, self.doors = speed, doors
         self._report: Any = None  # the last reply
 
     def _ask(self, **query: Any) -> Tuple[Any, memoryview]:
+        if self._progress is not None:
+            query["progress"] = True
+            self._client._show_progress = self._progress
         reply, attachment = self._client.request(
             navigation=messages.NavigationQuery(**self._options, **query))
         self._report = reply.navigation

@@ -3,6 +3,12 @@
 from __future__ import annotations
 
 import mmap
+import os
+import secrets
+import socket
+import struct
+import sys
+import weakref
 from collections import deque
 from typing import Any, Deque, List, Optional, Sequence, Tuple
 
@@ -16,6 +22,8 @@ from .kept_request import KeptRequest, varint
 
 _ALIGNMENT = 64  # bytes, of attachments in the reply
 _NOTHING = memoryview(b"")
+_PASSING_SECONDS = 5.0  # the server passes memory before it replies
+_CREDENTIALS = struct.Struct("=iII")  # process, user, group
 
 
 def _key(message: Any, field: str) -> bytes:
@@ -40,8 +48,10 @@ class WorldGroup:
 
     def __init__(self, client: Client, worlds: Sequence[str], *, shared_memory: bool = False) -> None:
         self._client = client
-        self._is_shared = shared_memory
-        self._memory: Tuple[Any, memoryview] = (None, memoryview(b""))  # the last one, and its bytes
+        self._memory: Optional[_SharedMemory] = None  # None: pictures come in the replies
+        if shared_memory and sys.platform == "linux":
+            self._memory = _SharedMemory()
+        self._shares = False  # the round under way asks for shared memory
         self._under_way: Optional[Tuple[List[int], List[_MemberConnection]]] = None
         self._connections = [_MemberConnection(self, world) for world in worlds]
         for connection in self._connections:
@@ -58,13 +68,16 @@ class WorldGroup:
             if not active:
                 raise EnfiladeError("no request awaits a reply")
             # The server overwrites its memory, so a round leaves it alone while pictures are unread.
-            shares = self._is_shared and not any(one.has_unread_picture() for one in self._connections)
-            request = _StepManyRequest(active, shares)
+            self._shares = self._memory is not None and not any(
+                one.has_unread_picture() for one in self._connections)
+            request = _StepManyRequest(active, self._memory.name if self._shares else "")
             self._under_way = (self._client._post([request]), active)
         posted, active = self._under_way
         reply, attachment = self._client.take(posted)[0]
         if reply.step_many.HasField("memory"):
-            attachment = self._shared(reply.step_many.memory)
+            attachment = self._memory.attachment(reply.step_many.memory)
+        elif self._shares:
+            self._memory = None  # the server is on another machine
         many, start = reply.step_many, 0
         steps = _Steps(many.steps) if many.HasField("steps") else None
         for i, (connection, world) in enumerate(zip(active, many.worlds)):
@@ -73,19 +86,44 @@ class WorldGroup:
             connection.receive(found)
         self._under_way = None
 
-    def _shared(self, place: Any) -> memoryview:
-        """Returns the server's memory from the attachment on. If this process cannot read it, the
-        group does without from now on."""
-        key = (place.process, place.file, place.bytes)
-        if self._memory[0] != key:
-            try:
-                with open(f"/proc/{place.process}/fd/{place.file}", "rb") as file:
-                    mapped = mmap.mmap(file.fileno(), place.bytes, mmap.MAP_SHARED, mmap.PROT_READ)
-            except OSError:
-                self._is_shared = False
-                return memoryview(b"")  # the first round, which has no pictures
-            self._memory = (key, memoryview(mapped))
-        return self._memory[1][place.offset:]
+
+class _SharedMemory:
+    """Memory of the server. It comes over a Unix socket on which this process listens."""
+
+    def __init__(self) -> None:
+        self.name = "enfilade-" + secrets.token_hex(16)
+        self._listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        self._listener.bind("\0" + self.name)
+        self._listener.listen(4)
+        self._listener.settimeout(_PASSING_SECONDS)
+        weakref.finalize(self, self._listener.close)
+        self._number = 0  # of the memory that is mapped
+        self._bytes = _NOTHING
+
+    def attachment(self, place: Any) -> memoryview:
+        """Returns the memory from the attachment on. Raises ConnectionFailed without it."""
+        while self._number != place.number:
+            self._accept()
+        return self._bytes[place.offset:]
+
+    def _accept(self) -> None:
+        """Maps the next memory that waits. Names of sockets are no secrets, so only this user and root
+        are believed."""
+        try:
+            sender, _ = self._listener.accept()
+        except socket.timeout:
+            raise ConnectionFailed("the server did not pass its shared memory: it has to run as this "
+                                   "user or as root") from None
+        with sender:
+            sender.settimeout(_PASSING_SECONDS)
+            peer = sender.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, _CREDENTIALS.size)
+            if _CREDENTIALS.unpack(peer)[1] not in (os.getuid(), 0):
+                return
+            number, descriptors, _, _ = socket.recv_fds(sender, 8, 1)
+        for one in descriptors:
+            with open(one, "rb") as file:
+                mapped = mmap.mmap(file.fileno(), 0, mmap.MAP_SHARED, mmap.PROT_READ)
+            self._number, self._bytes = int.from_bytes(number, "little"), memoryview(mapped)
 
 
 class _Steps:
@@ -156,9 +194,9 @@ class WorldReply:
 class _StepManyRequest:
     """A ClientMessage with the waiting requests of several members, joined from their bytes."""
 
-    def __init__(self, connections: List[_MemberConnection], shared_memory: bool) -> None:
+    def __init__(self, connections: List[_MemberConnection], memory_socket: str) -> None:
         self.request_id = 0
-        self._parts = [messages.StepMany(shared_memory=shared_memory).SerializeToString()]
+        self._parts = [messages.StepMany(memory_socket=memory_socket).SerializeToString()]
         for one in connections:
             self._parts += one.encoded()
 
