@@ -8,7 +8,7 @@
 #include <memory>
 
 #include "server/app/command_line.hpp"
-#include "server/app/rate_limited_sink.hpp"
+#include "server/log/rate_limited_sink.hpp"
 
 namespace enfilade::server {
 namespace {

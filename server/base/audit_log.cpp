@@ -1,8 +1,8 @@
 #include "server/base/audit_log.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
+
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -51,17 +51,16 @@ void logFindings(const scene::World& world, const scene::TickReport& report) {
   const auto& findings = report.audit->findings;
   const std::size_t loggedCount = std::min(findings.size(), kMaxLoggedFindings);
   for (std::size_t i = 0; i < loggedCount; ++i) {
-    spdlog::error("audit: {}", formatFinding(world, report.snapshot->tick, findings[i]));
+    logError("audit: {}", formatFinding(world, report.snapshot->tick, findings[i]));
   }
   if (loggedCount == findings.size()) return;
-  spdlog::error("audit: tick {}: and {} more", report.snapshot->tick,
-                findings.size() - loggedCount);
+  logError("audit: tick {}: and {} more", report.snapshot->tick, findings.size() - loggedCount);
 }
 
 void logTotals(const AuditTotals& totals) {
-  const auto level = totals.isClean() ? spdlog::level::info : spdlog::level::err;
-  spdlog::log(level, "audit: {} ticks, {} pairs by brute force, {} missed, {} extra", totals.ticks,
-              totals.pairs, totals.missed, totals.extra);
+  writeLog(totals.isClean() ? LogLevel::info : LogLevel::error,
+           "audit: {} ticks, {} pairs by brute force, {} missed, {} extra", totals.ticks,
+           totals.pairs, totals.missed, totals.extra);
 }
 
 }  // namespace enfilade::server

@@ -1,7 +1,5 @@
 #include "server/base/load_scene.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <chrono>
 #include <mutex>
 #include <vector>
@@ -10,6 +8,7 @@
 #include "scene/import/cache/model_cache.hpp"
 #include "scene/model/diagnostic_catalog.hpp"
 #include "server/base/progress.hpp"
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -18,7 +17,7 @@ void logLoadedScene(const scene::Scene& scene, const std::string& name, const Lo
   const scene::Model& model = scene.model();
   const scene::Vec3 size =
       scene.bounds().empty() ? scene::Vec3::Zero().eval() : scene.bounds().size();
-  spdlog::info(
+  logInfo(
       "{}: {} objects, {:.1f} x {:.1f} x {:.1f} m, unit {} m, up {}, read by {}, {} in {:.2f} s",
       name, model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit, model.upAxis,
       model.reader, loaded.fromCache ? "from the cache" : "imported", loaded.loadSeconds);
@@ -64,11 +63,11 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
       options.file, options.import, cache,
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });
   bar.clear();
-  for (const std::string& note : model.notes) spdlog::warn("cache: {}", note);
+  for (const std::string& note : model.notes) logWarning("cache: {}", note);
   scene::collectBodies(model.model, options.file, options.doors);
   if (!model.model.bodies.empty())
-    spdlog::info("{}: {} bodies: {}", options.file.filename().string(), model.model.bodies.size(),
-                 scene::formatBodySources(model.model));
+    logInfo("{}: {} bodies: {}", options.file.filename().string(), model.model.bodies.size(),
+            scene::formatBodySources(model.model));
   LoadedScene loaded{nullptr, model.fromCache, model.importSeconds, 0};
   loaded.scene = std::make_shared<const scene::Scene>(std::move(model.model));
   if (cache) keepCache(loaded.scene, *cache);
@@ -81,9 +80,9 @@ LoadedScene loadSceneTimed(const ModelOptions& options) {
 std::shared_ptr<const scene::Scene> loadScene(const ModelOptions& options) {
   std::shared_ptr<const scene::Scene> scene = loadSceneTimed(options).scene;
   for (const scene::Diagnostic& problem : scene->model().diagnostics)
-    spdlog::info("{}: {} ({}, {}), for example {}", options.file.filename().string(),
-                 scene::findDiagnosticKind(problem).meaning, problem.kind, problem.count,
-                 problem.example);
+    logInfo("{}: {} ({}, {}), for example {}", options.file.filename().string(),
+            scene::findDiagnosticKind(problem).meaning, problem.kind, problem.count,
+            problem.example);
   return scene;
 }
 

@@ -1,7 +1,5 @@
 #include "server/capture/capture.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -23,6 +21,7 @@
 #include "server/capture/metadata_files.hpp"
 #include "server/capture/overlay.hpp"
 #include "server/capture/video.hpp"
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -171,12 +170,12 @@ bool isCaptureComplete(const CaptureCommand& command, const CapturePlan& plan) {
 Json makeVideoReport(const CaptureCommand& command, const CapturePlan& plan) {
   if (!command.run.mp4 || !command.pictures.channels.rgb || plan.frames.size() < 2) return nullptr;
   if (!isCaptureComplete(command, plan)) {
-    spdlog::info("no video: frames of other shards are missing in this folder");
+    logInfo("no video: frames of other shards are missing in this folder");
     return nullptr;
   }
   const VideoResult video = makeVideo(command.out, plan.frames, command.pictures);
   if (video.created) return "video.mp4";
-  spdlog::info("no video: {}", video.reason);
+  logInfo("no video: {}", video.reason);
   return nullptr;
 }
 
@@ -223,7 +222,7 @@ ExitCode runCapture(const CaptureCommand& command) {
   const std::shared_ptr<const scene::Scene> scene = loadScene(command.model);
   if (isInterrupted()) throw Interrupted{};
   const CapturePlan plan = planCapture(scene, command.path, command.pictures, command.run.shard);
-  for (const std::string& note : plan.notes) spdlog::warn("path: {}", note);
+  for (const std::string& note : plan.notes) logWarning("path: {}", note);
   CaptureCounts counts;
   if (command.run.dryRun) {
     findMissingFrames(command, plan, counts);
@@ -238,7 +237,7 @@ ExitCode runCapture(const CaptureCommand& command) {
   writeMetadataFiles(command.out, *scene, plan, command.pictures);
   const std::vector<std::size_t> missing = findMissingFrames(command, plan, counts);
   if (counts.existing > 0)
-    spdlog::info("{} of {} frames exist already", counts.existing, counts.inShard);
+    logInfo("{} of {} frames exist already", counts.existing, counts.inShard);
   const auto start = Clock::now();
   std::optional<DepthReports> reports;
   if (command.run.reportDepth && !missing.empty()) reports.emplace(command.out, scene);
@@ -250,15 +249,15 @@ ExitCode runCapture(const CaptureCommand& command) {
   }
   counts.seconds = std::chrono::duration<double>(Clock::now() - start).count();
   if (counts.clampedPixels > 0)
-    spdlog::warn("{} depth pixels exceed the 16-bit range and were written as 65535",
-                 counts.clampedPixels.load());
+    logWarning("{} depth pixels exceed the 16-bit range and were written as 65535",
+               counts.clampedPixels.load());
   if (!counts.blankFrames.empty())
-    spdlog::warn(
+    logWarning(
         "{} frames show no object, the first is frame {}: is the camera inside a wall, below "
         "the floor or outside the scene?",
         counts.blankFrames.size(), counts.blankFrames.front());
   if (!counts.framesInsideSolids.empty())
-    spdlog::warn(
+    logWarning(
         "{} frames are taken from inside a solid, the first is frame {}: its camera is inside "
         "\"{}\"",
         counts.framesInsideSolids.size(), counts.framesInsideSolids.front(), counts.firstSolid);

@@ -1,10 +1,9 @@
 #include "server/capture/depth_reports.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <cstdio>
 
 #include "render/image/atomic_file.hpp"
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -46,9 +45,9 @@ void DepthReports::finish(const Shard& shard) const {
     name += "-" + std::to_string(shard.index) + "-of-" + std::to_string(shard.count);
   writeReport(folder_ / (name + ".json"), total_);
   constexpr double kMillimetres = 1000;
-  spdlog::info("depth error away from edges: mean {:.2g} mm, max {:.2g} mm, over {} frames",
-               kMillimetres * total_.awayFromEdges.mean(), kMillimetres * total_.awayFromEdges.max,
-               total_.frames);
+  logInfo("depth error away from edges: mean {:.2g} mm, max {:.2g} mm, over {} frames",
+          kMillimetres * total_.awayFromEdges.mean(), kMillimetres * total_.awayFromEdges.max,
+          total_.frames);
 }
 
 }  // namespace enfilade::server

@@ -1,6 +1,7 @@
 #include "server/commands/doctor.hpp"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
+
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>

@@ -1,7 +1,5 @@
 #include "server/commands/export.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cstdio>
 #include <fstream>
@@ -15,6 +13,7 @@
 #include "server/base/prepare_folder.hpp"
 #include "server/base/standard_output.hpp"
 #include "server/commands/camera_track.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/runs/run_report.hpp"
 
@@ -179,8 +178,8 @@ ExitCode exportRecording(const ExportCommand& command) {
                                          ": not a recording of Enfilade");
   report.push_back(files->finish());
   if (!reader.closed())
-    spdlog::warn("{}: truncated after byte {}; the data before that is exported",
-                 command.recording.string(), reader.wholeBytes());
+    logWarning("{}: truncated after byte {}; the data before that is exported",
+               command.recording.string(), reader.wholeBytes());
   writeToStdout(report.dump() + "\n", "the files are complete");
   return ExitCode::success;
 }

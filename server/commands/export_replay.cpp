@@ -1,7 +1,6 @@
 #include "server/commands/export_replay.hpp"
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 
 #include <cmath>
 #include <memory>
@@ -23,6 +22,7 @@
 #include "server/export/base64.hpp"
 #include "server/export/gzip.hpp"
 #include "server/export/scene_glb.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/net/page_files.hpp"
 #include "server/recording/world_from_recording.hpp"
@@ -89,8 +89,8 @@ ExportedRun readRun(const ExportReplayCommand& command) {
   }
   if (!found) throw RecordingError(command.recording.string() + ": not a recording of Enfilade");
   if (!reader.complete())
-    spdlog::warn("{}: truncated after byte {}; the data before that is exported",
-                 command.recording.string(), reader.wholeBytes());
+    logWarning("{}: truncated after byte {}; the data before that is exported",
+               command.recording.string(), reader.wholeBytes());
   return run;
 }
 
@@ -233,8 +233,8 @@ class ReplayExport {
   ExitCode finish() {
     render::writeFileAtomically(command_.html, html_);
     if (!leftOut_.empty())
-      spdlog::warn("left out to keep within {:g} MB: {}", command_.maxMegabytes,
-                   fmt::join(leftOut_, ", "));
+      logWarning("left out to keep within {:g} MB: {}", command_.maxMegabytes,
+                 fmt::join(leftOut_, ", "));
     const Json report{{"file", command_.html.string()},
                       {"bytes", html_.size()},
                       {"model_bytes", sceneBytes_.size()},

@@ -1,7 +1,6 @@
 #include "server/commands/route.hpp"
 
-#include <fmt/format.h>
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 
 #include <charconv>
 #include <nlohmann/json.hpp>
@@ -17,6 +16,7 @@
 #include "scene/navigation/place_names.hpp"
 #include "server/base/progress.hpp"
 #include "server/base/standard_output.hpp"
+#include "server/log/log.hpp"
 #include "server/navigation/shared_meshes.hpp"
 #include "server/plans/path_map.hpp"
 
@@ -187,7 +187,7 @@ void writePlan(const std::shared_ptr<const scene::Scene>& scene,
   trace.floors = {path.points.front().y(), path.points.back().y()};
   if (const auto image = drawMap(trace, {makePlanRenderer(renderer, snapshot), scene.get()})) {
     render::writePng(command.plan, *image);
-    spdlog::info("plan: {}", command.plan.string());
+    logInfo("plan: {}", command.plan.string());
   }
 }
 

@@ -2,7 +2,6 @@
 
 #include <malloc.h>
 #include <poll.h>
-#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <csignal>
@@ -13,6 +12,7 @@
 #include "protocol/recording/seekable_recording.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/base/standard_output.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/net/page_files.hpp"
 #include "server/net/server.hpp"
@@ -126,8 +126,8 @@ ExitCode serveUntilSignal(const ServeCommand& command) {
   Server server(scene, command.listen, std::move(options));
   printReady(server, *scene, command);
   const int signal = awaitEndingSignal(ending, server, command.stopAtEndOfInput);
-  spdlog::info("{}: finishing the tick and notifying the clients",
-               signal == SIGINT ? "interrupted" : "stopped");
+  logInfo("{}: finishing the tick and notifying the clients",
+          signal == SIGINT ? "interrupted" : "stopped");
   server.stop();
   const AuditTotals audit = server.auditTotals();
   if (command.auditEvery != 0) logTotals(audit);

@@ -1,7 +1,5 @@
 #include "server/commands/verify.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +8,7 @@
 #include "server/base/progress.hpp"
 #include "server/base/signal_handling.hpp"
 #include "server/base/standard_output.hpp"
+#include "server/log/log.hpp"
 #include "server/recording/playback.hpp"
 
 namespace enfilade::server {
@@ -98,8 +97,8 @@ nlohmann::ordered_json verifyAll(const VerifyCommand& command) {
                                 {"closed", recording.closed()}};
   if (!recording.complete()) {
     report["whole_bytes"] = recording.wholeBytes();
-    spdlog::warn("{}: truncated after byte {}; the data before that was verified",
-                 command.recording.string(), recording.wholeBytes());
+    logWarning("{}: truncated after byte {}; the data before that was verified",
+               command.recording.string(), recording.wholeBytes());
   }
   return report;
 }

@@ -3,8 +3,6 @@
 // both models side by side.
 #include "server/diff/change_images.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <array>
 #include <cmath>
 #include <map>
@@ -14,6 +12,7 @@
 #include "scene/world/queries/ray_caster.hpp"
 #include "server/capture/overlay.hpp"
 #include "server/diff/difference_text.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/plans/path_map.hpp"
 #include "server/recording/world_recorder.hpp"
@@ -352,7 +351,7 @@ void drawChanges(WalkDifference& difference, const ComparedModels& models,
   if (moments.empty()) return;
   drawMoments(moments, difference, models, folder);
   drawChangeMap(difference, models, folder);
-  spdlog::info("{} pictures of changes in {}", moments.size(), (folder / "changes").string());
+  logInfo("{} pictures of changes in {}", moments.size(), (folder / "changes").string());
 }
 
 }  // namespace enfilade::server

@@ -1,7 +1,5 @@
 #include "server/diff/resimulate.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <chrono>
 #include <map>
 #include <stdexcept>
@@ -17,6 +15,7 @@
 #include "server/diff/change_images.hpp"
 #include "server/diff/difference_json.hpp"
 #include "server/diff/difference_text.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/runs/in_process_driver.hpp"
 #include "server/runs/reported_run.hpp"
@@ -112,8 +111,8 @@ class WalkResimulation {
     }
     bar_.clear();
     if (extraTicks > 0)
-      spdlog::info("{} ticks more than recorded: some orders take longer{}", extraTicks,
-                   ends_.open() && !idle_ ? ", and have not ended yet" : "");
+      logInfo("{} ticks more than recorded: some orders take longer{}", extraTicks,
+              ends_.open() && !idle_ ? ", and have not ended yet" : "");
   }
 
   protocol::ScriptResult result;
@@ -173,7 +172,7 @@ std::shared_ptr<const scene::Scene> loadRecordedScene(const v1::RecordingStart& 
       throw std::runtime_error("it changed since the recording");
     return scene;
   } catch (const std::exception& error) {
-    spdlog::info("pictures show only the new model: {}: {}", model.file.string(), error.what());
+    logInfo("pictures show only the new model: {}: {}", model.file.string(), error.what());
     return nullptr;
   }
 }

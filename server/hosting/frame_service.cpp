@@ -1,7 +1,5 @@
 #include "server/hosting/frame_service.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <condition_variable>
 #include <deque>
@@ -13,6 +11,7 @@
 
 #include "render/service/render_thread.hpp"
 #include "server/base/work_thread.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/frame_encoding.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -128,7 +127,7 @@ EncodedMessage makeReply(PendingFrame& pending, const scene::Scene& scene) {
     return makeErrorReply(pending.job.requestId,
                           makeError(v1::ERROR_NO_RENDERER, error.what(), "renderer"));
   } catch (const std::exception& error) {
-    spdlog::error("cannot render a frame: {}", error.what());
+    logError("cannot render a frame: {}", error.what());
     return makeErrorReply(pending.job.requestId, makeError(v1::ERROR_INTERNAL, error.what()));
   }
 }
@@ -170,8 +169,8 @@ void FrameService::finish() {
 void FrameService::prepare() {
   state_->thread.post([&renderer = *state_->renderer] {
     if (!renderer.unavailableReason().empty())
-      return spdlog::warn("no frames: {}", renderer.unavailableReason());
-    if (!renderer.deviceWarning().empty()) spdlog::warn(renderer.deviceWarning());
+      return logWarning("no frames: {}", renderer.unavailableReason());
+    if (!renderer.deviceWarning().empty()) logWarning(renderer.deviceWarning());
   });
 }
 

@@ -1,9 +1,8 @@
 #include "server/hosting/replay_control.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include "collision/assert.hpp"
 #include "server/hosting/world_lifecycle.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -34,8 +33,8 @@ void startBranchRecording(HostedWorld& hosted) {
   const BranchPoint branch{hosted.replay->parent(), hosted.replay->activeContactsAt(hosted.world)};
   hosted.world.record(options, &branch);
   ++hosted.branchCount;
-  spdlog::info("recording the branch after tick {} to {}", branch.parent.tick(),
-               options.choice.file.string());
+  logInfo("recording the branch after tick {} to {}", branch.parent.tick(),
+          options.choice.file.string());
 }
 
 /// Replaces the world by the one after `tick`, with the active contacts of the replay.
@@ -146,7 +145,7 @@ std::optional<v1::Error> takeOverReplay(HostedWorld& hosted, ClientId id,
     try {
       startBranchRecording(hosted);
     } catch (const RecordingError& error) {
-      spdlog::error("cannot record the branch: {}", error.what());
+      logError("cannot record the branch: {}", error.what());
       return makeError(v1::ERROR_INTERNAL,
                        std::string("the branch cannot be recorded: ") + error.what());
     }

@@ -1,7 +1,6 @@
 #include "server/hosting/scene_file_service.hpp"
 
-#include <spdlog/fmt/fmt.h>
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <chrono>
@@ -11,6 +10,7 @@
 #include "scene/model/hasher.hpp"
 #include "server/export/gzip.hpp"
 #include "server/export/scene_glb.hpp"
+#include "server/log/log.hpp"
 #include "server/recording/foxglove/primitives.hpp"
 
 namespace enfilade::server {
@@ -38,9 +38,9 @@ SceneFile makeSceneFile(const scene::Scene& scene, const GlbContent& content) {
   file.bytes = std::make_shared<const FileBytes>(std::move(glb.bytes));
   file.tag = fmt::format("{:016x}-{:016x}", scene.hash(), hashContent(*file.bytes));
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  spdlog::info("scene.glb: {} entities, {} triangles, {} draw calls, {:.1f} MB in {:.2f} s",
-               glb.entities, glb.triangles, glb.drawGroups,
-               static_cast<double>(file.bytes->size()) / 1e6, seconds.count());
+  logInfo("scene.glb: {} entities, {} triangles, {} draw calls, {:.1f} MB in {:.2f} s",
+          glb.entities, glb.triangles, glb.drawGroups,
+          static_cast<double>(file.bytes->size()) / 1e6, seconds.count());
   return file;
 }
 
@@ -65,7 +65,7 @@ void SceneFileService::request(SceneFileKind kind, std::function<void(const Scen
     try {
       done(provide(kind));
     } catch (const std::exception& error) {  // too large, or no memory
-      spdlog::error("scene.glb: {}", error.what());
+      logError("scene.glb: {}", error.what());
       done({nullptr, "", error.what()});
     }
   });

@@ -1,7 +1,5 @@
 #include "server/inspection/inspect.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <filesystem>
 
 #include "protocol/mcap/reader.hpp"
@@ -12,6 +10,7 @@
 #include "server/inspection/inspect_recording.hpp"
 #include "server/inspection/inspection.hpp"
 #include "server/inspection/inspection_html.hpp"
+#include "server/log/log.hpp"
 #include "server/plans/floor_plans.hpp"
 
 namespace enfilade::server {
@@ -29,7 +28,7 @@ void writePlans(const std::shared_ptr<const scene::Scene>& scene, const InspectC
     } else {
       writeStoreyPage(*scene, storey, picture, command.planScale, file);
     }
-    spdlog::info("floor at {:.2f} m: {}", storey.height, file.string());
+    logInfo("floor at {:.2f} m: {}", storey.height, file.string());
   }
 }
 
@@ -44,7 +43,7 @@ void writePage(const Inspection& inspection, const InspectCommand& command) {
          drawStoreyPlan(*scene, storey, picture).value()});
   render::writeFileAtomically(command.html,
                               formatInspectionHtml(inspection, command.accepted, plans));
-  spdlog::info("report: {}", command.html.string());
+  logInfo("report: {}", command.html.string());
 }
 
 /// Logs the kinds that fail the check, with the option that accepts them.
@@ -54,7 +53,7 @@ ExitCode checkDiagnostics(const scene::SceneReport& report,
   for (const InspectedDiagnostic& entry : listDiagnostics(report, accepted))
     if (entry.fails()) kinds += (kinds.empty() ? "" : ",") + entry.diagnostic->kind;
   if (kinds.empty()) return ExitCode::success;
-  spdlog::error("--strict: the scene has problems; --accept {} accepts them", kinds);
+  logError("--strict: the scene has problems; --accept {} accepts them", kinds);
   return ExitCode::violations;
 }
 

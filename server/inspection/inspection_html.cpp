@@ -1,6 +1,6 @@
 #include "server/inspection/inspection_html.hpp"
 
-#include <fmt/format.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 

@@ -1,8 +1,8 @@
 #include "server/inspection/report_cache.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <nlohmann/json.hpp>
+
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -82,7 +82,7 @@ scene::SceneReport loadOrMakeReport(const scene::Scene& scene,
     if (auto report = parseReport(*cached)) return std::move(*report);
   scene::SceneReport report = makeSceneReport(scene);
   const std::string problem = scene::storeCachedText(*cache, key, serializeReport(report));
-  if (!problem.empty()) spdlog::warn("cache: the report cannot be stored: {}", problem);
+  if (!problem.empty()) logWarning("cache: the report cannot be stored: {}", problem);
   return report;
 }
 

@@ -1,4 +1,4 @@
-#include "server/app/rate_limited_sink.hpp"
+#include "server/log/rate_limited_sink.hpp"
 
 #include <spdlog/fmt/fmt.h>
 

@@ -5,7 +5,7 @@
 
 #include "collision/assert.hpp"
 #include "scene/world/contacts/excluded_pairs.hpp"
-#include "server/base/sanitize_for_log.hpp"
+#include "server/log/sanitize_for_log.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {

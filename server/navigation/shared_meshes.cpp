@@ -1,7 +1,5 @@
 #include "server/navigation/shared_meshes.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <bit>
 #include <chrono>
@@ -14,6 +12,7 @@
 #include "scene/import/cache/model_cache.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
 #include "server/base/load_scene.hpp"
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -67,8 +66,8 @@ std::unique_ptr<scene::Navigation> loadNavigation(const MeshRequest& request,
       std::make_unique<scene::Navigation>(request.scene, request.settings, request.agent, bytes);
   const std::size_t rebuilt = navigation->update(*request.snapshot, request.threads);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
-  spdlog::info("navigation: meshes for radius {} m, height {} m read in {:.2f} s, {} tiles built",
-               request.agent.radius, request.agent.height, seconds.count(), rebuilt);
+  logInfo("navigation: meshes for radius {} m, height {} m read in {:.2f} s, {} tiles built",
+          request.agent.radius, request.agent.height, seconds.count(), rebuilt);
   return navigation;
 }
 
@@ -77,13 +76,13 @@ std::unique_ptr<scene::Navigation> readNavigation(const MeshRequest& request,
                                                   std::vector<std::uint8_t>& bytes) {
   std::string damage;
   const auto text = scene::loadCachedText(cache, makeCacheKey(request), &damage);
-  if (!damage.empty()) spdlog::warn("cache: {}; the navigation meshes are built again", damage);
+  if (!damage.empty()) logWarning("cache: {}; the navigation meshes are built again", damage);
   if (!text) return nullptr;
   try {
     bytes.assign(text->begin(), text->end());
     return loadNavigation(request, bytes);
   } catch (const scene::MeshFileError& error) {
-    spdlog::warn("cache: {}; the navigation meshes are built again", error.what());
+    logWarning("cache: {}; the navigation meshes are built again", error.what());
     bytes.clear();
     return nullptr;
   }
@@ -104,9 +103,9 @@ std::unique_ptr<scene::Navigation> buildNavigation(const MeshRequest& request,
       std::make_unique<scene::Navigation>(request.scene, request.settings, request.agent,
                                           request.snapshot.get(), request.threads, progress);
   const scene::NavigationReport report = navigation->report();
-  spdlog::info("navigation: radius {} m, height {} m: {:.1f} m2 in {} islands, built in {:.2f} s",
-               request.agent.radius, request.agent.height, report.area, report.islandAreas.size(),
-               report.seconds);
+  logInfo("navigation: radius {} m, height {} m: {:.1f} m2 in {} islands, built in {:.2f} s",
+          request.agent.radius, request.agent.height, report.area, report.islandAreas.size(),
+          report.seconds);
   return navigation;
 }
 
@@ -126,7 +125,7 @@ std::unique_ptr<scene::Navigation> makeNavigation(const MeshRequest& request,
   if (!cache) return navigation;
   const std::string failure = scene::storeCachedText(
       *cache, makeCacheKey(request), std::string(shared->bytes.begin(), shared->bytes.end()));
-  if (!failure.empty()) spdlog::warn("cache: the navigation meshes are not kept: {}", failure);
+  if (!failure.empty()) logWarning("cache: the navigation meshes are not kept: {}", failure);
   return navigation;
 }
 

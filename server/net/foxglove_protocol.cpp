@@ -8,8 +8,8 @@
 
 #include "protocol/json_depth.hpp"
 #include "scene/model/trim.hpp"
-#include "server/base/sanitize_for_log.hpp"
 #include "server/export/base64.hpp"
+#include "server/log/sanitize_for_log.hpp"
 
 namespace enfilade::server::foxglove_protocol {
 namespace {

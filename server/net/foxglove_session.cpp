@@ -1,7 +1,5 @@
 #include "server/net/foxglove_session.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <boost/beast/websocket/rfc6455.hpp>
@@ -14,6 +12,7 @@
 #include "protocol/recording/recording.hpp"
 #include "server/base/version.hpp"
 #include "server/hosting/world_lifecycle.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/decode_message.hpp"
 #include "server/messages/frame_encoding.hpp"
 #include "server/net/tcp_transport.hpp"
@@ -133,7 +132,7 @@ void FoxgloveSession::join() {
       hosted.viewers.try_emplace(id, feed).first->second.select({}, hosted.world,
                                                                 hosted.activeContacts);
   });
-  spdlog::info("{} entered world '{}'", peer_, world_->identity().name);
+  logInfo("{} entered world '{}'", peer_, world_->identity().name);
 }
 
 // ---- receive -----------------------------------------------------------------------------------
@@ -447,7 +446,7 @@ void FoxgloveSession::end(v1::ErrorCode code, const std::string& reason) {
 void FoxgloveSession::close(const std::string& reason) {
   if (closed_) return;
   closed_ = true;
-  spdlog::info("{} left: {}", peer_, reason);
+  logInfo("{} left: {}", peer_, reason);
   if (client_ != 0) world_->leave(client_);
   if (accepted_ && ending_ && stream_.is_open() && !writing_) {
     stream_.async_close(websocket::close_code::going_away,

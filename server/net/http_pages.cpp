@@ -1,6 +1,6 @@
 #include "server/net/http_pages.hpp"
 
-#include <spdlog/fmt/fmt.h>
+#include <fmt/core.h>
 
 #include <algorithm>
 #include <cctype>

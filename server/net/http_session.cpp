@@ -1,7 +1,5 @@
 #include "server/net/http_session.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <boost/asio/post.hpp>
 #include <boost/asio/write.hpp>
@@ -10,6 +8,7 @@
 #include <utility>
 
 #include "collision/assert.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/decode_message.hpp"
 #include "server/net/foxglove_session.hpp"
 #include "server/net/http_pages.hpp"
@@ -78,7 +77,7 @@ void HttpSession::start(Clock::time_point deadline) {
             problem != http::error::end_of_stream && problem != http::error::partial_message) {
           return self->refuse(400, "not a request: " + problem.message());
         }
-        spdlog::info("{} left: {}", self->peer_, problem.message());
+        logInfo("{} left: {}", self->peer_, problem.message());
         self->close();
       });
 }
@@ -91,7 +90,7 @@ void HttpSession::end(v1::ErrorCode, const std::string& reason) {
 
 bool HttpSession::evictIfAnonymous() {
   if (closed_ || answered_ || awaitsFile_ || !replies_.empty()) return false;
-  spdlog::warn("{}: sent no request and was replaced by a new connection", peer_);
+  logWarning("{}: sent no request and was replaced by a new connection", peer_);
   close();
   return true;
 }
@@ -360,7 +359,7 @@ void HttpSession::sendMetrics() {
 
 void HttpSession::refuse(unsigned status, const std::string& reason) {
   if (answered_) return close();
-  spdlog::warn("{}: {} {}", peer_, status, reason);
+  logWarning("{}: {} {}", peer_, status, reason);
   sendResponse(status, "text/plain", reason + "\n");
 }
 

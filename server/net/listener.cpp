@@ -1,11 +1,10 @@
 #include "server/net/listener.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <boost/asio/io_context.hpp>
 
 #include "collision/assert.hpp"
 #include "server/base/server_error.hpp"
+#include "server/log/log.hpp"
 #include "server/net/protocol_detector.hpp"
 #include "server/net/server.hpp"
 
@@ -84,7 +83,7 @@ void Listener::accept() {
       return accept();
     }
     // Probably out of file descriptors: an immediate retry would spin.
-    spdlog::error("cannot accept a connection: {}", problem.message());
+    logError("cannot accept a connection: {}", problem.message());
     retryTimer_.expires_after(std::chrono::seconds(1));
     retryTimer_.async_wait([this](error_code stopped) {
       if (!stopped) accept();

@@ -1,13 +1,13 @@
 #include "server/net/page_files.hpp"
 
-#include <spdlog/fmt/fmt.h>
-#include <spdlog/spdlog.h>
+#include <fmt/core.h>
 
 #include <fstream>
 #include <iterator>
 #include <stdexcept>
 
 #include "scene/model/hasher.hpp"
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 namespace fs = std::filesystem;
@@ -63,7 +63,7 @@ PageFiles readPageFiles(const fs::path& folder) {
   }
   const auto index = files.find("/page/index.html");
   if (index != files.end()) files["/"] = index->second;
-  spdlog::info("page: {} files from {}", files.size(), folder.string());
+  logInfo("page: {} files from {}", files.size(), folder.string());
   return files;
 }
 

@@ -2,13 +2,12 @@
 
 #include <netinet/in.h>
 #include <netinet/tcp.h>
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <string_view>
 
 #include "collision/assert.hpp"
+#include "server/log/log.hpp"
 #include "server/net/http_session.hpp"
 #include "server/net/session.hpp"
 #include "server/net/tcp_transport.hpp"
@@ -66,7 +65,7 @@ bool ProtocolDetector::evictIfAnonymous() {
   if (finished_) return false;
   finished_ = true;
   timer_.cancel();
-  spdlog::warn("{}: sent nothing and was replaced by a new connection", formatPeerAddress(socket_));
+  logWarning("{}: sent nothing and was replaced by a new connection", formatPeerAddress(socket_));
   error_code none;
   socket_.close(none);
   return true;
@@ -82,8 +81,8 @@ void ProtocolDetector::read() {
     if (problem && !stopped) {
       self->finished_ = true;
       self->timer_.cancel();
-      spdlog::info("{} left without sending data: {}", formatPeerAddress(self->socket_),
-                   problem.message());
+      logInfo("{} left without sending data: {}", formatPeerAddress(self->socket_),
+              problem.message());
       return;
     }
     const Protocol detected = stopped ? Protocol::enfilade : self->detect();

@@ -1,14 +1,13 @@
 #include "server/net/session.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <boost/asio/post.hpp>
 #include <ranges>
 #include <utility>
 
 #include "collision/assert.hpp"
-#include "server/base/sanitize_for_log.hpp"
 #include "server/hosting/world_lifecycle.hpp"
+#include "server/log/log.hpp"
+#include "server/log/sanitize_for_log.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -199,7 +198,7 @@ void Session::handleHello(const v1::ClientMessage& message) {
 void Session::joinWorld(const v1::Hello& hello, Role role, std::uint64_t requestId) {
   world_ = context_.worlds.find(hello.world());
   if (world_) client_ = world_->join(hello.client_name(), role, out_, requestId);
-  if (client_ != 0) return spdlog::info("{} entered world '{}'", peer_, world_->identity().name);
+  if (client_ != 0) return logInfo("{} entered world '{}'", peer_, world_->identity().name);
   if (context_.worlds.isStopping())
     return fail(v1::ERROR_SHUTTING_DOWN, "the server is stopping", requestId);
   fail(v1::ERROR_UNKNOWN_WORLD,
@@ -219,7 +218,7 @@ void Session::fail(v1::ErrorCode code, const std::string& reason, std::uint64_t 
 void Session::end(v1::ErrorCode code, const std::string& reason) {
   if (!listening_) return;
   listening_ = false;
-  spdlog::warn("{}: {}; disconnected", peer_, reason);
+  logWarning("{}: {}; disconnected", peer_, reason);
   out_->finish(encodeBye(makeBye(code, reason)));
 }
 
@@ -259,7 +258,7 @@ void Session::startCloseTimer() {
   if (closeTimerStarted_) return;
   closeTimerStarted_ = true;
   if (listening_ && out_->overflowed()) {
-    spdlog::warn("{}: too slow for its replies and events; disconnected", peer_);
+    logWarning("{}: too slow for its replies and events; disconnected", peer_);
   }
   listening_ = false;
   timer_.expires_after(context_.limits.closeTimeout);
@@ -281,7 +280,7 @@ void Session::armTimer(Timer::time_point deadline, v1::ErrorCode code, std::stri
 void Session::close(const std::string& reason) {
   if (closed_) return;
   closed_ = true;
-  if (listening_ || client_ != 0) spdlog::info("{} left: {}", peer_, reason);
+  if (listening_ || client_ != 0) logInfo("{} left: {}", peer_, reason);
   listening_ = false;
   transport_->close();
   timer_.cancel();

@@ -1,13 +1,12 @@
 #include "server/plans/plan_drawing.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <limits>
 
 #include "scene/model/shapes/space_solid.hpp"
+#include "server/log/log.hpp"
 #include "server/plans/floor_plan_section.hpp"
 
 namespace enfilade::server {
@@ -239,7 +238,7 @@ std::string formatFloorAndCut(double floor) {
 
 void reportMissingFont(const Canvas& canvas) {
   if (canvas.textWithoutFont().empty()) return;
-  spdlog::warn(
+  logWarning(
       "a plan shows boxes in place of letters of '{}': no font has them here; install one, "
       "e.g. fonts-noto-cjk",
       canvas.textWithoutFont());

@@ -1,8 +1,7 @@
 #include "server/recording/playback.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include "scene/world/checkpoint/checkpoint.hpp"
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 
@@ -11,8 +10,7 @@ using protocol::mcap::RecordingError;
 Playback::Playback(const std::filesystem::path& recording, std::uint32_t run)
     : file_(recording), run_(run), recording_(recording, run), startTick_(recording_.firstTick()) {
   if (recording_.runs() > 1)
-    spdlog::info("{}: the file has {} runs; playing run {}", recording.string(), recording_.runs(),
-                 run);
+    logInfo("{}: the file has {} runs; playing run {}", recording.string(), recording_.runs(), run);
 }
 
 /// Restores the last checkpoint before `tick`; if it is unreadable, the start of the recording.
@@ -30,7 +28,7 @@ scene::World Playback::restoreNearest(std::uint64_t tick,
   } catch (const scene::CheckpointError& error) {
     if (scene->hash() != start().scene().hash() || firstTick() > 0)
       throw RecordingError(file_.string() + ": " + error.what());
-    spdlog::warn("{}: {}; playing from the beginning instead", file_.string(), error.what());
+    logWarning("{}: {}; playing from the beginning instead", file_.string(), error.what());
     startTick_ = firstTick();
     return makeWorldAtStart(scene, start());
   }

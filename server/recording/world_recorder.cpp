@@ -1,7 +1,5 @@
 #include "server/recording/world_recorder.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <array>
 #include <utility>
@@ -10,6 +8,7 @@
 #include "scene/world/checkpoint/checkpoint.hpp"
 #include "scene/world/data/validation.hpp"
 #include "server/base/version.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/body_messages.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -123,7 +122,7 @@ void WorldRecorder::writeUnlessBroken(const Work& work) {
     work();
   } catch (const RecordingError& error) {
     error_ = error.what();
-    spdlog::error("the recording ends here: {}", error.what());
+    logError("the recording ends here: {}", error.what());
   }
 }
 

@@ -1,7 +1,5 @@
 #include "server/runs/reported_run.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cstdio>
@@ -13,6 +11,7 @@
 #include "server/base/progress.hpp"
 #include "server/base/signal_handling.hpp"
 #include "server/base/standard_output.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/frame_messages.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/recording/contact_history.hpp"
@@ -62,7 +61,7 @@ PlanRenderer makePlanRenderer(const ScriptTarget& target) {
       std::memcpy(plan.ids.data(), ids.data(), plan.ids.size() * sizeof(std::uint32_t));
       return plan;
     } catch (const protocol::ProtocolError& problem) {
-      spdlog::warn("no map: {}", problem.what());
+      logWarning("no map: {}", problem.what());
       return std::nullopt;
     }
   };
@@ -195,7 +194,7 @@ std::unique_ptr<render::RendererSelector> tryMakeRenderer(
     return std::make_unique<render::RendererSelector>(scene, drawing.renderer, drawing.device);
   } catch (const render::RenderError& error) {
     if (drawing.isRequested()) throw;
-    spdlog::warn("no pictures: {}", error.what());
+    logWarning("no pictures: {}", error.what());
     return nullptr;
   }
 }

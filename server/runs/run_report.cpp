@@ -1,7 +1,5 @@
 #include "server/runs/run_report.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -10,6 +8,7 @@
 #include "render/image/atomic_file.hpp"
 #include "render/image/contact_sheet.hpp"
 #include "server/base/prepare_folder.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/event_names.hpp"
 #include "server/messages/world_messages.hpp"
 
@@ -224,7 +223,7 @@ void RunReport::writePictures(const RunSummary& runSummary, const MapBackground&
   if (const auto map = drawMap(trace_, background)) {
     render::writePng(folder_ / "map.png", *map);
   } else {
-    spdlog::warn("no map.png: no walks, or no renderer");
+    logWarning("no map.png: no walks, or no renderer");
   }
 }
 

@@ -1,7 +1,5 @@
 #include "server/worlds/tick_loop.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <iterator>
 
@@ -10,6 +8,7 @@
 #include "server/hosting/requests/dispatch.hpp"
 #include "server/hosting/requests/welcome.hpp"
 #include "server/hosting/world_lifecycle.hpp"
+#include "server/log/log.hpp"
 
 namespace enfilade::server {
 
@@ -283,7 +282,7 @@ void TickLoop::runRemainingJobs() {
 
 /// Ends this world after an internal error; other worlds continue.
 void TickLoop::fail(const std::string& reason) {
-  spdlog::critical("the tick of world '{}' failed: {}", identity().name, reason);
+  writeLog(LogLevel::critical, "the tick of world '{}' failed: {}", identity().name, reason);
   {
     const std::lock_guard lock(inbox_->mutex);
     inbox_->failure = std::current_exception();
@@ -296,7 +295,7 @@ void TickLoop::fail(const std::string& reason) {
     abortWorld(hosted_);
     runRemainingJobs();
   } catch (const std::exception& error) {
-    spdlog::critical("its clients cannot be notified: {}", error.what());
+    writeLog(LogLevel::critical, "its clients cannot be notified: {}", error.what());
   }
 }
 

@@ -1,13 +1,12 @@
 #include "server/worlds/world_registry.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include <algorithm>
 #include <filesystem>
 
 #include "collision/assert.hpp"
 #include "scene/model/names.hpp"
-#include "server/base/sanitize_for_log.hpp"
+#include "server/log/log.hpp"
+#include "server/log/sanitize_for_log.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -205,7 +204,7 @@ void WorldRegistry::endWorld(TickLoop& world, v1::ErrorCode code, const std::str
   ENFILADE_ASSERT(&world != mainWorld_.get());
   world.stop(code, reason);
   auditTotals_.addTotals(world.auditTotals());
-  spdlog::info("{}", reason);
+  logInfo("{}", reason);
 }
 
 std::variant<v1::World, v1::Error> WorldRegistry::createNow(CreateWorldRequest request) {
@@ -214,10 +213,10 @@ std::variant<v1::World, v1::Error> WorldRegistry::createNow(CreateWorldRequest r
     HostedScene& scene = *findScene(request.scene);
     if (request.name.empty()) request.name = makeUniqueWorldName(scene.name);
     const TickLoopPtr world = startWorld(request.name, scene, request.dropWhenEmpty);
-    spdlog::info("created the world '{}' of the scene '{}'", request.name, request.scene);
+    logInfo("created the world '{}' of the scene '{}'", request.name, request.scene);
     return world->makeStatus();
   } catch (const std::exception& error) {  // no memory, or no thread
-    spdlog::error("cannot create the world '{}': {}", request.name, error.what());
+    logError("cannot create the world '{}': {}", request.name, error.what());
     return makeError(v1::ERROR_INTERNAL, std::string("cannot create the world: ") + error.what());
   }
 }

@@ -73,6 +73,7 @@ const std::vector<std::string> kRooms{
     "protocol/recording",
     "protocol/script",
     "protocol/clients/cpp",
+    "server/log",
     "server/base",
     "server/export",
     "server/messages",

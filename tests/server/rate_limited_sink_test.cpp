@@ -1,5 +1,5 @@
 // Tests of the log's limit of lines.
-#include "server/app/rate_limited_sink.hpp"
+#include "server/log/rate_limited_sink.hpp"
 
 #include <gtest/gtest.h>
 #include <spdlog/sinks/ostream_sink.h>

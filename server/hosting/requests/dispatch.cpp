@@ -1,7 +1,5 @@
 #include "server/hosting/requests/dispatch.hpp"
 
-#include <spdlog/spdlog.h>
-
 #include "collision/assert.hpp"
 #include "protocol/framing.hpp"
 #include "protocol/unknown_enums.hpp"
@@ -12,6 +10,7 @@
 #include "server/hosting/requests/query_requests.hpp"
 #include "server/hosting/requests/subscription_requests.hpp"
 #include "server/hosting/requests/world_requests.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -154,7 +153,7 @@ void handleSafely(const RequestContext& context) {
   try {
     dispatchRequest(context);
   } catch (const std::exception& error) {
-    spdlog::error("a request of '{}' failed: {}", context.client.name, error.what());
+    logError("a request of '{}' failed: {}", context.client.name, error.what());
     context.client.pendingReply.reset();
     context.client.pendingStep.reset();
     replyError(context, v1::ERROR_INTERNAL, error.what());
