@@ -1,6 +1,6 @@
 #include "server/commands/export_replay.hpp"
 
-#include <fmt/core.h>
+#include <fmt/format.h>
 
 #include <cmath>
 #include <memory>

@@ -170,7 +170,7 @@ void FrameService::prepare() {
   state_->thread.post([&renderer = *state_->renderer] {
     if (!renderer.unavailableReason().empty())
       return logWarning("no frames: {}", renderer.unavailableReason());
-    if (!renderer.deviceWarning().empty()) logWarning(renderer.deviceWarning());
+    if (!renderer.deviceWarning().empty()) logWarning("{}", renderer.deviceWarning());
   });
 }
 
