@@ -297,9 +297,6 @@ void updateWalk(const Walk& walk, OrderContext& context) {
   const Vec3& goal = walk.waypoints[avatar.walk.waypointIndex];
   const double distance = computeRemainingDistance(avatar, goal);
   const bool isLast = avatar.walk.waypointIndex + 1 == walk.waypoints.size();
-  const bool mayPass = !isLast && walk.rides.empty();
-  const double arrivalDistance =
-      mayPass ? computePassingDistance(context.world, avatar) : kArrivalDistance;
   if (avatar.walk.waitsFor != 0) {
     avatar.walk.timeoutLeft -= context.world.settings.tickDuration;
     if (avatar.walk.timeoutLeft <= kTimeTolerance)
@@ -307,8 +304,14 @@ void updateWalk(const Walk& walk, OrderContext& context) {
               avatar.walk.waitsFor);
     return;
   }
-  if (distance <= arrivalDistance && !isFallingFar(avatar, context.world.settings) &&
-      std::abs(goal.y() - avatar.footPosition.y()) <= kArrivalHeight) {
+  const auto isPassedEarly = [&] {
+    return !isLast && walk.rides.empty() &&
+           mayPassEarly(context.world, avatar, distance,
+                        walk.waypoints[avatar.walk.waypointIndex + 1], context.count);
+  };
+  if (!isFallingFar(avatar, context.world.settings) &&
+      std::abs(goal.y() - avatar.footPosition.y()) <= kArrivalHeight &&
+      (distance <= kArrivalDistance || isPassedEarly())) {
     ++avatar.walk.waypointIndex;
     if (!isLast) return startWaypoint(context.world, walk, avatar);
     return endWalk(context, Notice::Kind::arrived);

@@ -1,7 +1,8 @@
 // A walk yields to another one that is ahead of it within kFollowDistance, is closer to its way
 // point, and walks to the same place or in about the same direction. Among walks to one place
-// that is a strict order, so one of them always goes. Walks in opposite directions do not yield;
-// they slide past each other.
+// that is a strict order, so one of them always goes. Two more rules keep other walks from waiting
+// for ever: rings are opened, and walks that wedge one another step back. Walks in opposite
+// directions do not yield; they slide past each other.
 #include "scene/world/avatars/yielding.hpp"
 
 #include <algorithm>
@@ -9,13 +10,16 @@
 #include <limits>
 
 #include "scene/world/avatars/walk_velocity.hpp"
+#include "scene/world/contacts/obstacles.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 constexpr double kMinGap = 0.02;  // metres between the boxes of the shapes: closer, it steps back
 constexpr double kFollowDistance = 0.1;       // metres: farther, it walks at full speed
-constexpr double kMinSpeedFactor = 0.05;      // slower, it stands
+constexpr double kMinSpeedFactor = 0.15;      // slower, it stands
+constexpr double kOpposedCosine = -0.9;       // of two walks that meet head-on
+constexpr double kStallSeconds = 1;           // without progress: it is wedged
 constexpr double kMaxRetreat = -0.5;          // of the speed
 constexpr double kAheadCosine = 0.7071;       // walks in one direction: within 45 degrees of it
 constexpr double kAbreastCosine = -0.1;       // walks to one place: ahead or abreast
@@ -71,8 +75,28 @@ double computeGapAhead(const Avatar& avatar, const GroundWalk& walk, const Avata
   return isCloser ? between - walk.reach - otherWalk.reach : kNone;
 }
 
+/// Walks that wedge one another, as in the arch that a crowd forms in front of a door: one that
+/// makes no progress yields to a neighbour that is closer to its own way point. Infinite: not to
+/// this one.
+double computeGapToUnwedge(const Avatar& avatar, const GroundWalk& walk, const Avatar& other,
+                           const GroundWalk& otherWalk) {
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  if (!otherWalk.goal || walk.heading.dot(otherWalk.heading) < kOpposedCosine) return kNone;
+  const bool isCloser = otherWalk.distance < walk.distance ||
+                        (otherWalk.distance == walk.distance && other.id < avatar.id);
+  const double between = computeGroundDistance(avatar.footPosition, other.footPosition);
+  return isCloser ? between - walk.reach - otherWalk.reach : kNone;
+}
+
+bool isStalled(const WorldSettings& settings, const Avatar& avatar) {
+  return avatar.walk.timeoutLeft <
+         settings.stuckTimeout - std::min(kStallSeconds, 0.5 * settings.stuckTimeout);
+}
+
+constexpr std::size_t kNobody = std::numeric_limits<std::size_t>::max();
+
 struct Leader {
-  const Avatar* avatar = nullptr;
+  std::size_t index = kNobody;   ///< into WorldData::avatars
   double gap = kFollowDistance;  ///< metres
 };
 
@@ -80,15 +104,45 @@ struct Leader {
 Leader findLeader(const WorldData& world, const std::vector<GroundWalk>& walks,
                   const Avatar& avatar, const GroundWalk& walk) {
   Leader leader;
+  const bool stalled = isStalled(world.settings, avatar);
   for (const auto& overlap :
        world.broadPhase.dynamicOverlapsOf(avatar.proxy)) {  // of the last tick
     const Avatar* other = world.findAvatarByProxy(overlap.id);
     if (!other) continue;
-    const double gap = computeGapAhead(
-        avatar, walk, *other, walks[static_cast<std::size_t>(other - world.avatars.data())]);
-    if (gap < kFollowDistance && gap <= leader.gap) leader = {other, gap};
+    const auto index = static_cast<std::size_t>(other - world.avatars.data());
+    double gap = computeGapAhead(avatar, walk, *other, walks[index]);
+    if (stalled) gap = std::min(gap, computeGapToUnwedge(avatar, walk, *other, walks[index]));
+    if (gap < kFollowDistance && gap <= leader.gap) leader = {index, gap};
   }
   return leader;
+}
+
+/// Walks to different way points may wait for one another in a ring, and would do so for ever: the
+/// one closest to its way point goes.
+void openRings(std::vector<Leader>& leaders, const std::vector<GroundWalk>& walks) {
+  std::vector<std::size_t> visit(leaders.size(), kNobody);  // the first walk whose chain led here
+  for (std::size_t first = 0; first < leaders.size(); ++first) {
+    std::size_t at = first;
+    while (at != kNobody && visit[at] == kNobody) {
+      visit[at] = first;
+      at = leaders[at].index;
+    }
+    if (at == kNobody || visit[at] != first) continue;
+    std::size_t closest = at;
+    for (std::size_t next = leaders[at].index; next != at; next = leaders[next].index)
+      if (walks[next].distance < walks[closest].distance) closest = next;
+    leaders[closest] = {};
+  }
+}
+
+/// The walk in whose queue the avatar waits: its leader, or who blocks it and waits itself.
+const Avatar* findQueueAhead(const WorldData& world, const std::vector<Leader>& leaders,
+                             std::size_t index) {
+  if (leaders[index].index != kNobody) return &world.avatars[leaders[index].index];
+  const Avatar* blocking = world.findAvatar(world.avatars[index].blockedBy);
+  if (!blocking) return nullptr;
+  const auto i = static_cast<std::size_t>(blocking - world.avatars.data());
+  return leaders[i].index != kNobody ? blocking : nullptr;
 }
 
 /// Negative: it steps back, as the one ahead may need the place, such as the way point itself.
@@ -101,20 +155,39 @@ double computeSpeedFactor(double gap) {
 
 void yieldToWalkersAhead(WorldData& world) {
   const std::vector<GroundWalk> walks = findGroundWalks(world);
+  std::vector<Leader> leaders(walks.size());
+  for (std::size_t i = 0; i < walks.size(); ++i)
+    if (walks[i].goal) leaders[i] = findLeader(world, walks, world.avatars[i], walks[i]);
+  openRings(leaders, walks);
   for (std::size_t i = 0; i < walks.size(); ++i) {
     if (!walks[i].goal) continue;
     Avatar& avatar = world.avatars[i];
-    const Leader leader = findLeader(world, walks, avatar, walks[i]);
-    avatar.walk.yields = leader.avatar != nullptr;
-    avatar.walk.flowTick = leader.avatar ? leader.avatar->walk.flowTick : world.tick;
-    if (!leader.avatar) continue;
-    avatar.desiredVelocity *= computeSpeedFactor(leader.gap);
+    const Leader& leader = leaders[i];
+    const Avatar* ahead = findQueueAhead(world, leaders, i);
+    avatar.walk.yields = ahead != nullptr;
+    avatar.walk.flowTick = ahead ? ahead->walk.flowTick : world.tick;
+    if (leader.index != kNobody) avatar.desiredVelocity *= computeSpeedFactor(leader.gap);
   }
 }
 
-double computePassingDistance(const WorldData& world, const Avatar& avatar) {
+bool mayPassEarly(const WorldData& world, const Avatar& avatar, double distance, const Vec3& next,
+                  QueryCount& count) {
   const bool isCrowded = avatar.walk.yields || avatar.blockedBy >= world.firstAvatarId();
-  return isCrowded && !avatar.flying ? 2 * computeHalfWidth(avatar.shape->box) : kArrivalDistance;
+  const double width = 2 * computeHalfWidth(avatar.shape->box);
+  if (!isCrowded || avatar.flying || distance > width) return false;
+  // As far as beyond the corner that the way point may mark.
+  Vec3 onward = projectToGround(next - avatar.footPosition);
+  const double length = onward.norm();
+  if (length > 2 * width) onward *= 2 * width / length;
+  Aabb box = placeBox(avatar.shape->box, avatar.footPosition);
+  box.include(placeBox(avatar.shape->box, avatar.footPosition + onward));
+  ObstacleSet obstacles =
+      collectObstaclesInBox(world, inflated(box, 2 * world.settings.contactOffset), avatar.id);
+  std::erase_if(obstacles.list,
+                [&](const Obstacle& one) { return one.entity >= world.firstAvatarId(); });
+  return castAvatarShape(*avatar.shape, avatar.footPosition, onward, obstacles,
+                         makeContactOffset(world.settings), count)
+             .entity == 0;
 }
 
 bool isQueueing(const WorldData& world, const Avatar& avatar) {

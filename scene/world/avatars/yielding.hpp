@@ -2,6 +2,7 @@
 // so that a crowd passes a door one by one instead of wedging itself in.
 #pragma once
 
+#include "scene/world/data/tick_report.hpp"
 #include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {
@@ -10,9 +11,11 @@ namespace enfilade::scene {
 /// velocities of the tick are known.
 void yieldToWalkersAhead(WorldData& world);
 
-/// Metres from a way point, not the last one, at which the avatar walks on to the next. In a crowd
-/// that is before it, because there is no room for all on one point.
-double computePassingDistance(const WorldData& world, const Avatar& avatar);
+/// True if the avatar walks on to `next` before it reaches the way point at `distance` metres. In a
+/// crowd it does so near the point, where there is no room for all, if no static object and no body
+/// is in the way.
+bool mayPassEarly(const WorldData& world, const Avatar& avatar, double distance, const Vec3& next,
+                  QueryCount& count);
 
 /// True while the avatar waits in a queue that advances, so that it is not stuck.
 bool isQueueing(const WorldData& world, const Avatar& avatar);
