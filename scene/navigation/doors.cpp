@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "scene/navigation/ghost.hpp"
 #include "scene/world/data/body.hpp"
 #include "scene/world/world.hpp"
@@ -53,6 +54,17 @@ std::shared_ptr<const Snapshot> makeSnapshotWithOpenDoors(std::shared_ptr<const 
       break;
   }
   return world.snapshot();
+}
+
+Snapshot takeDoors(const Scene& scene, Snapshot present, const Snapshot& open) {
+  auto bodies = std::make_shared<std::vector<BodySnapshot>>(*present.bodies);
+  for (std::size_t i = 0; i < bodies->size(); ++i) {
+    const BodySnapshot& opened = (*open.bodies)[i];
+    ENFILADE_ASSERT(opened.index == (*bodies)[i].index);
+    if (getTraits(scene.model().bodies[opened.index].kind).isDoor) (*bodies)[i] = opened;
+  }
+  present.bodies = std::move(bodies);
+  return present;
 }
 
 namespace {

@@ -19,6 +19,9 @@ bool hasDoors(const Scene& scene);
 std::shared_ptr<const Snapshot> makeSnapshotWithOpenDoors(std::shared_ptr<const Scene> scene,
                                                           const WorldSettings& settings);
 
+/// `present` with the doors as in `open`: all other bodies stand where they are.
+Snapshot takeDoors(const Scene& scene, Snapshot present, const Snapshot& open);
+
 struct DoorOnPath {
   std::uint32_t body = 0;    ///< index into Model::bodies
   std::size_t point = 0;     ///< index of the first point of the line on which it stands

@@ -46,7 +46,8 @@ void addBodies(const v1::NavigationPath& path, int skipped, v1::Walk& walk) {
   };
   for (const v1::NavigationLeg& leg : path.legs()) {
     const int first = static_cast<int>(leg.first());
-    if (leg.kind() == v1::NavigationLeg::KIND_DOOR && !leg.by_touch()) walk.add_opens(leg.name());
+    // Also a door that a touch would open: its leaf may swing towards whoever touches it.
+    if (leg.kind() == v1::NavigationLeg::KIND_DOOR) walk.add_opens(leg.name());
     if (leg.kind() != v1::NavigationLeg::KIND_LIFT) continue;
     addRide(first, leg, leg.from_level());  // in
     addRide(first + 1, leg, leg.to_level());

@@ -208,20 +208,28 @@ NavigationService::Entry& NavigationService::prepare(const scene::NavigationAgen
   const auto known = std::ranges::find_if(entries_, [&](const Entry& entry) {
     return entry.agent == agent && entry.doorsOpen == doorsOpen && entry.settings == state.settings;
   });
+  const auto snapshot = makeMeshSnapshot(doorsOpen, state);
   if (known != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, known);
-    if (!doorsOpen) {
-      known->navigation->update(*state.snapshot);
-      known->snapshot = state.snapshot;
-    }
+    known->navigation->update(*snapshot);
+    known->snapshot = snapshot;
     return *known;
   }
-  const auto snapshot =
-      doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
   auto navigation =
       makeNavigation({scene_, state.settings, agent, doorsOpen, snapshot}, state.progress);
   keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
   return entries_.front();
+}
+
+std::shared_ptr<const scene::Snapshot> NavigationService::makeMeshSnapshot(
+    bool doorsOpen, const NavigationState& state) {
+  if (!doorsOpen) return state.snapshot;
+  if (!openDoors_ || openDoorsSettings_ != state.settings) {
+    openDoors_ = scene::makeSnapshotWithOpenDoors(scene_, state.settings);
+    openDoorsSettings_ = state.settings;
+  }
+  return std::make_shared<const scene::Snapshot>(
+      scene::takeDoors(*scene_, *state.snapshot, *openDoors_));
 }
 
 void NavigationService::keep(Entry entry) {
@@ -236,8 +244,7 @@ std::optional<v1::Error> NavigationService::load(const scene::NavigationAgent& a
     auto navigation = std::make_unique<scene::Navigation>(
         scene_, state.settings, agent,
         std::span(reinterpret_cast<const std::uint8_t*>(mesh.data()), mesh.size()));
-    const auto snapshot =
-        doorsOpen ? scene::makeSnapshotWithOpenDoors(scene_, state.settings) : state.snapshot;
+    const auto snapshot = makeMeshSnapshot(doorsOpen, state);
     const std::size_t rebuilt = navigation->update(*snapshot);
     logInfo("navigation: loaded meshes for radius {} m, height {} m; {} tiles built again",
             agent.radius, agent.height, rebuilt);

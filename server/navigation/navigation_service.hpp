@@ -45,6 +45,9 @@ class NavigationService {
   /// The navigation of a size, brought to the state of the query.
   Entry& prepare(const scene::NavigationAgent& agent, bool doorsOpen, const NavigationState& state);
 
+  /// The state of a world for the meshes: with open doors if that is asked for.
+  std::shared_ptr<const scene::Snapshot> makeMeshSnapshot(bool doorsOpen,
+                                                          const NavigationState& state);
   void keep(Entry entry);
   /// Takes saved meshes for a size; nullopt: done.
   std::optional<v1::Error> load(const scene::NavigationAgent& agent, bool doorsOpen,
@@ -53,6 +56,9 @@ class NavigationService {
   std::shared_ptr<const scene::Scene> scene_;
   std::optional<scene::EntityIndex> index_;  ///< built at first use
   std::list<Entry> entries_;                 ///< most recently used first
+  /// A new world with open doors, made at first use, and its settings.
+  std::shared_ptr<const scene::Snapshot> openDoors_;
+  scene::WorldSettings openDoorsSettings_;
 };
 
 }  // namespace enfilade::server

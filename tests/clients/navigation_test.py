@@ -261,11 +261,11 @@ class DoorsTest(unittest.TestCase):
     SIDECAR = """{"walk":1,"bodies":[{"name":"door","kind":"sliding","objects":["leaf"],"axis":[0,0,1],
         "limits":[0,1.0],"speed":0.5%s}]}"""
 
-    def server(self, more=""):
+    def server(self, more="", sidecar="", **boxes):
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
-        (Path(folder.name) / "rooms.obj").write_text(obj(self.BOXES))
-        (Path(folder.name) / "rooms.walk.json").write_text(self.SIDECAR % more)
+        (Path(folder.name) / "rooms.obj").write_text(obj({**self.BOXES, **boxes}))
+        (Path(folder.name) / "rooms.walk.json").write_text(sidecar or self.SIDECAR % more)
         server = enfilade.serve(Path(folder.name) / "rooms.obj")
         self.addCleanup(server.stop)
         client = server.connect()
@@ -338,6 +338,29 @@ class DoorsTest(unittest.TestCase):
         self.assertTrue(path.doors[0].by_touch)
         ann = client.spawn("ann", at=(-1, 0, 0))
         self.assertEqual(ann.go_and_wait((2, 0, 0), doors="open"), "arrived")
+
+    def test_go_waits_for_a_leaf_that_swings_towards_it(self):
+        client = self.server(sidecar="""{"walk":1,"bodies":[{"name":"door","kind":"hinged","objects":["leaf"],
+            "anchor":[0,0,-0.48],"limits":[0,95],"speed":60,"opened_by":"touch","closes_after":1}]}""")
+        navigation = client.navigation(doors="open")
+        for x, z in ((-3, 0), (3, 0), (-2, 1.5), (2, 1.5), (-2, -1.5), (2, -1.5)):
+            goal = (-x, 0, 0.2)
+            self.assertTrue(navigation.path((x, 0, z), goal).doors[0].by_touch)
+            ann = client.spawn("ann", at=(x, 0, z))
+            self.assertEqual(ann.go_and_wait(goal, doors="open"), "arrived", (x, z))
+            ann.leave()
+            client.step(240)  # the door closes
+
+    def test_open_doors_leave_other_bodies_where_they_stand(self):
+        client = self.server(',"closes_after":1},{"name":"crate","kind":"lift","objects":["crate"],"stops":[-3,0]',
+                             crate=((0.5, 3.05, -0.45), (1.5, 4.5, 0.45)))
+        navigation = client.navigation(doors="open")
+        self.assertTrue(navigation.is_navigable((1, 0, 0)))
+        self.assertEqual(navigation.path((-2, 0, 0), (2, 0, 0)).length, 4)
+        client.body("crate", level=0)
+        client.step(600)
+        self.assertFalse(navigation.is_navigable((1, 0, 0)))
+        self.assertGreater(navigation.path((-2, 0, 0), (2, 0, 0)).length, 4.1)
 
     def test_islands_have_the_reason_that_separates_them(self):
         islands = self.server().navigation().islands(3)
