@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <random>
 #include <utility>
@@ -16,7 +17,7 @@ namespace {
 
 constexpr std::size_t kMaxCentres = 8;        // polygons of an island whose centre is tried
 constexpr int kMaxTrials = 64;                // further places of an island that are tried
-constexpr double kLeastDrawnArea = 1;         // square metres
+constexpr double kMinDrawnArea = 1;           // square metres
 constexpr double kBelowRoof = 1;              // metres: a floor below is lower by more
 constexpr double kBesideFloor = 1;            // metres: walls and furniture interrupt floors below
 constexpr std::size_t kMaxSearchFrom = 2000;  // polygons of an island whose neighbours are sought
@@ -90,7 +91,7 @@ void chooseDrawn(std::vector<Island>& islands) {
     for (Island& island : islands) any |= island.isDrawn = isWanted(island);
     return any;
   };
-  if (choose([](const Island& one) { return !one.isRoof && one.area >= kLeastDrawnArea; })) return;
+  if (choose([](const Island& one) { return !one.isRoof && one.area >= kMinDrawnArea; })) return;
   if (choose([](const Island& one) { return !one.isRoof; })) return;
   choose([](const Island&) { return true; });
 }
@@ -118,6 +119,43 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
         isRoof(mesh, list.numberOf, kept[i], list.islands[i].area, bounds.min.y());
   chooseDrawn(list.islands);
   return list;
+}
+
+void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
+                 const std::function<bool(const Vec3&, const Vec3&)>& isJoined) {
+  std::vector<std::uint32_t> joinedTo(list.islands.size());  // a smaller number, or itself
+  std::iota(joinedTo.begin(), joinedTo.end(), 0u);
+  const auto findFirst = [&](std::uint32_t number) {
+    while (joinedTo[number] != number) number = joinedTo[number];
+    return number;
+  };
+  for (std::uint32_t number = 1; number < joinedTo.size(); ++number) {
+    if (!list.islands[number].isDrawn) continue;
+    for (const IslandNeighbour& near : findNeighbours(mesh, list, number, reach, heightReach)) {
+      const std::uint32_t a = findFirst(number), b = findFirst(near.number);
+      if (a == b || !list.islands[near.number].isDrawn || !isJoined(near.from, near.to)) continue;
+      joinedTo[std::max(a, b)] = std::min(a, b);
+    }
+  }
+  std::vector<std::uint32_t> order;  // of the islands that remain, the largest first
+  for (std::uint32_t number = 0; number < joinedTo.size(); ++number) {
+    const std::uint32_t first = findFirst(number);
+    if (first == number)
+      order.push_back(number);
+    else
+      list.islands[first].area += list.islands[number].area;
+  }
+  std::ranges::stable_sort(order, std::greater(),
+                           [&](std::uint32_t number) { return list.islands[number].area; });
+  std::vector<Island> islands;
+  std::vector<std::uint32_t> rank(joinedTo.size());
+  for (const std::uint32_t number : order) {
+    rank[number] = static_cast<std::uint32_t>(islands.size());
+    islands.push_back(list.islands[number]);
+  }
+  for (std::uint32_t& number : list.numberOf)
+    if (number != kNoIsland) number = rank[findFirst(number)];
+  list.islands = std::move(islands);
 }
 
 std::vector<IslandNeighbour> findNeighbours(const NavigationMesh& mesh, const IslandList& list,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
@@ -31,6 +32,12 @@ struct IslandList {
 /// Leaves out islands on which no place to stand is found, as those in the inside of solids.
 /// `bounds`: of the scene.
 IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb& bounds);
+
+/// Makes one of islands that are drawn, close to each other, and joined. Portals of a mesh need
+/// some centimetres more than an agent, so a gap that it just passes separates them at first.
+/// `isJoined(from, to)`: an agent walks from one side of a gap to the other.
+void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
+                 const std::function<bool(const Vec3&, const Vec3&)>& isJoined);
 
 /// Another island that is close, and the points of both that are closest, about.
 struct IslandNeighbour {

@@ -22,6 +22,8 @@ namespace {
 
 constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile beyond the radius
 constexpr int kMaxRandomTries = 200;
+constexpr double kWallAndDoor = 1.5;  // metres between floors on both sides of a thick wall
+constexpr double kMaxGapDetour = 3;   // metres: a longer way around a gap does not pass it
 
 /// Puts a body where it rests.
 void placeBody(const collision::Pose& pose, Body& own) {
@@ -140,6 +142,7 @@ void Navigation::assembleMeshes() {
   ample_.emplace(grid_, ampleTiles_);
   scarce_.emplace(grid_, scarceTiles_);
   islands_ = collectIslands(*ample_, *walker_, world_.scene().bounds());
+  joinIslands();
   drawn_ = {};
   for (std::uint32_t i = 0; i < ample_->polygonCount(); ++i) {
     if (islands_.numberOf[i] == kNoIsland || !islands_.islands[islands_.numberOf[i]].isDrawn)
@@ -156,6 +159,35 @@ void Navigation::assembleMeshes() {
   report_.bytes = 2 * (ample_->memoryBytes() + scarce_->memoryBytes());
 }
 
+void Navigation::joinIslands() {
+  const std::vector<std::uint32_t> scarce = scarce_->findIslands();
+  scene::joinIslands(
+      *ample_, islands_, kWallAndDoor + 2 * agent_.radius, world_.settings().stepHeight,
+      [&](const Vec3& from, const Vec3& to) { return isGapPassable(from, to, scarce); });
+}
+
+/// `scarce`: islands of the mesh with portals that may be too narrow.
+bool Navigation::isGapPassable(const Vec3& from, const Vec3& to,
+                               const std::vector<std::uint32_t>& scarce) {
+  constexpr std::size_t kMaxRepairWalks = 2000;
+  const Vec3 extent(agent_.radius, 0.5, agent_.radius);
+  const auto a = scarce_->findNearest(from, extent), b = scarce_->findNearest(to, extent);
+  if (!a || !b || scarce[a->polygon] != scarce[b->polygon]) return false;
+  const auto known =
+      std::ranges::find_if(gaps_, [&](const Gap& gap) { return gap.from == from && gap.to == to; });
+  if (known != gaps_.end()) return known->isPassable;
+  const auto start = standNear(*walker_, from), goal = standNear(*walker_, to);
+  bool isPassable = false;
+  if (start && goal) {
+    const PathFinder finder{world_.data(), agent_,  *walker_,       *ample_,
+                            *scarce_,      nullptr, kMaxRepairWalks};
+    const NavigationPath path = scene::findPath(finder, *start, *goal);
+    isPassable = path.found() && path.length <= (*goal - *start).norm() + kMaxGapDetour;
+  }
+  gaps_.push_back({from, to, isPassable});
+  return isPassable;
+}
+
 std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
   const std::lock_guard lock(mutex_);
   bodies_ = std::make_shared<const Snapshot>(snapshot);
@@ -163,6 +195,10 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
   std::vector<bool> isChanged(ampleTiles_.size(), false);
   const double margin = agent_.radius + kTileMargin;
   const auto markTiles = [&](const Aabb& box) {
+    std::erase_if(gaps_, [&](const Gap& gap) {
+      const Aabb around{gap.from.cwiseMin(gap.to), gap.from.cwiseMax(gap.to)};
+      return overlaps(inflated(around, kMaxGapDetour + agent_.radius), box);
+    });
     const auto tileOf = [&](double at, double origin, int count) {
       const double tile = std::floor((at - origin) / grid_.tileSize());
       return static_cast<int>(std::clamp(tile, 0.0, count - 1.0));
@@ -246,22 +282,32 @@ std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
     return collision::contains(inflated(box, kHeightError), {place, place}) &&
            (!named.space || isInSpace(*named.space, {place.x(), middle.y(), place.z()}));
   };
-  if (const auto place = standAt(*walker_, centre + Vec3(0, kHeightError, 0), 2 * kHeightError);
-      place && isInside(*place) && (!island || islandAt(*place) == island))
-    return place;
-  std::vector<std::pair<double, Vec3>> candidates;
-  const auto addCandidate = [&](const Vec3& point) {
-    candidates.emplace_back(computeGroundDistance(point, centre), point);
+  if (const auto place = standAt(*walker_, centre + Vec3(0, kHeightError, 0), 2 * kHeightError)) {
+    const auto number = islandAt(*place);
+    const bool isWanted = island ? number == island : number && islands_.islands[*number].isDrawn;
+    if (isInside(*place) && isWanted) return place;
+  }
+  struct Candidate {
+    bool isAside;     // on a table, say: places on islands that are drawn come first
+    double distance;  // metres from the centre
+    Vec3 point;
   };
+  std::vector<Candidate> candidates;
   const std::vector<Vec3> aims = listAims(named, centre);
   for (const std::uint32_t polygon : ample_->findPolygons(box.centre(), 0.5 * box.size())) {
-    if (island && islands_.numberOf[polygon] != *island) continue;
-    addCandidate(ample_->centre(polygon));
-    for (const Vec3& aim : aims) addCandidate(ample_->closestPoint(polygon, aim));
+    const std::uint32_t number = islands_.numberOf[polygon];
+    if (island && number != *island) continue;
+    const bool isAside = number == kNoIsland || !islands_.islands[number].isDrawn;
+    const auto add = [&](const Vec3& point) {
+      candidates.push_back({isAside, computeGroundDistance(point, centre), point});
+    };
+    add(ample_->centre(polygon));
+    for (const Vec3& aim : aims) add(ample_->closestPoint(polygon, aim));
   }
-  std::ranges::sort(candidates, {}, &std::pair<double, Vec3>::first);
-  for (const auto& [distance, point] : candidates)
-    if (const auto place = standNear(*walker_, point); place && isInside(*place)) return place;
+  std::ranges::stable_sort(
+      candidates, {}, [](const Candidate& one) { return std::pair(one.isAside, one.distance); });
+  for (const Candidate& one : candidates)
+    if (const auto place = standNear(*walker_, one.point); place && isInside(*place)) return place;
   return std::nullopt;
 }
 
@@ -273,13 +319,30 @@ std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named,
   return findPlaceOn(named, std::nullopt);
 }
 
-std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance) {
+std::optional<Vec3> Navigation::findNearestOn(std::uint32_t island, const Vec3& point,
+                                              double maxDistance) const {
+  std::optional<Vec3> nearest;
+  for (const std::uint32_t polygon : ample_->findPolygons(point, Vec3::Constant(maxDistance))) {
+    if (islands_.numberOf[polygon] != island) continue;
+    const Vec3 closest = ample_->closestPoint(polygon, point);
+    if (!nearest || (closest - point).norm() < (*nearest - point).norm()) nearest = closest;
+  }
+  return nearest;
+}
+
+std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance,
+                                     const std::optional<std::uint32_t>& island) {
   const std::lock_guard lock(mutex_);
   if (const auto place = standAt(*walker_, point))
-    if ((*place - point).norm() <= maxDistance) return place;
-  const auto nearest = ample_->findNearest(point, Vec3::Constant(maxDistance));
+    if ((*place - point).norm() <= maxDistance && (!island || islandAt(*place) == island))
+      return place;
+  std::optional<Vec3> nearest;
+  if (island)
+    nearest = findNearestOn(*island, point, maxDistance);
+  else if (const auto found = ample_->findNearest(point, Vec3::Constant(maxDistance)))
+    nearest = found->point;
   if (!nearest) return std::nullopt;
-  const auto place = standNear(*walker_, nearest->point);
+  const auto place = standNear(*walker_, *nearest);
   return place && (*place - point).norm() <= maxDistance ? place : std::nullopt;
 }
 
@@ -338,7 +401,6 @@ std::vector<Island> Navigation::islands() {
 }
 
 std::vector<IslandNeighbour> Navigation::findIslandNeighbours(std::uint32_t island) {
-  constexpr double kWallAndDoor = 1.5;  // metres between floors on both sides of a thick wall
   const std::lock_guard lock(mutex_);
   std::vector<IslandNeighbour> neighbours =
       findNeighbours(*ample_, islands_, island, kWallAndDoor + 2 * agent_.radius,

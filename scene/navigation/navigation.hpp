@@ -86,8 +86,10 @@ class Navigation {
   /// place on the island that has such places is preferred, if it has any.
   std::optional<Vec3> findPlaceIn(const NamedPlace& named,
                                   const std::optional<Vec3>& start = std::nullopt);
-  /// The standing place at `point`, or else the closest one within `maxDistance` metres.
-  std::optional<Vec3> snap(const Vec3& point, double maxDistance);
+  /// The standing place at `point`, or else the closest one within `maxDistance` metres; only on
+  /// `island`, if that is given.
+  std::optional<Vec3> snap(const Vec3& point, double maxDistance,
+                           const std::optional<std::uint32_t>& island = std::nullopt);
   /// A place that is uniform in area; nullopt: none was found.
   std::optional<Vec3> findRandomPlace(std::mt19937_64& random, const RandomPlace& wanted);
   /// The end of a walk from one place towards another: at the first obstacle, or, if it slides,
@@ -108,8 +110,12 @@ class Navigation {
  private:
   void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
   void assembleMeshes();
+  void joinIslands();
+  bool isGapPassable(const Vec3& from, const Vec3& to, const std::vector<std::uint32_t>& scarce);
   NavigationMesh buildUnobstructed(int threads) const;
   std::optional<std::uint32_t> islandAt(const Vec3& point) const;
+  std::optional<Vec3> findNearestOn(std::uint32_t island, const Vec3& point,
+                                    double maxDistance) const;
   Aabb computeBox(const NamedPlace& named) const;
   /// As findPlaceIn(), on an island, or anywhere.
   std::optional<Vec3> findPlaceOn(const NamedPlace& named,
@@ -124,7 +130,12 @@ class Navigation {
   std::optional<Links> links_;              ///< of the options that were asked for last
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
   IslandList islands_;                      ///< of `ample_`
-  PolygonSampler drawn_;                    ///< of islands with Island::isDrawn
+  struct Gap {
+    Vec3 from, to;
+    bool isPassable;
+  };
+  std::vector<Gap> gaps_;  ///< between islands, that were examined
+  PolygonSampler drawn_;   ///< of islands with Island::isDrawn
   NavigationReport report_;
 };
 

@@ -17,7 +17,6 @@ namespace enfilade::scene {
 namespace {
 
 constexpr int kMaxProposals = 12;                             // corridors to try on a mesh
-constexpr std::size_t kMaxRepairWalks = 100'000;              // of a path: some tenths of a second
 constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  // metres
 constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way around it begins
 constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
@@ -37,8 +36,10 @@ double computeLength(const std::vector<Vec3>& points) {
 
 /// The work and the obstacles of a search so far.
 struct Proof {
-  GridSearch coarse{kCoarseSpacing, 1.5, kMaxRepairWalks};
-  GridSearch fine{kFineSpacing, 0.7, kMaxRepairWalks};
+  explicit Proof(std::size_t maxRepairWalks)
+      : coarse{kCoarseSpacing, 1.5, maxRepairWalks}, fine{kFineSpacing, 0.7, maxRepairWalks} {}
+
+  GridSearch coarse, fine;
   bool isRepaired = false;       ///< the present proposal
   Vec3 failedAt = Vec3::Zero();  ///< where the last proof failed
   std::vector<Obstruction> met;
@@ -276,7 +277,7 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
     return none;
   }
   const Vec3 goal = finder.walker.footPosition();
-  Proof proof;
+  Proof proof(finder.maxRepairWalks);
   NavigationPath best = findPathOn(finder, finder.ample, Clearance::ample, start, goal, proof);
   const Vec3 extent(finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
                     finder.agent.radius);
@@ -290,7 +291,7 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
     NavigationPath other = findPathOn(finder, finder.scarce, Clearance::scarce, start, goal, proof);
     if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
   }
-  if (!best.found()) {
+  if (!best.found() && finder.unobstructed) {
     if (!proof.met.empty()) best.obstruction = proof.met.front();
     explain(finder, start, goal, best);
   }

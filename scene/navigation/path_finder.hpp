@@ -47,8 +47,9 @@ struct PathFinder {
   Walker& walker;
   NavigationMesh& ample;
   NavigationMesh& scarce;
-  /// The mesh of Clearance::none; built at the first call.
+  /// The mesh of Clearance::none; built at the first call. Null: reasons are not sought.
   std::function<const NavigationMesh&()> unobstructed;
+  std::size_t maxRepairWalks = 100'000;  ///< of a path: some tenths of a second
 };
 
 /// A path from where an agent at `from` stands to where it stands at `to`.

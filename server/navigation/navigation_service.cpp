@@ -116,10 +116,11 @@ struct Answer {
     if (auto error = validateCount("snap.points", query.points_size(), 10'000)) return error;
     if (auto error = validateNumber("snap.max_distance", query.max_distance(), 0, 100))
       return error;
+    const auto island = query.has_island() ? std::optional(query.island()) : std::nullopt;
     for (int i = 0; i < query.points_size(); ++i) {
       const std::string field = "snap.points[" + std::to_string(i) + "]";
       if (auto error = validatePoint(field, query.points(i))) return error;
-      addSpot(navigation.snap(vectorFromProto(query.points(i)), query.max_distance()));
+      addSpot(navigation.snap(vectorFromProto(query.points(i)), query.max_distance(), island));
     }
     return std::nullopt;
   }

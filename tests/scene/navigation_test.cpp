@@ -301,6 +301,68 @@ class FloodFill {
   std::vector<bool> reached_;
 };
 
+TEST(Navigation, IslandsAgreeWithThePathsThroughANarrowGap) {
+  for (const double gap : {0.8, 0.7, 0.66, 0.64, 0.62, 0.595, 0.55}) {
+    Navigation navigation(boxScene(twoRooms(gap)), {}, {});
+    const Vec3 left(2, 0, 0), right(6, 0, 0);
+    const bool found = navigation.findPath(left, right).found();
+    EXPECT_EQ(found, gap > 0.6) << gap;
+    EXPECT_EQ(navigation.islandOf(left) == navigation.islandOf(right), found) << gap;
+    EXPECT_EQ(navigation.islands().size(), found ? 1u : 2u) << gap;
+    EXPECT_GT(navigation.islands()[0].area, found ? 30 : 15) << gap;
+  }
+}
+
+/// A moved body may close a gap, or free it: what was found out about a gap is forgotten.
+TEST(Navigation, IslandsPartWhereABodyClosesTheGap) {
+  std::vector<NamedBox> boxes = twoRooms(0.62);
+  boxes.push_back({"gate", {3.95, 3, -0.3}, {4.05, 5, 0.3}});
+  Model model = boxModel(boxes);
+  BodySpec gate = bodySpec("gate", BodyKind::lift, {3});
+  gate.stops = {-2.99, 0};
+  gate.low = -2.99;
+  model.bodies.push_back(gate);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  World world(scene);
+  Navigation navigation(scene, {}, {});
+  EXPECT_EQ(navigation.islandOf({2, 0, 0}), navigation.islandOf({6, 0, 0}));
+  for (const std::uint32_t level : {0u, 1u}) {
+    BodyCommand command;
+    command.body = "gate";
+    command.action = BodyCommand::Action::moveToLevel;
+    command.level = level;
+    submitBodyCommand(world, std::move(command));
+    for (int i = 0; i < 400; ++i) tickWorld(world);
+    navigation.update(*world.snapshot());
+    EXPECT_EQ(navigation.islandOf({2, 0, 0}) == navigation.islandOf({6, 0, 0}), level == 1);
+  }
+}
+
+TEST(Navigation, TheClosestPlaceOnAnIsland) {
+  Navigation navigation(boxScene(twoRooms(0.5)), {}, {});
+  const Vec3 left(3, 0, 0);
+  const auto own = navigation.islandOf(left), other = navigation.islandOf({5, 0, 0});
+  ASSERT_TRUE(own && other && own != other);
+  EXPECT_EQ(navigation.snap(left, 4, own), navigation.snap(left, 4));
+  const auto beyond = navigation.snap(left, 4, other);
+  ASSERT_TRUE(beyond);
+  EXPECT_EQ(navigation.islandOf(*beyond), other);
+  EXPECT_LT(beyond->x(), 4.6);
+  EXPECT_FALSE(navigation.snap(left, 1, other));
+}
+
+TEST(Navigation, ARoomByNameIsItsFloorAndNoTable) {
+  Navigation navigation(
+      boxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}}, {"table", {3.5, 0, -0.4}, {4.5, 0.75, 0.4}}}),
+      {}, {});
+  NamedPlace room;
+  room.box = {{0, 0, -3}, {8, 2.5, 3}};
+  room.middle = {4, 1.2, 0};
+  const auto place = navigation.findPlaceIn(room);
+  ASSERT_TRUE(place);
+  EXPECT_LT(place->y(), 0.1);
+}
+
 TEST(Navigation, ReachabilityAgreesWithAFloodFillOfExactPlaces) {
   int reachable = 0, unreachable = 0, undecided = 0;
   for (std::uint64_t seed = 1; seed <= 6; ++seed) {
