@@ -88,6 +88,38 @@ class Environments(RoomCase):
         with self.assertRaisesRegex(enfilade.OrderFailed, "column"):
             env.reset(seed=0)
 
+    def test_starts_that_are_refused_are_drawn_again(self):
+        bad, good = (0, 0, 6), (0, 0.01, 0)
+        env, vector = self.environment(starts=[bad, good], channels=()), self.vector(3, starts=[bad, good])
+        for seed in range(8):
+            self.assertLess(env.reset(seed=seed)[0]["position"][2], 1)
+            self.assertLess(vector.reset(seed=seed)[0]["position"][:, 2].max(), 1)
+        for one in (env, vector):
+            with self.assertRaisesRegex(enfilade.OrderFailed, r"could not spawn at \(0, 0, 6\)"):
+                one.reset(seed=1, options={"start": bad})
+
+    def test_options_hold_for_starts_that_are_drawn_again(self):
+        env = self.environment(starts=[(0, 0, 6), (0, 0.01, 0)], channels=(), goal=(3, 0, 0))
+        for seed in range(8):
+            seen, _ = env.reset(seed=seed, options={"goal": (-4, 0, 0)})
+            np.testing.assert_allclose(seen["position"] + seen["to_goal"], (-4, 0, 0), atol=1e-9)
+
+    def test_starts_that_are_all_refused_are_counted_with_the_reason(self):
+        bad = [(0, 0, 6), (5.1, 0, 0)]
+        for env in (self.environment(starts=bad, channels=()), self.vector(2, starts=bad)):
+            with self.assertRaisesRegex(enfilade.OrderFailed, r"32 starts were refused; the last: .*\(.*\): ."):
+                env.reset(seed=1)
+
+    def test_an_episode_whose_start_is_refused_is_passed_over(self):
+        episodes = [enfilade.Episode(start, 0.0, (3.0, 0.0, 0.0), 5.0, name)
+                    for name, start in (("bad", (0.0, 0.0, 6.0)), ("good", (0.0, 0.0, 0.0)))]
+        env = self.environment(starts=(), episodes=episodes, channels=())
+        env.reset(seed=1)
+        self.assertEqual(env.episode.id, "good")
+        env = self.environment(starts=(), episodes=episodes[:1], channels=())
+        with self.assertRaisesRegex(enfilade.OrderFailed, "^the avatar could not spawn"):
+            env.reset(seed=1)
+
     def test_a_vector_of_environments_does_as_each_alone(self):
         vector = enfilade.VectorWalkEnv(self.scene, 2, starts=_STARTS, channels=(), max_steps=3)
         self.addCleanup(vector.close)

@@ -29,6 +29,7 @@ from .world_group import Member
 Observation = Dict[str, np.ndarray]
 
 _RADII, _HEIGHTS = (0.05, 5), (0.2, 10)  # metres: those of Spawn
+MAX_STARTS = 32  # that are drawn for one episode
 _DISCRETE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 
 
@@ -64,7 +65,9 @@ class WalkEnv(spaces.EnvBase):
         server (this client must then drive its world `world`). Or client: a connected one, which
         close() leaves open.
     starts: start positions, (x, y, z) of the feet or (x, y, z, facing in degrees); each reset chooses
-        one at random, and a facing if none is given. Or "anywhere": random places.
+        one at random, and a facing if none is given. Or "anywhere": random places. A start that the world
+        refuses is drawn again, up to 32 times (of `episodes`: the next one is taken); one that
+        reset(options=...) names is not.
     goal: the walk succeeds within `goal_radius` metres of it, on the ground.
     goals: goals instead, of which each reset chooses one that can be reached, or "anywhere". Distances
         are then geodesic, at least `min_distance` at the start. Or `episodes` instead of starts and goals,
@@ -248,7 +251,8 @@ class WalkEnv(spaces.EnvBase):
               options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
         """Restarts the world. `options` may have "start", as in `starts`, and "goal", if the
         environment has one: both for this episode."""
-        return self._take_reset(self._post_reset(seed, options or {}))
+        options = options or {}
+        return self._entered(self._post_reset(seed, options), options)
 
     def step(self, action: Any) -> Tuple[Observation, float, bool, bool, Dict[str, Any]]:
         return self._take_step(self._post_step(self._meaning(action)))
@@ -296,6 +300,21 @@ class WalkEnv(spaces.EnvBase):
             messages.ClientMessage(command=messages.Command(avatar=self._name, tag=self._tag,
                                                             spawn=spawn)),
             messages.ClientMessage(step=messages.Step(ticks=1, avatars=True)), *self._pictures()])
+
+    def _entered(self, posted: List[int], options: Dict[str, Any]) -> Tuple[Observation, Dict[str, Any]]:
+        """Takes the reply to _post_reset(). Draws again while the start is refused."""
+        given = self.starts if self.episodes is None else self.episodes
+        draws = 1 if "start" in options or len(given) == 1 else MAX_STARTS
+        for refused in range(1, draws + 1):
+            try:
+                return self._take_reset(posted)
+            except OrderFailed as error:
+                if refused == draws:
+                    if draws > 1:
+                        error.args = (f"{draws} starts were refused; the last: {error}",)
+                    raise
+            posted = self._post_reset(None, options)
+        raise AssertionError("at least one start is drawn")
 
     def _chosen(self, seed: Optional[int], options: Dict[str, Any]) -> Tuple[Any, Any]:
         """Returns the start and the goal of the episode."""

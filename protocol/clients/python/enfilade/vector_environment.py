@@ -12,12 +12,9 @@ import numpy as np
 from . import spaces
 from .client import Client, connect
 from .environment import Observation, WalkEnv
-from .errors import OrderFailed
 from .kept_request import KeptRequest
 from .process import Server, serve
 from .world_group import Member, WorldGroup
-
-MAX_DRAWS = 32  # of a start, for one episode
 
 
 class _Batch:
@@ -53,8 +50,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     An environment whose episode ended restarts with the next step(). That step ignores its action,
     and its reward is 0 (Gymnasium's "next step" mode).
 
-    A start that the world refuses is drawn again, up to 32 times, while the others go on; a start
-    that reset(options=...) names is not.
+    A start that the world refuses is drawn again, as by WalkEnv, while the others wait.
 
     A wrong number of actions or seeds, or an invalid action, is a ValueError before anything is sent.
     If an environment fails later, all replies are awaited and its error is raised with its number.
@@ -117,19 +113,18 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     def reset(self, *, seed: Union[int, Sequence[Optional[int]], None] = None,
               options: Optional[Dict[str, Any]] = None) -> Tuple[Observation, Dict[str, Any]]:
         """`seed`: one per environment, or a number to which each adds its own index."""
-        seeds = self._seeds(seed)
+        seeds, options = self._seeds(seed), options or {}
         self._over = None
         self._kept = [None] * self.num_envs
-        is_drawn = "start" not in (options or {})
         batch = _Batch(self.single_observation_space, self.num_envs)
 
         def take(i: int, ids: List[int]) -> Dict[str, Any]:
-            seen, info = self._entered(i, ids, is_drawn)
+            seen, info = self.envs[i]._entered(ids, options)
             batch.add(i, seen)
             return info
 
         infos, failures = self._each(
-            lambda i: self.envs[i]._post_reset(seeds[i], options or {}), take)
+            lambda i: self.envs[i]._post_reset(seeds[i], options), take)
         if failures:
             raise self._numbered(failures)
         self._last = batch
@@ -163,7 +158,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
         def take(i: int, ids: List[int]) -> Tuple[float, bool, bool, Dict[str, Any]]:
             if over[i]:
-                seen, info = self._entered(i, ids, True)
+                seen, info = self.envs[i]._entered(ids, {})
                 batch.add(i, seen)
                 return 0.0, False, False, info
             return self._take_step(i, ids, batch)
@@ -226,18 +221,6 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         seen, *result = env._take_step(ids)
         batch.add(i, seen)
         return tuple(result)
-
-    def _entered(self, i: int, ids: List[int], is_drawn: bool) -> Tuple[Observation, Dict[str, Any]]:
-        """Takes the reply to a reset. A start that is refused is drawn again."""
-        env = self.envs[i]
-        for _ in range(MAX_DRAWS - 1):
-            try:
-                return env._take_reset(ids)
-            except OrderFailed:
-                if not is_drawn or (len(env.starts) == 1 and not env.is_geodesic):
-                    raise
-                ids = env._post_reset(None, {})
-        return env._take_reset(ids)
 
     def _each(self, post: Callable[[int], List[int]], take: Callable[[int, List[int]], Any],
               ) -> Tuple[List[Any], List[Tuple[int, Exception]]]:
