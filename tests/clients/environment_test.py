@@ -1,6 +1,7 @@
 """The environments: Gymnasium's API, and the same seed for the same observations."""
 
 import math
+import os
 import time
 import unittest
 import unittest.mock
@@ -235,6 +236,67 @@ class Environments(RoomCase):
             env = enfilade.WalkEnv(token="keeper-0123456789", **options)
             env.reset(seed=1)
             env.close()
+
+    def tick_by_tick(self, env, start, actions, ticks):
+        """After each action: whether the avatar met the wall or the column in one of `ticks`, and the feet."""
+        env.reset(options={"start": start})
+        for ahead, turn in actions:
+            infos = [env.step((ahead, 0 if tick else turn))[-1] for tick in range(ticks)]
+            yield any(one["stopped_by"] or any(contact.kind == "begin" and contact.b_name != "floor"
+                                               for contact in one["contacts"])
+                      for one in infos), env._feet
+
+    def grazing_walks(self, count, steps):
+        """Starts that look past the column or the ends of the wall, and actions that turn."""
+        random = np.random.default_rng(4)
+        for _ in range(count):
+            x, z = ((0, 6), (5.1, 4), (5.1, -4))[random.integers(3)]
+            angle, aside = random.uniform(0, 2 * math.pi), random.uniform(-0.6, 0.6)
+            ahead = np.array((math.cos(angle), -math.sin(angle)))
+            at = (x, z) - ahead * random.uniform(0.75, 1.1) + aside * ahead[::-1] * (1, -1)
+            start = (at[0], 0.01, at[1], math.degrees(angle))
+            yield start, random.uniform((0.5, -1), 1, (steps, 2))
+
+    def test_a_collision_in_any_tick_of_a_step_counts(self):
+        ticks, count, steps = 30, 4, 4
+        alone = self.environment(channels=(), ticks_per_step=1, turn_speed=ticks * math.pi / 2)
+        vectors = [self.vector(count, is_packing, ticks_per_step=ticks) for is_packing in (True, False)]
+        walks, missed, free, left = list(self.grazing_walks(48, steps)), 0, 0, 0
+        for first in range(0, len(walks), count):
+            some, stopped = walks[first:first + count], [""] * count
+            try:
+                truth = [list(self.tick_by_tick(alone, *walk, ticks)) for walk in some]
+            except enfilade.OrderFailed:
+                continue  # a start in an obstacle
+            for vector in vectors:
+                for env, (start, _) in zip(vector.envs, some):
+                    env.starts = [start]
+                vector.reset()
+                for step in range(steps):
+                    seen, *_, infos = vector.step(np.array([actions[step] for _, actions in some]))
+                    for i in range(count):
+                        collided, feet = truth[i][step]
+                        np.testing.assert_allclose(seen["position"][i], feet, atol=1e-9)
+                        self.assertEqual(infos["collided"][i], collided, (first + i, step))
+                        missed += collided and not infos["stopped_by"][i]
+                        free += not collided
+                        left += collided and not infos["stopped_by"][i] and bool(stopped[i]) and not any(
+                            one.kind in ("begin", "blocked") for one in infos["contacts"][i])
+                    stopped = infos["stopped_by"]
+        self.assertGreater(missed, 20)  # by a look at the last tick of each step
+        self.assertGreater(free, 20)
+        self.assertGreater(left, 0)  # stopped in the first ticks only, after a step that ended there
+
+    def test_stairs_are_no_collision(self):
+        with enfilade.serve(os.environ["ENFILADE_BUILDING"]) as server:
+            env = enfilade.WalkEnv(address=server.address, starts=[(49, 0.01, -4, 0)], channels=(),
+                                   ticks_per_step=30)
+            env.reset()
+            infos = [env.step((1, 0))[-1] for _ in range(6)]
+            self.assertGreater(env._feet[1], 1.5)
+            env.close()
+        self.assertTrue(any("tread" in contact.b_name for info in infos for contact in info["contacts"]))
+        self.assertEqual({info["collided"] for info in infos}, {False})
 
     def test_a_failed_start_is_reported_with_number_and_position(self):
         vector = enfilade.VectorWalkEnv(

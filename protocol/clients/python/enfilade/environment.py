@@ -85,9 +85,10 @@ class WalkEnv(spaces.EnvBase):
     "heading" as its cosine and sine, and with a goal "to_goal" in metres and "goal_polar": the distance
     on the ground, and the angle from the heading, left positive. The reward is the progress towards the
     goal, or without a goal the distance walked, in metres; override reward() and is_over(), and
-    new_episode() for other starts and goals. With goals or episodes `info` has "geodesic_distance",
-    "success", "spl" and "collided" (a step ended at something other than the floor). A fall out of
-    the scene ends the episode, with "fell" in `info` and the observation before it.
+    new_episode() for other starts and goals. `info` has "collided": in any tick of the step an obstacle
+    stopped the avatar, or came into contact with it; ground that it can stand on is none. With goals or
+    episodes `info` has "geodesic_distance", "success" and "spl", too. A fall out of the scene ends the
+    episode, with "fell" in `info` and the observation before it.
 
     Raises ValueError with the name of the argument before anything is sent. An exception during a
     step (KeyboardInterrupt) leaves it usable, but the world may have advanced by that step.
@@ -162,7 +163,8 @@ class WalkEnv(spaces.EnvBase):
         self._left = math.inf  # geodesic distance to the goal, metres
         self._tag = 0  # of the last reset()'s spawn
         self._feet: Optional[np.ndarray] = None  # metres; None: no episode has begun
-        self._stopped_by = ""
+        self._stopped_by = ""  # in the last tick
+        self._velocity = (0.0, 0.0)  # of the last step, metres per second along x and z
         self._rgb: Optional[np.ndarray] = None
         self._seen: Observation = {}  # of the last step
         self.server: Optional[Server] = None
@@ -177,6 +179,7 @@ class WalkEnv(spaces.EnvBase):
 
     def _begin(self) -> None:
         self.navigation = self.client.navigation(**self._size, speed=self.speed)
+        self._floor = math.cos(self.client.welcome.policies.walkable_slope) - 1e-9
         limit = self.client.welcome.policies.speed_limit
         if self.speed > limit:
             raise ValueError(f"speed: {self.speed:g} m/s exceeds the server's limit of {limit:g}")
@@ -374,7 +377,7 @@ class WalkEnv(spaces.EnvBase):
             raise OrderFailed(f"the avatar could not spawn at ({where}): {' '.join(why)}")
         for reply, _ in replies[3:]:
             raise_refusal(reply)
-        info = self._info(entered.tick, entered.state_hash, contacts)
+        info = self._info(entered.tick, entered.state_hash, contacts, False)
         if self.is_geodesic:
             info["geodesic_distance"] = self._left
         return self._observation(replies[3:]), info
@@ -413,7 +416,8 @@ class WalkEnv(spaces.EnvBase):
         ahead, turn = meaning
         self._face(math.remainder(self._heading + turn * self.turn_speed * self._seconds, math.tau))
         cosine, sine = self._direction
-        return ahead * self.speed * cosine, ahead * self.speed * -sine
+        self._velocity = ahead * self.speed * cosine, ahead * self.speed * -sine
+        return self._velocity
 
     def _kept_step(self, member: Member) -> KeptRequest:
         """The requests of a step in this episode. The doubles are _step_numbers()."""
@@ -446,6 +450,7 @@ class WalkEnv(spaces.EnvBase):
         assert before is not None
         made = replies[1][0].step
         self._steps += 1
+        was_stopped = bool(self._stopped_by)
         if not self._take_avatar(made):
             if not left:
                 raise OrderFailed("the avatar is no longer in the world: another client commands it")
@@ -454,17 +459,45 @@ class WalkEnv(spaces.EnvBase):
         for reply, _ in replies[2:]:
             raise_refusal(reply)
         path = replies.pop()[0].navigation.paths[0] if self.is_geodesic else None
-        return (self._observation(replies[2:]),
-                *self._judged(before, self._info(made.tick, made.state_hash, contacts), path))
+        info = self._info(made.tick, made.state_hash, contacts,
+                          self._has_collided(before, was_stopped, contacts))
+        return (self._observation(replies[2:]), *self._judged(before, info, path))
 
     def _take_packed(self, step: Tuple[int, int, np.ndarray, str]) -> Dict[str, Any]:
         """Keeps the avatar's state of a packed step. Returns its info."""
+        before, was_stopped = self._feet, bool(self._stopped_by)
+        assert before is not None
         tick, state_hash, self._feet, self._stopped_by = step
         self._steps += 1
         client = self.client
         client._notices.clear()
         contacts = client._kept_contacts() if client._contacts else []
-        return self._info(tick, state_hash, contacts)
+        return self._info(tick, state_hash, contacts, self._has_collided(before, was_stopped, contacts))
+
+    def _has_collided(self, before: np.ndarray, was_stopped: bool,
+                      contacts: List[results.Contact]) -> bool:
+        """Whether an obstacle stopped the avatar in any tick of the step, or came into contact with it.
+        `was_stopped`: in the last tick of the step before."""
+        if self._stopped_by or any(map(self._is_collision, contacts)):
+            return True
+        if not was_stopped:
+            return False
+        # "blocked" is not sent again for the first ticks after a step that ended at the obstacle. They
+        # show as a displacement that is shorter than the drive.
+        assert self._feet is not None
+        x, z = self._velocity
+        made = (self._feet[0] - before[0]) * x + (self._feet[2] - before[2]) * z
+        return made < (1 - 1e-6) * (x * x + z * z) * self._seconds
+
+    def _is_collision(self, contact: results.Contact) -> bool:
+        """Whether a contact event is one of the avatar with something that it cannot stand on."""
+        if self._name not in (contact.a_name, contact.b_name):
+            return False
+        is_first = contact.a_name == self._name
+        if contact.kind == "blocked":
+            return is_first
+        down = -contact.normal[1] if is_first else contact.normal[1]
+        return contact.kind == "begin" and down < self._floor
 
     def _judged(self, before: np.ndarray, info: Dict[str, Any],
                 path: Any) -> Tuple[float, bool, bool, Dict[str, Any]]:
@@ -478,9 +511,10 @@ class WalkEnv(spaces.EnvBase):
 
     def _fallen(self, made: Any, contacts: List[results.Contact]) -> Dict[str, Any]:
         """The info of the step in which the avatar fell out of the scene."""
-        info = {**self._info(made.tick, made.state_hash, contacts), "fell": True}
+        info = self._info(made.tick, made.state_hash, contacts, any(map(self._is_collision, contacts)))
+        info["fell"] = True
         if self.is_geodesic:
-            info.update(progress=0.0, geodesic_distance=self._left, success=False, spl=0.0, collided=False)
+            info.update(progress=0.0, geodesic_distance=self._left, success=False, spl=0.0)
         return info
 
     def _add_measures(self, info: Dict[str, Any], before: np.ndarray, after: np.ndarray,
@@ -492,8 +526,7 @@ class WalkEnv(spaces.EnvBase):
         success = left <= self.goal_radius
         walked = self._walked + left
         info.update(progress=self._left - left, geodesic_distance=left, success=success,
-                    spl=1.0 if success and walked <= shortest else shortest / walked if success else 0.0,
-                    collided=bool(info["stopped_by"]))
+                    spl=1.0 if success and walked <= shortest else shortest / walked if success else 0.0)
         self._left = left
 
     def _meaning(self, action: Any) -> Tuple[float, float]:
@@ -551,6 +584,7 @@ class WalkEnv(spaces.EnvBase):
                                            math.remainder(angle, math.tau)])
         return seen
 
-    def _info(self, tick: int, state_hash: int, contacts: List[results.Contact]) -> Dict[str, Any]:
+    def _info(self, tick: int, state_hash: int, contacts: List[results.Contact],
+              collided: bool) -> Dict[str, Any]:
         return {"tick": tick, "state_hash": state_hash, "contacts": contacts,
-                "stopped_by": self._stopped_by}
+                "stopped_by": self._stopped_by, "collided": collided}
