@@ -248,6 +248,79 @@ class CompatTest(RoomCase):
                 self.finder.load_nav_mesh(file)
 
 
+class FurnitureTest(unittest.TestCase):
+    """A floor with a cupboard, whose top habitat's mesh would leave out as too small, and a bed, whose top it has."""
+
+    BOXES = {
+        "floor": ((-6, -0.5, -6), (6, 0, 6)),
+        "cupboard": ((-0.4, 0, -0.4), (0.4, 0.9, 0.4)),
+        "bed": ((2, 0, -1), (4, 0.7, 1)),
+    }
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory()
+        cls.addClassCleanup(folder.cleanup)
+        (Path(folder.name) / "room.obj").write_text(obj(cls.BOXES))
+        server = enfilade.serve(Path(folder.name) / "room.obj")
+        cls.addClassCleanup(server.stop)
+        client = server.connect()
+        cls.addClassCleanup(client.close)
+        cls.finder = PathFinder(client.navigation(radius=0.1, height=1.5))
+
+    def path(self, start, end):
+        path = ShortestPath()
+        path.requested_start, path.requested_end = start, end
+        return path, self.finder.find_path(path)
+
+    def test_ends_of_paths_are_snapped(self):
+        path, found = self.path((-4, 0.7, 0), (0, 0.45, 0))
+        self.assertTrue(found)
+        np.testing.assert_allclose(path.points[0], (-4, 0, 0), atol=0.01)
+        self.assertAlmostEqual(np.abs(path.points[-1][[0, 2]]).max(), 0.5, delta=0.1)  # beside the cupboard
+        self.assertAlmostEqual(path.points[-1][1], 0, delta=0.01)
+        for end, is_found in (((-4, 3.5, 3), True), ((-4, 4.5, 3), False), ((-7.5, 0, 0), True),
+                              ((-8.5, 0, 0), False), ((-4, -3.5, 3), True)):
+            path, found = self.path((-3, 0, 0), end)
+            self.assertEqual(found, is_found, end)
+            self.assertEqual(math.isfinite(path.geodesic_distance), is_found)
+            self.assertEqual(self.path(end, (-3, 0, 0))[1], is_found, end)
+
+    def test_an_end_without_a_place_does_not_hide_the_others(self):
+        many = MultiGoalShortestPath()
+        many.requested_start = (-4, 0, 0)
+        many.requested_ends = [(-50, 0, 0), (0, 0.45, 0), (-3, 0, 0)]
+        self.assertTrue(self.finder.find_path(many))
+        self.assertEqual(many.closest_end_point_index, 2)
+        self.assertAlmostEqual(many.geodesic_distance, 1, delta=0.01)
+        many.requested_ends = many.requested_ends[:1]
+        self.assertFalse(self.finder.find_path(many))
+        self.assertEqual((many.closest_end_point_index, many.geodesic_distance, many.points), (-1, math.inf, []))
+
+    def test_snapping_leaves_small_islands_out(self):
+        point = np.array((0, 0.6, 0.1))
+        snapped = self.finder.snap_point(point)
+        self.assertAlmostEqual(snapped[1], 0, delta=0.01)
+        self.assertAlmostEqual(np.linalg.norm(snapped - point), math.hypot(0.6, 0.4), delta=0.05)
+        self.assertEqual(self.finder.get_island(point), 0)
+        top = self.finder.navigation.snap(point).at  # a place that is given exactly stays
+        self.assertAlmostEqual(top[1], 0.9, delta=0.01)
+        np.testing.assert_allclose(self.finder.snap_point(top), top, atol=2e-3)
+
+    def test_snapping_to_an_island_finds_its_closest_place(self):
+        point = np.array((3, 0.5, 0.2))
+        top = self.finder.snap_point(point)
+        self.assertAlmostEqual(top[1], 0.7, delta=0.01)
+        island = self.finder.get_island(point)
+        self.assertNotEqual(island, 0)
+        np.testing.assert_allclose(self.finder.snap_point(point, island), top)
+        floor = self.finder.snap_point(point, 0)
+        self.assertAlmostEqual(floor[1], 0, delta=0.01)
+        self.assertAlmostEqual(np.linalg.norm(floor - point), math.hypot(0.9, 0.5), delta=0.05)
+        self.assertTrue(np.isnan(self.finder.snap_point((-4, 0, 0), island)).all())
+        self.assertTrue(np.isnan(self.finder.snap_point((3, 4.2, 0), 0)).all())
+
+
 class DoorsTest(unittest.TestCase):
     """Two rooms with a door between them, and a platform that no step reaches."""
 

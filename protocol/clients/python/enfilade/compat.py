@@ -24,6 +24,10 @@ from .navigation import Navigation, Spot
 _NOWHERE = np.full(3, np.nan)
 _MOST_ACTIONS = 2000  # of find_path(): 500 m of steps ahead
 _FARTHEST = 20.0  # metres that the server searches for obstacles
+_EXTENTS = np.array((2.0, 4.0, 2.0))  # metres: habitat projects a point within this box on either side
+_SMALL = 1.0  # square metres: by default habitat's meshes have no smaller regions (20 x 20 cells of 5 cm)
+_EXACT = 2e-3  # metres: a point so close to a place is that place, on an island of any size
+_ROUNDS = 4  # of the search for the closest place on an island
 
 
 class ShortestPath:
@@ -187,16 +191,20 @@ class PathFinder:
         return True
 
     def find_path(self, path: "ShortestPath | MultiGoalShortestPath") -> bool:
-        """Fills in `points` and `geodesic_distance`. Returns whether there is a path."""
+        """Fills in `points` and `geodesic_distance`. Returns whether there is a path. Start and ends are
+        snap_point() of those requested; an end without a place close to it counts as unreachable."""
         many = isinstance(path, MultiGoalShortestPath)
         ends = list(path.requested_ends) if many else [path.requested_end]  # type: ignore[union-attr]
-        found = self.navigation.paths(path.requested_start, ends)
+        start, *spots = self._projected([path.requested_start, *ends])
+        goals = [i for i, spot in enumerate(spots) if spot is not None]
+        found = self.navigation.paths(start.at, [spots[i].at for i in goals]) if start and goals else []  # type: ignore[union-attr]
         best = min(range(len(found)), key=lambda i: found[i].length, default=-1)
         path.geodesic_distance = found[best].length if best >= 0 else math.inf
         path.points = list(found[best].points) if best >= 0 else []
+        is_found = math.isfinite(path.geodesic_distance)
         if many:
-            path.closest_end_point_index = best if math.isfinite(path.geodesic_distance) else -1  # type: ignore[union-attr]
-        return math.isfinite(path.geodesic_distance)
+            path.closest_end_point_index = goals[best] if is_found else -1  # type: ignore[union-attr]
+        return is_found
 
     def get_random_navigable_point(self, max_tries: int = 10, island_index: int = -1) -> np.ndarray:
         """`max_tries` has no effect: the server tries often enough."""
@@ -208,18 +216,68 @@ class PathFinder:
                                                    island=_island(island_index)))
 
     def snap_point(self, point: Sequence[float], island_index: int = -1) -> np.ndarray:
-        """The closest place within 2 m; NaN: none, or it lies on another island."""
-        spot = self.navigation.snap(point)
-        if spot is not None and island_index >= 0 and spot.island != island_index:
-            return _NOWHERE.copy()
-        return _point(spot)
+        """The closest place of that island, or of any that is not small, within 2 m along x and z and 4 m
+        along y; NaN: none."""
+        return _point(self._projected([point], _island(island_index))[0])
+
+    def _projected(self, wanted: Sequence[Sequence[float]],
+                   island: Optional[int] = None) -> List[Optional[Spot]]:
+        """The places that snap_point() has for points."""
+        spots = self.navigation.snap_all(wanted, float(np.linalg.norm(_EXTENTS)))
+        targets = np.asarray(wanted, float).reshape(-1, 3)
+        return [self._nearest([spot], target, island) or self._closest(target, island)
+                for spot, target in zip(spots, targets)]
+
+    def _closest(self, target: np.ndarray, island: Optional[int]) -> Optional[Spot]:
+        """The closest place that counts, where the closest of all does not (Snap takes no island): of those
+        around the point in the whole box, then of those nearer than the best one and at its height."""
+        levels = target[1] + np.arange(-_EXTENTS[1], _EXTENTS[1] + 0.1, 0.5)
+        around = np.concatenate([_rings(target, y, _EXTENTS[0], 4, 8) for y in levels])
+        best = self._nearest(self.navigation.snap_all(around, 1.0), target, island)
+        for _ in range(_ROUNDS if best is not None else 0):
+            assert best is not None
+            before = float(np.linalg.norm(best.at - target))
+            across = math.hypot(best.at[0] - target[0], best.at[2] - target[2])
+            around = np.concatenate([target + np.linspace(0, 1, 16)[:, None] * (best.at - target),
+                                     _rings(target, best.at[1], across, 8, 16)])
+            best = self._nearest([best, *self.navigation.snap_all(around, 1.0)], target, island)
+            if best is None or before - float(np.linalg.norm(best.at - target)) < 1e-3:
+                break
+        return best
+
+    def _nearest(self, spots: Sequence[Optional[Spot]], target: np.ndarray,
+                 island: Optional[int]) -> Optional[Spot]:
+        """The place nearest to the target of those that count."""
+        counting = sorted(((float(np.linalg.norm(spot.at - target)), i, spot) for i, spot in enumerate(spots)
+                           if spot is not None and self._counts(spot, target, island)), key=lambda one: one[:2])
+        if counting and counting[0][0] <= _EXACT and island is None:
+            return counting[0][2]
+        for first in range(0, len(counting), 16):
+            some = [spot for _, _, spot in counting[first:first + 16]]
+            # A place without mesh, as the rim of a table, has the island of the closest mesh below. From under
+            # the surface the server looks for mesh only.
+            again = self.navigation.snap_all([spot.at - (0, 0.2, 0) for spot in some], 0.35)
+            for spot, one in zip(some, again):
+                if one is not None and one.island == spot.island:
+                    return spot
+        return None
+
+    def _counts(self, spot: Spot, target: np.ndarray, island: Optional[int]) -> bool:
+        """Whether a place lies within the extents of a point, and on the island or on one that is not small."""
+        if (np.abs(spot.at - target) > _EXTENTS).any():
+            return False
+        if island is not None:
+            return spot.island == island
+        areas = self.navigation.island_areas
+        return bool(np.linalg.norm(spot.at - target) <= _EXACT) or (
+            spot.island is not None and spot.island < len(areas) and areas[spot.island] >= min(_SMALL, areas[0]))
 
     def is_navigable(self, pt: Sequence[float], max_y_delta: float = 0.5) -> bool:
         return self.navigation.is_navigable(pt, max_y_delta)
 
     def try_step(self, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
         """Where a straight walk ends that slides along obstacles. If no agent can stand at `start`, it begins
-        at the closest place within 2 m; without one it is `start`."""
+        at its snap_point(); without one it is `start`."""
         return self._stepped(start, end, True)
 
     def try_step_no_sliding(self, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
@@ -229,12 +287,12 @@ class PathFinder:
     def _stepped(self, start: Sequence[float], end: Sequence[float], slide: bool) -> np.ndarray:
         spot = self.navigation.try_step(start, end, slide=slide)
         if spot is None:
-            snapped = self.navigation.snap(start)
+            snapped = self._projected([start])[0]
             spot = snapped and self.navigation.try_step(snapped.at, end, slide=slide)
         return np.array(start, float) if spot is None else spot.at
 
     def get_island(self, point: Sequence[float]) -> int:
-        spot = self.navigation.snap(point)
+        spot = self._projected([point])[0]
         return spot.island if spot is not None and spot.island is not None else -1
 
     def island_area(self, island_index: int = -1) -> float:
@@ -250,8 +308,8 @@ class PathFinder:
         return self.navigation.navigable_area
 
     def distance_to_closest_obstacle(self, pt: Sequence[float], max_search_radius: float = 2.0) -> float:
-        """From the agent's surface, at most `max_search_radius`; infinite: no agent can stand within 2 m of
-        the point."""
+        """From the agent's surface, at most `max_search_radius`; infinite: the point has no
+        snap_point()."""
         return self.closest_obstacle_surface_point(pt, max_search_radius).hit_dist
 
     def closest_obstacle_surface_point(self, pt: Sequence[float],
@@ -261,7 +319,7 @@ class PathFinder:
         most = _FARTHEST - radius
         if not 0 < max_search_radius <= most:
             raise ValueError(f"max_search_radius: give metres above 0 and up to {most:g}, not {max_search_radius}")
-        spot = self.navigation.snap(pt)
+        spot = self._projected([pt])[0]
         found = spot and self.navigation.clearance(spot.at, max(0.1, max_search_radius + radius))
         if found is None:
             return HitRecord(_NOWHERE.copy(), _NOWHERE.copy(), math.inf)
@@ -289,6 +347,15 @@ class PathFinder:
         if eps != 0.5:
             raise ValueError(f"eps: the server's maps have the floors within 0.5 m, not {eps}")
         return self.navigation.top_down(height, meters_per_pixel).cells
+
+
+def _rings(centre: np.ndarray, height: float, radius: float, rings: int, spokes: int) -> np.ndarray:
+    """Points at a height, on circles around a vertical axis and on the axis."""
+    radii = np.linspace(0, radius, rings + 1)[1:, None]
+    angles = np.linspace(0, 2 * math.pi, spokes, endpoint=False)
+    x, z = centre[0] + radii * np.cos(angles), centre[2] + radii * np.sin(angles)
+    around = np.stack([x.ravel(), np.full(x.size, height), z.ravel()], axis=1)
+    return np.concatenate([[(centre[0], height, centre[2])], around])
 
 
 def _island(index: int) -> Optional[int]:
