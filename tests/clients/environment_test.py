@@ -344,9 +344,40 @@ class Environments(RoomCase):
                               ({"cameras": [5]}, r"cameras\[0\]"), ({"cameras": camera}, "cameras")):
             with self.assertRaisesRegex(ValueError, name):
                 enfilade.WalkEnv(address=self.server.address, starts=_STARTS, **{"cameras": [camera], **options})
-        for name, value in (("name", 5), ("yaw", math.nan), ("ahead", math.inf), ("left", "a"), ("fov_y", 0)):
-            with self.assertRaisesRegex(ValueError, name):
+        for name, value in (("name", 5), ("yaw", math.nan), ("ahead", math.inf), ("left", "a"), ("fov_y", 0),
+                            ("lens", "pinhole"), ("depth_noise", -1), ("depth_noise", {"seeds": 1}),
+                            ("distortion", (0.1,))):
+            with self.assertRaisesRegex(ValueError, "lens" if name == "distortion" else name):
                 enfilade.Camera(**{"name": "a", name: value})
+        for name, options in (("fov_y", {"lens": "fisheye", "fov_y": 7}), ("lens", {"lens": "equirectangular", "fov_y": 1}),
+                              ("depth_noise", {"depth_noise": 1, "channels": ("rgb",)})):
+            with self.assertRaisesRegex(ValueError, name):
+                enfilade.Camera("a", **options)
+
+    def test_cameras_have_the_lens_and_the_noise_of_frame(self):
+        self.need_pictures()
+        looks = {"plain": {}, "fisheye": {"lens": "fisheye", "fov_y": 4.0, "distortion": (0.01, 0.002)},
+                 "round": {"lens": "equirectangular"}, "noisy": {"depth_noise": {"seed": 5, "scale": 2.0}}}
+        for options in ({}, {"pitch": 0.3}):
+            env = self.environment(size=None, starts=[(2, 0.01, 0, 30)], cameras=[
+                enfilade.Camera(name, (32, 24), ("depth", "rgb"), **look, **options)
+                for name, look in looks.items()])
+            env.reset(seed=1)
+            seen, *_ = env.step((0.5, 0.2))
+            self.assertTrue(env.observation_space.contains(seen))
+            pitch, (cosine, sine) = options.get("pitch", 0.0), seen["heading"]
+            across = math.cos(pitch)
+            for name, look in looks.items():
+                frame = env.client.frame("walker", forward=(across * cosine, math.sin(pitch), -across * sine),
+                                         width=32, height=24, channels=("depth", "rgb"),
+                                         **({"fov_y": 1.2} if "lens" not in look else {}), **look)
+                depth = np.where(np.isnan(frame.depth), np.inf, frame.depth)
+                np.testing.assert_array_equal(seen[name + "_depth"], depth, name)
+                np.testing.assert_array_equal(seen[name + "_rgb"], frame.rgb, name)
+        self.assertLess(seen["round_depth"].min(), 0)
+        self.assertFalse(np.array_equal(seen["noisy_depth"], seen["plain_depth"]))
+        env._rgb = None
+        np.testing.assert_array_equal(env.render(), seen["plain_rgb"])
 
     def test_actions_that_are_no_sequence_are_named(self):
         vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=2, starts=_STARTS, channels=())

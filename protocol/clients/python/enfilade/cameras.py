@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -27,18 +27,24 @@ class Camera:
     size: (width, height) in pixels. channels: some of "rgb", "depth", "ids", "class", "thing",
     "normals", "range". yaw, pitch: radians, left and upwards positive. height: metres above the feet;
     None: the avatar's eyes. ahead, left: metres from its axis. samples: 1, 4 or 16 of the colour in
-    each pixel."""
+    each pixel. fov_y: radians, the vertical angle, by default 1.2. lens, distortion and depth_noise are
+    those of Client.frame(): with "fisheye" fov_y is the angle of the whole width, by default pi, and
+    "equirectangular" has none. Depths behind a lens are negative, and those that the noise loses are
+    inf, as the background."""
 
     name: str
     size: Tuple[int, int] = (128, 128)
     channels: Sequence[str] = ("rgb", "depth")
-    fov_y: float = 1.2
+    fov_y: Optional[float] = None
     yaw: float = 0.0
     pitch: float = 0.0
     height: Optional[float] = None
     ahead: float = 0.0
     left: float = 0.0
     samples: int = 1
+    lens: str = ""
+    distortion: Sequence[float] = ()
+    depth_noise: Union[None, int, Mapping[str, Any]] = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
@@ -52,12 +58,25 @@ class Camera:
             good = False
         if not good:
             raise ValueError(f"size: give two whole numbers of pixels, at least 1, not {self.size!r}")
-        number(self.fov_y, "fov_y", above=0, below=math.pi)
+        if self.fov_y is not None and self.lens:
+            number(self.fov_y, "fov_y", high=2 * math.pi, above=0)
+        elif self.fov_y is not None:
+            number(self.fov_y, "fov_y", above=0, below=math.pi)
         number(self.pitch, "pitch", above=-math.pi / 2, below=math.pi / 2)
         for name in ("yaw", "ahead", "left") + (() if self.height is None else ("height",)):
             number(getattr(self, name), name)
         if self.samples not in (1, 4, 16):
             raise ValueError(f"samples: give 1, 4 or 16, not {self.samples}")
+        if self.lens or len(self.distortion) or self.depth_noise is not None:
+            self.request("avatar")  # checks them
+
+    def request(self, avatar: str) -> Any:
+        """Returns the FrameRequest of a picture along +X from an avatar's eyes."""
+        width, height = map(int, self.size)
+        fov_y = 1.2 if self.fov_y is None and not self.lens else self.fov_y
+        return frame_request(avatar, forward=(1, 0, 0), width=width, height=height, fov_y=fov_y,
+                             channels=self.channels, samples=self.samples, lens=self.lens,
+                             distortion=self.distortion, depth_noise=self.depth_noise)
 
 
 def chosen_cameras(cameras: Sequence[Camera], **one: Any) -> List[Camera]:
@@ -86,10 +105,7 @@ class CameraRequest:
         self.camera = camera
         self.channels = tuple(camera.channels)
         self.prefix = camera.name + "_" if camera.name else ""
-        width, height = map(int, camera.size)
-        request = messages.ClientMessage(frame=frame_request(
-            avatar, forward=(1, 0, 0), width=width, height=height, fov_y=camera.fov_y,
-            channels=camera.channels, samples=camera.samples))
+        request = messages.ClientMessage(frame=camera.request(avatar))
         eyes = request.frame.eyes
         if camera.height is not None:
             eyes.height = camera.height
@@ -120,5 +136,7 @@ class CameraRequest:
         parts: Dict[str, Any] = {}
         for name in self.channels:
             low, high, more, kind = _BOXES[name]
+            if name == "depth" and self.camera.lens:
+                low = -np.inf
             parts[self.prefix + name] = spaces.Box(low, high, (height, width, *more), kind)
         return parts

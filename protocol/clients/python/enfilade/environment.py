@@ -266,9 +266,8 @@ class WalkEnv(spaces.EnvBase):
             return None
         if self._rgb is not None:
             return self._rgb.copy()
-        look = Camera("", (128, 128), ("rgb",)) if not self.cameras else self.cameras[0].camera
-        request = CameraRequest(Camera("", look.size, ("rgb",), look.fov_y, look.yaw, look.pitch,
-                                       look.height, look.ahead, look.left), self._name)
+        look = self.cameras[0].camera if self.cameras else Camera("")
+        request = CameraRequest(replace(look, channels=("rgb",), depth_noise=None), self._name)
         request.aim(self._heading)
         reply, attachment = self.client.take(self.client._post([request.request]))[0]
         return results.frame(reply.frame, attachment).rgb
