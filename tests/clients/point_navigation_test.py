@@ -169,12 +169,38 @@ class PointNavigation(RoomCase):
             with self.assertRaisesRegex(ValueError, r"episodes\[0\].goal"):
                 enfilade.write_episodes(file, [enfilade.Episode((2, 0, 0), 0, (8, 0, math.nan), 6)], "room.obj")
 
+    def test_scenes_and_radii_of_goals_are_kept(self):
+        episodes = [enfilade.Episode((2.0, 0.0, float(i)), 90.0, (8.0, 0.0, 0.0), 6.0, str(i), scene, radius)
+                    for i, (scene, radius) in enumerate((("a.glb", 0.2), ("a.glb", None), ("b.glb", 0.0)))]
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "episodes.json"
+            enfilade.write_episodes(file, episodes[:2])
+            self.assertEqual(enfilade.read_episodes(file), episodes[:2])
+            listed = json.loads(file.read_text())["episodes"]
+            self.assertEqual([one["goals"][0]["radius"] for one in listed], [0.2, None])
+            enfilade.write_episodes(file, episodes)
+            with self.assertRaisesRegex(ValueError, "episodes.json: .*2 scenes; give scene_id.*'a.glb', 'b.glb'"):
+                enfilade.read_episodes(file)
+            self.assertEqual(enfilade.read_episodes(file, "a.glb"), episodes[:2])
+            self.assertEqual(enfilade.read_episodes(file, scene_id="b.glb"), episodes[2:])
+            with self.assertRaisesRegex(ValueError, "scene_id: .*'c.glb', but in 'a.glb', 'b.glb'"):
+                enfilade.read_episodes(file, "c.glb")
+            enfilade.write_episodes(file, episodes, "room.obj")
+            self.assertEqual({one.scene_id for one in enfilade.read_episodes(file)}, {"room.obj"})
+            enfilade.write_episodes(file, [enfilade.Episode((0, 0, 0), 0, (1, 0, 0), 1, "", f"{i}.glb")
+                                           for i in range(30)])
+            with self.assertRaisesRegex(ValueError, "30 scenes.*'19.glb' and 10 more$"):
+                enfilade.read_episodes(file)
+            with self.assertRaisesRegex(ValueError, r"scene: .*episodes\[0\]"):
+                enfilade.write_episodes(file, [enfilade.Episode((0, 0, 0), 0, (1, 0, 0), 1)])
+
     def test_wrong_files_are_named_with_the_episode(self):
         good = {"start_position": [0, 0, 0], "start_rotation": [0, 0, 0, 1], "goals": [{"position": [1, 0, 0]}]}
         with tempfile.TemporaryDirectory() as folder:
             file = Path(folder) / "some.json"
             for wrong, words in (({"start_position": [0, 0]}, "start_position"),
                                  ({"goals": [{"position": [1, 0]}]}, "position"), ({"goals": []}, "goals"),
+                                 ({"goals": [{"position": [1, 0, 0], "radius": -1}]}, "radius"),
                                  ({"start_rotation": [0, 0, 0, 0]}, "unit quaternion"),
                                  ({"start_rotation": [0, 0, 1]}, "start_rotation"),
                                  ({"start_position": [0, math.nan, 0]}, "start_position")):

@@ -17,6 +17,7 @@ from .errors import EnfiladeError
 from .navigation import Navigation
 
 MAX_DRAWS = 64  # of a start and a goal, for one episode
+MAX_LISTED = 20  # scenes in an error
 NEAR_START = 2.0  # metres: where a given start is looked for on the mesh
 
 Point3 = Tuple[float, float, float]
@@ -31,13 +32,18 @@ class Episode:
     goal: Point3
     geodesic_distance: float
     id: str = ""
+    scene_id: str = ""  # as in its file
+    goal_radius: Optional[float] = None  # metres, of the goal in its file; WalkEnv has its own
 
 
 def check_episode(one: Episode, name: str) -> None:
-    """Raises ValueError with the name of the field if start, facing or goal are not finite numbers."""
+    """Raises ValueError with the name of the field if start, facing, goal or its radius are not finite
+    numbers."""
     numbers(one.start, f"{name}.start", (3,))
     number(one.facing, f"{name}.facing")
     numbers(one.goal, f"{name}.goal", (3,))
+    if one.goal_radius is not None:
+        number(one.goal_radius, f"{name}.goal_radius", 0)
 
 
 def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_distance: float = 1.0,
@@ -76,10 +82,11 @@ def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_dis
                         f"{draws} {'draws' if draws > 1 else 'draw'}; the last, from {where}: {why}")
 
 
-def read_episodes(file: Union[str, Path]) -> List[Episode]:
-    """Reads habitat-lab's PointNav JSON, also .json.gz: start_position, start_rotation, the first of the
-    goals, info. A `geodesic_distance` that is missing is NaN: WalkEnv measures it. Raises ValueError with
-    the file and the number of the episode."""
+def read_episodes(file: Union[str, Path], scene_id: Optional[str] = None) -> List[Episode]:
+    """Reads habitat-lab's PointNav JSON, also .json.gz: scene_id, start_position, start_rotation, the first of
+    the goals, info. `scene_id`: only the episodes of this scene; a file with several needs one. A
+    `geodesic_distance` that is missing is NaN: WalkEnv measures it. Raises ValueError with the file, and
+    the number of the episode or the scenes."""
     with (gzip.open if str(file).endswith(".gz") else open)(file, "rt", encoding="utf-8") as text:
         try:
             listed = json.load(text)["episodes"]
@@ -93,14 +100,26 @@ def read_episodes(file: Union[str, Path]) -> List[Episode]:
         except (AttributeError, KeyError, IndexError, TypeError, ValueError) as error:
             why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
             raise ValueError(f"{file}: episodes[{i}]: {why}") from None
-    return episodes
+    scenes = list(dict.fromkeys(one.scene_id for one in episodes))
+    if scene_id is None and len(scenes) > 1:
+        raise ValueError(f"{file}: its episodes are in {len(scenes)} scenes; give scene_id, one of {_listed(scenes)}")
+    if scene_id is not None and scene_id not in scenes:
+        raise ValueError(f"scene_id: {file} has no episodes in {scene_id!r}, but in {_listed(scenes)}")
+    return [one for one in episodes if scene_id in (None, one.scene_id)]
 
 
-def write_episodes(file: Union[str, Path], episodes: Sequence[Episode], scene: str) -> None:
-    """Writes the same format; `scene` is the scene_id of all. A `geodesic_distance` that is not known is
-    left out."""
+def _listed(scenes: Sequence[str]) -> str:
+    more = len(scenes) - MAX_LISTED
+    return ", ".join(map(repr, scenes[:MAX_LISTED])) + (f" and {more} more" if more > 0 else "")
+
+
+def write_episodes(file: Union[str, Path], episodes: Sequence[Episode], scene: str = "") -> None:
+    """Writes the same format; `scene` is the scene_id of all, by default each has its own. A
+    `geodesic_distance` that is not known is left out."""
     for i, one in enumerate(episodes):
         check_episode(one, f"episodes[{i}]")
+        if not (scene or one.scene_id):
+            raise ValueError(f"scene: give one, episodes[{i}] has no scene_id")
     data = {"episodes": [_to_habitat(one, i, scene) for i, one in enumerate(episodes)]}
     written = json.dumps(data, allow_nan=False)  # before the file is opened
     with (gzip.open if str(file).endswith(".gz") else open)(file, "wt", encoding="utf-8") as text:
@@ -124,13 +143,17 @@ def _from_habitat(one: Dict[str, Any]) -> Episode:
     distance = math.nan if distance is None else float(distance)
     if distance < 0:
         raise ValueError(f"geodesic_distance: give at least 0, not {distance:g}")
-    return Episode(start, facing % 360, goal, distance, str(one.get("episode_id", "")))  # type: ignore[arg-type]
+    radius = one["goals"][0].get("radius")
+    if radius is not None:
+        radius = number(radius, "goals[0].radius", 0)
+    return Episode(start, facing % 360, goal, distance, str(one.get("episode_id", "")),  # type: ignore[arg-type]
+                   str(one.get("scene_id", "")), radius)
 
 
 def _to_habitat(one: Episode, number: int, scene: str) -> Dict[str, Any]:
     half = 0.5 * math.radians(one.facing - 90.0)
     is_known = math.isfinite(one.geodesic_distance)
-    return {"episode_id": one.id or str(number), "scene_id": scene, "start_position": list(one.start),
+    return {"episode_id": one.id or str(number), "scene_id": scene or one.scene_id, "start_position": list(one.start),
             "start_rotation": [0.0, math.sin(half), 0.0, math.cos(half)],
             "info": {"geodesic_distance": one.geodesic_distance} if is_known else {},
-            "goals": [{"position": list(one.goal), "radius": None}], "shortest_paths": None}
+            "goals": [{"position": list(one.goal), "radius": one.goal_radius}], "shortest_paths": None}
