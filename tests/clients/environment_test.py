@@ -349,7 +349,8 @@ class Environments(RoomCase):
                             ("distortion", (0.1,))):
             with self.assertRaisesRegex(ValueError, "lens" if name == "distortion" else name):
                 enfilade.Camera(**{"name": "a", name: value})
-        for name, options in (("fov_y", {"lens": "fisheye", "fov_y": 7}), ("lens", {"lens": "equirectangular", "fov_y": 1}),
+        for name, options in (("fov_y", {"lens": "fisheye", "fov_y": 7}),
+                              ("lens", {"lens": "equirectangular", "fov_y": 1}),
                               ("depth_noise", {"depth_noise": 1, "channels": ("rgb",)})):
             with self.assertRaisesRegex(ValueError, name):
                 enfilade.Camera("a", **options)

@@ -249,7 +249,7 @@ class CompatTest(RoomCase):
 
 
 class FurnitureTest(unittest.TestCase):
-    """A floor with a cupboard, whose top habitat's mesh would leave out as too small, and a bed, whose top it has."""
+    """A floor with a cupboard and a bed. habitat's mesh leaves out the cupboard's small top."""
 
     BOXES = {
         "floor": ((-6, -0.5, -6), (6, 0, 6)),
@@ -277,7 +277,7 @@ class FurnitureTest(unittest.TestCase):
         path, found = self.path((-4, 0.7, 0), (0, 0.45, 0))
         self.assertTrue(found)
         np.testing.assert_allclose(path.points[0], (-4, 0, 0), atol=0.01)
-        self.assertAlmostEqual(np.abs(path.points[-1][[0, 2]]).max(), 0.5, delta=0.1)  # beside the cupboard
+        self.assertAlmostEqual(np.abs(path.points[-1][[0, 2]]).max(), 0.5, delta=0.1)  # at the cupboard's side
         self.assertAlmostEqual(path.points[-1][1], 0, delta=0.01)
         for end, is_found in (((-4, 3.5, 3), True), ((-4, 4.5, 3), False), ((-7.5, 0, 0), True),
                               ((-8.5, 0, 0), False), ((-4, -3.5, 3), True)):
@@ -494,7 +494,7 @@ class FollowerTest(RoomCase):
         self.assertIsNone(action)
         self.assertLess(math.hypot(place[0] - 8, place[2]), 0.25)
         with self.assertRaisesRegex(ValueError, "no path"):
-            follower.next_action_along(place, heading, (5.1, 3.1, 0))
+            follower.next_action_along(place, heading, (5.1, 9, 0))
 
     def test_find_path_returns_the_actions_up_to_the_stop(self):
         follower = GreedyGeodesicFollower(PathFinder(self.client.navigation()), stop_key="stop")
@@ -511,7 +511,10 @@ class FollowerTest(RoomCase):
             heading += {"turn_left": 1, "turn_right": -1}.get(action, 0) * math.radians(10)
         self.assertEqual(actions.index("stop"), len(actions) - 1)
         with self.assertRaisesRegex(ValueError, "no path"):
-            follower.find_path((2, 0, 0), 0.3, (5.1, 3.1, 0))
+            follower.find_path((2, 0, 0), 0.3, (5.1, 9, 0))
+        actions = follower.find_path((2, 0.7, 0), 0.0, (0, 1, 6))  # into the column
+        self.assertEqual(actions[-1], "stop")
+        self.assertIn("move_forward", actions)
 
 
 if __name__ == "__main__":

@@ -103,6 +103,7 @@ class GreedyGeodesicFollower:
         self.goal_radius = 0.75 * forward_amount if goal_radius is None else goal_radius
         self.keys = {"forward": forward_key, "left": left_key, "right": right_key, "stop": stop_key}
         self.forward_amount, self.turn_amount = forward_amount, turn_amount
+        self._snapped: Tuple[Tuple[float, ...], Optional[Spot]] = ((), None)  # the last goal, and its place
 
     def next_action_along(self, position: Sequence[float], heading: float,
                           goal: Sequence[float]) -> Optional[str]:
@@ -129,12 +130,18 @@ class GreedyGeodesicFollower:
                          f"actions; give more, or a smaller forward_amount than {self.forward_amount:g} m")
 
     def _next(self, position: Sequence[float], heading: float, goal: Sequence[float]) -> str:
-        path = self.pathfinder.navigation.path(position, goal)
+        wanted = tuple(map(float, goal))
+        if self._snapped[0] != wanted:
+            self._snapped = wanted, self.pathfinder._projected([wanted])[0]
+        start, end = self.pathfinder._projected([position])[0], self._snapped[1]
+        if start is None or end is None:
+            raise ValueError(f"no path: no agent can stand near the {'start' if start is None else 'goal'}")
+        path = self.pathfinder.navigation.path(start.at, end.at)
         if not path.found:
             raise ValueError(f"no path: {path.reason}")
         if path.length <= self.goal_radius:
             return "stop"
-        here = np.asarray(position, float)
+        here = start.at
         ahead = next((p for p in path.points[1:]
                       if math.hypot(p[0] - here[0], p[2] - here[2]) > 0.05), path.points[-1])
         turn = math.remainder(math.atan2(here[2] - ahead[2], ahead[0] - here[0]) - heading, math.tau)
@@ -196,14 +203,14 @@ class PathFinder:
         many = isinstance(path, MultiGoalShortestPath)
         ends = list(path.requested_ends) if many else [path.requested_end]  # type: ignore[union-attr]
         start, *spots = self._projected([path.requested_start, *ends])
-        goals = [i for i, spot in enumerate(spots) if spot is not None]
-        found = self.navigation.paths(start.at, [spots[i].at for i in goals]) if start and goals else []  # type: ignore[union-attr]
+        goals = {i: spot.at for i, spot in enumerate(spots) if spot is not None}
+        found = self.navigation.paths(start.at, list(goals.values())) if start is not None else []
         best = min(range(len(found)), key=lambda i: found[i].length, default=-1)
         path.geodesic_distance = found[best].length if best >= 0 else math.inf
         path.points = list(found[best].points) if best >= 0 else []
         is_found = math.isfinite(path.geodesic_distance)
         if many:
-            path.closest_end_point_index = goals[best] if is_found else -1  # type: ignore[union-attr]
+            path.closest_end_point_index = list(goals)[best] if is_found else -1  # type: ignore[union-attr]
         return is_found
 
     def get_random_navigable_point(self, max_tries: int = 10, island_index: int = -1) -> np.ndarray:
