@@ -128,4 +128,12 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
   return doors;
 }
 
+double computeOpeningSeconds(const std::vector<DoorOnPath>& doors) {
+  double seconds = 0;
+  for (std::size_t i = 0; i < doors.size(); ++i)
+    if (i + 1 == doors.size() || doors[i + 1].point != doors[i].point)
+      seconds += doors[i].secondsToOpen;
+  return seconds;
+}
+
 }  // namespace enfilade::scene

@@ -36,4 +36,8 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
                                         const Snapshot& snapshot, const NavigationAgent& agent,
                                         const std::vector<Vec3>& points);
 
+/// Seconds that a walk waits for the doors in all. Doors on one line, as the leaves of one, open
+/// together: the last one counts.
+double computeOpeningSeconds(const std::vector<DoorOnPath>& doors);
+
 }  // namespace enfilade::scene

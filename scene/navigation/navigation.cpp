@@ -319,31 +319,44 @@ std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named,
   return findPlaceOn(named, std::nullopt);
 }
 
-std::optional<Vec3> Navigation::findNearestOn(std::uint32_t island, const Vec3& point,
-                                              double maxDistance) const {
-  std::optional<Vec3> nearest;
-  for (const std::uint32_t polygon : ample_->findPolygons(point, Vec3::Constant(maxDistance))) {
-    if (islands_.numberOf[polygon] != island) continue;
-    const Vec3 closest = ample_->closestPoint(polygon, point);
-    if (!nearest || (closest - point).norm() < (*nearest - point).norm()) nearest = closest;
-  }
-  return nearest;
-}
-
-std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance,
-                                     const std::optional<std::uint32_t>& island) {
+std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance) {
   const std::lock_guard lock(mutex_);
   if (const auto place = standAt(*walker_, point))
-    if ((*place - point).norm() <= maxDistance && (!island || islandAt(*place) == island))
-      return place;
-  std::optional<Vec3> nearest;
-  if (island)
-    nearest = findNearestOn(*island, point, maxDistance);
-  else if (const auto found = ample_->findNearest(point, Vec3::Constant(maxDistance)))
-    nearest = found->point;
+    if ((*place - point).norm() <= maxDistance) return place;
+  const auto nearest = ample_->findNearest(point, Vec3::Constant(maxDistance));
   if (!nearest) return std::nullopt;
-  const auto place = standNear(*walker_, *nearest);
+  const auto place = standNear(*walker_, nearest->point);
   return place && (*place - point).norm() <= maxDistance ? place : std::nullopt;
+}
+
+/// Places come from the mesh alone: where there is none, as on the rim of a table, a place would
+/// have the island of the mesh below.
+std::optional<Vec3> Navigation::snapTo(const Vec3& point, const SnapTarget& wanted) {
+  constexpr double kExact = 2e-3, kMaxHeightError = 0.3;  // metres
+  constexpr std::size_t kMaxCandidates = 16;
+  const std::lock_guard lock(mutex_);
+  if (!wanted.island)
+    if (const auto place = standAt(*walker_, point); place && (*place - point).norm() <= kExact)
+      return place;
+  const Aabb box{point - wanted.extents, point + wanted.extents};
+  std::vector<std::pair<double, Vec3>> candidates;
+  for (const std::uint32_t polygon : ample_->findPolygons(point, wanted.extents)) {
+    const std::uint32_t number = islands_.numberOf[polygon];
+    if (number == kNoIsland || (wanted.island && number != *wanted.island) ||
+        (wanted.isDrawn && !islands_.islands[number].isDrawn))
+      continue;
+    const Vec3 closest = ample_->closestPoint(polygon, point);
+    candidates.emplace_back((closest - point).norm(), closest);
+  }
+  std::ranges::stable_sort(candidates, {}, &std::pair<double, Vec3>::first);
+  candidates.resize(std::min(candidates.size(), kMaxCandidates));
+  for (const auto& [distance, closest] : candidates) {
+    const auto place = standNear(*walker_, closest);
+    if (place && std::abs(place->y() - closest.y()) < kMaxHeightError &&
+        collision::contains(box, {*place, *place}))
+      return place;
+  }
+  return std::nullopt;
 }
 
 std::optional<Vec3> Navigation::tryStep(const Vec3& from, const Vec3& to, bool slides) {

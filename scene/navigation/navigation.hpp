@@ -51,6 +51,13 @@ struct RandomPlace {
 
 /// Thread-safe; queries run one after another. The state of bodies is that of the construction or
 /// of the last update().
+/// Where Navigation::snapTo() looks for a place.
+struct SnapTarget {
+  Vec3 extents = Vec3::Zero();          ///< metres: half the box around the point
+  std::optional<std::uint32_t> island;  ///< nullopt: any
+  bool isDrawn = false;  ///< only islands with Island::isDrawn; a place within 2 mm stays
+};
+
 class Navigation {
  public:
   using Progress = std::function<void(double)>;  ///< share that is done, 0..1
@@ -86,10 +93,10 @@ class Navigation {
   /// place on the island that has such places is preferred, if it has any.
   std::optional<Vec3> findPlaceIn(const NamedPlace& named,
                                   const std::optional<Vec3>& start = std::nullopt);
-  /// The standing place at `point`, or else the closest one within `maxDistance` metres; only on
-  /// `island`, if that is given.
-  std::optional<Vec3> snap(const Vec3& point, double maxDistance,
-                           const std::optional<std::uint32_t>& island = std::nullopt);
+  /// The standing place at `point`, or else the closest one within `maxDistance` metres.
+  std::optional<Vec3> snap(const Vec3& point, double maxDistance);
+  /// The closest standing place on the wanted islands.
+  std::optional<Vec3> snapTo(const Vec3& point, const SnapTarget& wanted);
   /// A place that is uniform in area; nullopt: none was found.
   std::optional<Vec3> findRandomPlace(std::mt19937_64& random, const RandomPlace& wanted);
   /// The end of a walk from one place towards another: at the first obstacle, or, if it slides,
@@ -114,8 +121,6 @@ class Navigation {
   bool isGapPassable(const Vec3& from, const Vec3& to, const std::vector<std::uint32_t>& scarce);
   NavigationMesh buildUnobstructed(int threads) const;
   std::optional<std::uint32_t> islandAt(const Vec3& point) const;
-  std::optional<Vec3> findNearestOn(std::uint32_t island, const Vec3& point,
-                                    double maxDistance) const;
   Aabb computeBox(const NamedPlace& named) const;
   /// As findPlaceIn(), on an island, or anywhere.
   std::optional<Vec3> findPlaceOn(const NamedPlace& named,

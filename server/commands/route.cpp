@@ -210,7 +210,7 @@ ExitCode route(const RouteCommand& command) {
   bar.clear();
   const Vec3 from = resolvePlace(start, command.from, "FROM", navigation, std::nullopt);
   const Vec3 to = resolvePlace(goal, command.to, "TO", navigation, from);
-  const scene::NavigationPath path = navigation.findPath(from, to, command.links);
+  scene::NavigationPath path = navigation.findPath(from, to, command.links);
   const auto narrowest =
       path.found() ? navigation.findNarrowest(path.points) : std::optional<scene::NarrowPlace>();
   scene::EntityIndex index(scene);
@@ -220,6 +220,7 @@ ExitCode route(const RouteCommand& command) {
                                    *scene::World(scene, command.settings).snapshot(), command.agent,
                                    path.points)
           : std::vector<scene::DoorOnPath>();
+  path.seconds += scene::computeOpeningSeconds(doors);
   constexpr auto kReplace = Json::error_handler_t::replace;
   writeToStdout(command.json ? makeReport(command, path, narrowest, doors, *scene, navigation)
                                        .dump(-1, ' ', false, kReplace) +

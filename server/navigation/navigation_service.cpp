@@ -116,11 +116,21 @@ struct Answer {
     if (auto error = validateCount("snap.points", query.points_size(), 10'000)) return error;
     if (auto error = validateNumber("snap.max_distance", query.max_distance(), 0, 100))
       return error;
-    const auto island = query.has_island() ? std::optional(query.island()) : std::nullopt;
+    scene::SnapTarget wanted;
+    wanted.isDrawn = query.drawn();
+    wanted.extents = query.has_extents() ? vectorFromProto(query.extents())
+                                         : Vec3(Vec3::Constant(query.max_distance()));
+    if (query.has_extents() &&
+        !((wanted.extents.array() >= 0).all() && (wanted.extents.array() <= 100).all()))
+      return makeNavigationError("snap.extents", "give 0 to 100 m");
+    if (query.has_island()) wanted.island = query.island();
+    const bool isAny = !query.has_island() && !query.drawn() && !query.has_extents();
     for (int i = 0; i < query.points_size(); ++i) {
       const std::string field = "snap.points[" + std::to_string(i) + "]";
       if (auto error = validatePoint(field, query.points(i))) return error;
-      addSpot(navigation.snap(vectorFromProto(query.points(i)), query.max_distance(), island));
+      const Vec3 point = vectorFromProto(query.points(i));
+      addSpot(isAny ? navigation.snap(point, query.max_distance())
+                    : navigation.snapTo(point, wanted));
     }
     return std::nullopt;
   }

@@ -267,5 +267,11 @@ TEST(Doors, ThoseOnAPathAreFoundOpenOrClosed) {
   EXPECT_TRUE(findDoorsOnPath(index, {}, *open, {}, {{1, 0, 0}, {4, 0, 2}}).empty());
 }
 
+TEST(Doors, LeavesOnOneLineOpenTogether) {
+  EXPECT_EQ(computeOpeningSeconds({}), 0);
+  EXPECT_EQ(computeOpeningSeconds({{0, 1, 2, 1.5, true}, {1, 1, 2, 2, true}, {2, 3, 5, 4, true}}),
+            6);
+}
+
 }  // namespace
 }  // namespace enfilade::scene::testing

@@ -343,12 +343,30 @@ TEST(Navigation, TheClosestPlaceOnAnIsland) {
   const Vec3 left(3, 0, 0);
   const auto own = navigation.islandOf(left), other = navigation.islandOf({5, 0, 0});
   ASSERT_TRUE(own && other && own != other);
-  EXPECT_EQ(navigation.snap(left, 4, own), navigation.snap(left, 4));
-  const auto beyond = navigation.snap(left, 4, other);
+  const auto here = navigation.snapTo(left, {Vec3::Constant(4), own});
+  ASSERT_TRUE(here);
+  EXPECT_LT((*here - left).norm(), 0.01);
+  const auto beyond = navigation.snapTo(left, {Vec3::Constant(4), other});
   ASSERT_TRUE(beyond);
   EXPECT_EQ(navigation.islandOf(*beyond), other);
   EXPECT_LT(beyond->x(), 4.6);
-  EXPECT_FALSE(navigation.snap(left, 1, other));
+  EXPECT_FALSE(navigation.snapTo(left, {Vec3::Constant(1), other}));
+}
+
+TEST(Navigation, APlaceOnATableLeadsToTheFloorThatIsDrawn) {
+  Navigation navigation(
+      boxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}}, {"table", {3.5, 0, -0.4}, {4.5, 0.75, 0.4}}}),
+      {}, {});
+  const Vec3 above(4, 1, 0.1);
+  EXPECT_GT(navigation.snap(above, 2)->y(), 0.7);
+  const auto floor = navigation.snapTo(above, {Vec3(2, 4, 2), std::nullopt, true});
+  ASSERT_TRUE(floor);
+  EXPECT_LT(floor->y(), 0.1);
+  EXPECT_LT(std::abs(floor->z()), 1);
+  EXPECT_FALSE(navigation.snapTo(above, {Vec3(2, 0.5, 2), std::nullopt, true}));
+  const Vec3 onTable(4, 0.752, 0);
+  EXPECT_EQ(navigation.snapTo(onTable, {Vec3(2, 4, 2), std::nullopt, true}),
+            navigation.snap(onTable, 1));
 }
 
 TEST(Navigation, ARoomByNameIsItsFloorAndNoTable) {

@@ -24,10 +24,7 @@ from .navigation import Navigation, Spot
 _NOWHERE = np.full(3, np.nan)
 _MOST_ACTIONS = 2000  # of find_path(): 500 m of steps ahead
 _FARTHEST = 20.0  # metres that the server searches for obstacles
-_EXTENTS = np.array((2.0, 4.0, 2.0))  # metres: habitat projects a point within this box on either side
-_SMALL = 1.0  # square metres: by default habitat's meshes have no smaller regions (20 x 20 cells of 5 cm)
-_EXACT = 2e-3  # metres: a point so close to a place is that place, on an island of any size
-_ROUNDS = 4  # of the search for the closest place on an island
+_EXTENTS = (2.0, 4.0, 2.0)  # metres: habitat projects a point within this box on either side
 
 
 class ShortestPath:
@@ -230,54 +227,7 @@ class PathFinder:
     def _projected(self, wanted: Sequence[Sequence[float]],
                    island: Optional[int] = None) -> List[Optional[Spot]]:
         """The places that snap_point() has for points."""
-        spots = self.navigation.snap_all(wanted, float(np.linalg.norm(_EXTENTS)))
-        targets = np.asarray(wanted, float).reshape(-1, 3)
-        return [self._nearest([spot], target, island) or self._closest(target, island)
-                for spot, target in zip(spots, targets)]
-
-    def _closest(self, target: np.ndarray, island: Optional[int]) -> Optional[Spot]:
-        """The closest place that counts, where the closest of all does not (Snap takes no island): of those
-        around the point in the whole box, then of those nearer than the best one and at its height."""
-        levels = target[1] + np.arange(-_EXTENTS[1], _EXTENTS[1] + 0.1, 0.5)
-        around = np.concatenate([_rings(target, y, _EXTENTS[0], 4, 8) for y in levels])
-        best = self._nearest(self.navigation.snap_all(around, 1.0), target, island)
-        for _ in range(_ROUNDS if best is not None else 0):
-            assert best is not None
-            before = float(np.linalg.norm(best.at - target))
-            across = math.hypot(best.at[0] - target[0], best.at[2] - target[2])
-            around = np.concatenate([target + np.linspace(0, 1, 16)[:, None] * (best.at - target),
-                                     _rings(target, best.at[1], across, 8, 16)])
-            best = self._nearest([best, *self.navigation.snap_all(around, 1.0)], target, island)
-            if best is None or before - float(np.linalg.norm(best.at - target)) < 1e-3:
-                break
-        return best
-
-    def _nearest(self, spots: Sequence[Optional[Spot]], target: np.ndarray,
-                 island: Optional[int]) -> Optional[Spot]:
-        """The place nearest to the target of those that count."""
-        counting = sorted(((float(np.linalg.norm(spot.at - target)), i, spot) for i, spot in enumerate(spots)
-                           if spot is not None and self._counts(spot, target, island)), key=lambda one: one[:2])
-        if counting and counting[0][0] <= _EXACT and island is None:
-            return counting[0][2]
-        for first in range(0, len(counting), 16):
-            some = [spot for _, _, spot in counting[first:first + 16]]
-            # A place without mesh, as the rim of a table, has the island of the closest mesh below. From under
-            # the surface the server looks for mesh only.
-            again = self.navigation.snap_all([spot.at - (0, 0.2, 0) for spot in some], 0.35)
-            for spot, one in zip(some, again):
-                if one is not None and one.island == spot.island:
-                    return spot
-        return None
-
-    def _counts(self, spot: Spot, target: np.ndarray, island: Optional[int]) -> bool:
-        """Whether a place lies within the extents of a point, and on the island or on one that is not small."""
-        if (np.abs(spot.at - target) > _EXTENTS).any():
-            return False
-        if island is not None:
-            return spot.island == island
-        areas = self.navigation.island_areas
-        return bool(np.linalg.norm(spot.at - target) <= _EXACT) or (
-            spot.island is not None and spot.island < len(areas) and areas[spot.island] >= min(_SMALL, areas[0]))
+        return self.navigation.snap_all(wanted, extents=_EXTENTS, island=island, drawn=island is None)
 
     def is_navigable(self, pt: Sequence[float], max_y_delta: float = 0.5) -> bool:
         return self.navigation.is_navigable(pt, max_y_delta)
@@ -354,15 +304,6 @@ class PathFinder:
         if eps != 0.5:
             raise ValueError(f"eps: the server's maps have the floors within 0.5 m, not {eps}")
         return self.navigation.top_down(height, meters_per_pixel).cells
-
-
-def _rings(centre: np.ndarray, height: float, radius: float, rings: int, spokes: int) -> np.ndarray:
-    """Points at a height, on circles around a vertical axis and on the axis."""
-    radii = np.linspace(0, radius, rings + 1)[1:, None]
-    angles = np.linspace(0, 2 * math.pi, spokes, endpoint=False)
-    x, z = centre[0] + radii * np.cos(angles), centre[2] + radii * np.sin(angles)
-    around = np.stack([x.ravel(), np.full(x.size, height), z.ravel()], axis=1)
-    return np.concatenate([[(centre[0], height, centre[2])], around])
 
 
 def _island(index: int) -> Optional[int]:

@@ -215,13 +215,18 @@ class Navigation:
         """Returns where an avatar at the point stands, or the closest place; None: none is so close."""
         return self.snap_all([point], max_distance)[0]
 
-    def snap_all(self, where: Any, max_distance: float = 2.0) -> List[Optional[Spot]]:
-        """snap() of N x 3 points."""
+    def snap_all(self, where: Any, max_distance: float = 2.0, *, island: Optional[int] = None,
+                 drawn: bool = False, extents: Optional[Point] = None) -> List[Optional[Spot]]:
+        """snap() of N x 3 points; with `island` or `drawn` to places on that island, or on islands that are
+        `drawn`. `extents`: half the box in which to look, instead of `max_distance`."""
+        options = {} if extents is None else {"extents": vec(extents)}
         array = points(where, "snap")
         found: List[Optional[Spot]] = []
         for first in range(0, len(array), _MOST_POINTS):
             page = array[first:first + _MOST_POINTS]
-            query = messages.NavigationQuery.Snap(points=[vec(p) for p in page], max_distance=max_distance)
+            query = messages.NavigationQuery.Snap(
+                points=[vec(p) for p in page], max_distance=max_distance, drawn=drawn,
+                island=optional_whole(island, "island", high=UINT32), **options)
             found += [_spot(one) for one in self._ask(snap=query)[0].spots]
         return found
 
