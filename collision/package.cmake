@@ -14,6 +14,7 @@ set(public_headers
   minkowski/feature_cache.hpp
   minkowski/verdict.hpp
   motion/interpolated_motion.hpp
+  motion/motion_result.hpp
   motion/moving_pose.hpp
   motion/pair_schedule.hpp
   motion/rigid_motion.hpp

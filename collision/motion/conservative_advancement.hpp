@@ -3,97 +3,76 @@
 //     plane separates the bodies.
 //  2. A bound of the motion certifies that the plane separates them up to a later position. Advance
 //     to it and repeat.
-// Shape casts bound it by motion_bounds.hpp, the time of impact by time_of_impact.cpp.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <span>
+
 #include "collision/assert.hpp"
-#include "collision/motion/shape_cast.hpp"
+#include "collision/motion/motion_result.hpp"
 
 namespace enfilade::collision {
 
 /// In place of a step or a position: the target is reached.
 inline constexpr double kArrived = -1;
 
-enum class AdvancementEnd : std::uint8_t { clear, arrived, iterationLimit };
-
 /// Advances `at` (>= 0) up to `end`. `certify(at)` returns the position up to which the motion from
-/// `at` is certified, which is at least `end` if its rest is clear, or kArrived.
+/// `at` is certified, which is at least `end` if its rest is clear, or kArrived. `unproved`: the
+/// limit of steps.
 template <class Certify>
-AdvancementEnd advance(double& at, double end, int maxSteps, const Certify& certify) {
+MotionOutcome advance(double& at, double end, int maxSteps, const Certify& certify) {
   for (int i = 0; i < maxSteps; ++i) {
     ENFILADE_ASSERT(at >= 0 && at <= end);
     const double next = certify(at);
-    if (next == kArrived) return AdvancementEnd::arrived;
-    if (next >= end) return AdvancementEnd::clear;
+    if (next == kArrived) return MotionOutcome::contact;
+    if (next >= end) return MotionOutcome::clear;
     at = next;
   }
-  return AdvancementEnd::iterationLimit;
+  return MotionOutcome::unproved;
 }
 
-struct Advancement {
-  double fraction = 0;   ///< certified
-  bool arrived = false;  ///< false: clear up to the end of the motion
-  bool iterationLimitReached = false;
-  double queriedFraction = 0;   ///< of `separation`; below `fraction` at the iteration limit only
-  SeparationResult separation;  ///< of the last query
-};
-
-/// Advances a motion from fraction `from`. `query(fraction)` returns the separation; nullopt if the
-/// rest of the motion is clear. `step(fraction, separation)` returns the certified advance, or
-/// kArrived. Counts the queries in `result`.
+/// Advances a motion from the fraction result.lo. `query(fraction)` returns the separation; nullopt
+/// if the rest of the motion is clear. `step(fraction, separation)` returns the certified advance,
+/// or kArrived. At the limit of steps, result.separation is of a fraction below result.lo.
 template <class Query, class Step>
-Advancement advanceConservatively(double from, int maxSteps, ShapeCastResult& result,
-                                  const Query& query, const Step& step) {
+void advanceFraction(int maxSteps, MotionResult& result, const Query& query, const Step& step) {
   constexpr double kWhole = 1;
-  Advancement advancement;
-  advancement.fraction = from;
-  const AdvancementEnd end = advance(advancement.fraction, kWhole, maxSteps, [&](double at) {
+  result.outcome = advance(result.lo, kWhole, maxSteps, [&](double at) {
     const std::optional<SeparationResult> separation = query(at);
-    ++result.queries;
+    result.countQuery(separation ? separation->certificate : Certificate::filter);
     if (!separation) return kWhole;
-    if (separation->certificate == Certificate::rational) ++result.exactQueries;
-    advancement.separation = *separation;
-    advancement.queriedFraction = at;
+    result.separation = *separation;
     const double certified = step(at, *separation);
     return certified == kArrived ? kArrived : at + certified;
   });
-  advancement.arrived = end != AdvancementEnd::clear;
-  advancement.iterationLimitReached = end == AdvancementEnd::iterationLimit;
-  return advancement;
+  if (result.isClear()) result.lo = kWhole;
 }
 
-/// A distance to advance to, metres.
-struct TargetDistance {
-  double distance, tolerance;
-};
+/// Smallest s > 0 with gap - closing s - curvature s^2 / 2 = 0; infinity if there is no such s.
+/// gap, curvature >= 0.
+inline double findFirstRoot(double gap, double closing, double curvature) {
+  if (curvature == 0) return closing > 0 ? gap / closing : std::numeric_limits<double>::infinity();
+  const double root = std::sqrt(closing * closing + 2 * curvature * gap);
+  return closing > 0 ? 2 * gap / (closing + root) : (root - closing) / curvature;
+}
 
-inline constexpr double kArrivalTolerance = 1.0 / 32;  // of (rest - min): tolerance at a target
-
-/// Advances to offset.rest, and from there to offset.min to check that the obstacle really blocks
-/// the motion. `cast` advances to a target (advanceTo), and decides where the first target is
-/// reached: isLeaving(), for bodies that overlap there, frees the motion; findSecondTarget()
-/// returns nullopt if it ends there.
-template <class Cast>
-void castToOffset(Cast& cast, const ContactOffset& offset, ShapeCastResult& result) {
-  ENFILADE_ASSERT(offset.min < offset.rest);
-  const double tolerance = kArrivalTolerance * (offset.rest - offset.min);
-  Advancement rest = cast.advanceTo({offset.rest, tolerance}, 0, result);
-  if (!rest.arrived) return;
-  bool blocked = true, limited = rest.iterationLimitReached;
-  if (rest.separation.verdict != Verdict::separated) {
-    blocked = !cast.isLeaving(rest);
-  } else if (!limited) {
-    if (const auto target = cast.findSecondTarget(rest, {offset.min, tolerance})) {
-      const Advancement min = cast.advanceTo(*target, rest.fraction, result);
-      blocked = min.arrived;
-      limited = min.iterationLimitReached;
-    }
+/// Lower bound of the s at which a vertex reaches the plane that lies `gap` metres beyond the
+/// foremost vertex. `path` bounds the motion of a vertex along the plane's normal. With
+/// r = path.arm(vertex), the vertex starts at path.height(r) and advances in s by at most
+/// path.speed(r) s + path.curvature(r) s^2 / 2.
+template <class Path>
+double findPlaneCrossing(std::span<const Vec3> vertices, double gap, const Path& path) {
+  double foremost = -std::numeric_limits<double>::infinity();
+  for (const Vec3& vertex : vertices) foremost = std::max(foremost, path.height(path.arm(vertex)));
+  double first = std::numeric_limits<double>::infinity();
+  for (const Vec3& vertex : vertices) {
+    const Vec3 r = path.arm(vertex);
+    const double behind = gap + (foremost - path.height(r));
+    first = std::min(first, findFirstRoot(behind, path.speed(r), path.curvature(r)));
   }
-  if (!blocked) return;
-  result.stopped = true;
-  result.iterationLimitReached = limited;
-  result.fraction = rest.fraction;
-  result.separationAtStop = rest.separation;
+  return first;
 }
 
 }  // namespace enfilade::collision

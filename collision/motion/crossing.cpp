@@ -33,9 +33,8 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr std::size_t kMaxSearchedVertices = 4;  // of each body: at most 68 pairs of features
-constexpr std::size_t kMaxFaces = 200;           // for exact arithmetic, two microseconds each
-constexpr LongReal kSlack = 1 + 0x1p-40L;        // exceeds the rounding of the bounds
+constexpr std::size_t kMaxFaces = 200;     // for exact arithmetic, two microseconds each
+constexpr LongReal kSlack = 1 + 0x1p-40L;  // exceeds the rounding of the bounds
 
 /// A point, or a difference of points, at both ends of the interval.
 struct Ends {
@@ -113,17 +112,6 @@ double computeMagnitude(const PlacedConvex& body) {
   return (body.rotation ? body.rotation->norm() : 1) * computeRadius(body, false);
 }
 
-/// Distinct vertices of one body in the simplex.
-struct VertexSet {
-  std::array<std::uint32_t, 4> indices{};
-  std::size_t size = 0;
-
-  void insert(std::uint32_t index) {
-    const auto end = indices.begin() + static_cast<std::ptrdiff_t>(size);
-    if (std::find(indices.begin(), end, index) == end) indices[size++] = index;
-  }
-};
-
 class CrossingSearch {
  public:
   CrossingSearch(const MovingBody& a, const MovingBody& b, double from, double to)
@@ -144,54 +132,52 @@ class CrossingSearch {
   }
 
   bool isProvedFor(const FeatureCache& features) const {
-    VertexSet a, b;
+    std::vector<std::uint32_t> a, b;
     for (int i = 0; i < features.size; ++i) {
-      a.insert(features.pairs[i].a);
-      b.insert(features.pairs[i].b);
+      const auto [vertexA, vertexB] = features.pairs[i];
+      if (vertexA >= start_.a().vertices.size() || vertexB >= start_.b().vertices.size())
+        return false;
+      if (std::ranges::find(a, vertexA) == a.end()) a.push_back(vertexA);
+      if (std::ranges::find(b, vertexB) == b.end()) b.push_back(vertexB);
     }
-    const auto& [ia, sizeA] = a;
-    const auto& [ib, sizeB] = b;
-    if (*std::max_element(ia.begin(), ia.end()) >= start_.a().vertices.size() ||
-        *std::max_element(ib.begin(), ib.end()) >= start_.b().vertices.size())
-      return false;
-    if (sizeA == 1 && sizeB == 3)
-      return signs_.isPierced({atB(ib[0]), atB(ib[1]), atB(ib[2])}, atA(ia[0]));
-    if (sizeA == 3 && sizeB == 1)
-      return signs_.isPierced({atA(ia[0]), atA(ia[1]), atA(ia[2])}, atB(ib[0]));
-    return sizeA == 2 && sizeB == 2 &&
-           signs_.doEdgesCross({atA(ia[0]), atA(ia[1])}, {atB(ib[0]), atB(ib[1])});
+    // A vertex and a triangle, or two edges.
+    return a.size() + b.size() == 4 && isProvedAmong(a, b);
   }
 
-  /// Tries all vertices, edges and triangles of bodies with few vertices.
+  /// Of bodies of at most four vertices: at most 68 pairs of features.
   bool isProvedForAny() const {
+    constexpr std::array<std::uint32_t, 4> kAll{0, 1, 2, 3};
     const std::size_t sizeA = start_.a().vertices.size(), sizeB = start_.b().vertices.size();
-    if (std::max(sizeA, sizeB) > kMaxSearchedVertices) return false;
-    std::array<Ends, kMaxSearchedVertices> a{}, b{};
-    for (std::size_t i = 0; i < sizeA; ++i) a[i] = atA(i);
-    for (std::size_t i = 0; i < sizeB; ++i) b[i] = atB(i);
-    return isAnyTrianglePierced({a.data(), sizeA}, {b.data(), sizeB}) ||
-           isAnyTrianglePierced({b.data(), sizeB}, {a.data(), sizeA}) ||
-           doAnyEdgesCross({a.data(), sizeA}, {b.data(), sizeB});
+    if (std::max(sizeA, sizeB) > kAll.size()) return false;
+    return isProvedAmong(std::span(kAll).first(sizeA), std::span(kAll).first(sizeB));
   }
 
  private:
-  Ends atA(std::size_t i) const { return {placeVertex(start_.a(), i), placeVertex(end_.a(), i)}; }
-  Ends atB(std::size_t i) const { return {placeVertex(start_.b(), i), placeVertex(end_.b(), i)}; }
+  /// Tries all vertices, edges and triangles of these vertices.
+  bool isProvedAmong(std::span<const std::uint32_t> verticesA,
+                     std::span<const std::uint32_t> verticesB) const {
+    std::vector<Ends> a, b;
+    for (const std::uint32_t i : verticesA)
+      a.push_back({placeVertex(start_.a(), i), placeVertex(end_.a(), i)});
+    for (const std::uint32_t i : verticesB)
+      b.push_back({placeVertex(start_.b(), i), placeVertex(end_.b(), i)});
+    return isAnyTrianglePierced(a, b) || isAnyTrianglePierced(b, a) || doAnyEdgesCross(a, b);
+  }
 
   bool isAnyTrianglePierced(std::span<const Ends> corners, std::span<const Ends> points) const {
-    for (std::size_t i = 0; i < corners.size(); ++i)
-      for (std::size_t j = 0; j < i; ++j)
-        for (std::size_t k = 0; k < j; ++k)
+    for (std::size_t k = 2; k < corners.size(); ++k)
+      for (std::size_t j = 1; j < k; ++j)
+        for (std::size_t i = 0; i < j; ++i)
           for (const Ends& point : points)
             if (signs_.isPierced({corners[i], corners[j], corners[k]}, point)) return true;
     return false;
   }
 
   bool doAnyEdgesCross(std::span<const Ends> a, std::span<const Ends> b) const {
-    for (std::size_t i = 0; i < a.size(); ++i)
-      for (std::size_t j = 0; j < i; ++j)
-        for (std::size_t k = 0; k < b.size(); ++k)
-          for (std::size_t l = 0; l < k; ++l)
+    for (std::size_t j = 1; j < a.size(); ++j)
+      for (std::size_t i = 0; i < j; ++i)
+        for (std::size_t l = 1; l < b.size(); ++l)
+          for (std::size_t k = 0; k < l; ++k)
             if (signs_.doEdgesCross({a[i], a[j]}, {b[k], b[l]})) return true;
     return false;
   }

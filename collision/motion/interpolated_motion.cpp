@@ -36,47 +36,34 @@ Quat nearestRotation(const Quat& q0, const Quat& q1) {
 }
 
 /// Upper bound in radians.
-double computeRotationAngle(const InterpolatedMotion& motion) {
-  const Quat to = nearestRotation(motion.fromRotation, motion.toRotation);
-  const double s = 0.5 * (to.coeffs() - motion.fromRotation.coeffs()).norm();
+double computeRotationAngle(const Quat& from, const Quat& to) {
+  const double s = 0.5 * (nearestRotation(from, to).coeffs() - from.coeffs()).norm();
   return 4 * s * (1 + s * s) * kRoundUpFactor;
 }
 
-CentrePose computeMiddlePose(const CentrePose& from, const CentrePose& to) {
-  CentrePose middle;
-  middle.centre = 0.5 * (from.centre + to.centre);
-  middle.rotation.coeffs() =
-      from.rotation.coeffs() + nearestRotation(from.rotation, to.rotation).coeffs();
-  const double length = std::sqrt(middle.rotation.squaredNorm());
-  ENFILADE_ASSERT(!(length < 1));  // the nearer of two unit quaternions: the sum is longer
-  middle.rotation.coeffs() /= length;
-  return middle;
+RigidTransform computeFrame(const CentrePose& pose, const Vec3& centreInFrame) {
+  const Mat3 rotation = pose.rotation.toRotationMatrix();
+  return {rotation, pose.centre - rotation * centreInFrame};
+}
+
+PlacedConvex placeAt(const InterpolatedShape& body, bool atEnd) {
+  return place(body.shape, atEnd ? body.motion.toFrame : body.motion.fromFrame);
+}
+
+double computeChordDeviation(const InterpolatedMotion& motion) {
+  return motion.radius * motion.rotationAngle * motion.rotationAngle / 2 * kRoundUpFactor;
 }
 
 /// The whole motion of two shapes, or a part of it.
 struct MovingPair {
-  const ConvexShape& shapeA;
-  const ConvexShape& shapeB;
-  const InterpolatedMotion& a;
-  const InterpolatedMotion& b;
-
-  PlacedConvex placedA(bool atEnd) const { return place(shapeA, a, atEnd); }
-  PlacedConvex placedB(bool atEnd) const { return place(shapeB, b, atEnd); }
+  InterpolatedShape a, b;
 
   /// Certified separation along a unit axis, at the start or the end.
   double separationAlong(const Vec3& axis, bool atEnd) const {
-    return computeAxisSeparation(placedA(atEnd), placedB(atEnd), axis).lowerBound;
+    return computeAxisSeparation(placeAt(a, atEnd), placeAt(b, atEnd), axis).lowerBound;
   }
-  double chordDeviation() const { return computeChordDeviation(a) + computeChordDeviation(b); }
-
- private:
-  static PlacedConvex place(const ConvexShape& shape, const InterpolatedMotion& motion,
-                            bool atEnd) {
-    return {shape.vertices, atEnd ? motion.toPosition : motion.fromPosition,
-            atEnd ? &motion.toMatrix : &motion.fromMatrix, shape.hull};
-  }
-  static double computeChordDeviation(const InterpolatedMotion& motion) {
-    return motion.radius * motion.rotationAngle * motion.rotationAngle / 2 * kRoundUpFactor;
+  double chordDeviation() const {
+    return computeChordDeviation(a.motion) + computeChordDeviation(b.motion);
   }
 };
 
@@ -89,13 +76,13 @@ struct Sample {
 
 /// Queries the certified distance at the start or the end.
 Sample querySample(const MovingPair& pair, bool atEnd, const FeatureCache& hint,
-                   std::uint32_t& queries) {
+                   MotionResult& result) {
   Sample sample{hint, 0, 0};
-  const SeparationResult result =
-      computeSeparation(pair.placedA(atEnd), pair.placedB(atEnd), sample.cache);
-  ++queries;
-  if (result.verdict == Verdict::separated)
-    sample.lowerBound = sample.axisLowerBound = result.distance - result.errorBound;
+  const SeparationResult separation =
+      computeSeparation(placeAt(pair.a, atEnd), placeAt(pair.b, atEnd), sample.cache);
+  result.countQuery(separation.certificate);
+  if (separation.verdict == Verdict::separated)
+    sample.lowerBound = sample.axisLowerBound = separation.distance - separation.errorBound;
   return sample;
 }
 
@@ -114,8 +101,8 @@ bool isSeparatedByPlane(double atStart, double atEnd, double chordDeviation) {
 
 /// Returns whether the two ends alone prove the motion clear.
 bool isProvenClear(const MovingPair& pair, const Sample& start, const Sample& end) {
-  const double approach =
-      computeApproachBound(computeDisplacementBound(pair.a), computeDisplacementBound(pair.b));
+  const double approach = computeApproachBound(computeDisplacementBound(pair.a.motion),
+                                               computeDisplacementBound(pair.b.motion));
   if (approach < start.lowerBound || approach < end.lowerBound) return true;
   const double deviation = pair.chordDeviation();
   return isSeparatedByPlane(start.axisLowerBound, separationAlong(pair, start.cache, true),
@@ -125,41 +112,36 @@ bool isProvenClear(const MovingPair& pair, const Sample& start, const Sample& en
 
 /// Returns the fraction of the motion that is proved clear. The end may be unseparated.
 double searchClearFraction(const MovingPair& pair, const Sample& start, const Sample& end,
-                           int halvings, std::uint32_t& queries) {
+                           int halvings, MotionResult& result) {
   if (end.lowerBound > 0 && isProvenClear(pair, start, end)) return 1;
   if (halvings == 0) return 0;
-  const CentrePose middleA = computeMiddlePose(pair.a), middleB = computeMiddlePose(pair.b);
-  const InterpolatedMotion firstA = makeFirstHalf(pair.a, middleA),
-                           firstB = makeFirstHalf(pair.b, middleB);
-  const MovingPair firstHalf{pair.shapeA, pair.shapeB, firstA, firstB};
-  const Sample middle = querySample(firstHalf, true, start.cache, queries);
-  const double first = searchClearFraction(firstHalf, start, middle, halvings - 1, queries);
+  const InterpolatedMotion &a = pair.a.motion, &b = pair.b.motion;
+  const CentrePose middleA = computeMiddlePose(a.from, a.to);
+  const CentrePose middleB = computeMiddlePose(b.from, b.to);
+  const InterpolatedMotion firstA = replaceEnds(a, a.from, middleA),
+                           firstB = replaceEnds(b, b.from, middleB);
+  const MovingPair firstHalf{{pair.a.shape, firstA}, {pair.b.shape, firstB}};
+  const Sample middle = querySample(firstHalf, true, start.cache, result);
+  const double first = searchClearFraction(firstHalf, start, middle, halvings - 1, result);
   if (first < 1) return 0.5 * first;
-  const InterpolatedMotion secondA = makeSecondHalf(pair.a, middleA),
-                           secondB = makeSecondHalf(pair.b, middleB);
-  return 0.5 + 0.5 * searchClearFraction({pair.shapeA, pair.shapeB, secondA, secondB}, middle, end,
-                                         halvings - 1, queries);
+  const InterpolatedMotion secondA = replaceEnds(a, middleA, a.to),
+                           secondB = replaceEnds(b, middleB, b.to);
+  const MovingPair secondHalf{{pair.a.shape, secondA}, {pair.b.shape, secondB}};
+  return 0.5 + 0.5 * searchClearFraction(secondHalf, middle, end, halvings - 1, result);
 }
 
 }  // namespace
 
 void updateDerived(InterpolatedMotion& motion) {
-  ENFILADE_ASSERT(!(std::abs(motion.fromRotation.squaredNorm() - 1) > 1e-6) &&
-                  !(std::abs(motion.toRotation.squaredNorm() - 1) > 1e-6));
-  motion.rotationAngle = computeRotationAngle(motion);
-  motion.fromMatrix = motion.fromRotation.toRotationMatrix();
-  motion.toMatrix = motion.toRotation.toRotationMatrix();
-  motion.fromPosition = motion.fromCentre - motion.fromMatrix * motion.centreInFrame;
-  motion.toPosition = motion.toCentre - motion.toMatrix * motion.centreInFrame;
-}
-
-double computeMaxDisplacement(const InterpolatedMotion& motion) {
-  const Vec3 displacement = motion.toCentre - motion.fromCentre;
-  return (displacement.norm() + motion.rotationAngle * motion.radius) * kRoundUpFactor;
+  ENFILADE_ASSERT(!(std::abs(motion.from.rotation.squaredNorm() - 1) > 1e-6) &&
+                  !(std::abs(motion.to.rotation.squaredNorm() - 1) > 1e-6));
+  motion.rotationAngle = computeRotationAngle(motion.from.rotation, motion.to.rotation);
+  motion.fromFrame = computeFrame(motion.from, motion.centreInFrame);
+  motion.toFrame = computeFrame(motion.to, motion.centreInFrame);
 }
 
 DisplacementBound computeDisplacementBound(const InterpolatedMotion& motion) {
-  return {motion.toCentre - motion.fromCentre, motion.rotationAngle * motion.radius};
+  return {motion.to.centre - motion.from.centre, motion.rotationAngle * motion.radius};
 }
 
 double computeApproachBound(const DisplacementBound& a, const DisplacementBound& b) {
@@ -167,32 +149,29 @@ double computeApproachBound(const DisplacementBound& a, const DisplacementBound&
          kRoundUpFactor;
 }
 
-CentrePose computeMiddlePose(const InterpolatedMotion& motion) {
-  return computeMiddlePose({motion.fromCentre, motion.fromRotation},
-                           {motion.toCentre, motion.toRotation});
+CentrePose computeMiddlePose(const CentrePose& from, const CentrePose& to) {
+  CentrePose middle;
+  middle.centre = 0.5 * (from.centre + to.centre);
+  middle.rotation.coeffs() =
+      from.rotation.coeffs() + nearestRotation(from.rotation, to.rotation).coeffs();
+  const double length = std::sqrt(middle.rotation.squaredNorm());
+  ENFILADE_ASSERT(!(length < 1));  // the nearer of two unit quaternions: the sum is longer
+  middle.rotation.coeffs() /= length;
+  return middle;
 }
 
-InterpolatedMotion makeFirstHalf(const InterpolatedMotion& motion, const CentrePose& middle) {
-  InterpolatedMotion half = motion;
-  half.toCentre = middle.centre, half.toRotation = middle.rotation;
-  updateDerived(half);
-  return half;
-}
-
-InterpolatedMotion makeSecondHalf(const InterpolatedMotion& motion, const CentrePose& middle) {
-  InterpolatedMotion half = motion;
-  half.fromCentre = middle.centre, half.fromRotation = middle.rotation;
-  updateDerived(half);
-  return half;
+InterpolatedMotion replaceEnds(InterpolatedMotion motion, const CentrePose& from,
+                               const CentrePose& to) {
+  motion.from = from, motion.to = to;
+  updateDerived(motion);
+  return motion;
 }
 
 InterpolatedMotion truncateMotion(const InterpolatedMotion& motion, double fraction) {
   if (fraction == 1 || motion.isStationary) return motion;
   ENFILADE_ASSERT(fraction >= 0 && fraction < 1);
   ENFILADE_ASSERT(fraction * kFractionSteps == std::floor(fraction * kFractionSteps));
-  // The interval that remains; only the result gets its derived fields.
-  CentrePose from{motion.fromCentre, motion.fromRotation};
-  CentrePose to{motion.toCentre, motion.toRotation};
+  CentrePose from = motion.from, to = motion.to;  // the interval that remains
   for (int i = 0; i < kMaxHalvings && fraction > 0; ++i) {
     const CentrePose middle = computeMiddlePose(from, to);
     fraction *= 2;
@@ -203,12 +182,12 @@ InterpolatedMotion truncateMotion(const InterpolatedMotion& motion, double fract
       to = middle;
     }
   }
-  return makeFirstHalf(motion, from);
+  return replaceEnds(motion, motion.from, from);
 }
 
 double computeClearFractionAlong(const InterpolatedShape& a, const InterpolatedShape& b,
                                  const Vec3& axis) {
-  const MovingPair pair{a.shape, b.shape, a.motion, b.motion};
+  const MovingPair pair{a, b};
   const double atStart = pair.separationAlong(axis, false),
                atEnd = pair.separationAlong(axis, true);
   const double deviation = pair.chordDeviation();
@@ -221,7 +200,7 @@ double computeClearFractionAlong(const InterpolatedShape& a, const InterpolatedS
     if (!(fraction > 0)) return 0;
     const InterpolatedMotion doneA = truncateMotion(a.motion, fraction),
                              doneB = truncateMotion(b.motion, fraction);
-    const MovingPair done{a.shape, b.shape, doneA, doneB};
+    const MovingPair done{{a.shape, doneA}, {b.shape, doneB}};
     const double atFraction = done.separationAlong(axis, true);
     if (atFraction > 0 &&
         isSeparatedByPlane(done.separationAlong(axis, false), atFraction, done.chordDeviation()))
@@ -231,23 +210,23 @@ double computeClearFractionAlong(const InterpolatedShape& a, const InterpolatedS
 }
 
 bool isSeparatedAtEnd(const InterpolatedShape& a, const InterpolatedShape& b, FeatureCache cache) {
-  const MovingPair pair{a.shape, b.shape, a.motion, b.motion};
   // The distance is not needed: the query ends when separation is certain.
-  const auto result = computeSeparationWithin(pair.placedA(true), pair.placedB(true), 0, cache);
+  const auto result = computeSeparationWithin(placeAt(a, true), placeAt(b, true), 0, cache);
   return !result || result->verdict == Verdict::separated;
 }
 
-ClearanceResult computeClearance(const InterpolatedShape& a, const InterpolatedShape& b,
-                                 const FeatureCache& cache, double lowerBound) {
-  const MovingPair pair{a.shape, b.shape, a.motion, b.motion};
-  ClearanceResult result{0, 0};
+MotionResult computeClearance(const InterpolatedShape& a, const InterpolatedShape& b,
+                              const FeatureCache& cache, double lowerBound) {
+  const MovingPair pair{a, b};
+  MotionResult result{.outcome = MotionOutcome::unproved, .lo = 0};
   const Sample start = lowerBound > 0
                            ? Sample{cache, lowerBound, separationAlong(pair, cache, false)}
-                           : querySample(pair, false, cache, result.queries);
+                           : querySample(pair, false, cache, result);
   if (!(start.lowerBound > 0)) return result;
-  const Sample end = querySample(pair, true, start.cache, result.queries);
-  result.fraction = searchClearFraction(pair, start, end, kMaxHalvings, result.queries);
-  ENFILADE_ASSERT(result.fraction >= 0 && result.fraction <= 1);
+  const Sample end = querySample(pair, true, start.cache, result);
+  result.lo = searchClearFraction(pair, start, end, kMaxHalvings, result);
+  ENFILADE_ASSERT(result.lo >= 0 && result.lo <= 1);
+  if (result.lo == 1) result.outcome = MotionOutcome::clear;
   return result;
 }
 

@@ -21,7 +21,6 @@
 #include "collision/motion/shape_cast.hpp"
 
 #include "collision/motion/conservative_advancement.hpp"
-#include "collision/motion/motion_bounds.hpp"
 #include "collision/narrow_phase/penetration_depth.hpp"
 
 namespace enfilade::collision {
@@ -33,10 +32,41 @@ constexpr int kMaxScrewSteps = 200;       // two or three are usual
 // Of |displacement|, or of the radius: slower approach counts as none, because the direction of a
 // small distance between large bodies has an error of this size.
 constexpr double kGrazing = 1e-9;
+constexpr double kArrivalTolerance = 1.0 / 32;    // of (rest - min): tolerance at a target
 constexpr double kKeptDistanceRatio = 15.0 / 16;  // of an initial distance below min: to be kept
 constexpr double kRelativeSlack = 0x1p-40;        // of a step; more than the rounding of a root
 constexpr double kMinStepNearContact = 1.0 / 32;  // shorter steps close to contact end the cast
 constexpr double kMinStep = 1e-9;                 // shorter steps are no progress
+
+/// A distance to advance to, metres.
+struct TargetDistance {
+  double distance, tolerance;
+};
+
+/// Advances to offset.rest, and from there to offset.min to check that the obstacle really blocks
+/// the motion. `cast` advances to a target (advanceTo), and decides where the first target is
+/// reached: isLeaving(), for bodies that overlap there, frees the motion; findSecondTarget()
+/// returns nullopt if it ends there.
+template <class Cast>
+MotionResult castToOffset(Cast& cast, const ContactOffset& offset) {
+  ENFILADE_ASSERT(offset.min < offset.rest);
+  const double tolerance = kArrivalTolerance * (offset.rest - offset.min);
+  MotionResult result{.lo = 0};
+  cast.advanceTo({offset.rest, tolerance}, result);
+  if (result.isClear()) return result;
+  if (result.separation.verdict != Verdict::separated) {
+    if (cast.isLeaving(result)) result.outcome = MotionOutcome::clear;
+  } else if (result.outcome == MotionOutcome::contact) {
+    if (const auto target = cast.findSecondTarget(result, {offset.min, tolerance})) {
+      MotionResult min = result;
+      cast.advanceTo(*target, min);
+      result.outcome = min.outcome;
+      result.queries = min.queries, result.exactQueries = min.exactQueries;
+    }
+  }
+  if (result.isClear()) result.lo = 1;
+  return result;
+}
 
 // ---- translation -------------------------------------------------------------------------------
 
@@ -61,10 +91,10 @@ struct TranslationCast {
     return isSeparationProved(a, b, distance + closing + rounding, cache);
   }
 
-  Advancement advanceTo(const TargetDistance& target, double from, ShapeCastResult& result) {
+  void advanceTo(const TargetDistance& target, MotionResult& result) {
     const double arrival = target.distance + target.tolerance;
-    return advanceConservatively(
-        from, kMaxTranslationSteps, result,
+    advanceFraction(
+        kMaxTranslationSteps, result,
         [&](double at) {
           return computeSeparationWithin(placeAt(at), b, arrival + (1 - at) * displacement.norm(),
                                          cache);
@@ -82,15 +112,15 @@ struct TranslationCast {
 
   /// True if the displacement does not increase the overlap along the axis of minimum penetration.
   /// If the bodies penetrate, sets the normal to that axis.
-  bool isLeaving(Advancement& at) {
+  bool isLeaving(MotionResult& at) {
     if (at.separation.verdict == Verdict::penetrating) {
       DepthCache none;
-      at.separation.normal = computePenetrationDepth(placeAt(at.fraction), b, cache, none).normal;
+      at.separation.normal = computePenetrationDepth(placeAt(at.lo), b, cache, none).normal;
     }
     return displacement.dot(at.separation.normal) <= 0;
   }
 
-  std::optional<TargetDistance> findSecondTarget(const Advancement&, const TargetDistance& min) {
+  std::optional<TargetDistance> findSecondTarget(const MotionResult&, const TargetDistance& min) {
     return min;
   }
 };
@@ -135,11 +165,11 @@ struct RotationCast {
     return (1 - kRelativeSlack) * std::max(fixedPlaneAngle, rotatingPlaneAngle);
   }
 
-  Advancement advanceTo(const TargetDistance& target, double from, ShapeCastResult& result) {
+  void advanceTo(const TargetDistance& target, MotionResult& result) {
     RigidTransform pose;
     PlacedConvex moved;
-    return advanceConservatively(
-        from, kMaxRotationSteps, result,
+    advanceFraction(
+        kMaxRotationSteps, result,
         [&](double at) {
           pose = computeTransformAfter(a, rotation, at);
           moved = place({a.vertices, a.hull}, pose);
@@ -154,12 +184,12 @@ struct RotationCast {
         });
   }
 
-  bool isLeaving(const Advancement&) const { return false; }
+  bool isLeaving(const MotionResult&) const { return false; }
 
-  std::optional<TargetDistance> findSecondTarget(const Advancement& rest,
+  std::optional<TargetDistance> findSecondTarget(const MotionResult& rest,
                                                  const TargetDistance& min) const {
     const SeparationResult& start = rest.separation;
-    if (rest.fraction != 0 || start.distance > min.distance + min.tolerance) return min;
+    if (rest.lo != 0 || start.distance > min.distance + min.tolerance) return min;
     const Vec3 r = start.pointA - rotation.pivot;
     if (start.normal.dot(axis.cross(r)) > kGrazing * maxRadius) return std::nullopt;
     const double kept = kKeptDistanceRatio * start.distance;
@@ -188,13 +218,32 @@ struct ScrewPath {
   double curvature(const Vec3& r) const { return curvaturePerRadius * r.norm(); }
 };
 
-/// `query(fraction)` returns the separation; `certify(normal, gap)` the fraction for which a plane
-/// is proved to keep the gap open.
-template <class Query, class Certify>
-ShapeCastResult castScrew(const ContactOffset& offset, const Query& query, const Certify& certify) {
-  ShapeCastResult result;
-  const Advancement stop = advanceConservatively(
-      0, kMaxScrewSteps, result, query, [&](double at, const SeparationResult& separation) {
+/// `still`: B if it is stationary; then `b` is only its shape.
+MotionResult castScrew(const MovingShape& a, const MovingShape& b, const PlacedConvex* still,
+                       const ContactOffset& offset, FeatureCache& cache) {
+  RigidTransform poseA, poseB;
+  const Vec3 relativeTranslation = a.motion.translation - b.motion.translation;
+  const bool rotatesB = b.motion.angle != 0;
+  const auto certify = [&](const Vec3& normal, double gap) {
+    const ScrewPath pathA(a.motion, relativeTranslation, poseA.rotation, normal);
+    const double share = rotatesB ? gap / 2 : gap;
+    const double step = findPlaneCrossing(a.shape.vertices, share, pathA);
+    if (!rotatesB) return step;
+    const ScrewPath pathB(b.motion, Vec3::Zero(), poseB.rotation, -normal);
+    return std::min(step, findPlaneCrossing(b.shape.vertices, share, pathB));
+  };
+  MotionResult result{.lo = 0};
+  double queried = 0;
+  advanceFraction(
+      kMaxScrewSteps, result,
+      [&](double at) {
+        queried = at;
+        poseA = computeTransformAfter(a.motion, at);
+        if (!still) poseB = computeTransformAfter(b.motion, at);
+        return std::optional(computeSeparation(place(a.shape, poseA),
+                                               still ? *still : place(b.shape, poseB), cache));
+      },
+      [&](double at, const SeparationResult& separation) {
         if (separation.verdict != Verdict::separated) return kArrived;
         const double distance = separation.distance - separation.errorBound;
         const double certified =
@@ -202,69 +251,35 @@ ShapeCastResult castScrew(const ContactOffset& offset, const Query& query, const
         const double minStep = distance <= offset.rest ? kMinStepNearContact : kMinStep;
         return at + certified < 1 && certified < minStep ? kArrived : certified;
       });
-  if (!stop.arrived) return result;
-  result.stopped = true;
-  result.iterationLimitReached = stop.iterationLimitReached;
-  result.fraction = stop.queriedFraction;
-  result.separationAtStop = stop.separation;
+  if (!result.isClear()) result.lo = queried;
   return result;
 }
 
 }  // namespace
 
-ShapeCastResult castShape(const PlacedConvex& a, const Vec3& displacement, const PlacedConvex& b,
-                          const ContactOffset& offset, FeatureCache& cache) {
-  ShapeCastResult result;
+MotionResult castShape(const PlacedConvex& a, const Vec3& displacement, const PlacedConvex& b,
+                       const ContactOffset& offset, FeatureCache& cache) {
   TranslationCast cast{a, displacement, b, cache};
-  if (!displacement.isZero(0) && !cast.isMissCertified(offset.min))
-    castToOffset(cast, offset, result);
-  return result;
+  if (displacement.isZero(0) || cast.isMissCertified(offset.min)) return {};
+  return castToOffset(cast, offset);
 }
 
-ShapeCastResult castShape(const PlacedConvex& a, const AxisRotation& rotation,
-                          const PlacedConvex& b, const ContactOffset& offset, FeatureCache& cache) {
-  ShapeCastResult result;
-  if (rotation.angle == 0) return result;
+MotionResult castShape(const PlacedConvex& a, const AxisRotation& rotation, const PlacedConvex& b,
+                       const ContactOffset& offset, FeatureCache& cache) {
+  if (rotation.angle == 0) return {};
   RotationCast cast{a, rotation, b, cache};
-  castToOffset(cast, offset, result);
-  return result;
+  return castToOffset(cast, offset);
 }
 
-ShapeCastResult castShape(const MovingShape& a, const PlacedConvex& b, const ContactOffset& offset,
-                          FeatureCache& cache) {
-  RigidTransform pose;
-  return castScrew(
-      offset,
-      [&](double at) {
-        pose = computeTransformAfter(a.motion, at);
-        return std::optional(computeSeparation(place(a.shape, pose), b, cache));
-      },
-      [&](const Vec3& normal, double gap) {
-        const ScrewPath path(a.motion, a.motion.translation, pose.rotation, normal);
-        return findPlaneCrossing(a.shape.vertices, gap, path);
-      });
+MotionResult castShape(const MovingShape& a, const PlacedConvex& b, const ContactOffset& offset,
+                       FeatureCache& cache) {
+  const ScrewMotion none{};
+  return castScrew(a, {{b.vertices, b.hull}, none}, &b, offset, cache);
 }
 
-ShapeCastResult castShape(const MovingShape& a, const MovingShape& b, const ContactOffset& offset,
-                          FeatureCache& cache) {
-  RigidTransform poseA, poseB;
-  const Vec3 relativeTranslation = a.motion.translation - b.motion.translation;
-  const bool rotatesB = b.motion.angle != 0;
-  return castScrew(
-      offset,
-      [&](double at) {
-        poseA = computeTransformAfter(a.motion, at), poseB = computeTransformAfter(b.motion, at);
-        return std::optional(
-            computeSeparation(place(a.shape, poseA), place(b.shape, poseB), cache));
-      },
-      [&](const Vec3& normal, double gap) {
-        const ScrewPath pathA(a.motion, relativeTranslation, poseA.rotation, normal);
-        const double share = rotatesB ? gap / 2 : gap;
-        const double step = findPlaneCrossing(a.shape.vertices, share, pathA);
-        if (!rotatesB) return step;
-        const ScrewPath pathB(b.motion, Vec3::Zero(), poseB.rotation, -normal);
-        return std::min(step, findPlaneCrossing(b.shape.vertices, share, pathB));
-      });
+MotionResult castShape(const MovingShape& a, const MovingShape& b, const ContactOffset& offset,
+                       FeatureCache& cache) {
+  return castScrew(a, b, nullptr, offset, cache);
 }
 
 }  // namespace enfilade::collision

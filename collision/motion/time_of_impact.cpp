@@ -43,7 +43,6 @@
 #include "collision/floating_point.hpp"
 #include "collision/motion/conservative_advancement.hpp"
 #include "collision/motion/crossing.hpp"
-#include "collision/motion/motion_bounds.hpp"
 #include "collision/narrow_phase/refine.hpp"
 
 namespace enfilade::collision {
@@ -320,22 +319,22 @@ class ImpactSearch {
   ImpactSearch(const MovingBody& a, const MovingBody& b, double horizon, FeatureCache& cache)
       : a_(a), b_(b), horizon_(horizon), cache_(cache) {}
 
-  TimeOfImpact run() {
+  MotionResult run() {
     double reached = 0;
-    const AdvancementEnd end =
+    const MotionOutcome end =
         advance(reached, horizon_, kMaxSteps, [this](double) { return certify(); });
-    if (end == AdvancementEnd::clear) {
-      finish(Impact::none, horizon_, horizon_);
+    if (end == MotionOutcome::clear) {
+      finish(MotionOutcome::clear, horizon_, horizon_);
     } else if (!ended_ && !findContactWithin(kMaxWindow)) {
-      finish(Impact::unproved, time_, horizon_);
+      finish(MotionOutcome::unproved, time_, horizon_);
     }
     return result_;
   }
 
  private:
-  void finish(Impact impact, double lo, double hi) {
+  void finish(MotionOutcome outcome, double lo, double hi) {
     ENFILADE_ASSERT(lo <= hi);
-    result_.impact = impact;
+    result_.outcome = outcome;
     result_.lo = lo;
     result_.hi = hi;
     ended_ = true;
@@ -348,7 +347,6 @@ class ImpactSearch {
     const PairState at(pair, a_.motion, b_.motion, time_);
     const SeparatingPlane plane = findSeparatingPlane(pair, at);
     if (ended_ || !(plane.gap > 0)) return kArrived;
-    result_.normal = plane.normal;
     const double before = time_;
     time_ = addStep(computeLongestStep(at, plane, cache_, horizon_ - time_));
     if (time_ >= horizon_) return horizon_;
@@ -369,16 +367,24 @@ class ImpactSearch {
   }
 
   SeparatingPlane findSeparatingPlane(const PairAtTime& pair, const PairState& at) {
-    ++result_.queries;
     const SeparationResult separation = computeSeparation(pair.a(), pair.b(), cache_);
+    result_.countQuery(separation.certificate);
     if (separation.verdict != Verdict::separated) {
-      if (time_ == 0) finish(Impact::contact, 0, 0);
+      if (time_ == 0) finish(MotionOutcome::contact, 0, 0);
       return {};
     }
-    const SeparatingPlane plane = makeSeparatingPlane(separation.normal, at, pair.error());
-    if (plane.gap > 0) return plane;
-    ++result_.queries;
+    SeparatingPlane plane = makeSeparatingPlane(separation.normal, at, pair.error());
+    if (!(plane.gap > 0)) plane = findExactPlane(pair);
+    if (plane.gap > 0) {
+      result_.separation = separation;
+      result_.separation.normal = plane.normal;
+    }
+    return plane;
+  }
+
+  SeparatingPlane findExactPlane(const PairAtTime& pair) {
     const RefinedSeparation refined = refineSeparation(pair.a(), pair.b(), cache_);
+    result_.countQuery(refined.certificate);
     const double length = refined.closest.norm();
     if (!(length > 0)) return {};
     const double gap = refined.distance * (1 - 32 * kRoundoff) - pair.error();
@@ -389,9 +395,9 @@ class ImpactSearch {
   bool isContactAt(double time) {
     const PairAtTime pair(a_, b_, time);
     if (!std::isfinite(pair.error())) return false;
-    ++result_.queries;
     FeatureCache cache = cache_;
     const RefinedSeparation refined = refineSeparation(pair.a(), pair.b(), cache);
+    result_.countQuery(refined.certificate);
     if (refined.verdict == Verdict::separated) return false;
     return pair.error() == 0 || refined.penetration * (1 - 1e-9) > pair.error();
   }
@@ -415,7 +421,7 @@ class ImpactSearch {
   bool findCrossingBy(double hi) {
     const double from = std::max(0.0, time_ - (hi - time_));
     const bool cross = from < hi && isCrossingProved(a_, b_, from, hi, cache_);
-    if (cross) finish(Impact::contact, time_, hi);
+    if (cross) finish(MotionOutcome::contact, time_, hi);
     return cross;
   }
 
@@ -426,15 +432,15 @@ class ImpactSearch {
     exactlyUndecided_ = !time;
     if (!time) return false;
     if (time->hi > horizon_)
-      finish(Impact::none, horizon_, horizon_);
+      finish(MotionOutcome::clear, horizon_, horizon_);
     else
-      finish(Impact::contact, std::max(time->lo, time_), std::max(time->hi, time_));
+      finish(MotionOutcome::contact, std::max(time->lo, time_), std::max(time->hi, time_));
     return true;
   }
 
   bool findContactBy(double hi) {
     const bool meet = isContactAt(hi);
-    if (meet) finish(Impact::contact, time_, hi);
+    if (meet) finish(MotionOutcome::contact, time_, hi);
     return meet;
   }
 
@@ -446,12 +452,12 @@ class ImpactSearch {
   int probes_ = 0;
   bool exactlyUndecided_ = false;
   bool ended_ = false;
-  TimeOfImpact result_;
+  MotionResult result_;
 };
 
 }  // namespace
 
-TimeOfImpact computeTimeOfImpact(const MovingBody& a, const MovingBody& b, double horizon,
+MotionResult computeTimeOfImpact(const MovingBody& a, const MovingBody& b, double horizon,
                                  FeatureCache& cache) {
   return ImpactSearch(a, b, horizon, cache).run();
 }

@@ -20,7 +20,6 @@
 #include <cmath>
 
 #include "collision/floating_point.hpp"
-#include "collision/motion/time_of_impact.hpp"
 
 namespace enfilade::collision {
 namespace {
@@ -81,24 +80,6 @@ NextCheck scheduleCheck(double distance, const ClosingBounds& closing, double mi
       (closing.speed * minInterval + 0.5 * closing.acceleration * minInterval * minInterval) *
       kRoundUp;
   return {minInterval, closes < 2 * clearance};
-}
-
-SeparationForecast separatedUntil(const MovingBody& a, const MovingBody& b, double t,
-                                  FeatureCache& cache) {
-  const auto makeBounds = [](const MovingBody& moving) {
-    return MotionBounds{moving.motion.velocity, moving.motion.acceleration.norm() * kRoundUp,
-                        moving.motion.angularVelocity, 0, computeRadius(moving.body, true)};
-  };
-  const SeparationResult now = computeSeparation(a.body, b.body, cache);
-  if (now.verdict != Verdict::separated) return {};
-  const double distance = now.distance - now.errorBound;
-  // Use the direction of the relative motion: no separating plane closes faster along its normal.
-  const Vec3 direction = (a.motion.velocity - b.motion.velocity).normalized();
-  const double soonest = computeTimeToContact(
-      distance, computeClosingBounds(makeBounds(a), makeBounds(b), direction, t));
-  if (soonest >= t) return {true, t};
-  const TimeOfImpact impact = computeTimeOfImpact(a, b, t, cache);
-  return {impact.impact == Impact::none, impact.lo};
 }
 
 }  // namespace enfilade::collision

@@ -2,7 +2,7 @@
 // check. Metres and seconds.
 #pragma once
 
-#include "collision/motion/moving_pose.hpp"
+#include "collision/types.hpp"
 
 namespace enfilade::collision {
 
@@ -44,16 +44,5 @@ struct NextCheck {
 /// (Zeno). `clearance` >= 0, metres.
 NextCheck scheduleCheck(double distance, const ClosingBounds& closing, double minInterval,
                         double clearance);
-
-/// Result of separatedUntil().
-struct SeparationForecast {
-  bool proved = false;  ///< separated on all of [0, t)
-  double until = 0;     ///< proved separated before this time; at most t
-};
-
-/// Checks that A and B do not touch before `t` (>= 0, finite): first the cheap bound, then the time
-/// of impact.
-SeparationForecast separatedUntil(const MovingBody& a, const MovingBody& b, double t,
-                                  FeatureCache& cache);
 
 }  // namespace enfilade::collision

@@ -21,7 +21,7 @@ constexpr int kPartialPasses = 4;  // after these passes a blocking body does no
 
 InterpolatedMotion makeSweptMotion(const PhysicsBody& body, const BodyMotion& goal) {
   InterpolatedMotion sweep = makeStationaryMotion(body);
-  sweep.toCentre = goal.centre, sweep.toRotation = goal.rotation;
+  sweep.to = {goal.centre, goal.rotation};
   sweep.isStationary = false;
   updateDerived(sweep);
   return sweep;
@@ -44,14 +44,14 @@ double computePairClearFraction(const PhysicsWorld& world, const BodyPair& pair,
   usedNarrowPhase = 1;
   // If they overlap at the end, the plane that separated them is as good as any.
   if (fraction >= 0 && !isSeparatedAtEnd(partA, partB, pair.features())) return fraction;
-  return computeClearance(partA, partB, pair.features(), lowerBound).fraction;
+  return computeClearance(partA, partB, pair.features(), lowerBound).lo;
 }
 
 /// Shortens a motion that exceeds maxStepDisplacement. The velocity does not change.
 void limitDisplacement(const PhysicsBody& body, InterpolatedMotion& sweep) {
   for (int i = 0;
        i < collision::kMaxHalvings && computeMaxDisplacement(sweep) > body.maxStepDisplacement; ++i)
-    sweep = makeFirstHalf(sweep, computeMiddlePose(sweep));
+    sweep = replaceEnds(sweep, sweep.from, computeMiddlePose(sweep.from, sweep.to));
   if (computeMaxDisplacement(sweep) > body.maxStepDisplacement) sweep = makeStationaryMotion(body);
 }
 
@@ -87,9 +87,9 @@ CarrierMotion makeCarrierMotion(std::uint32_t carrier, double seconds, const Ste
   const InterpolatedMotion& sweep = scratch.sweptMotions[carrier];
   CarrierMotion carrierMotion;
   carrierMotion.carrier = carrier;
-  carrierMotion.pivot = sweep.fromCentre;
-  carrierMotion.translation = sweep.toCentre - sweep.fromCentre;
-  carrierMotion.rotation = sweep.toRotation * sweep.fromRotation.conjugate();
+  carrierMotion.pivot = sweep.from.centre;
+  carrierMotion.translation = sweep.to.centre - sweep.from.centre;
+  carrierMotion.rotation = sweep.to.rotation * sweep.from.rotation.conjugate();
   carrierMotion.rotates = sweep.rotationAngle > 0;
   carrierMotion.velocity = carrierMotion.translation / seconds;
   carrierMotion.angularVelocity = scratch.motions[carrier].angularVelocity;
@@ -176,7 +176,8 @@ void startPasses(const PhysicsWorld& world, const StepScratch& scratch, Pass& pa
     pass.teleportedDistances.push_back(world.bodies[body].teleportedDistance);
   pass.meanDisplacement = Vec3::Zero();
   for (std::uint32_t i = 0; i < scratch.report.awake; ++i)  // awake bodies come first
-    pass.meanDisplacement += scratch.sweptMotions[i].toCentre - scratch.sweptMotions[i].fromCentre;
+    pass.meanDisplacement +=
+        scratch.sweptMotions[i].to.centre - scratch.sweptMotions[i].from.centre;
   if (scratch.report.awake > 0) pass.meanDisplacement /= scratch.report.awake;
 }
 
@@ -254,20 +255,20 @@ void scaleMotion(std::uint32_t body, double fraction, StepScratch& scratch) {
   InterpolatedMotion& sweep = scratch.sweptMotions[body];
   const CarrierMotion& carrierMotion = scratch.carrierMotions[body];
   if (carrierMotion.carrier != kNoIndex) sweep.isStationary = false;
-  sweep.toCentre -= carrierMotion.translation;
+  sweep.to.centre -= carrierMotion.translation;
   if (carrierMotion.rotates) {
-    sweep.toCentre = carrierMotion.rotation.conjugate() * (sweep.toCentre - carrierMotion.pivot) +
-                     carrierMotion.pivot;
-    sweep.toRotation = carrierMotion.rotation.conjugate() * sweep.toRotation;
+    sweep.to.centre = carrierMotion.rotation.conjugate() * (sweep.to.centre - carrierMotion.pivot) +
+                      carrierMotion.pivot;
+    sweep.to.rotation = carrierMotion.rotation.conjugate() * sweep.to.rotation;
   }
   updateDerived(sweep);
   sweep = truncateMotion(sweep, fraction);
   if (carrierMotion.rotates) {
-    sweep.toCentre =
-        carrierMotion.rotation * (sweep.toCentre - carrierMotion.pivot) + carrierMotion.pivot;
-    sweep.toRotation = (carrierMotion.rotation * sweep.toRotation).normalized();
+    sweep.to.centre =
+        carrierMotion.rotation * (sweep.to.centre - carrierMotion.pivot) + carrierMotion.pivot;
+    sweep.to.rotation = (carrierMotion.rotation * sweep.to.rotation).normalized();
   }
-  sweep.toCentre += carrierMotion.translation;
+  sweep.to.centre += carrierMotion.translation;
   updateDerived(sweep);
 }
 
@@ -296,7 +297,7 @@ bool isCarriedInto(std::uint32_t body, std::uint32_t other, const StepScratch& s
 bool depenetrate(std::uint32_t body, double maxDisplacement, StepScratch& scratch) {
   const Vec3 depenetration = std::exchange(scratch.depenetrations[body], Vec3::Zero());
   InterpolatedMotion sweep = scratch.sweptMotions[body];
-  sweep.toCentre += depenetration;
+  sweep.to.centre += depenetration;
   sweep.isStationary = false;
   updateDerived(sweep);
   if (depenetration.isZero(0) || computeMaxDisplacement(sweep) > maxDisplacement) return false;

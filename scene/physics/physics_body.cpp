@@ -37,13 +37,11 @@ void updateTransform(PhysicsBody& body) {
 
 collision::InterpolatedMotion makeStationaryMotion(const PhysicsBody& body) {
   collision::InterpolatedMotion motion;
-  motion.fromCentre = motion.toCentre = body.motion.centre;
-  motion.fromRotation = motion.toRotation = body.motion.rotation;
+  motion.from = motion.to = {body.motion.centre, body.motion.rotation};
   motion.radius = body.radius;
   motion.centreInFrame = body.centreInFrame;
   motion.isStationary = true;
-  motion.fromMatrix = motion.toMatrix = body.rotation;
-  motion.fromPosition = motion.toPosition = body.position;
+  motion.fromFrame = motion.toFrame = {body.rotation, body.position};
   return motion;
 }
 

@@ -240,8 +240,9 @@ void findKinematicPenetrations(const PhysicsWorld& world, StepScratch& scratch) 
 double computeApproach(const ContactConstraint& constraint, const StepScratch& scratch) {
   const auto displacementOf = [&](std::uint32_t body, const Vec3& arm) -> Vec3 {
     const collision::InterpolatedMotion& sweep = scratch.sweptMotions[body];
-    const Vec3 inFrame = sweep.fromMatrix.transpose() * arm;
-    return sweep.toCentre - sweep.fromCentre + (sweep.toMatrix - sweep.fromMatrix) * inFrame;
+    const Vec3 inFrame = sweep.fromFrame.rotation.transpose() * arm;
+    return sweep.to.centre - sweep.from.centre +
+           (sweep.toFrame.rotation - sweep.fromFrame.rotation) * inFrame;
   };
   double maxApproach = -std::numeric_limits<double>::infinity();
   for (const ContactConstraintPoint& point : constraint.activePoints()) {
@@ -308,10 +309,10 @@ void applyMotions(PhysicsWorld& world, StepScratch& scratch) {
     if (!isAwake && !body.isKinematic()) continue;
     const collision::InterpolatedMotion& sweep = scratch.sweptMotions[i];
     ENFILADE_ASSERT(scratch.motionFractions[i] >= 0 && scratch.motionFractions[i] <= 1);
-    body.motion.centre = sweep.toCentre, body.motion.rotation = sweep.toRotation;
+    body.motion.centre = sweep.to.centre, body.motion.rotation = sweep.to.rotation;
     if (isAwake) {
       const CarrierMotion& carrierMotion = scratch.carrierMotions[i];
-      const Vec3 carrierVelocity = carrierMotion.velocityAt(sweep.fromCentre);
+      const Vec3 carrierVelocity = carrierMotion.velocityAt(sweep.from.centre);
       body.motion.velocity = carrierVelocity + scratch.motionFractions[i] *
                                                    (scratch.motions[i].velocity - carrierVelocity);
       body.motion.angularVelocity =

@@ -95,8 +95,8 @@ void answerCourse(const Course& course, const PlacedConvex& a, const PlacedConve
   answer.tc = computeTimeToContact(separation,
                                    {course.velocity.norm() * up, course.acceleration.norm() * up});
   const MovingBody moving{a, {course.velocity, course.acceleration, Vec3::Zero()}};
-  const TimeOfImpact impact = computeTimeOfImpact(moving, {b, {}}, kLastTime, cache);
-  if (impact.impact != Impact::none) answer.toi = {impact.lo, impact.hi};
+  const MotionResult impact = computeTimeOfImpact(moving, {b, {}}, kLastTime, cache);
+  if (impact.outcome != MotionOutcome::clear) answer.toi = {impact.lo, impact.hi};
 }
 
 void answerPair(const Case& testCase, Level level, WarmStart& warmth, Answer& answer) {

@@ -112,10 +112,10 @@ void measure(const char* motion, const std::vector<MovingPair>& pairs, Results& 
     FeatureCache cache;
     const SeparationResult gap = computeSeparation(e.a().body, e.b().body, cache);
     auto start = Clock::now();
-    const TimeOfImpact impact = computeTimeOfImpact(e.a(), e.b(), kHorizon, cache);
+    const MotionResult impact = computeTimeOfImpact(e.a(), e.b(), kHorizon, cache);
     impacts.seconds += secondsSince(start);
-    unproved += impact.impact == Impact::unproved;
-    if (impact.impact != Impact::contact) continue;
+    unproved += impact.outcome == MotionOutcome::unproved;
+    if (impact.outcome != MotionOutcome::contact) continue;
     ++met;
     const auto compare = [&](Tally& tally, auto&& bound) {
       start = Clock::now();

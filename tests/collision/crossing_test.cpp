@@ -117,13 +117,13 @@ std::optional<mpq_class> findFirstTime(const MovingBody& a, const MovingBody& b)
   return times.empty() ? std::nullopt : std::optional(*times.begin());
 }
 
-TimeOfImpact findImpact(const MovingBody& a, const MovingBody& b, double horizon) {
+MotionResult findImpact(const MovingBody& a, const MovingBody& b, double horizon) {
   FeatureCache cache;
   return computeTimeOfImpact(a, b, horizon, cache);
 }
 
-void expectContactAtExactly(const TimeOfImpact& impact, const mpq_class& time) {
-  ASSERT_EQ(impact.impact, Impact::contact);
+void expectContactAtExactly(const MotionResult& impact, const mpq_class& time) {
+  ASSERT_EQ(impact.outcome, MotionOutcome::contact);
   EXPECT_LE(mpq_class(impact.lo), time);
   EXPECT_GE(mpq_class(impact.hi), time);
   EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi));
@@ -132,7 +132,7 @@ void expectContactAtExactly(const TimeOfImpact& impact, const mpq_class& time) {
 TEST(Crossing, APointPassesThroughATriangle) {
   for (const double speed : {1.0 / 3, 0.7, 12.3, 900.1}) {
     const MovingBody a{{kPoint, {0.3, 0.2, -1}}, translate({0, 0, speed})};
-    const TimeOfImpact impact = findImpact(a, {{kTriangle}, {}}, 10);
+    const MotionResult impact = findImpact(a, {{kTriangle}, {}}, 10);
     expectContactAtExactly(impact, 1 / mpq_class(speed));
     EXPECT_LE(impact.queries, 8u);
   }
@@ -163,7 +163,8 @@ TEST(Crossing, OneUlpOutsideTheTriangleIsNoContact) {
         Case{std::nextafter(1.0, 2.0), 0}, Case{-0x1p-70, -0x1p-70}}) {
     for (const double speed : {1.0 / 3, 0.7, 12.3}) {
       const MovingBody a{{kPoint, {x, y, -1}}, translate({0, 0, speed})};
-      EXPECT_EQ(findImpact(a, {{kTriangle}, {}}, 10).impact, Impact::none) << x << ' ' << y;
+      EXPECT_EQ(findImpact(a, {{kTriangle}, {}}, 10).outcome, MotionOutcome::clear)
+          << x << ' ' << y;
     }
   }
 }
@@ -171,7 +172,7 @@ TEST(Crossing, OneUlpOutsideTheTriangleIsNoContact) {
 TEST(Crossing, EdgesThatMissByOneUlpAreNoContact) {
   const std::vector<Vec3> alongX{{-1, 0, 0}, {1, 0, 0}}, alongY{{0, 0x1p-56, 0}, {0, 1, 0}};
   const MovingBody a{{alongX, {0, 0, -1}}, translate({0, 0, 1.0 / 3})};
-  EXPECT_EQ(findImpact(a, {{alongY}, {}}, 10).impact, Impact::none);
+  EXPECT_EQ(findImpact(a, {{alongY}, {}}, 10).outcome, MotionOutcome::clear);
 }
 
 /// Two bodies of one to three vertices that approach each other.
@@ -193,13 +194,13 @@ TEST(Crossing, ThinBodiesMeetAtTheExactTime) {
     const auto& [sizeA, sizeB] = sizes[static_cast<std::size_t>(i) % sizes.size()];
     makeThinPair(random, sizeA, sizeB, points, a, b);
     const auto time = findFirstTime(a, b);
-    const TimeOfImpact impact = findImpact(a, b, 3);
+    const MotionResult impact = findImpact(a, b, 3);
     const bool meets = time && *time <= 3;
     ++(meets ? contacts : misses);
     if (meets)
       expectContactAtExactly(impact, *time);
     else
-      EXPECT_EQ(impact.impact, Impact::none) << i;
+      EXPECT_EQ(impact.outcome, MotionOutcome::clear) << i;
   }
   EXPECT_GT(contacts, 300);
   EXPECT_GT(misses, 400);
@@ -250,14 +251,14 @@ TEST(Crossing, ThinBodiesOnALatticeMeetAtTheExactTime) {
     FeatureCache cache;
     if (computeSeparation(a.body, b.body, cache).verdict != Verdict::separated) continue;
     const auto time = findFirstTime(a, b);
-    const TimeOfImpact impact = findImpact(a, b, 100);
+    const MotionResult impact = findImpact(a, b, 100);
     if (!time) {  // none, or a contact within one plane
-      if (impact.impact != Impact::contact) continue;
+      if (impact.outcome != MotionOutcome::contact) continue;
       const PairAtTime pair(a, b, impact.hi);
       EXPECT_NE(computeSeparation(pair.a(), pair.b(), cache).verdict, Verdict::separated) << i;
       continue;
     }
-    ASSERT_EQ(impact.impact, Impact::contact) << i;
+    ASSERT_EQ(impact.outcome, MotionOutcome::contact) << i;
     ++contacts;
     EXPECT_LE(mpq_class(impact.lo), *time) << i;
     EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi)) << i;
@@ -273,22 +274,22 @@ TEST(Crossing, ADoorWithoutThicknessMeetsAPoint) {
     const double angle = 1;  // the door rotates from +X towards -Z
     const MovingBody a{{door}, {Vec3::Zero(), Vec3::Zero(), {0, 0.25, 0}}};
     const MovingBody b{{kPoint, {radius * std::cos(angle), 0.7, -radius * std::sin(angle)}}, {}};
-    const TimeOfImpact impact = findImpact(a, b, 64);
-    ASSERT_EQ(impact.impact, Impact::contact) << radius;
+    const MotionResult impact = findImpact(a, b, 64);
+    ASSERT_EQ(impact.outcome, MotionOutcome::contact) << radius;
     EXPECT_NEAR(impact.lo, 4 * angle, 1e-13 / radius);
     EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi));
   }
   const MovingBody a{{door}, {Vec3::Zero(), Vec3::Zero(), {0, 0.25, 0}}};
   const double past = 1 + 1e-13;
   const MovingBody b{{kPoint, {past * std::cos(1), 0.7, -past * std::sin(1)}}, {}};
-  EXPECT_NE(findImpact(a, b, 12).impact, Impact::contact);
+  EXPECT_NE(findImpact(a, b, 12).outcome, MotionOutcome::contact);
 }
 
 TEST(Crossing, AFallingPointPassesThroughATriangle) {
   const std::vector<Vec3> floor{{-1, 0, -1}, {2, 0, -1}, {0, 0, 2}};
   const MovingBody a{{kPoint, {0.1, 3, 0.2}}, {{0.01, 0, 0}, {0, -9.81, 0}, Vec3::Zero()}};
-  const TimeOfImpact impact = findImpact(a, {{floor}, {}}, 10);
-  ASSERT_EQ(impact.impact, Impact::contact);
+  const MotionResult impact = findImpact(a, {{floor}, {}}, 10);
+  ASSERT_EQ(impact.outcome, MotionOutcome::contact);
   EXPECT_NEAR(impact.hi, std::sqrt(6 / 9.81), 1e-12);
   EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi));
 }
@@ -310,9 +311,9 @@ TEST(Crossing, TumblingTrianglesMeetWhereTheirDistanceVanishes) {
     a.motion.angularVelocity = randomPoint(random, 3);
     b.motion.angularVelocity = randomPoint(random, 3);
     a.motion.acceleration = randomPoint(random, 0.3);
-    const TimeOfImpact impact = findImpact(a, b, 3);
-    unproved += impact.impact == Impact::unproved;
-    if (impact.impact != Impact::contact) continue;
+    const MotionResult impact = findImpact(a, b, 3);
+    unproved += impact.outcome == MotionOutcome::unproved;
+    if (impact.outcome != MotionOutcome::contact) continue;
     ++contacts;
     EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi)) << i;
     EXPECT_LT(computeDistanceAt(a, b, impact.lo), 1e-10) << i;

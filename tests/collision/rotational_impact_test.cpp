@@ -29,13 +29,13 @@ Motion makeSpinning(const Vec3& angularVelocity) {
   return {Vec3::Zero(), Vec3::Zero(), angularVelocity};
 }
 
-TimeOfImpact findImpactCold(const MovingBody& a, const MovingBody& b, double horizon) {
+MotionResult findImpactCold(const MovingBody& a, const MovingBody& b, double horizon) {
   FeatureCache cache;
   return computeTimeOfImpact(a, b, horizon, cache);
 }
 
-void expectContactAt(const TimeOfImpact& impact, double time) {
-  ASSERT_EQ(impact.impact, Impact::contact);
+void expectContactAt(const MotionResult& impact, double time) {
+  ASSERT_EQ(impact.outcome, MotionOutcome::contact);
   EXPECT_LE(impact.lo, time + 4e-15 * (1 + time));
   EXPECT_GE(impact.hi, time - 4e-15 * (1 + time));
   EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi));
@@ -61,8 +61,8 @@ TEST(RotationalImpact, ACubeNextToAWallMeetsItWithItsEdge) {
 TEST(RotationalImpact, ACubeThatHasRoomTurnsForever) {
   const auto wall = makeBox({1.4143, -5, -5}, {2, 5, 5});
   const MovingBody cube{{kCube}, makeSpinning({0, 3, 0})};
-  const TimeOfImpact impact = findImpactCold(cube, {{wall}, {}}, 20);
-  EXPECT_EQ(impact.impact, Impact::none);
+  const MotionResult impact = findImpactCold(cube, {{wall}, {}}, 20);
+  EXPECT_EQ(impact.outcome, MotionOutcome::clear);
   EXPECT_EQ(impact.lo, 20);
 }
 
@@ -73,7 +73,7 @@ TEST(RotationalImpact, ADoorMeetsAPostNearItsHingeInFewSteps) {
     const double angle = 1;  // of the post, seen from the hinge; the door rotates towards it
     const MovingBody b{{post, {far * std::cos(angle), 0, -far * std::sin(angle)}}, {}};
     const MovingBody a{{door}, makeSpinning({0, 0.25, 0})};
-    const TimeOfImpact impact = findImpactCold(a, b, 64);
+    const MotionResult impact = findImpactCold(a, b, 64);
     expectContactAt(impact, (angle - std::asin(0.02 / far)) / 0.25);
     EXPECT_LE(impact.queries, 25u) << far;
   }
@@ -85,8 +85,8 @@ TEST(RotationalImpact, TwoTurningRodsCrossedMeetEdgeOnEdge) {
   const Mat3 across = Eigen::AngleAxisd(1.2, Vec3::UnitY()).toRotationMatrix();
   const MovingBody a{{rod}, makeSpinning({0.3, 0, 0.2})};
   const MovingBody b{{rod, {0.3, 0.4, 0.2}, &across}, makeSpinning({0, 0.1, -0.25})};
-  const TimeOfImpact impact = findImpactCold(a, b, 64);
-  ASSERT_EQ(impact.impact, Impact::contact);
+  const MotionResult impact = findImpactCold(a, b, 64);
+  ASSERT_EQ(impact.outcome, MotionOutcome::contact);
   EXPECT_LE(impact.hi - impact.lo, 1e-12 * (1 + impact.hi));
   EXPECT_LE(impact.queries, 40u);
 }
@@ -94,14 +94,14 @@ TEST(RotationalImpact, TwoTurningRodsCrossedMeetEdgeOnEdge) {
 TEST(RotationalImpact, BodiesThatRotateTogetherNeverMeet) {
   const MovingBody a{{kCube}, makeSpinning({0, 1, 0})};
   const MovingBody b{{kHalfCube, {0, 1.5 + 1e-9, 0}}, makeSpinning({0, 1, 0})};
-  EXPECT_EQ(findImpactCold(a, b, 10).impact, Impact::none);
+  EXPECT_EQ(findImpactCold(a, b, 10).outcome, MotionOutcome::clear);
 }
 
 TEST(RotationalImpact, BodiesThatTouchHaveMetAlready) {
   const MovingBody a{{kCube}, makeSpinning({0, 1, 0})};
   const MovingBody b{{kCube, {2, 0, 0}}, {}};
-  const TimeOfImpact impact = findImpactCold(a, b, 10);
-  EXPECT_EQ(impact.impact, Impact::contact);
+  const MotionResult impact = findImpactCold(a, b, 10);
+  EXPECT_EQ(impact.outcome, MotionOutcome::contact);
   EXPECT_EQ(impact.hi, 0);
 }
 
@@ -130,8 +130,8 @@ TEST(GrazingImpact, ABodyThatSlidesOnAFaceMeetsItWhenItsEdgeIsOverIt) {
 TEST(GrazingImpact, OneUlpOfRoomIsRoom) {
   const auto table = makeBox({1, -1, -5}, {9, 0, 5});
   const MovingBody a{{kCube, {-3, 1 + 0x1p-52, 0}}, {{0.3, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
-  const TimeOfImpact impact = findImpactCold(a, {{table}, {}}, 60);
-  EXPECT_EQ(impact.impact, Impact::none);
+  const MotionResult impact = findImpactCold(a, {{table}, {}}, 60);
+  EXPECT_EQ(impact.outcome, MotionOutcome::clear);
 }
 
 TEST(GrazingImpact, OneUlpTooLittleIsAContact) {
@@ -151,7 +151,7 @@ TEST(GrazingImpact, AContactOfOneInstantIsFoundIfTheInstantIsADouble) {
   const std::vector<Vec3> point{{0, 0, 0}}, rod{{0, 0, -1}, {0, 0, 1}};
   for (const double time : {0.5, 0.4375, 3.0, 40.125}) {
     const MovingBody a{{point, {-2 * time, 0, 0}}, {{2, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
-    const TimeOfImpact impact = findImpactCold(a, {{rod}, {}}, 64);
+    const MotionResult impact = findImpactCold(a, {{rod}, {}}, 64);
     expectContactAt(impact, time);
     EXPECT_EQ(impact.hi, time);
   }
@@ -162,7 +162,7 @@ TEST(GrazingImpact, AThrownCubeThatJustFailsToReachTheCeilingMisses) {
   const auto ceiling = makeBox({-5, 0, -5}, {5, 1, 5});
   const Motion thrown{{0, 1, 0}, {0, -1, 0}, Vec3::Zero()};
   const MovingBody low{{kCube, {0, -1.5 - 1e-12, 0}}, thrown};
-  EXPECT_EQ(findImpactCold(low, {{ceiling}, {}}, 2).impact, Impact::none);
+  EXPECT_EQ(findImpactCold(low, {{ceiling}, {}}, 2).outcome, MotionOutcome::clear);
   const MovingBody high{{kCube, {0, -1.5 + 0x1p-20, 0}}, thrown};
   expectContactAt(findImpactCold(high, {{ceiling}, {}}, 2), 1 - std::sqrt(0x1p-19));
 }
@@ -212,9 +212,9 @@ TEST(RotationalImpact, TumblingBodiesMeetWhenSmallStepsSayThatTheyDo) {
   for (int i = 0; i < 120; ++i) {
     Tumble tumble;
     makeTumble(random, tumble);
-    const TimeOfImpact impact = findImpactCold(tumble.a, tumble.b, kHorizon);
-    ASSERT_NE(impact.impact, Impact::unproved) << i;
-    const bool contact = impact.impact == Impact::contact;
+    const MotionResult impact = findImpactCold(tumble.a, tumble.b, kHorizon);
+    ASSERT_NE(impact.outcome, MotionOutcome::unproved) << i;
+    const bool contact = impact.outcome == MotionOutcome::contact;
     ++(contact ? contacts : misses);
     for (int k = 0; k <= kSteps; ++k) {
       const double time = kHorizon * k / kSteps;
@@ -237,14 +237,14 @@ TEST(RotationalImpact, SwappingTheBodiesMeetsAtTheSameTime) {
   for (int i = 0; i < 60; ++i) {
     Tumble tumble;
     makeTumble(random, tumble);
-    const TimeOfImpact one = findImpactCold(tumble.a, tumble.b, 3);
-    const TimeOfImpact other = findImpactCold(tumble.b, tumble.a, 3);
-    ASSERT_EQ(one.impact, other.impact) << i;
-    if (one.impact != Impact::contact) continue;
+    const MotionResult one = findImpactCold(tumble.a, tumble.b, 3);
+    const MotionResult other = findImpactCold(tumble.b, tumble.a, 3);
+    ASSERT_EQ(one.outcome, other.outcome) << i;
+    if (one.outcome != MotionOutcome::contact) continue;
     ++contacts;
     EXPECT_LE(one.lo, other.hi) << i;
     EXPECT_LE(other.lo, one.hi) << i;
-    EXPECT_LT(one.normal.dot(other.normal), one.hi > 0 ? -0.99 : 2) << i;
+    EXPECT_LT(one.separation.normal.dot(other.separation.normal), one.hi > 0 ? -0.99 : 2) << i;
   }
   EXPECT_GT(contacts, 15);
 }

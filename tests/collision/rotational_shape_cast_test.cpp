@@ -34,12 +34,12 @@ TEST(RotationalShapeCast, ARodStopsEpsilonBeforeTheWallItsTipComesTo) {
   const auto wall = makeBoxPoints({-2, -1, -0.6}, {2, 1, -0.55});  // +Y rotation: towards -Z
   FeatureCache cache;
   const AxisRotation turn{Vec3::Zero(), Vec3::UnitY(), 2};
-  const ShapeCastResult swept = castShape({rod}, turn, {wall}, kBand, cache);
-  ASSERT_TRUE(swept.stopped);
+  const MotionResult swept = castShape({rod}, turn, {wall}, kBand, cache);
+  ASSERT_FALSE(swept.isClear());
   // The corner (1, 0.05) is at -sin(phi) - 0.05 cos(phi), and must be at -0.55 + 1.03 mm.
   const double far = std::hypot(1, 0.05), start = std::atan2(0.05, 1);
-  EXPECT_NEAR(swept.fraction * turn.angle, std::asin((0.55 - kBand.rest) / far) - start, 1e-5);
-  EXPECT_NEAR(computeDistanceAfter({rod}, turn, swept.fraction, {wall}), kBand.rest, 1e-5);
+  EXPECT_NEAR(swept.lo * turn.angle, std::asin((0.55 - kBand.rest) / far) - start, 1e-5);
+  EXPECT_NEAR(computeDistanceAfter({rod}, turn, swept.lo, {wall}), kBand.rest, 1e-5);
   EXPECT_LT(swept.queries, 12u);
 }
 
@@ -48,23 +48,23 @@ TEST(RotationalShapeCast, APostNearThePivotIsReachedInFewStepsThoughTheTipIsFast
   const auto post = makeBoxPoints({0.1, -1, -0.2}, {0.12, 1, -0.1});
   FeatureCache cache;
   const AxisRotation turn{Vec3::Zero(), Vec3::UnitY(), 3};
-  const ShapeCastResult swept = castShape({rod}, turn, {post}, kBand, cache);
-  ASSERT_TRUE(swept.stopped);
-  EXPECT_FALSE(swept.iterationLimitReached);
+  const MotionResult swept = castShape({rod}, turn, {post}, kBand, cache);
+  ASSERT_FALSE(swept.isClear());
+  EXPECT_NE(swept.outcome, MotionOutcome::unproved);
   EXPECT_LT(swept.queries, 20u);
-  EXPECT_NEAR(computeDistanceAfter({rod}, turn, swept.fraction, {post}), kBand.rest, 1e-5);
+  EXPECT_NEAR(computeDistanceAfter({rod}, turn, swept.lo, {post}), kBand.rest, 1e-5);
 }
 
 TEST(RotationalShapeCast, ATurnAlongATableIsFreeAndOneAwayFromItToo) {
   const auto rod = makeBoxPoints({0, 0.001, -0.05}, {1, 0.1, 0.05});
   const auto table = makeBoxPoints({-2, -0.1, -2}, {2, 0, 2});
   FeatureCache cache;
-  EXPECT_FALSE(castShape({rod}, AxisRotation{Vec3::Zero(), Vec3::UnitY(), 6}, {table}, kBand, cache)
-                   .stopped);
+  EXPECT_TRUE(castShape({rod}, AxisRotation{Vec3::Zero(), Vec3::UnitY(), 6}, {table}, kBand, cache)
+                  .isClear());
   const AxisRotation up{{-0.5, 0, 0}, Vec3::UnitZ(), 1};
-  EXPECT_FALSE(castShape({rod}, up, {table}, kBand, cache).stopped);
+  EXPECT_TRUE(castShape({rod}, up, {table}, kBand, cache).isClear());
   const AxisRotation down{{-0.5, 0, 0}, Vec3::UnitZ(), -1};
-  EXPECT_EQ(castShape({rod}, down, {table}, kBand, cache).fraction, 0);
+  EXPECT_EQ(castShape({rod}, down, {table}, kBand, cache).lo, 0);
 }
 
 TEST(RotationalShapeCast, NothingIsCrossedOnTheWayOfRandomTurns) {
@@ -87,15 +87,14 @@ TEST(RotationalShapeCast, NothingIsCrossedOnTheWayOfRandomTurns) {
     const AxisRotation turn{point(1), direction.normalized(), uniform(-4, 4)};
     if (!(computeDistanceAfter({a}, turn, 0, {b}) > kBand.rest)) continue;
     FeatureCache cache;
-    const ShapeCastResult swept = castShape({a}, turn, {b}, kBand, cache);
-    ++queryCount, stopped += swept.stopped;
-    EXPECT_FALSE(swept.iterationLimitReached) << k;
+    const MotionResult swept = castShape({a}, turn, {b}, kBand, cache);
+    ++queryCount, stopped += !swept.isClear();
+    EXPECT_NE(swept.outcome, MotionOutcome::unproved) << k;
     for (int i = 0; i <= 100; ++i)
-      ASSERT_GT(computeDistanceAfter({a}, turn, swept.fraction * i / 100, {b}),
-                kBand.min * (1 - 1e-9))
+      ASSERT_GT(computeDistanceAfter({a}, turn, swept.lo * i / 100, {b}), kBand.min * (1 - 1e-9))
           << k << " at " << i;
-    if (!swept.stopped) continue;
-    EXPECT_LT(computeDistanceAfter({a}, turn, swept.fraction, {b}), kBand.rest * 1.01) << k;
+    if (swept.isClear()) continue;
+    EXPECT_LT(computeDistanceAfter({a}, turn, swept.lo, {b}), kBand.rest * 1.01) << k;
   }
   EXPECT_GT(stopped, queryCount / 20);
   EXPECT_LT(stopped, queryCount / 2);

@@ -129,21 +129,21 @@ TEST(NextCheck, WaitsForTheContactOrForTheLeastTimeAndSaysWhetherThatIsProved) {
 const std::vector<Vec3> kCube{{-1, -1, -1}, {1, -1, -1}, {-1, 1, -1}, {1, 1, -1},
                               {-1, -1, 1},  {1, -1, 1},  {-1, 1, 1},  {1, 1, 1}};
 
-TEST(SeparatedUntil, IsProvedUpToTheContactAndNotBeyond) {
+TEST(TimeOfImpact, IsProvedUpToTheContactAndNotBeyond) {
   MovingBody a{{kCube}, {{1, 0, 0}, Vec3::Zero(), Vec3::Zero()}};
   MovingBody b{{kCube, {5, 0, 0}}, {}};
   for (const double t : {1.0, 2.0, 2.9999999, 3 - 1e-11}) {
     FeatureCache cache;
-    const SeparationForecast answer = separatedUntil(a, b, t, cache);
-    EXPECT_TRUE(answer.proved) << t;
-    EXPECT_EQ(answer.until, t);
+    const MotionResult impact = computeTimeOfImpact(a, b, t, cache);
+    EXPECT_TRUE(impact.isClear()) << t;
+    EXPECT_EQ(impact.lo, t);
   }
   FeatureCache cache;
-  const SeparationForecast beyond = separatedUntil(a, b, 3.1, cache);
-  EXPECT_FALSE(beyond.proved);
-  EXPECT_NEAR(beyond.until, 3, 1e-11);
+  const MotionResult beyond = computeTimeOfImpact(a, b, 3.1, cache);
+  EXPECT_EQ(beyond.outcome, MotionOutcome::contact);
+  EXPECT_NEAR(beyond.lo, 3, 1e-11);
   a.body.translation = {4, 0, 0};
-  EXPECT_FALSE(separatedUntil(a, b, 1e-6, cache).proved);
+  EXPECT_FALSE(computeTimeOfImpact(a, b, 1e-6, cache).isClear());
 }
 
 using PreciseMatrix = std::array<std::array<mpf_class, 3>, 3>;

@@ -30,8 +30,9 @@ class BodyPairs : public ::testing::Test {
   InterpolatedMotion wayOf(const PhysicsBody& solid, double length) {
     InterpolatedMotion way = makeStationaryMotion(solid);
     way.isStationary = false;
-    way.toCentre += vector(length);
-    way.toRotation = (way.toRotation * Quat(1, number(0.1), number(0.1), number(0.1))).normalized();
+    way.to.centre += vector(length);
+    way.to.rotation =
+        (way.to.rotation * Quat(1, number(0.1), number(0.1), number(0.1))).normalized();
     updateDerived(way);
     return way;
   }
@@ -110,19 +111,19 @@ TEST_F(BodyPairs, AFractionOfAMotionEqualsRepeatedHalving) {
   for (int n = 1; n < kParts; ++n) {
     InterpolatedMotion rest = way, done = way;
     for (int bit = kParts / 2, left = n; left > 0; bit /= 2) {
-      const collision::CentrePose middle = computeMiddlePose(rest);
+      const collision::CentrePose middle = computeMiddlePose(rest.from, rest.to);
       if (left >= bit) {
-        done = makeFirstHalf(rest, middle);
-        rest = makeSecondHalf(rest, middle), left -= bit;
+        done = replaceEnds(rest, rest.from, middle);
+        rest = replaceEnds(rest, middle, rest.to), left -= bit;
       } else {
-        rest = makeFirstHalf(rest, middle);
+        rest = replaceEnds(rest, rest.from, middle);
       }
     }
     const InterpolatedMotion part = truncateMotion(way, static_cast<double>(n) / kParts);
-    EXPECT_EQ(part.toCentre, done.toCentre) << n;
-    EXPECT_EQ(part.toRotation.coeffs(), done.toRotation.coeffs()) << n;
-    EXPECT_EQ(part.toMatrix, done.toMatrix) << n;
-    EXPECT_EQ(part.fromCentre, way.fromCentre) << n;
+    EXPECT_EQ(part.to.centre, done.to.centre) << n;
+    EXPECT_EQ(part.to.rotation.coeffs(), done.to.rotation.coeffs()) << n;
+    EXPECT_EQ(part.toFrame.rotation, done.toFrame.rotation) << n;
+    EXPECT_EQ(part.from.centre, way.from.centre) << n;
   }
 }
 
@@ -140,7 +141,7 @@ TEST_F(BodyPairs, AMotionClearedByACachedBoundIsClear) {
     cache.axis += 0.1 * cache.axis.norm() * vector(1);
     const collision::ConvexShape part = getPartShape(a, 0);
     const InterpolatedMotion wayA = wayOf(a, 0.3), wayB = wayOf(b, 0.3);
-    const double fraction = computeClearance({part, wayA}, {part, wayB}, cache, apart).fraction;
+    const double fraction = computeClearance({part, wayA}, {part, wayB}, cache, apart).lo;
     ++(fraction == 1 ? whole : cut);
     for (double at = 0x1p-6; at <= fraction; at += 0x1p-6) {
       const InterpolatedMotion doneA = truncateMotion(wayA, at), doneB = truncateMotion(wayB, at);

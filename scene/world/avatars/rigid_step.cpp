@@ -7,11 +7,11 @@
 namespace enfilade::scene {
 namespace {
 
-collision::ShapeCastResult castPart(const AvatarPart& part, const Vec3& footPosition,
-                                    const RigidStep& step, double delta,
-                                    const collision::PlacedConvex& other,
-                                    const collision::ContactOffset& contactOffset,
-                                    collision::FeatureCache& cache) {
+collision::MotionResult castPart(const AvatarPart& part, const Vec3& footPosition,
+                                 const RigidStep& step, double delta,
+                                 const collision::PlacedConvex& other,
+                                 const collision::ContactOffset& contactOffset,
+                                 collision::FeatureCache& cache) {
   const collision::PlacedConvex placed = placeAvatarPart(part, footPosition);
   if (step.isRotation)
     return collision::castShape(placed, collision::AxisRotation{step.pivot, step.axis, delta},
@@ -41,9 +41,9 @@ struct StepCaster {
     const auto result = castPart(movedPart, avatar.footPosition, step, hit.fraction * step.delta,
                                  other, contactOffset, cache);
     count.add(result);
-    const double fraction = hit.fraction * result.fraction;
-    if (!result.stopped || (hit.entity != 0 && fraction >= hit.fraction)) return;
-    hit = {fraction, entity, result.separationAtStop};
+    const double fraction = hit.fraction * result.lo;
+    if (result.isClear() || (hit.entity != 0 && fraction >= hit.fraction)) return;
+    hit = {fraction, entity, result.separation};
   }
 
   /// The part may turn, so no planes are kept.

@@ -83,16 +83,14 @@ struct FirstHit {
   Avatar* avatar = nullptr;
   const CarriedBody* carried =
       nullptr;  ///< carried body that hit the avatar; null: the body itself
-  collision::ShapeCastResult cast;
+  collision::MotionResult cast;
 };
 
-collision::ShapeCastResult castPart(const collision::Hull& part,
-                                    const collision::ScrewMotion& motion,
-                                    const collision::PlacedConvex& other,
-                                    const collision::ContactOffset& contactOffset,
-                                    QueryCount& count) {
+collision::MotionResult castPart(const collision::Hull& part, const collision::ScrewMotion& motion,
+                                 const collision::PlacedConvex& other,
+                                 const collision::ContactOffset& contactOffset, QueryCount& count) {
   collision::FeatureCache cache;
-  const collision::ShapeCastResult cast =
+  const collision::MotionResult cast =
       collision::castShape({makeConvexShape(part), motion}, other, contactOffset, cache);
   count.add(cast);
   return cast;
@@ -106,10 +104,10 @@ void findFirstHit(const Body& body, const collision::ScrewMotion& motion, double
                               contactOffset.rest + maxDisplacement);
     for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
       if (!overlaps(box, getPartBox(body, part))) continue;
-      const collision::ShapeCastResult cast =
+      const collision::MotionResult cast =
           castPart(body.shape->parts[part], motion,
                    placeAvatarPart(avatarPart, avatar.footPosition), contactOffset, count);
-      if (cast.stopped && (!firstHit.avatar || cast.fraction < firstHit.cast.fraction))
+      if (!cast.isClear() && (!firstHit.avatar || cast.lo < firstHit.cast.lo))
         firstHit = {&avatar, nullptr, cast};
     }
   }
@@ -129,13 +127,12 @@ void findFirstCarriedHit(const CarriedBody& carried, Avatar& avatar, const World
     box.min -= appliedLift, box.max -= appliedLift;
     for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
       if (!overlaps(box, getPartBox(body, part))) continue;
-      collision::ShapeCastResult cast =
+      collision::MotionResult cast =
           castPart(body.shape->parts[part], motion,
                    placeAvatarPart(avatarPart, avatar.footPosition), contactOffset, count);
-      if (!cast.stopped) continue;
-      cast.fraction = (from + cast.fraction * lift - carried.lift) / carried.remainingLift;
-      if (!firstHit.avatar || cast.fraction < firstHit.cast.fraction)
-        firstHit = {&avatar, &carried, cast};
+      if (cast.isClear()) continue;
+      cast.lo = (from + cast.lo * lift - carried.lift) / carried.remainingLift;
+      if (!firstHit.avatar || cast.lo < firstHit.cast.lo) firstHit = {&avatar, &carried, cast};
     }
   }
 }
@@ -155,10 +152,10 @@ void applyJointPose(Body& body, const JointPose& to, double fraction) {
 /// Pushes the avatar that was hit; returns false if the body gains nothing.
 bool pushHitAvatar(WorldData& world, const Body& body, const JointPose& to, const FirstHit& hit,
                    const std::vector<CarriedBody>& carriedBodies, QueryCount& count) {
-  const collision::SeparationResult& at = hit.cast.separationAtStop;
+  const collision::SeparationResult& at = hit.cast.separation;
   if (at.verdict != collision::Verdict::separated) return false;
-  const double remaining = 1 - hit.cast.fraction;  // applies to a carried body; the body itself was
-                                                   // already advanced
+  const double remaining = 1 - hit.cast.lo;  // applies to a carried body; the body itself was
+                                             // already advanced
   const Vec3 displacement = hit.carried
                                 ? Vec3(0, remaining * hit.carried->remainingLift, 0)
                                 : Vec3(computeCarriedPoint(body, to, at.pointA) - at.pointA);
@@ -179,7 +176,7 @@ void emitBodyBlocked(const WorldData& world, Body& body, const FirstHit& hit, Ti
   if (alreadyReported) return;
   Contact contact;
   contact.other = hit.avatar->id;
-  contact.separation = hit.cast.separationAtStop;
+  contact.separation = hit.cast.separation;
   report.contacts.push_back(makeContactEvent(world, ContactEvent::Kind::blocked, body.id, contact));
 }
 
@@ -220,8 +217,8 @@ double moveUntilBlocked(WorldData& world, Body& body, const JointPose& to, Passe
       for (Avatar* avatar : carried.nearbyAvatars)
         if (carried.isLifted() && !isAvatarLifted(passengers, *avatar))
           findFirstCarriedHit(carried, *avatar, world, hit, count);
-    applyJointPose(body, to, hit.cast.fraction);
-    remaining *= 1 - hit.cast.fraction;
+    applyJointPose(body, to, hit.cast.lo);
+    remaining *= 1 - hit.cast.lo;
     if (!hit.avatar) return 1;
     if (!pushHitAvatar(world, body, to, hit, passengers.bodies, count)) break;
     if (i + 1 == kMaxPushes) ++count.bounded;

@@ -82,9 +82,9 @@ std::optional<SeparationResult> computeTransientTouch(const collision::PlacedCon
                                                       const SeparationResult& separation,
                                                       const WorldSettings& settings) {
   collision::FeatureCache cache;
-  const collision::ShapeCastResult cast = collision::castShape(
+  const collision::MotionResult cast = collision::castShape(
       a, separation.distance * separation.normal, b, makeContactOffset(settings), cache);
-  return cast.stopped ? std::optional(cast.separationAtStop) : std::nullopt;
+  return cast.isClear() ? std::nullopt : std::optional(cast.separation);
 }
 
 void swapSides(std::optional<SeparationResult>& separation) {

@@ -188,11 +188,11 @@ std::optional<Contact> findTransientTouch(const WorldData& world, const EntityPa
     const collision::ScrewMotion motion = makeSegmentMotion(body, i, n);
     const collision::ScrewMotion otherMotion =
         other ? makeSegmentMotion(*other, i, n) : collision::ScrewMotion();
-    collision::ShapeCastResult earliest;
+    collision::MotionResult earliest;
     for (const auto& [a, b] : pairs) {
       const collision::MovingShape part{makeConvexShape(body.shape->parts[a]), motion};
       collision::FeatureCache cache;
-      const collision::ShapeCastResult cast =
+      const collision::MotionResult cast =
           other
               ? collision::castShape(
                     part,
@@ -202,14 +202,14 @@ std::optional<Contact> findTransientTouch(const WorldData& world, const EntityPa
                                      contactOffset, cache);
       count.add(cast);
       const bool reached =
-          cast.stopped && collision::isWithin(cast.separationAtStop, contactOffset.rest);
-      if (reached && cast.fraction < earliest.fraction) earliest = cast;
+          !cast.isClear() && collision::isWithin(cast.separation, contactOffset.rest);
+      if (reached && cast.lo < earliest.lo) earliest = cast;
     }
-    if (earliest.stopped) {
+    if (!earliest.isClear()) {
       Contact touch;
       touch.other = key.second;
       touch.touching = true;
-      touch.separation = earliest.separationAtStop;
+      touch.separation = earliest.separation;
       return touch;
     }
   }

@@ -136,13 +136,13 @@ class PartCast {
 
   void castAgainst(EntityId entity, const collision::PlacedConvex& obstacle,
                    collision::FeatureCache& cache) {
-    const collision::ShapeCastResult result =
+    const collision::MotionResult result =
         collision::castShape(part_, rest_, obstacle, contactOffset_, cache);
     count_.add(result);
-    const double fraction = hit_.fraction * result.fraction;
-    if (!result.stopped || (hit_.entity != 0 && fraction >= hit_.fraction)) return;
-    hit_ = {fraction, entity, -result.separationAtStop.normal, result.separationAtStop.distance,
-            result.separationAtStop};
+    const double fraction = hit_.fraction * result.lo;
+    if (result.isClear() || (hit_.entity != 0 && fraction >= hit_.fraction)) return;
+    hit_ = {fraction, entity, -result.separation.normal, result.separation.distance,
+            result.separation};
     rest_ = fraction * displacement_;
     updateSweptBox();
     planes_.reduceTo(rest_, contactOffset_.min);

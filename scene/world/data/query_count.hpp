@@ -14,10 +14,10 @@ struct QueryCount {
   std::uint32_t bounded = 0;        ///< casts that stopped at their iteration limit
   std::uint32_t partsLookedAt = 0;  ///< triangles and hulls of dense objects
 
-  void add(const collision::ShapeCastResult& cast) {
+  void add(const collision::MotionResult& cast) {
     narrow += cast.queries;
     rational += cast.exactQueries;
-    bounded += cast.iterationLimitReached ? 1 : 0;
+    bounded += cast.outcome == collision::MotionOutcome::unproved ? 1 : 0;
   }
   void add(const QueryCount& other) {
     narrow += other.narrow;

@@ -223,7 +223,7 @@ double computeSeparatedUntil(const collision::NearestParts& parts, const Motion&
   };
   collision::FeatureCache cache;
   cache.axis = parts.separation.normal;
-  const collision::TimeOfImpact impact =
+  const collision::MotionResult impact =
       collision::computeTimeOfImpact(moving(parts.a, a), moving(parts.b, b), kImpactHorizon, cache);
   budget -= std::min<std::size_t>(budget, impact.queries);
   return impact.lo;
