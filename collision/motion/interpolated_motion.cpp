@@ -41,9 +41,9 @@ double computeRotationAngle(const Quat& from, const Quat& to) {
   return 4 * s * (1 + s * s) * kRoundUpFactor;
 }
 
-RigidTransform computeFrame(const CentrePose& pose, const Vec3& centreInFrame) {
-  const Mat3 rotation = pose.rotation.toRotationMatrix();
-  return {rotation, pose.centre - rotation * centreInFrame};
+void placeFrame(const CentrePose& pose, const Vec3& centreInFrame, RigidTransform& worldFromFrame) {
+  worldFromFrame.rotation = pose.rotation.toRotationMatrix();
+  worldFromFrame.translation = pose.centre - worldFromFrame.rotation * centreInFrame;
 }
 
 PlacedConvex placeAt(const InterpolatedShape& body, bool atEnd) {
@@ -136,8 +136,8 @@ void updateDerived(InterpolatedMotion& motion) {
   ENFILADE_ASSERT(!(std::abs(motion.from.rotation.squaredNorm() - 1) > 1e-6) &&
                   !(std::abs(motion.to.rotation.squaredNorm() - 1) > 1e-6));
   motion.rotationAngle = computeRotationAngle(motion.from.rotation, motion.to.rotation);
-  motion.fromFrame = computeFrame(motion.from, motion.centreInFrame);
-  motion.toFrame = computeFrame(motion.to, motion.centreInFrame);
+  placeFrame(motion.from, motion.centreInFrame, motion.fromFrame);
+  placeFrame(motion.to, motion.centreInFrame, motion.toFrame);
 }
 
 DisplacementBound computeDisplacementBound(const InterpolatedMotion& motion) {
@@ -160,11 +160,12 @@ CentrePose computeMiddlePose(const CentrePose& from, const CentrePose& to) {
   return middle;
 }
 
-InterpolatedMotion replaceEnds(InterpolatedMotion motion, const CentrePose& from,
+InterpolatedMotion replaceEnds(const InterpolatedMotion& motion, const CentrePose& from,
                                const CentrePose& to) {
-  motion.from = from, motion.to = to;
-  updateDerived(motion);
-  return motion;
+  InterpolatedMotion replaced = motion;
+  replaced.from = from, replaced.to = to;
+  updateDerived(replaced);
+  return replaced;
 }
 
 InterpolatedMotion truncateMotion(const InterpolatedMotion& motion, double fraction) {

@@ -45,7 +45,7 @@ inline double computeMaxDisplacement(const InterpolatedMotion& motion) {
 CentrePose computeMiddlePose(const CentrePose& from, const CentrePose& to);
 
 /// Returns `motion` with other ends, and its derived fields updated.
-InterpolatedMotion replaceEnds(InterpolatedMotion motion, const CentrePose& from,
+InterpolatedMotion replaceEnds(const InterpolatedMotion& motion, const CentrePose& from,
                                const CentrePose& to);
 
 inline constexpr int kMaxHalvings = 6;

@@ -1,18 +1,16 @@
-// Schedule of pair checks: body pairs ordered by their next check time (Lin 1993, section 5.1;
-// Mirtich 1996).
+// Schedule of pair checks: a heap of body pairs ordered by their next check time (Lin 1993, section
+// 5.1; Mirtich 1996).
 #pragma once
 
-#include <compare>
 #include <cstdint>
 #include <map>
 #include <optional>
-#include <set>
 #include <utility>
 #include <vector>
 
 namespace enfilade::collision {
 
-/// Priority queue with changeable keys. The order is by (time, pair), so it does not depend on the
+/// Binary heap with changeable keys. The order is by (time, pair), so it does not depend on the
 /// order of insertion.
 class PairSchedule {
  public:
@@ -20,8 +18,6 @@ class PairSchedule {
   struct Entry {
     double time;  ///< seconds; may be infinite, never NaN
     BodyPair pair;
-
-    auto operator<=>(const Entry&) const = default;
   };
 
   /// Inserts the pair or changes its time (seconds). The ids may be in either order. Throws
@@ -40,13 +36,29 @@ class PairSchedule {
   /// Removes and returns the earliest entry if it is due at `now`.
   std::optional<Entry> popDue(double now);
 
-  std::size_t size() const { return queue_.size(); }
-  /// Throws std::logic_error if the two containers disagree. For tests and debug builds.
+  std::size_t size() const { return heap_.size(); }
+  /// Checks all invariants. Throws std::logic_error that names the violated one. For tests and
+  /// debug builds.
   void validate() const;
 
  private:
-  std::set<Entry> queue_;
-  std::map<BodyPair, double> times_;  ///< each pair in both orders
+  struct Slot {
+    Entry entry;
+    std::size_t heapIndex;  ///< index into heap_
+  };
+
+  bool isBefore(std::uint32_t p, std::uint32_t q) const;
+  void placeSlot(std::size_t index, std::uint32_t slot);
+  void siftUp(std::size_t index);
+  void siftDown(std::size_t index);
+  void restoreHeapOrder(std::uint32_t slot);
+  void removeSlot(std::uint32_t slot);
+  std::vector<std::uint32_t> findSlots(std::uint32_t body) const;
+
+  std::vector<Slot> slots_;
+  std::vector<std::uint32_t> freeSlots_;          ///< slot indices
+  std::vector<std::uint32_t> heap_;               ///< slot indices; each before its two children
+  std::map<BodyPair, std::uint32_t> slotByPair_;  ///< each pair in both orders
 };
 
 }  // namespace enfilade::collision
