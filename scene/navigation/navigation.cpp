@@ -396,6 +396,19 @@ NavigationMap Navigation::drawMap(double cell, double height) {
   return map;
 }
 
+std::vector<Vec3> Navigation::collectTriangles(const std::optional<std::uint32_t>& island) {
+  const std::lock_guard lock(mutex_);
+  std::vector<Vec3> triangles;
+  for (std::uint32_t polygon = 0; polygon < ample_->polygonCount(); ++polygon) {
+    const std::uint32_t number = islands_.numberOf[polygon];
+    if (number == kNoIsland || (island && number != *island)) continue;
+    const std::vector<Vec3> corners = ample_->corners(polygon);
+    for (std::size_t i = 2; i < corners.size(); ++i)
+      triangles.insert(triangles.end(), {corners[0], corners[i - 1], corners[i]});
+  }
+  return triangles;
+}
+
 std::optional<std::uint32_t> Navigation::islandAt(const Vec3& point) const {
   const auto nearest = ample_->findNearest(
       point, Vec3(2 * agent_.radius, 0.5 + world_.settings().stepHeight, 2 * agent_.radius));

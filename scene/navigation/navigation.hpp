@@ -107,6 +107,8 @@ class Navigation {
   /// The walkable cells at floors within 0.5 m of `height`. Throws std::invalid_argument for more
   /// than 4 million cells.
   NavigationMap drawMap(double cell, double height);
+  /// The triangles of the mesh, three corners each, or of one island: scene frame, metres.
+  std::vector<Vec3> collectTriangles(const std::optional<std::uint32_t>& island);
   /// Number of the island at a point, 0 for the largest; nullopt: no polygon is near.
   std::optional<std::uint32_t> islandOf(const Vec3& point);
   /// By number.

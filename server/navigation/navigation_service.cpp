@@ -1,7 +1,9 @@
 #include "server/navigation/navigation_service.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <optional>
 #include <random>
@@ -203,6 +205,14 @@ struct Answer {
   }
 };
 
+std::vector<std::uint8_t> encodeTriangles(const std::vector<Vec3>& corners) {
+  static_assert(std::endian::native == std::endian::little);
+  std::vector<std::uint8_t> bytes(corners.size() * 3 * sizeof(double));
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    std::memcpy(&bytes[i * 3 * sizeof(double)], corners[i].data(), 3 * sizeof(double));
+  return bytes;
+}
+
 void addReport(scene::Navigation& navigation, v1::NavigationReply& reply) {
   const scene::NavigationReport report = navigation.report();
   reply.set_navigable_area(report.area);
@@ -282,7 +292,8 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   if (auto error = validateNumber("speed", agent.speed, 0.01, 20)) return std::move(*error);
   if (query.query_case() == v1::NavigationQuery::QUERY_NOT_SET)
     return makeNavigationError(
-        "query", "give path, random, snap, steps, clearance, map, islands, save_mesh or load_mesh");
+        "query",
+        "give path, random, snap, steps, clearance, map, islands, mesh, save_mesh or load_mesh");
   PathPlaces places;
   if (query.has_path()) {  // before the meshes, whose building takes long
     auto found = findPathPlaces(query.path(), *scene_, *state.snapshot, agent.radius);
@@ -325,6 +336,10 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
       break;
     case v1::NavigationQuery::kMap:
       error = answer.writeMap(query.map(), attachment);
+      break;
+    case v1::NavigationQuery::kMesh:
+      attachment = encodeTriangles(navigation.collectTriangles(
+          query.mesh().has_island() ? std::optional(query.mesh().island()) : std::nullopt));
       break;
     case v1::NavigationQuery::kSaveMesh:
       attachment = navigation.save();

@@ -213,6 +213,23 @@ class CompatTest(RoomCase):
             NavMeshSettings(cellsize=0.1)
 
 
+    def test_the_triangles_of_the_mesh_cover_the_island(self):
+        triangles = self.navigation.triangles(0)
+        edges = triangles[:, 1:] - triangles[:, :1]
+        area = 0.5 * np.abs(np.cross(edges[:, 0][:, [0, 2]], edges[:, 1][:, [0, 2]])).sum()
+        self.assertAlmostEqual(area, self.navigation.island_areas[0], delta=0.01 * area)
+        self.assertLessEqual(len(triangles), len(self.navigation.triangles()))
+        self.assertEqual(len(self.navigation.triangles(999)), 0)
+        finder = PathFinder(self.navigation)
+        self.assertEqual(len(finder.build_navmesh_vertices(0)), 3 * len(triangles))
+        self.assertEqual(len(finder.build_navmesh_vertex_indices(0)), 3 * len(triangles))
+
+    def test_the_step_height_is_that_of_the_world(self):
+        step = self.client.welcome.policies.step_height
+        self.assertTrue(self.client.navigation(0.3, 1.75, step).is_navigable((2, 0, 0)))
+        with self.assertRaisesRegex(ValueError, "--step-height 0.1"):
+            self.client.navigation(0.3, 1.75, 0.1)
+
     def test_progress_is_shown_while_meshes_are_built(self):
         shown = []
         navigation = self.client.navigation(radius=0.37, progress=shown.append)

@@ -326,6 +326,15 @@ Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) con
   return toVec3(point.data());
 }
 
+std::vector<Vec3> NavigationMesh::corners(std::uint32_t index) const {
+  const dtPoly* polygon = nullptr;
+  const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
+  std::vector<Vec3> corners;
+  for (int i = 0; i < polygon->vertCount; ++i)
+    corners.push_back(toVec3(&tile.verts[polygon->verts[i] * 3]));
+  return corners;
+}
+
 void NavigationMesh::rasterize(std::uint32_t index, double x, double z, double cell,
                                std::uint32_t width, std::uint32_t height,
                                std::vector<std::uint8_t>& cells) const {

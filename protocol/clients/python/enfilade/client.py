@@ -618,13 +618,13 @@ class Client:
         reply, _ = self.request(cannot_touch=cannot_touch_query(a, b, assume, least, tick))
         return results.apart(reply.cannot_touch)
 
-    def navigation(self, radius: Optional[float] = None, height: Optional[float] = None, *,
-                   speed: Optional[float] = None, doors: str = "as_they_are",
+    def navigation(self, radius: Optional[float] = None, height: Optional[float] = None,
+                   step: Optional[float] = None, *, speed: Optional[float] = None, doors: str = "as_they_are",
                    progress: Optional[Callable[[float], None]] = None) -> Navigation:
         """Returns paths and places for an upright avatar of a size in metres (default: as an avatar's).
         `doors`: "as_they_are" at the tick of each query, or "open". The first query builds meshes, and
-        calls `progress` with the share that is done, 0 to 1."""
-        return Navigation(self, radius, height, speed, doors, progress)
+        calls `progress` with the share that is done, 0 to 1. `step`: the height, that of the world alone."""
+        return Navigation(self, radius, height, speed, doors, progress, step)
 
     def names(self, ids: Union[np.ndarray, Iterable[int]]) -> Dict[int, str]:
         """Returns the path of an object or the name of an avatar, by entity id; "" for an unknown

@@ -229,6 +229,13 @@ class PathFinder:
         """The places that snap_point() has for points."""
         return self.navigation.snap_all(wanted, extents=_EXTENTS, island=island, drawn=island is None)
 
+    def build_navmesh_vertices(self, island_index: int = -1) -> List[np.ndarray]:
+        """The corners of all triangles, three by three."""
+        return list(self.navigation.triangles(_island(island_index)).reshape(-1, 3))
+
+    def build_navmesh_vertex_indices(self, island_index: int = -1) -> List[int]:
+        return list(range(3 * len(self.navigation.triangles(_island(island_index)))))
+
     def is_navigable(self, pt: Sequence[float], max_y_delta: float = 0.5) -> bool:
         return self.navigation.is_navigable(pt, max_y_delta)
 

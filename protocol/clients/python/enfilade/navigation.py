@@ -140,7 +140,11 @@ class Navigation:
 
     def __init__(self, client: "Client", radius: Optional[float], height: Optional[float],
                  speed: Optional[float], doors: str,
-                 progress: Optional[Callable[[float], None]] = None) -> None:
+                 progress: Optional[Callable[[float], None]] = None, step: Optional[float] = None) -> None:
+        present = client.welcome.policies.step_height
+        if step is not None and not math.isclose(step, present, abs_tol=1e-6):
+            raise ValueError(f"step is {present:g} in this world, not {step:g}: start the server with "
+                             f"--step-height {step:g}")
         self._client = client
         self.radius = 0.3 if radius is None else radius  # metres
         self.height = 1.75 if height is None else height
@@ -269,6 +273,12 @@ class Navigation:
         """Returns the map as a PNG: white cells are walkable."""
         query = messages.NavigationQuery.Map(cell=cell, height=height, format="FORMAT_PNG")
         return bytes(self._ask(map=query)[1])
+
+    def triangles(self, island: Optional[int] = None) -> np.ndarray:
+        """Returns the triangles of the mesh, or of one island: N x 3 corners x 3 metres. The mesh only proposes
+        paths; it ends up to 10 cm before places where an avatar can stand."""
+        query = messages.NavigationQuery.Mesh(island=optional_whole(island, "island", high=UINT32))
+        return np.frombuffer(self._ask(mesh=query)[1], np.float64).reshape(-1, 3, 3)
 
     def save(self, path: Union[str, pathlib.Path]) -> None:
         """Writes the meshes of this size to a file, for load()."""
