@@ -214,15 +214,15 @@ class CompatTest(RoomCase):
 
 
     def test_the_triangles_of_the_mesh_cover_the_island(self):
-        triangles = self.navigation.triangles(0)
+        navigation = self.finder.navigation
+        triangles = navigation.triangles(0)
         edges = triangles[:, 1:] - triangles[:, :1]
         area = 0.5 * np.abs(np.cross(edges[:, 0][:, [0, 2]], edges[:, 1][:, [0, 2]])).sum()
-        self.assertAlmostEqual(area, self.navigation.island_areas[0], delta=0.01 * area)
-        self.assertLessEqual(len(triangles), len(self.navigation.triangles()))
-        self.assertEqual(len(self.navigation.triangles(999)), 0)
-        finder = PathFinder(self.navigation)
-        self.assertEqual(len(finder.build_navmesh_vertices(0)), 3 * len(triangles))
-        self.assertEqual(len(finder.build_navmesh_vertex_indices(0)), 3 * len(triangles))
+        self.assertAlmostEqual(area, navigation.island_areas[0], delta=0.01 * area)
+        self.assertLessEqual(len(triangles), len(navigation.triangles()))
+        self.assertEqual(len(navigation.triangles(999)), 0)
+        self.assertEqual(len(self.finder.build_navmesh_vertices(0)), 3 * len(triangles))
+        self.assertEqual(len(self.finder.build_navmesh_vertex_indices(0)), 3 * len(triangles))
 
     def test_the_step_height_is_that_of_the_world(self):
         step = self.client.welcome.policies.step_height
