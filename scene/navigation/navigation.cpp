@@ -329,8 +329,8 @@ std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance) {
   return place && (*place - point).norm() <= maxDistance ? place : std::nullopt;
 }
 
-/// Places come from the mesh alone: where there is none, as on the rim of a table, a place would
-/// have the island of the mesh below.
+/// Places come from the mesh alone: a place without mesh, as on the rim of a table, would have the
+/// island of the mesh below.
 std::optional<Vec3> Navigation::snapTo(const Vec3& point, const SnapTarget& wanted) {
   constexpr double kExact = 2e-3, kMaxHeightError = 0.3;  // metres
   constexpr std::size_t kMaxCandidates = 16;

@@ -46,7 +46,7 @@ void addBodies(const v1::NavigationPath& path, int skipped, v1::Walk& walk) {
   };
   for (const v1::NavigationLeg& leg : path.legs()) {
     const int first = static_cast<int>(leg.first());
-    // Also a door that a touch would open: its leaf may swing towards whoever touches it.
+    // Also a door that a touch would open: its leaf may swing towards the walker.
     if (leg.kind() == v1::NavigationLeg::KIND_DOOR) walk.add_opens(leg.name());
     if (leg.kind() != v1::NavigationLeg::KIND_LIFT) continue;
     addRide(first, leg, leg.from_level());  // in

@@ -120,7 +120,7 @@ struct Hall {
   static Vec3 start(int i) { return {-1.5 - 0.8 * (i / 20), 0, -8 + 0.8 * (i % 20)}; }
   static Vec3 goal(int i) { return {12, 0, -9 + 1.2 * (i % 16)}; }
 
-  /// Who arrives leaves; nobody is sent again.
+  /// Avatars that arrive leave; none is sent again.
   void walkAll(int avatars, const std::function<std::vector<Vec3>(int)>& waypoints) {
     for (int i = 0; i < avatars; ++i) {
       Walk walk;

@@ -18,7 +18,7 @@ class SharedMemory {
   SharedMemory& operator=(const SharedMemory&) = delete;
 
   /// Sends the file and `number` to the process that listens on the Unix socket of this abstract
-  /// name (unix(7), SCM_RIGHTS). Does not wait. False: nobody listens there, or its queue is full.
+  /// name (unix(7), SCM_RIGHTS). Does not wait. False: no process listens, or its queue is full.
   bool passTo(const std::string& socketName, std::uint64_t number) const;
   std::span<std::uint8_t> bytes() const { return bytes_; }
 

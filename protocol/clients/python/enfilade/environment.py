@@ -86,7 +86,7 @@ class WalkEnv(spaces.EnvBase):
     on the ground, and the angle from the heading, left positive. The reward is the progress towards the
     goal, or without a goal the distance walked, in metres; override reward() and is_over(), and
     new_episode() for other starts and goals. `info` has "collided": in any tick of the step an obstacle
-    stopped the avatar, or came into contact with it; ground that it can stand on is none. With goals or
+    stopped the avatar, or came into contact with it; the ground on which it stands is no obstacle. With goals or
     episodes `info` has "geodesic_distance", "success" and "spl", too. A fall out of the scene ends the
     episode, with "fell" in `info` and the observation before it.
 
