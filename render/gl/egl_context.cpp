@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cctype>
 #include <cstdio>
 #include <mutex>
 #include <sstream>
@@ -14,6 +13,7 @@
 #include <vector>
 
 #include "render/render_error.hpp"
+#include "scene/model/ascii.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -175,11 +175,6 @@ EGLContext probeDevice(const DisplayCandidate& candidate, DeviceProbe& probe) {
   return context;
 }
 
-std::string toLower(std::string text) {
-  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return text;
-}
-
 bool isNumber(const std::string& text) {
   return !text.empty() && text.size() < 4 &&
          std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
@@ -189,12 +184,12 @@ bool isNumber(const std::string& text) {
 std::string explainRejection(const DeviceChoice& choice, std::size_t index,
                              const DeviceProbe& probe) {
   if (choice.requireGpu && probe.software) return "draws on the CPU, but a GPU is required";
-  const std::string wanted = toLower(choice.device);
+  const std::string wanted = scene::toLowerCase(choice.device);
   if (wanted.empty()) return "";
   if (isNumber(wanted)) return std::stoul(wanted) == index ? "" : "is not number " + wanted;
-  const std::string uuid = toLower(probe.uuid);
+  const std::string uuid = scene::toLowerCase(probe.uuid);
   const bool byUuid = !uuid.empty() && (wanted == uuid || wanted == "gpu-" + uuid);
-  if (byUuid || toLower(probe.name).find(wanted) != std::string::npos) return "";
+  if (byUuid || scene::toLowerCase(probe.name).find(wanted) != std::string::npos) return "";
   return "is named \"" + probe.name + "\", not \"" + choice.device + "\"";
 }
 

@@ -4,27 +4,16 @@
 #include <charconv>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <string_view>
 
-#include "scene/import/file/ascii.hpp"
 #include "scene/import/file/import_options.hpp"
+#include "scene/import/file/read_file.hpp"
 #include "scene/import/file/zip_archive.hpp"
 #include "scene/import/ifc/ifc_units.hpp"
+#include "scene/model/ascii.hpp"
 
 namespace enfilade::scene {
 namespace {
-
-/// Reads the first `limit` bytes of a file.
-std::string readStart(const std::filesystem::path& file, std::size_t limit) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw ImportError(file.string() + ": cannot be opened for reading");
-  const std::size_t size = std::min(limit, static_cast<std::size_t>(file_size(file)));
-  std::string text(size, '\0');
-  in.read(text.data(), static_cast<std::streamsize>(size));
-  text.resize(static_cast<std::size_t>(in.gcount()));
-  return text;
-}
 
 std::optional<double> parseNumber(std::string_view text) {
   while (!text.empty() && std::strchr(" \t\r\n\"'", text.front()) != nullptr) text.remove_prefix(1);
@@ -43,7 +32,7 @@ std::uint32_t readLittleEndian32(std::string_view bytes, std::size_t at) {
 }
 
 void requireWholeGlb(const std::filesystem::path& file) {
-  const std::string start = readStart(file, 12);
+  const std::string start = readFile(file, 12);
   if (start.size() < 12 || start.compare(0, 4, "glTF") != 0) {
     throw ImportError(file.string() + ": not a GLB file (it does not begin with 'glTF'); export " +
                       "it again, or rename a JSON file to .gltf");
@@ -63,7 +52,7 @@ void requireWholeGlb(const std::filesystem::path& file) {
 
 /// Throws if a .gltf file is a GLB file.
 void rejectGlb(const std::filesystem::path& file) {
-  if (readStart(file, 4) == "glTF")
+  if (readFile(file, 4) == "glTF")
     throw ImportError(file.string() +
                       ": is a GLB file by its first bytes; check where it comes from and rename " +
                       "it to .glb");
@@ -78,7 +67,7 @@ bool isZippedCollada(const std::filesystem::path& file) {
 }
 
 std::string readColladaText(const std::filesystem::path& file, std::size_t limit) {
-  if (!isZippedCollada(file)) return readStart(file, limit);
+  if (!isZippedCollada(file)) return readFile(file, limit);
   return readOnlyZipMember(file, ".dae", kMaxColladaBytes).substr(0, limit);
 }
 
@@ -143,7 +132,7 @@ std::optional<double> findFbxSetting(const std::string& text, const std::string&
 }
 
 FileMetadata readFbxMetadata(const std::filesystem::path& file) {
-  const std::string start = readStart(file, 1 << 20);
+  const std::string start = readFile(file, 1 << 20);
   FileMetadata metadata;
   const double centimetres = findFbxSetting(start, "UnitScaleFactor").value_or(0);
   const bool assimpWroteIt = start.find("Open Asset Import Library") != std::string::npos;

@@ -9,10 +9,10 @@
 #include <cstring>
 #include <limits>
 
-#include "scene/import/file/ascii.hpp"
 #include "scene/import/file/model_format.hpp"
 #include "scene/import/worker/model_stream.hpp"
 #include "scene/import/worker/process.hpp"
+#include "scene/model/ascii.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,10 +1,11 @@
 #include "server/base/access.hpp"
 
 #include <algorithm>
-#include <cctype>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
+
+#include "scene/model/ascii.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -39,20 +40,15 @@ bool isIpLiteral(std::string_view host) {
   return !host.empty() && host.find_first_not_of("0123456789.") == std::string_view::npos;
 }
 
-/// Names of hosts have no case (RFC 3986, 3.2.2).
-std::string toLower(std::string_view text) {
-  std::string lower(text);
-  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return lower;
-}
-
 bool contains(const std::vector<std::string>& names, std::string_view name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
 
+/// Names of hosts have no case (RFC 3986, 3.2.2).
 bool containsHost(const std::vector<std::string>& hosts, std::string_view lowerName) {
-  return std::any_of(hosts.begin(), hosts.end(),
-                     [&](const std::string& host) { return toLower(host) == lowerName; });
+  return std::any_of(hosts.begin(), hosts.end(), [&](const std::string& host) {
+    return scene::toLowerCase(host) == lowerName;
+  });
 }
 
 }  // namespace
@@ -94,13 +90,14 @@ std::vector<Access::Token> readTokens(const std::filesystem::path& file) {
 
 std::optional<std::string> validateOrigin(const Access& access, std::string_view givenHost,
                                           std::string_view origin) {
-  const std::string host = toLower(givenHost);
+  const std::string host = scene::toLowerCase(std::string(givenHost));
   const std::string_view name = stripPort(host);
   if (name != "localhost" && !isIpLiteral(name) && !containsHost(access.hosts, name))
     return "the host name '" + std::string(name) + "' is not allowed: see --allow-host";
   if (origin.empty() || contains(access.origins, origin)) return std::nullopt;
   const std::size_t start = origin.find("://");
-  if (start != std::string_view::npos && toLower(origin.substr(start + 3)) == host)
+  if (start != std::string_view::npos &&
+      scene::toLowerCase(std::string(origin.substr(start + 3))) == host)
     return std::nullopt;
   return "pages of " + std::string(origin) + " may not connect: see --allow-origin";
 }

@@ -20,13 +20,13 @@
 
 #include "scene/import/cache/deduplicate_meshes.hpp"
 #include "scene/import/cache/model_cache_entry.hpp"
-#include "scene/import/file/ascii.hpp"
 #include "scene/import/file/content_hash.hpp"
 #include "scene/import/file/model_format.hpp"
 #include "scene/import/ifc/web_ifc.hpp"
 #include "scene/import/import_model.hpp"
 #include "scene/import/toolchain_version.hpp"
 #include "scene/import/worker/model_stream.hpp"
+#include "scene/model/ascii.hpp"
 
 namespace enfilade::scene {
 namespace {

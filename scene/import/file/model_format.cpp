@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <array>
 
-#include "scene/import/file/ascii.hpp"
+#include "scene/model/ascii.hpp"
 
 namespace enfilade::scene {
 namespace {

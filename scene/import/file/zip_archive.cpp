@@ -7,8 +7,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "scene/import/file/ascii.hpp"
 #include "scene/import/file/import_options.hpp"
+#include "scene/model/ascii.hpp"
 
 namespace enfilade::scene {
 namespace {

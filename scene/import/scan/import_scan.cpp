@@ -1,13 +1,13 @@
 #include "scene/import/scan/import_scan.hpp"
 
 #include <cmath>
-#include <fstream>
 #include <unordered_map>
 #include <utility>
 
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/finish_model.hpp"
 #include "scene/import/assembly/path_names.hpp"
+#include "scene/import/file/read_file.hpp"
 #include "scene/import/scan/ply_file.hpp"
 #include "scene/import/scan/stl_file.hpp"
 #include "scene/import/scan/up_axis.hpp"
@@ -16,17 +16,8 @@
 namespace enfilade::scene {
 namespace {
 
-std::string readScanFile(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  if (!in) throw ImportError(file.string() + ": cannot be opened for reading");
-  std::string bytes(static_cast<std::size_t>(file_size(file)), '\0');
-  in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  bytes.resize(static_cast<std::size_t>(in.gcount()));
-  return bytes;
-}
-
 std::vector<ScanMesh> parseScan(const std::filesystem::path& file, ModelFormat format) {
-  const std::string bytes = readScanFile(file);
+  const std::string bytes = readFile(file);
   try {
     if (format == ModelFormat::stl) return parseStl(bytes);
     std::vector<ScanMesh> meshes;
