@@ -48,39 +48,9 @@ struct RecordingStats {
   std::vector<RunStats> runs;
 };
 
-const char* getCommandName(const v1::Command& command) {
-  switch (command.order_case()) {
-    case v1::Command::kSpawn:
-      return "spawn";
-    case v1::Command::kWalk:
-      return "walk";
-    case v1::Command::kLook:
-      return "look";
-    case v1::Command::kWait:
-      return "wait";
-    case v1::Command::kCapture:
-      return "capture";
-    case v1::Command::kLeave:
-      return "leave";
-    case v1::Command::kDrive:
-      return "drive";
-    case v1::Command::kJump:
-      return "jump";
-    case v1::Command::kFly:
-      return "fly";
-    case v1::Command::kCrouch:
-      return "crouch";
-    case v1::Command::kDriveJoints:
-      return "drive_joints";
-    case v1::Command::kTurn:
-      return "turn";
-    case v1::Command::kTeleport:
-      return "teleport";
-    case v1::Command::kGo:
-      return "go";
-    default:
-      return "unknown";
-  }
+std::string getCommandName(const v1::Command& command) {
+  const auto* order = v1::Command::descriptor()->FindFieldByNumber(command.order_case());
+  return order ? order->name() : "unknown";
 }
 
 void addCommands(RunStats& run, const v1::RecordedCommands& commands) {

@@ -1,105 +1,41 @@
 #include "server/messages/event_names.hpp"
 
+#include "scene/model/ascii.hpp"
+
 namespace enfilade::server {
+namespace {
 
-const char* toString(v1::ContactEvent::Kind kind) {
-  switch (kind) {
-    case v1::ContactEvent::KIND_BEGIN:
-      return "begin";
-    case v1::ContactEvent::KIND_END:
-      return "end";
-    case v1::ContactEvent::KIND_NEAR:
-      return "near";
-    case v1::ContactEvent::KIND_BLOCKED:
-      return "blocked";
-    case v1::ContactEvent::KIND_ENTER:
-      return "enter";
-    case v1::ContactEvent::KIND_LEAVE:
-      return "leave";
-    case v1::ContactEvent::KIND_LEFT_WORLD:
-      return "left_world";
-    case v1::ContactEvent::KIND_PERSIST:
-      return "persist";
-    default:
-      return "unknown";
-  }
+/// Returns the value's name in the schema, in lower case and without `prefix`.
+template <class Enum>
+std::string formatEnumName(Enum value, std::string_view prefix, const char* unknown) {
+  const auto* known = google::protobuf::GetEnumDescriptor<Enum>()->FindValueByNumber(value);
+  return known && value != 0 ? scene::toLowerCase(known->name().substr(prefix.size())) : unknown;
 }
 
-const char* toString(v1::ContactEvent::Reason reason) {
-  switch (reason) {
-    case v1::ContactEvent::REASON_PARTED:
-      return "parted";
-    case v1::ContactEvent::REASON_LEFT:
-      return "left";
-    case v1::ContactEvent::REASON_SHUTDOWN:
-      return "shutdown";
-    case v1::ContactEvent::REASON_RESTART:
-      return "restart";
-    default:
-      return "unknown";
-  }
+}  // namespace
+
+std::string toString(v1::ContactEvent::Kind kind) {
+  return formatEnumName(kind, "KIND_", "unknown");
 }
 
-const char* toString(v1::Verdict verdict) {
-  switch (verdict) {
-    case v1::VERDICT_SEPARATED:
-      return "separated";
-    case v1::VERDICT_TOUCHING:
-      return "touching";
-    case v1::VERDICT_PENETRATING:
-      return "penetrating";
-    default:
-      return "unknown";
-  }
+std::string toString(v1::ContactEvent::Reason reason) {
+  return formatEnumName(reason, "REASON_", "unknown");
 }
 
-const char* toString(v1::Feature feature) {
-  switch (feature) {
-    case v1::FEATURE_VERTEX:
-      return "vertex";
-    case v1::FEATURE_EDGE:
-      return "edge";
-    case v1::FEATURE_FACE:
-      return "face";
-    default:
-      return "unknown";
-  }
+std::string toString(v1::ContactEvent::Phase phase) {
+  return formatEnumName(phase, "PHASE_", "unknown");
 }
 
-const char* toString(v1::Notice::Kind kind) {
-  switch (kind) {
-    case v1::Notice::KIND_ARRIVED:
-      return "arrived";
-    case v1::Notice::KIND_BLOCKED:
-      return "blocked";
-    case v1::Notice::KIND_REFUSED:
-      return "refused";
-    case v1::Notice::KIND_LEFT:
-      return "left";
-    case v1::Notice::KIND_SPAWNED:
-      return "spawned";
-    case v1::Notice::KIND_DONE:
-      return "done";
-    case v1::Notice::KIND_CAPTURE:
-      return "capture";
-    case v1::Notice::KIND_DROPPED:
-      return "dropped";
-    default:
-      return "other";
-  }
+std::string toString(v1::Verdict verdict) {
+  return formatEnumName(verdict, "VERDICT_", "unknown");
 }
 
-const char* toString(v1::ContactEvent::Phase phase) {
-  switch (phase) {
-    case v1::ContactEvent::PHASE_BEGIN:
-      return "begin";
-    case v1::ContactEvent::PHASE_MIN:
-      return "min";
-    case v1::ContactEvent::PHASE_END:
-      return "end";
-    default:
-      return "unknown";
-  }
+std::string toString(v1::Feature feature) {
+  return formatEnumName(feature, "FEATURE_", "unknown");
+}
+
+std::string toString(v1::Notice::Kind kind) {
+  return formatEnumName(kind, "KIND_", "other");
 }
 
 }  // namespace enfilade::server

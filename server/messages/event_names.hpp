@@ -1,15 +1,17 @@
 // Names of events and enums in output files: contacts.jsonl, summary.json, diff.json.
 #pragma once
 
+#include <string>
+
 #include "protocol/enfilade.pb.h"
 
 namespace enfilade::server {
 
-const char* toString(v1::ContactEvent::Kind kind);
-const char* toString(v1::ContactEvent::Reason reason);
-const char* toString(v1::ContactEvent::Phase phase);
-const char* toString(v1::Verdict verdict);
-const char* toString(v1::Feature feature);
-const char* toString(v1::Notice::Kind kind);
+std::string toString(v1::ContactEvent::Kind kind);
+std::string toString(v1::ContactEvent::Reason reason);
+std::string toString(v1::ContactEvent::Phase phase);
+std::string toString(v1::Verdict verdict);
+std::string toString(v1::Feature feature);
+std::string toString(v1::Notice::Kind kind);
 
 }  // namespace enfilade::server

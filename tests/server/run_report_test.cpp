@@ -5,10 +5,32 @@
 
 #include <nlohmann/json.hpp>
 
+#include "server/messages/event_names.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server::testing {
 namespace {
+
+template <class Enum>
+std::string joinNames() {
+  std::string names;
+  const auto* values = google::protobuf::GetEnumDescriptor<Enum>();
+  for (int i = 0; i < values->value_count(); ++i)
+    names += toString(static_cast<Enum>(values->value(i)->number())) + " ";
+  return names;
+}
+
+TEST(EventNames, AreThoseOfThePagesForEachValueOfTheSchema) {
+  EXPECT_EQ(joinNames<v1::ContactEvent::Kind>(),
+            "unknown begin end near blocked enter leave left_world persist ");
+  EXPECT_EQ(joinNames<v1::ContactEvent::Reason>(), "unknown parted left shutdown restart seek ");
+  EXPECT_EQ(joinNames<v1::ContactEvent::Phase>(), "unknown begin min end ");
+  EXPECT_EQ(joinNames<v1::Verdict>(), "unknown separated touching penetrating ");
+  EXPECT_EQ(joinNames<v1::Feature>(), "unknown vertex edge face ");
+  EXPECT_EQ(joinNames<v1::Notice::Kind>(),
+            "other spawned refused arrived blocked done capture left dropped ");
+  EXPECT_EQ(toString(static_cast<v1::Notice::Kind>(1000)), "other");
+}
 
 TEST(RunReport, WalksNameTheirObstacleAndItsGlobalId) {
   const tests::TemporaryFolder folder;
