@@ -1,9 +1,8 @@
 // Binary archive of values. Layout<T>::archive() defines the encoding of a type once, for both
-// directions: a Writer reads from a const T, a Reader writes to a T. A struct's layout names all
-// members in a structured binding, so that an added member stops the build until its encoding is
-// decided.
-// Counts, ids and enums are varints (seven bits a byte, least significant first); doubles are their
-// eight bytes, little-endian.
+// directions: a Writer reads from a const T, a Reader writes to a T. archiveMembers() names all
+// members of a struct in a structured binding, so that an added member stops the build until its
+// encoding is decided. Counts, ids and enums are varints (seven bits a byte, least significant
+// first); doubles are their eight bytes, little-endian.
 #pragma once
 
 #include <array>
@@ -32,8 +31,14 @@ namespace enfilade::scene {
 template <class Archive, class T>
 using MaybeConst = std::conditional_t<Archive::kWrites, const T, T>;
 
+/// A struct has a function archiveMembers(archive, value).
 template <class T>
-struct Layout;
+struct Layout {
+  template <class A>
+  static void archive(A& a, MaybeConst<A, T>& value) {
+    archiveMembers(a, value);
+  }
+};
 
 class Writer {
  public:
@@ -155,14 +160,14 @@ inline void archiveExtended(Reader& a, double& value) {
 
 /// The last enumerator of an enum.
 template <class Enum>
-struct MaxEnumerator;
+constexpr Enum kMaxEnumerator;
 
 template <class Enum>
 requires std::is_enum_v<Enum>
 struct Layout<Enum> {
   static void archive(Writer& a, Enum value) { a.writeVarint(static_cast<std::uint64_t>(value)); }
   static void archive(Reader& a, Enum& value) {
-    value = static_cast<Enum>(a.readVarint(static_cast<std::uint64_t>(MaxEnumerator<Enum>::value)));
+    value = static_cast<Enum>(a.readVarint(static_cast<std::uint64_t>(kMaxEnumerator<Enum>)));
   }
 };
 
@@ -189,15 +194,12 @@ struct Layout<collision::Quat> {
   }
 };
 
-template <>
-struct Layout<collision::Aabb> {
-  template <class A>
-  static void archive(A& a, MaybeConst<A, collision::Aabb>& box) {
-    auto& [min, max] = box;
-    for (Eigen::Index i = 0; i < 3; ++i) archiveExtended(a, min.data()[i]);
-    for (Eigen::Index i = 0; i < 3; ++i) archiveExtended(a, max.data()[i]);
-  }
-};
+template <class A>
+void archiveMembers(A& a, MaybeConst<A, collision::Aabb>& box) {
+  auto& [min, max] = box;
+  for (Eigen::Index i = 0; i < 3; ++i) archiveExtended(a, min.data()[i]);
+  for (Eigen::Index i = 0; i < 3; ++i) archiveExtended(a, max.data()[i]);
+}
 
 // ---- lists -------------------------------------------------------------------------------------
 
