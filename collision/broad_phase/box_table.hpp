@@ -66,7 +66,6 @@ class BoxTable {
   void classify(std::span<const SignedBounds> maxEndpoints, std::span<const Id> ids);
   void makeLevels();
   static void sizeGrid(Level& level);
-  std::size_t levelOf(std::size_t exponent) const { return levelByExponent_[exponent]; }
   Run cellsAt(std::size_t first, std::size_t end) const {
     return {cellStart_[first], cellStart_[end]};
   }

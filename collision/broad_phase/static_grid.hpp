@@ -83,7 +83,6 @@ class StaticGrid {
   void fillEntries(std::span<const Aabb> boxes, std::span<const std::uint32_t> ids,
                    const CellAssignment& assignment);
 
-  Cell openCell(std::size_t level, const CellCoords& at);
   void growCell(CellData& cell);
 
   CellGrid grid_;

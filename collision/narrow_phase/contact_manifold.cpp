@@ -70,10 +70,6 @@ struct Outline {
 
 // ---- step 1 ------------------------------------------------------------------------------------
 
-Vec3 computeWorldVertex(const PlacedConvex& convex, std::uint32_t i) {
-  return placeVertex(convex, convex.vertices[i]);
-}
-
 /// A placed convex, projected along the contact normal.
 struct ProjectedConvex {
   const PlacedConvex& body;
@@ -321,7 +317,7 @@ double computeExtent(const PlacedConvex& convex, const Vec3& origin) {
   if (convex.hull) return convex.hull->radius + (convex.translation - origin).cwiseAbs().maxCoeff();
   double size = 0;
   for (std::uint32_t i = 0; i < convex.vertices.size(); ++i)
-    size = std::max(size, (computeWorldVertex(convex, i) - origin).cwiseAbs().maxCoeff());
+    size = std::max(size, (placeVertex(convex, convex.vertices[i]) - origin).cwiseAbs().maxCoeff());
   return size;
 }
 

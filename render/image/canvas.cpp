@@ -138,13 +138,6 @@ struct Canvas::State {
   }
 };
 
-Image makeBlankImage(int width, int height, Colour c) {
-  Image image{width, height, {}};
-  image.rgb.resize(3 * static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
-  for (std::size_t i = 0; i < image.rgb.size(); ++i) image.rgb[i] = c[i % 3];
-  return image;
-}
-
 Canvas::Canvas(int width, int height, Colour paper)
     : state_(std::make_unique<State>(makeImageSurface(width, height), width, height)) {
   setColour(state_->cairo, paper);

@@ -15,8 +15,6 @@ namespace enfilade::render {
 
 using Colour = std::array<std::uint8_t, 3>;  ///< sRGB
 
-Image makeBlankImage(int width, int height, Colour c);
-
 /// Units of a canvas: pixels of an image, points (1/72 inch) of a page; y points down.
 struct Point {
   double x = 0, y = 0;

@@ -23,6 +23,10 @@ struct PrimaryRays {
   /// Start of Embree's ray, relative to the eye.
   Vec3 startAt(double x, double y) const { return originAt(x, y) + start * forward; }
   Vec3 directionAt(double x, double y) const { return direction + x * directionX + y * directionY; }
+  std::size_t pixelIndex(int x, int y) const {
+    return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
+           static_cast<std::size_t>(x);
+  }
 };
 
 /// `camera` must satisfy validateCamera().

@@ -128,10 +128,6 @@ class FrameTracer {
   TraceContext makeTraceContext(const std::vector<const RayTree*>& trees) const {
     return {trees, rays_, shading_, origin_, options_.hiddenEntity};
   }
-  std::size_t pixelIndex(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(rays_.width) +
-           static_cast<std::size_t>(x);
-  }
   int endRow(std::size_t tile) const {
     return std::min(rays_.height, static_cast<int>(tile) * kTileSize + kTileSize);
   }
@@ -187,7 +183,7 @@ void FrameTracer::writeDepthRow(const TraceContext& trace, int y, std::span<cons
         return CachedPlane{computePlaneDepth(triangle.corners(rays_.eye), rays_),
                            triangle.batch->id};
       });
-      const std::size_t first = pixelIndex(static_cast<int>(x), y), count = end - x;
+      const std::size_t first = rays_.pixelIndex(static_cast<int>(x), y), count = end - x;
       if (!frame_.depth.empty())
         fillDepth(cached.depth, static_cast<int>(x), y,
                   std::span(frame_.depth).subspan(first, count));
@@ -202,7 +198,7 @@ void FrameTracer::shadeRow(const TraceContext& trace, int y, std::span<const Hit
                            RecentCache<ShadedTriangle>& recent) {
   for (int x = 0; x < rays_.width; ++x) {
     const HitKey key = keys[static_cast<std::size_t>(x)];
-    const std::size_t pixel = pixelIndex(x, y);
+    const std::size_t pixel = rays_.pixelIndex(x, y);
     if (key == kNoHit) {
       if (options_.channels.rgb) linearColours_[pixel] = shading_.shadeSky(x, y);
       continue;
@@ -280,7 +276,7 @@ void FrameTracer::blendTransparent(const TraceContext& trace, int y,
 void FrameTracer::encodeRow(int y, std::span<std::uint8_t> visibility) {
   ambientOcclusion_->computeRow(y, visibility);
   for (int x = 0; x < rays_.width; ++x) {
-    const std::size_t pixel = pixelIndex(x, y);
+    const std::size_t pixel = rays_.pixelIndex(x, y);
     const glsl::vec3& linear = linearColours_[pixel];
     const auto transmittance = static_cast<std::uint8_t>(
         transmittance_.empty() ? 255.0f : 255 * transmittance_[pixel] + 0.5f);

@@ -89,15 +89,10 @@ class ReferenceFrameBuilder {
               });
     frame.edge.resize(frame.ids.size());
     for (int y = 0; y < rays_.height; ++y)
-      for (int x = 0; x < rays_.width; ++x) frame.edge[pixelIndex(x, y)] = isAtEdge(x, y);
+      for (int x = 0; x < rays_.width; ++x) frame.edge[rays_.pixelIndex(x, y)] = isAtEdge(x, y);
   }
 
  private:
-  std::size_t pixelIndex(int x, int y) const {
-    return static_cast<std::size_t>(y) * static_cast<std::size_t>(rays_.width) +
-           static_cast<std::size_t>(x);
-  }
-
   /// False if the search was abandoned.
   bool resolvePixel(int x, int y, std::vector<ReferenceFrame::Tie>& ties) {
     double from = rays_.near;
@@ -124,7 +119,7 @@ class ReferenceFrameBuilder {
         std::min_element(surfaces.begin(), surfaces.end(), [](const Surface& a, const Surface& b) {
           return std::pair(a.z, a.id) < std::pair(b.z, b.id);
         });
-    const std::size_t pixel = pixelIndex(x, y);
+    const std::size_t pixel = rays_.pixelIndex(x, y);
     frame.ids[pixel] = first->id;
     frame.depth[pixel] = first->z;
     planes_[pixel] = first->plane;
@@ -137,10 +132,10 @@ class ReferenceFrameBuilder {
   }
 
   bool isAtEdge(int x, int y) const {
-    const std::size_t here = pixelIndex(x, y);
+    const std::size_t here = rays_.pixelIndex(x, y);
     for (int v = std::max(0, y - 1); v <= std::min(rays_.height - 1, y + 1); ++v) {
       for (int u = std::max(0, x - 1); u <= std::min(rays_.width - 1, x + 1); ++u) {
-        const std::size_t there = pixelIndex(u, v);
+        const std::size_t there = rays_.pixelIndex(u, v);
         if (frame.ids[there] != frame.ids[here]) return true;
         if (frame.ids[here] == 0) continue;
         const PlaneDepth& plane = planes_[here];

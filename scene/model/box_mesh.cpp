@@ -4,12 +4,7 @@ namespace enfilade::scene {
 
 Mesh makeBoxMesh(const Aabb& box) {
   Mesh mesh;
-  for (unsigned i = 0; i < 8; ++i) {
-    mesh.positions.push_back(Vec3((i & 1u) != 0 ? box.max.x() : box.min.x(),
-                                  (i & 2u) != 0 ? box.max.y() : box.min.y(),
-                                  (i & 4u) != 0 ? box.max.z() : box.min.z())
-                                 .cast<float>());
-  }
+  for (unsigned i = 0; i < 8; ++i) mesh.positions.push_back(computeBoxCorner(box, i).cast<float>());
   mesh.indices = {0, 2, 3, 0, 3, 1, 4, 5, 7, 4, 7, 6, 0, 1, 5, 0, 5, 4,
                   2, 6, 7, 2, 7, 3, 0, 4, 6, 0, 6, 2, 1, 3, 7, 1, 7, 5};
   return mesh;

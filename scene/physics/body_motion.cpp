@@ -34,19 +34,6 @@ Vec3 computeNewtonStep(const Mat3& inertia, const Vec3& before, const Vec3& angu
 
 }  // namespace
 
-BodyMotion makeDynamicMotion(const MassProperties& properties,
-                             const collision::Pose& worldFromBody) {
-  BodyMotion motion;
-  motion.rotation = worldFromBody.rotation;
-  motion.centre =
-      worldFromBody.rotation.toRotationMatrix() * properties.centre + worldFromBody.translation;
-  ENFILADE_ASSERT(properties.mass > 0);
-  motion.inverseMass = 1 / properties.mass;
-  motion.inertia = properties.inertia;
-  motion.inverseInertia = properties.inertia.inverse();
-  return motion;
-}
-
 void integratePose(BodyMotion& motion, double seconds) {
   motion.centre += seconds * motion.velocity;
   const Vec3 half = 0.5 * seconds * motion.angularVelocity;

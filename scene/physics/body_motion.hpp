@@ -23,10 +23,6 @@ struct BodyMotion {
   double restitution = 0;              ///< 0..1; a pair uses the larger one
 };
 
-/// Returns a dynamic body at rest whose frame has its origin at `worldFromBody`.
-BodyMotion makeDynamicMotion(const MassProperties& properties,
-                             const collision::Pose& worldFromBody);
-
 /// Advances the pose by `seconds` with constant velocities. The rotation uses the Cayley map,
 /// (1, w t / 2) normalised. It rotates by 2 atan(|w| t / 2), which is less than |w| t by its cube.
 void integratePose(BodyMotion& motion, double seconds);

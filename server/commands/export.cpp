@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "protocol/recording/recording.hpp"
+#include "scene/model/names.hpp"
 #include "server/base/camera_rotation.hpp"
 #include "server/base/prepare_folder.hpp"
 #include "server/base/standard_output.hpp"
@@ -130,11 +131,7 @@ class RunExport {
   /// Makes a file name of letters, digits, '.', '_' and '-'; duplicates get a number.
   std::string makeFileName(const std::string& name, const std::filesystem::path& folder) {
     std::string stem;
-    for (const char c : name) {
-      const bool plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
-                         (c >= '0' && c <= '9') || c == '.' || c == '_' || c == '-';
-      stem.push_back(plain ? c : '_');
-    }
+    for (const char c : name) stem.push_back(scene::isNameCharacter(c) ? c : '_');
     stem.resize(std::min<std::size_t>(stem.size(), 128));
     std::string uniqueStem = stem;
     for (int number = 2; !taken_.insert(folder / uniqueStem).second; ++number)

@@ -1,5 +1,6 @@
 #include "server/diff/difference_json.hpp"
 
+#include <array>
 #include <nlohmann/json.hpp>
 
 #include "protocol/recording/recording.hpp"
@@ -54,35 +55,14 @@ Json optionalJson(const std::optional<Value>& value) {
   return value ? toJson(*value) : Json(nullptr);
 }
 
-const char* getKindName(WalkEventKind kind) {
-  switch (kind) {
-    case WalkEventKind::blocked:
-      return "blocked";
-    case WalkEventKind::contact:
-      return "contact";
-    case WalkEventKind::fall:
-      return "fall";
-    case WalkEventKind::enter:
-      return "enter";
-    case WalkEventKind::leave:
-      return "leave";
-    case WalkEventKind::ground:
-      return "ground";
-  }
-  return "unknown";
-}
+// In the order of the enumerators.
+constexpr std::array<const char*, kWalkEventKinds> kKindNames{"blocked", "contact", "fall",
+                                                              "enter",   "leave",   "ground"};
+constexpr std::array<const char*, 4> kModelNames{"both", "before", "after", "unknown"};
 
-const char* getModelName(ModelSide model) {
-  switch (model) {
-    case ModelSide::both:
-      return "both";
-    case ModelSide::before:
-      return "before";
-    case ModelSide::after:
-      return "after";
-    default:
-      return "unknown";
-  }
+template <class Enum, std::size_t kCount>
+const char* toString(Enum value, const std::array<const char*, kCount>& names) {
+  return names.at(static_cast<std::size_t>(value));
 }
 
 template <class Change>
@@ -99,11 +79,11 @@ void addCommonFields(Json& json, const Change& change) {
 }
 
 Json toJson(const WalkEventChange& change) {
-  Json json{{"kind", getKindName(change.kind)},
+  Json json{{"kind", toString(change.kind, kKindNames)},
             {"change", getChangeName(change)},
             {"before", optionalJson(change.before)},
             {"after", optionalJson(change.after)},
-            {"b_in_model", getModelName(change.inModel)}};
+            {"b_in_model", toString(change.inModel, kModelNames)}};
   if (change.before && change.after) {
     json["shift"] = change.shift;
     json["delay"] = change.delay;
@@ -129,7 +109,7 @@ Json toJson(const ClearanceChange& change) {
             {"before", optionalJson(change.before)},
             {"after", optionalJson(change.after)},
             {"changed_by_at_least", change.minChange},
-            {"b_in_model", getModelName(change.inModel)}};
+            {"b_in_model", toString(change.inModel, kModelNames)}};
   addCommonFields(json, change);
   return json;
 }

@@ -1,5 +1,6 @@
 #include "server/messages/order_messages.hpp"
 
+#include "scene/model/box_mesh.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -17,12 +18,9 @@ std::vector<scene::Vec3> pointsFromProto(const v1::ConvexPart& part) {
   std::vector<scene::Vec3> points;
   for (const v1::Vec3& point : part.points()) points.push_back(vectorFromProto(point));
   if (!points.empty() || !part.has_box()) return points;
-  const scene::Vec3 min = vectorFromProto(part.box().min()),
-                    max = vectorFromProto(part.box().max());
-  for (int corner = 0; corner < 8; ++corner) {
-    points.emplace_back(corner & 1 ? max.x() : min.x(), corner & 2 ? max.y() : min.y(),
-                        corner & 4 ? max.z() : min.z());
-  }
+  const scene::Aabb box{vectorFromProto(part.box().min()), vectorFromProto(part.box().max())};
+  for (unsigned corner = 0; corner < 8; ++corner)
+    points.push_back(scene::computeBoxCorner(box, corner));
   return points;
 }
 

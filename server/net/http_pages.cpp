@@ -3,6 +3,7 @@
 #include <fmt/core.h>
 
 #include <algorithm>
+#include <boost/beast/http/status.hpp>
 #include <cctype>
 #include <sstream>
 
@@ -83,35 +84,6 @@ std::variant<v1::ClientMessage, HttpError> parseMjpegRequest(const Target& targe
   }
   if (!query.error().empty()) return HttpError{400, query.error()};
   return message;
-}
-
-const char* statusPhrase(unsigned status) {
-  switch (status) {
-    case 200:
-      return "OK";
-    case 400:
-      return "Bad Request";
-    case 401:
-      return "Unauthorized";
-    case 403:
-      return "Forbidden";
-    case 404:
-      return "Not Found";
-    case 405:
-      return "Method Not Allowed";
-    case 408:
-      return "Request Timeout";
-    case 413:
-      return "Payload Too Large";
-    case 431:
-      return "Request Header Fields Too Large";
-    case 500:
-      return "Internal Server Error";
-    case 503:
-      return "Service Unavailable";
-    default:
-      return "Error";
-  }
 }
 
 /// Writes Prometheus text: each metric with help and type, and one line per world.
@@ -259,7 +231,8 @@ std::string makeMetricsPage(std::span<const WorldMetrics> worlds) {
 }
 
 std::string makeResponse(unsigned status, const std::string& type, const std::string& body) {
-  std::string head = "HTTP/1.1 " + std::to_string(status) + " " + statusPhrase(status) +
+  std::string head = "HTTP/1.1 " + std::to_string(status) + " " +
+                     std::string(obsolete_reason(boost::beast::http::int_to_status(status))) +
                      "\r\nServer: enfilade " + kServerVersion + "\r\nContent-Type: " + type +
                      "\r\nContent-Length: " + std::to_string(body.size()) +
                      "\r\nX-Content-Type-Options: nosniff\r\nCache-Control: no-store\r\n";

@@ -287,9 +287,7 @@ void TickLoop::fail(const std::string& reason) {
     const std::lock_guard lock(inbox_->mutex);
     inbox_->failure = std::current_exception();
     closeInbox(*inbox_, makeBye(v1::ERROR_INTERNAL, "the world failed: " + reason));
-    std::move(inbox_->jobs.begin(), inbox_->jobs.end(), std::back_inserter(jobs_));
-    inbox_->jobs.clear();
-    hosted_.closeNotice = inbox_->closeNotice;
+    takeJobs();
   }
   try {
     abortWorld(hosted_);

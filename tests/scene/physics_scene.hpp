@@ -45,6 +45,19 @@ inline void addParts(std::span<const collision::Hull* const> hulls, PhysicsBody&
   updateTransform(body);
 }
 
+/// Returns a dynamic body at rest whose frame has its origin at `worldFromBody`.
+inline BodyMotion makeDynamicMotion(const MassProperties& properties,
+                                    const collision::Pose& worldFromBody) {
+  BodyMotion motion;
+  motion.rotation = worldFromBody.rotation;
+  motion.centre =
+      worldFromBody.rotation.toRotationMatrix() * properties.centre + worldFromBody.translation;
+  motion.inverseMass = 1 / properties.mass;
+  motion.inertia = properties.inertia;
+  motion.inverseInertia = properties.inertia.inverse();
+  return motion;
+}
+
 /// Makes a dynamic body of convex parts (hulls in one frame; uniform `density` in kg/m^3).
 inline PhysicsBody makeDynamicBody(std::span<const collision::Hull* const> hulls, double density,
                                    const collision::Pose& worldFromFrame) {

@@ -13,6 +13,15 @@ Eigen::Matrix3d makeYUpRotation(char up) {
   return rotation;
 }
 
+Aabb computeObjectAabb(const Model& model, const Object& object,
+                       const Eigen::Affine3d& frameFromMesh) {
+  Aabb box;
+  for (const std::uint32_t mesh : object.meshes)
+    for (const std::uint32_t i : model.meshes[mesh].indices)
+      box.include(frameFromMesh * model.meshes[mesh].positions[i].cast<double>());
+  return box;
+}
+
 double computeMedian(std::vector<double> values) {
   ENFILADE_ASSERT(!values.empty());
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

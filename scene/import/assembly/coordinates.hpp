@@ -1,8 +1,9 @@
 // Coordinates of imported models: up axis, distance and precision.
 #pragma once
 
-#include <Eigen/Core>
 #include <vector>
+
+#include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
@@ -13,6 +14,10 @@ inline constexpr double kMaxFloatSpacing = 1e-4;
 
 /// Rotates the up axis `up` ('x', 'y' or 'z') to Y, by a quarter turn about the third axis.
 Eigen::Matrix3d makeYUpRotation(char up);
+
+/// The box of an object's triangles in the frame that `frameFromMesh` leads to.
+Aabb computeObjectAabb(const Model& model, const Object& object,
+                       const Eigen::Affine3d& frameFromMesh);
 
 /// The upper median of at least one value.
 double computeMedian(std::vector<double> values);

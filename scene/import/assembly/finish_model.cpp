@@ -8,6 +8,7 @@
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/file/import_options.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/box_mesh.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -27,11 +28,8 @@ Aabb computeMeshAabb(const Mesh& mesh) {
 
 Aabb transformMeshAabb(const Aabb& box, const Eigen::Affine3d& transform) {
   Aabb result;
-  for (int corner = 0; corner < 8; ++corner) {
-    result.include(transform * Vec3((corner & 1) != 0 ? box.max.x() : box.min.x(),
-                                    (corner & 2) != 0 ? box.max.y() : box.min.y(),
-                                    (corner & 4) != 0 ? box.max.z() : box.min.z()));
-  }
+  for (unsigned corner = 0; corner < 8; ++corner)
+    result.include(transform * computeBoxCorner(box, corner));
   return result;
 }
 

@@ -68,6 +68,17 @@ double readComponent(const char* bytes, std::size_t componentType, bool normalis
   }
 }
 
+template <class Number>
+std::vector<Number> convertElements(const GltfElements& elements, bool normalise) {
+  const std::size_t size = getComponentSize(elements.componentType);
+  std::vector<Number> values;
+  values.reserve(elements.bytes.size() / size);
+  for (std::size_t at = 0; at < elements.bytes.size(); at += size)
+    values.push_back(static_cast<Number>(
+        readComponent(elements.bytes.data() + at, elements.componentType, normalise)));
+  return values;
+}
+
 int decodeBase64Digit(char letter) {
   if (letter >= 'A' && letter <= 'Z') return letter - 'A';
   if (letter >= 'a' && letter <= 'z') return letter - 'a' + 26;
@@ -306,27 +317,16 @@ std::vector<double> GltfBuffers::readNumbers(std::size_t accessor, std::size_t p
   const GltfElements elements = readElements(accessor, perElement);
   if (elements.componentType == 5125)
     fail("accessors[" + std::to_string(accessor) + "] is not of type floats");
-  const std::size_t size = getComponentSize(elements.componentType);
-  std::vector<double> values;
-  values.reserve(elements.bytes.size() / size);
-  for (std::size_t at = 0; at < elements.bytes.size(); at += size) {
-    values.push_back(readComponent(elements.bytes.data() + at, elements.componentType, true));
-    if (!std::isfinite(values.back())) fail("an animation contains a non-finite number");
-  }
+  std::vector<double> values = convertElements<double>(elements, true);
+  for (const double value : values)
+    if (!std::isfinite(value)) fail("an animation contains a non-finite number");
   return values;
 }
 
 std::vector<float> GltfBuffers::readFloats(std::size_t accessor, std::size_t perElement,
                                            bool normalise) {
   const GltfElements elements = readElements(accessor, perElement);
-  const std::size_t size = getComponentSize(elements.componentType);
-  normalise = normalise || elements.normalised;
-  std::vector<float> values;
-  values.reserve(elements.bytes.size() / size);
-  for (std::size_t at = 0; at < elements.bytes.size(); at += size)
-    values.push_back(static_cast<float>(
-        readComponent(elements.bytes.data() + at, elements.componentType, normalise)));
-  return values;
+  return convertElements<float>(elements, normalise || elements.normalised);
 }
 
 std::vector<double> GltfBuffers::readValues(std::size_t accessor, std::size_t& perElement) {
@@ -336,14 +336,8 @@ std::vector<double> GltfBuffers::readValues(std::size_t accessor, std::size_t& p
                : type != nullptr && *type == "VEC4" ? 4
                                                     : 1;
   const GltfElements elements = readElements(accessor, perElement);
-  const std::size_t size = getComponentSize(elements.componentType);
   spend(elements.count * perElement, sizeof(double), "accessors[" + std::to_string(accessor) + "]");
-  std::vector<double> values;
-  values.reserve(elements.bytes.size() / size);
-  for (std::size_t at = 0; at < elements.bytes.size(); at += size)
-    values.push_back(
-        readComponent(elements.bytes.data() + at, elements.componentType, elements.normalised));
-  return values;
+  return convertElements<double>(elements, elements.normalised);
 }
 
 std::vector<std::uint32_t> GltfBuffers::readIndices(std::size_t accessor) {

@@ -8,6 +8,7 @@
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/gltf_nodes.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/box_mesh.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -242,12 +243,8 @@ Aabb computePosedBox(const RestPose& pose, const Aabb& box, const Json& primitiv
   used[0] = used[0] || vertices == 0 || std::ranges::count(sums, 0.0) > 0;
   Aabb posed;
   for (std::size_t joint = 0; joint < used.size(); ++joint) {
-    for (unsigned corner = 0; used[joint] && corner < 8; ++corner) {
-      const Vec3 point((corner & 1U) != 0 ? box.max.x() : box.min.x(),
-                       (corner & 2U) != 0 ? box.max.y() : box.min.y(),
-                       (corner & 4U) != 0 ? box.max.z() : box.min.z());
-      posed.include(pose.nodeFromJoint[joint] * point);
-    }
+    for (unsigned corner = 0; used[joint] && corner < 8; ++corner)
+      posed.include(pose.nodeFromJoint[joint] * computeBoxCorner(box, corner));
   }
   return posed;
 }

@@ -8,6 +8,7 @@
 
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/box_mesh.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -101,9 +102,8 @@ Json replaceUnreadable(const UnreadableMesh& mesh, const Json& accessors, GltfBu
   if (!box) return nullptr;
   std::vector<float> positions;
   for (unsigned corner = 0; corner < 8; ++corner)
-    for (int axis = 0; axis < 3; ++axis)
-      positions.push_back(
-          static_cast<float>((corner >> axis & 1) != 0 ? box->max[axis] : box->min[axis]));
+    for (const double coordinate : computeBoxCorner(*box, corner))
+      positions.push_back(static_cast<float>(coordinate));
   static constexpr std::array<std::uint32_t, 36> kFaces{0, 2, 1, 1, 2, 3, 4, 5, 6, 5, 7, 6,
                                                         0, 1, 4, 1, 5, 4, 2, 6, 3, 3, 6, 7,
                                                         0, 4, 2, 2, 4, 6, 1, 3, 5, 3, 7, 5};

@@ -20,14 +20,6 @@ constexpr double kOutlineMargin = 0.1;  // fraction of the outline at each side 
 
 using Corners = std::array<Vec3, 3>;
 
-Aabb computeObjectAabb(const Model& model, const Object& object) {
-  Aabb box;
-  for (const std::uint32_t mesh : object.meshes)
-    for (const std::uint32_t i : model.meshes[mesh].indices)
-      box.include(computeWorldPosition(object, model.meshes[mesh], i));
-  return box;
-}
-
 /// Heights of the storeys' floors in the scene frame, ascending and distinct.
 std::vector<double> collectStoreyHeights(const Model& model, const IfcMetadata& metadata) {
   const double scale = model.metresPerUnit / metadata.metresPerUnit;
@@ -120,7 +112,7 @@ class ElevatorFinder {
 
   void addElevator(std::uint32_t index) {
     const Object& elevator = model_.objects[index];
-    const Aabb cabin = computeObjectAabb(model_, elevator);
+    const Aabb cabin = computeObjectAabb(model_, elevator, elevator.worldFromMesh);
     if (cabin.empty()) return;
     if (cabin.size().y() > kMaxCabinHeight)
       return reportStatic(elevator, "it is taller than a cabin, so its moving part is unknown");

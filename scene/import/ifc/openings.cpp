@@ -4,6 +4,7 @@
 #include <cmath>
 #include <map>
 
+#include "scene/import/assembly/coordinates.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
@@ -30,14 +31,6 @@ Eigen::Affine3d computeFrameFromMesh(const OpeningFrame& frame, const Object& ob
   return frame.worldFromFrame.inverse(Eigen::Isometry) * object.worldFromMesh;
 }
 
-Aabb computeAabbInFrame(const Model& model, const Object& object, const Eigen::Affine3d& toFrame) {
-  Aabb box;
-  for (const std::uint32_t mesh : object.meshes)
-    for (const std::uint32_t i : model.meshes[mesh].indices)
-      box.include(toFrame * model.meshes[mesh].positions[i].cast<double>());
-  return box;
-}
-
 /// The horizontal axis that is not the door's width.
 int findNormalAxis(const Object& object, const Vec3& size) {
   const auto like = [&](double extent) {
@@ -52,7 +45,7 @@ int findNormalAxis(const Object& object, const Vec3& size) {
 std::optional<OpeningFrame> computeOpeningFrame(const Model& model, const Object& object) {
   if (!object.worldFromPlacement) return std::nullopt;
   OpeningFrame frame{*object.worldFromPlacement, {}, 1};
-  frame.box = computeAabbInFrame(model, object, computeFrameFromMesh(frame, object));
+  frame.box = computeObjectAabb(model, object, computeFrameFromMesh(frame, object));
   if (frame.box.empty()) return std::nullopt;
   frame.normalAxis = findNormalAxis(object, frame.box.size());
   return frame;
@@ -158,7 +151,7 @@ std::vector<Wall> collectWalls(const Model& model, const IfcMetadata& metadata,
     const auto product = products.find(object.globalId);
     if (product == products.end()) continue;
     if (isWall(product->second) || isPartOfWall(*product->second))
-      walls.push_back({&object, computeAabbInFrame(model, object, object.worldFromMesh)});
+      walls.push_back({&object, computeObjectAabb(model, object, object.worldFromMesh)});
   }
   return walls;
 }
@@ -179,7 +172,7 @@ std::vector<const Object*> findSurroundingWalls(const Model& model, const std::v
   for (const Wall& wall : walls)
     if (isOverlapping(wall.box, inWorld) &&
         isOverlapping(
-            computeAabbInFrame(model, *wall.object, computeFrameFromMesh(frame, *wall.object)),
+            computeObjectAabb(model, *wall.object, computeFrameFromMesh(frame, *wall.object)),
             inner))
       around.push_back(wall.object);
   return around;

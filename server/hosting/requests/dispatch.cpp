@@ -116,13 +116,13 @@ void dispatchRequest(const RequestContext& context) {
     case v1::ClientMessage::kWatchFrames:
       return handleWatchFrames(context, message.watch_frames());
     case v1::ClientMessage::kRays:
-      return handleRays(context, message.rays());
+      return forwardQuery(context, message.rays(), "rays.tick");
     case v1::ClientMessage::kDistances:
-      return handleDistances(context, message.distances());
+      return forwardQuery(context, message.distances(), "distances.tick");
     case v1::ClientMessage::kTouching:
-      return handleTouching(context, message.touching());
+      return forwardQuery(context, message.touching(), "touching.tick");
     case v1::ClientMessage::kCannotTouch:
-      return handleCannotTouch(context, message.cannot_touch());
+      return forwardQuery(context, message.cannot_touch(), "cannot_touch.tick");
     case v1::ClientMessage::kNavigation:
       return handleNavigation(context, message.navigation());
     case v1::ClientMessage::kDescribe:

@@ -1,28 +1,12 @@
 #include "server/hosting/requests/query_requests.hpp"
 
 #include <algorithm>
-#include <functional>
-#include <utility>
 
 #include "server/hosting/requests/checkpoint_requests.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
 namespace {
-
-/// Forwards a query about the last tick to the query service.
-template <class Query>
-void forwardQuery(const RequestContext& context, const Query& query, const char* tickField,
-                  std::function<void(double)> progress = {}) {
-  HostedWorld& hosted = context.hosted;
-  if (query.has_tick()) {
-    if (auto error = validateTick(hosted, query.tick(), tickField))
-      return replyError(context, std::move(*error));
-  }
-  hosted.queries.submit({hosted.world.snapshot(), context.message, hosted.world.settings(),
-                         hosted.limits, std::move(progress)},
-                        deferReply(context));
-}
 
 /// Sends a message to the client with each further per cent.
 std::function<void(double)> makeProgress(const RequestContext& context) {
@@ -99,22 +83,10 @@ class BoundedNames {
 
 }  // namespace
 
-void handleRays(const RequestContext& context, const v1::RayQuery& query) {
-  forwardQuery(context, query, "rays.tick");
-}
 void handleNavigation(const RequestContext& context, const v1::NavigationQuery& query) {
   if (query.has_load_mesh()) return loadMesh(context, query);
   forwardQuery(context, query, "navigation.tick",
                query.progress() ? makeProgress(context) : std::function<void(double)>());
-}
-void handleDistances(const RequestContext& context, const v1::DistanceQuery& query) {
-  forwardQuery(context, query, "distances.tick");
-}
-void handleTouching(const RequestContext& context, const v1::TouchingQuery& query) {
-  forwardQuery(context, query, "touching.tick");
-}
-void handleCannotTouch(const RequestContext& context, const v1::CannotTouchQuery& query) {
-  forwardQuery(context, query, "cannot_touch.tick");
 }
 
 void handleDescribe(const RequestContext& context, const v1::DescribeEntities& request) {

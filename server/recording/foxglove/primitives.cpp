@@ -12,12 +12,13 @@ namespace {
 const Eigen::Vector3f kAvatarColour{0.85f, 0.4f, 0.1f};
 constexpr double kNameHeight = 0.12;  // metres, font size of the name above an avatar
 
-foxglove::Point3 toPoint(const scene::Vec3& v) {
-  foxglove::Point3 point;
-  point.set_x(v.x());
-  point.set_y(v.y());
-  point.set_z(v.z());
-  return point;
+template <class Message>
+Message toXyz(const scene::Vec3& v) {
+  Message message;
+  message.set_x(v.x());
+  message.set_y(v.y());
+  message.set_z(v.z());
+  return message;
 }
 
 foxglove::Color materialColour(const scene::Material& material) {
@@ -46,7 +47,8 @@ void addMesh(foxglove::TriangleListPrimitive& into, const scene::Object& object,
              const scene::Mesh& mesh, const scene::Vec3& origin) {
   const auto first = static_cast<std::uint32_t>(into.points_size());
   for (std::uint32_t vertex = 0; vertex < mesh.positions.size(); ++vertex)
-    *into.add_points() = toPoint(scene::computeWorldPosition(object, mesh, vertex) - origin);
+    *into.add_points() =
+        toXyz<foxglove::Point3>(scene::computeWorldPosition(object, mesh, vertex) - origin);
   for (const std::uint32_t index : mesh.indices) into.add_indices(first + index);
 }
 
@@ -92,7 +94,7 @@ std::size_t countTriangles(const scene::Model& model, const std::vector<std::uin
 void addHull(foxglove::TriangleListPrimitive& into, const scene::AvatarPart& part) {
   const auto first = static_cast<std::uint32_t>(into.points_size());
   for (const scene::Vec3& vertex : part.hull->vertices)
-    *into.add_points() = toPoint(part.rotation * vertex + part.offset);
+    *into.add_points() = toXyz<foxglove::Point3>(part.rotation * vertex + part.offset);
   for (const auto& face : part.hull->faces)
     for (std::size_t corner = 2; corner < face.size(); ++corner)
       for (const std::uint32_t vertex : {face[0], face[corner - 1], face[corner]})
@@ -110,11 +112,7 @@ google::protobuf::Timestamp toTimestamp(double seconds) {
 }
 
 foxglove::Vector3 toVector(const scene::Vec3& v) {
-  foxglove::Vector3 message;
-  message.set_x(v.x());
-  message.set_y(v.y());
-  message.set_z(v.z());
-  return message;
+  return toXyz<foxglove::Vector3>(v);
 }
 
 foxglove::Quaternion toQuaternion(const Eigen::Quaterniond& q) {
