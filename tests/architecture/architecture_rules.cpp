@@ -351,6 +351,15 @@ Faults headersWithoutPragmaOnce(const Sources& sources) {
   return faults;
 }
 
+Faults headersWithoutComment(const Sources& sources) {
+  Faults faults;
+  for (const auto& [path, text] : sources)
+    if (endsWith(path, ".hpp") && kMayInclude.count(folderOf(path)) != 0 &&
+        text.rfind("//", 0) != 0)
+      faults.push_back(path + ": does not begin with a comment that says what it is");
+  return faults;
+}
+
 Faults longFiles(const Sources& sources, int maxLines) {
   Faults faults;
   for (const auto& [path, text] : sources) {
@@ -402,7 +411,7 @@ Faults oddWords(const Sources& sources) {
   static const std::regex words(
       "\\b([Tt]old|[Tt]ells|[Aa]new|[Ll]est|[Bb]esides?|[Ss]omebody|[Nn]obody|[Ww]hoever|[Tt]"
       "hereof|"
-      "has the say|goes on|stands for|is none)\\b");
+      "has the say|goes on|stands for|is none|k(Most|Least|Few)[A-Z]\\w*)\\b");
   // A comment names its subject.
   static const std::regex subjects("^\\s*//+<? (What|Which|Who)\\b");
   Faults faults;

@@ -34,6 +34,8 @@ Faults thirdPartiesOutOfPlace(const Sources& sources);
 Faults roomsWithoutDescription(const Sources& sources);
 
 Faults headersWithoutPragmaOnce(const Sources& sources);
+/// A header of the product begins with a comment.
+Faults headersWithoutComment(const Sources& sources);
 /// A schema (.proto) may be twice as long: it is read as one document.
 Faults longFiles(const Sources& sources, int maxLines);
 Faults unfinishedWork(const Sources& sources);
@@ -46,7 +48,8 @@ Faults sourcesWithoutHeader(const Sources& sources);
 Faults crowdedFolders(const Sources& sources, int maxFiles);
 
 /// Words of HOUSE.md's list that do not belong in technical English, one fault a place. Comments,
-/// messages and pages count; identifiers that merely contain such a word do not.
+/// messages and pages count; identifiers that merely contain such a word do not. Constants are
+/// named kMax.. and kMin.., not kMost.. and kLeast...
 Faults oddWords(const Sources& sources);
 
 /// Each kind of diagnostic that scene/ reports is in scene/model/diagnostic_catalog.cpp.

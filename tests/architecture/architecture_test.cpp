@@ -50,6 +50,11 @@ TEST(Architecture, EveryHeaderIsIncludedOnce) {
   EXPECT_EQ(headersWithoutPragmaOnce(repository()), Faults{});
 }
 
+TEST(Architecture, EveryHeaderBeginsWithAComment) {
+  const Faults faults = headersWithoutComment(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
 TEST(Architecture, FilesAreShort) {
   Sources product;
   for (const auto& [path, text] : repository())
@@ -250,6 +255,13 @@ TEST(ArchitectureRules, SmallFaultsAreFound) {
   const Sources sources{{"a.hpp", "int a;\n// " + word + ": more\nint b;\n"},
                         {"b.md", "see [the code](a.hpp) and [nothing](c.hpp#top)\n"}};
   EXPECT_EQ(headersWithoutPragmaOnce(sources), Faults{"a.hpp: no #pragma once"});
+  EXPECT_EQ(headersWithoutComment({{"scene/model/a.hpp", "#pragma once\n// Late.\n"},
+                                   {"scene/model/b.hpp", "// A body.\n#pragma once\n"},
+                                   {"tests/c.hpp", "#pragma once\n"}}),
+            Faults{"scene/model/a.hpp: does not begin with a comment that says what it is"});
+  EXPECT_EQ(
+      oddWords({{"scene/a.cpp", "constexpr int kMostParts = 1, kLeastArea = 2, kMostly = 3;\n"}}),
+      (Faults{"scene/a.cpp:1: kMostParts", "scene/a.cpp:1: kLeastArea"}));
   EXPECT_EQ(longFiles(sources, 2), Faults{"a.hpp: 3 lines"});
   EXPECT_EQ(unfinishedWork(sources), Faults{"a.hpp:2: // " + word + ": more"});
   EXPECT_EQ(brokenLinks(sources), Faults{"b.md:1: links to c.hpp, which is not there"});
