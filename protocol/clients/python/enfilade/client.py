@@ -113,24 +113,24 @@ class Client:
 
     def post(self, requests: Iterable[Dict[str, Any]]) -> List[int]:
         """The first half of pipeline(): sends without waiting. Returns the request ids."""
-        asked = [messages.ClientMessage(**body) for body in requests]
-        posted = self._post(asked)
-        for one in asked:
+        batch = [messages.ClientMessage(**body) for body in requests]
+        posted = self._post(batch)
+        for one in batch:
             if one.HasField("subscribe"):
                 self._subscribed = one.subscribe
         return posted
 
-    def _post(self, asked: List[Any]) -> List[int]:
+    def _post(self, batch: List[Any]) -> List[int]:
         """Numbers and sends ClientMessages, which the caller may use again."""
-        posted = [next(self._ids) for _ in asked]
-        for one, number in zip(asked, posted):
+        posted = [next(self._ids) for _ in batch]
+        for one, number in zip(batch, posted):
             one.request_id = number
-        self._send(asked)
+        self._send(batch)
         return posted
 
-    def _send(self, asked: List[Any]) -> None:
+    def _send(self, batch: List[Any]) -> None:
         try:
-            self._connection.send(asked)
+            self._connection.send(batch)
         except ConnectionFailed:
             self._raise_final_error()
             raise
@@ -488,7 +488,7 @@ class Client:
         load_distortion(). `flow_from`: the earlier tick of the channel "flow", of the last 32, and
         `flow_forward` the direction in which the avatar looked then, if `forward` is given. `collision_shapes`
         draws avatars as these, not as people. `samples`: 1, 4 or 16 of the colour in each pixel."""
-        asked = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
+        query = frame_request(avatar, eye=eye, target=target, forward=forward, up=up, width=width,
                               height=height, fov_y=fov_y, intrinsics=intrinsics, height_y=height_y,
                               near=near, far=far, channels=channels, glass=glass,
                               renderer=renderer, shadows=shadows, lens=lens, distortion=distortion,
@@ -499,7 +499,7 @@ class Client:
             warnings.warn("frame: this server draws one sample a pixel; start a newer one", stacklevel=2)
         if shadows and "shadows" not in self.welcome.capabilities:
             warnings.warn("frame: this server draws no shadows; start a newer one", stacklevel=2)
-        reply, attachment = self.request(frame=asked)
+        reply, attachment = self.request(frame=query)
         return results.frame(reply.frame, attachment)
 
     def watch(self, number: int = 1, avatar: str = "", *, rate: float = 0.0, **view: Any) -> None:
@@ -530,10 +530,10 @@ class Client:
         for start in range(0, max(1, len(origins)), page):
             options = messages.RayQuery(through_avatar=through_avatar, through_glass=through_glass,
                                         packed=packed)
-            asked = results.RayRequest(next(self._ids), origins[start:start + page],
+            query = results.RayRequest(next(self._ids), origins[start:start + page],
                                        directions[start:start + page], reach, options)
-            self._send([asked])
-            reply, attachment = self.take([asked.request_id])[0]
+            self._send([query])
+            reply, attachment = self.take([query.request_id])[0]
             replies.append(results.packed_hits(reply.rays, attachment) if packed else
                            results.hits(reply.rays))
         if replies[0].tick != replies[-1].tick:

@@ -73,21 +73,21 @@ def cannot_touch_query(a: Any, b: Any, assume: str, least: float, tick: Optional
                                      tick=optional_whole(tick, "tick"))
 
 
-def _set_lens(asked: Any, lens: str, width: Optional[float], distortion: Sequence[float]) -> None:
+def _set_lens(request: Any, lens: str, width: Optional[float], distortion: Sequence[float]) -> None:
     if lens not in ("fisheye", "equirectangular"):
         raise ValueError(f"lens: give \"fisheye\" or \"equirectangular\", not {lens!r}")
     if lens == "equirectangular":
         if width is not None or len(distortion):
             raise ValueError("lens: an equirectangular picture has neither fov_y nor distortion")
-        asked.lens.equirectangular.SetInParent()
+        request.lens.equirectangular.SetInParent()
         return
     if len(distortion) > 4:
         raise ValueError("distortion: give at most four coefficients, k1 to k4")
-    asked.lens.fisheye.SetInParent()
+    request.lens.fisheye.SetInParent()
     if width is not None:
-        asked.lens.fisheye.width = width
+        request.lens.fisheye.width = width
     for name, value in zip(("k1", "k2", "k3", "k4"), distortion):
-        setattr(asked.lens.fisheye, name, value)
+        setattr(request.lens.fisheye, name, value)
 
 
 def load_distortion(table: Any) -> np.ndarray:
@@ -149,15 +149,15 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
     for name, given in (("flow_from", flow_from), ("flow_forward", flow_forward)):
         if given is not None and "flow" not in channels:
             raise ValueError(f"{name}: it needs \"flow\" among the channels")
-    asked = messages.FrameRequest(width=whole(width, "width"), height=whole(height, "height"),
-                                  channels=results.channels(channels), shadows=shadows,
-                                  collision_shapes=collision_shapes, samples=whole(samples, "samples"),
-                                  tick=optional_whole(tick, "tick"))
+    request = messages.FrameRequest(width=whole(width, "width"), height=whole(height, "height"),
+                                    channels=results.channels(channels), shadows=shadows,
+                                    collision_shapes=collision_shapes, samples=whole(samples, "samples"),
+                                    tick=optional_whole(tick, "tick"))
     if eye is None:
-        view = asked.eyes
+        view = request.eyes
         view.avatar = avatar
     else:
-        view = asked.free
+        view = request.free
         view.eye.CopyFrom(vec(eye))
         view.hide_avatar = avatar
     for name, point in (("target", target), ("forward", forward), ("up", up)):
@@ -168,17 +168,17 @@ def frame_request(avatar: str = "", *, eye: Optional[Point] = None, target: Opti
             setattr(view, name, value)
     if intrinsics is not None:
         fx, fy, cx, cy = intrinsics
-        asked.intrinsics.CopyFrom(messages.Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy))
+        request.intrinsics.CopyFrom(messages.Intrinsics(fx=fx, fy=fy, cx=cx, cy=cy))
     if lens or len(distortion):
-        _set_lens(asked, lens, fov_y, distortion)
+        _set_lens(request, lens, fov_y, distortion)
     if flow_from is not None:
-        asked.flow_from = whole(flow_from, "flow_from", high=UINT64)
+        request.flow_from = whole(flow_from, "flow_from", high=UINT64)
     if flow_forward is not None:
-        asked.flow_forward.CopyFrom(vec(flow_forward))
+        request.flow_forward.CopyFrom(vec(flow_forward))
     if depth_noise is not None:
-        asked.depth_noise.CopyFrom(_depth_noise(depth_noise))
+        request.depth_noise.CopyFrom(_depth_noise(depth_noise))
     if glass:
-        asked.glass = _named("GLASS_", glass, "glass")
+        request.glass = _named("GLASS_", glass, "glass")
     if renderer:
-        asked.renderer = _named("RENDERER_", renderer, "renderer")
-    return asked
+        request.renderer = _named("RENDERER_", renderer, "renderer")
+    return request
