@@ -32,7 +32,7 @@ std::uint32_t readLittleEndian32(std::string_view bytes, std::size_t at) {
 }
 
 void requireWholeGlb(const std::filesystem::path& file) {
-  const std::string start = readFile(file, 12);
+  const std::string start = readModelFile(file, 12);
   if (start.size() < 12 || start.compare(0, 4, "glTF") != 0) {
     throw ImportError(file.string() + ": not a GLB file (it does not begin with 'glTF'); export " +
                       "it again, or rename a JSON file to .gltf");
@@ -52,7 +52,7 @@ void requireWholeGlb(const std::filesystem::path& file) {
 
 /// Throws if a .gltf file is a GLB file.
 void rejectGlb(const std::filesystem::path& file) {
-  if (readFile(file, 4) == "glTF")
+  if (readModelFile(file, 4) == "glTF")
     throw ImportError(file.string() +
                       ": is a GLB file by its first bytes; check where it comes from and rename " +
                       "it to .glb");
@@ -67,7 +67,7 @@ bool isZippedCollada(const std::filesystem::path& file) {
 }
 
 std::string readColladaText(const std::filesystem::path& file, std::size_t limit) {
-  if (!isZippedCollada(file)) return readFile(file, limit);
+  if (!isZippedCollada(file)) return readModelFile(file, limit);
   return readOnlyZipMember(file, ".dae", kMaxColladaBytes).substr(0, limit);
 }
 
@@ -132,7 +132,7 @@ std::optional<double> findFbxSetting(const std::string& text, const std::string&
 }
 
 FileMetadata readFbxMetadata(const std::filesystem::path& file) {
-  const std::string start = readFile(file, 1 << 20);
+  const std::string start = readModelFile(file, 1 << 20);
   FileMetadata metadata;
   const double centimetres = findFbxSetting(start, "UnitScaleFactor").value_or(0);
   const bool assimpWroteIt = start.find("Open Asset Import Library") != std::string::npos;

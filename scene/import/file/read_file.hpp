@@ -11,8 +11,8 @@
 namespace enfilade::scene {
 
 /// Reads a file, or its first `limit` bytes. Throws ImportError if it cannot be opened.
-inline std::string readFile(const std::filesystem::path& file,
-                            std::size_t limit = std::string::npos) {
+inline std::string readModelFile(const std::filesystem::path& file,
+                                 std::size_t limit = std::string::npos) {
   std::ifstream in(file, std::ios::binary);
   if (!in) throw ImportError(file.string() + ": cannot be opened for reading");
   std::string text(std::min(limit, static_cast<std::size_t>(file_size(file))), '\0');

@@ -14,15 +14,15 @@ std::string readWholeFile(const fs::path& file, std::size_t maxBytes) {
     throw ImportError(file.string() + ": is larger than the " + std::to_string(maxBytes >> 20) +
                       " MiB allowed; split it or raise the memory limit");
   }
-  return readFile(file);
+  return readModelFile(file);
 }
 
 }  // namespace
 
 std::string readIfcFile(const fs::path& file, std::size_t maxBytes) {
-  if (readFile(file, 12) == "ISO-10303-21") return readWholeFile(file, maxBytes);
+  if (readModelFile(file, 12) == "ISO-10303-21") return readWholeFile(file, maxBytes);
   const bool named = file.extension() == ".ifczip" || file.extension() == ".IFCZIP";
-  if (!named && readFile(file, 4) != "PK\3\4") return readWholeFile(file, maxBytes);
+  if (!named && readModelFile(file, 4) != "PK\3\4") return readWholeFile(file, maxBytes);
   return readOnlyZipMember(file, ".ifc", maxBytes);
 }
 

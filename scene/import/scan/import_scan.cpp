@@ -17,7 +17,7 @@ namespace enfilade::scene {
 namespace {
 
 std::vector<ScanMesh> parseScan(const std::filesystem::path& file, ModelFormat format) {
-  const std::string bytes = readFile(file);
+  const std::string bytes = readModelFile(file);
   try {
     if (format == ModelFormat::stl) return parseStl(bytes);
     std::vector<ScanMesh> meshes;
