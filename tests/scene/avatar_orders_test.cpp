@@ -213,6 +213,16 @@ TEST(Spawn, WhereThereIsNoRoomItSaysWhereThereIs) {
   EXPECT_NE(text.find("there is room at [1.4"), std::string::npos) << text;
 }
 
+TEST(Spawn, WithTheHeadInTheCeilingItNamesTheFloorBelow) {
+  // A hall without walls near; the roof above the ceiling has free places too, but higher.
+  WorldFixture run({floorBox(), {"ceiling", {-9, 2.5, -9}, {9, 2.8, 9}}});
+  run.order("ann", Spawn{{0, 1.2, 0}});
+  run.step();
+  const std::string text = run.text(Kind::refused);
+  EXPECT_NE(text.find("it would overlap ceiling"), std::string::npos) << text;
+  EXPECT_NE(text.find("there is room at [0, 0.0005, 0]"), std::string::npos) << text;
+}
+
 TEST(Spawn, HighAboveTheFloorIsReportedAndTooHighIsRefused) {
   WorldFixture run({floorBox()});
   run.order("ann", Spawn{{0, 30, 0}});

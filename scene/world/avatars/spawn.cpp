@@ -100,25 +100,49 @@ std::optional<std::string> tryPlacement(PlacementSearch& search, const Vec3& at,
   return error;
 }
 
-/// Describes the nearest free position around `at`, for an error message. Tests horizontal rings of
-/// increasing radius, at each height.
-std::string describeFreePlace(PlacementSearch& search, const Vec3& at, Avatar& avatar) {
-  constexpr std::array<double, 5> kRings{0.2, 0.5, 1, 2, 4};  // metres
-  constexpr std::array<double, 2> kHeights{0, 1};             // metres
+constexpr std::array<double, 5> kRings{0.2, 0.5, 1, 2, 4};  // metres around a refused position
+
+/// The free position nearest to `at` on horizontal rings of increasing radius, at each height.
+std::optional<Vec3> findPlaceAround(PlacementSearch& search, const Vec3& at, Avatar& avatar,
+                                    std::uint64_t maxCost) {
+  constexpr std::array<double, 2> kHeights{0, 1};  // metres
   constexpr int kDirections = 8;
-  const std::uint64_t maxCost = search.cost() + kMaxSearchCost;
   for (const double height : kHeights) {
     for (const double ring : kRings) {
-      if (search.cost() > maxCost) return "; the search for a free position reached its limit";
+      if (search.cost() > maxCost) return std::nullopt;
       for (int i = 0; i < kDirections; ++i) {
         const Vec3 position =
             at + ring * makeHeadingFromDegrees(360.0 / kDirections * i) + Vec3(0, height, 0);
-        if (tryPlacement(search, position, avatar)) continue;
-        return "; there is room at " + formatPoint(avatar.footPosition) + ", " +
-               formatShortNumber((avatar.footPosition - at).norm()) + " m away";
+        if (!tryPlacement(search, position, avatar)) return avatar.footPosition;
       }
     }
   }
+  return std::nullopt;
+}
+
+/// The floor below `at`, if an avatar that starts lower fits: a start with the head in the ceiling
+/// is a wrong height more often than a wrong place.
+std::optional<Vec3> findFloorUnder(PlacementSearch& search, const Vec3& at, Avatar& avatar,
+                                   std::uint64_t maxCost) {
+  constexpr double kStep = 0.25, kMaxDepth = 3;  // metres: less than a storey and its slab
+  for (double depth = kStep; depth <= kMaxDepth && search.cost() <= maxCost; depth += kStep) {
+    if (tryPlacement(search, at - Vec3(0, depth, 0), avatar)) continue;
+    if (avatar.flying) return avatar.footPosition;
+    return avatar.footPosition - Vec3(0, findFloorBelow(search, avatar).depth, 0);
+  }
+  return std::nullopt;
+}
+
+/// Describes the nearest free position around or below `at`, for an error message.
+std::string describeFreePlace(PlacementSearch& search, const Vec3& at, Avatar& avatar) {
+  const std::uint64_t maxCost = search.cost() + kMaxSearchCost;
+  const std::optional<Vec3> below = findFloorUnder(search, at, avatar, maxCost);
+  std::optional<Vec3> place = findPlaceAround(search, at, avatar, maxCost);
+  if (below && (!place || (*below - at).norm() < (*place - at).norm())) place = below;
+  if (place)
+    return "; there is room at " + formatPoint(*place) + ", " +
+           formatShortNumber((*place - at).norm()) + " m away";
+  if (search.cost() > maxCost) return "; the search for a free position reached its limit";
   return "; there is no room within " + formatShortNumber(kRings.back()) + " m";
 }
 
