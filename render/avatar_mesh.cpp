@@ -128,8 +128,9 @@ void addFigure(AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar) {
 }  // namespace
 
 Eigen::Vector3f avatarColour(scene::EntityId id) {
+  // No red: it marks contacts.
   static const std::array<Eigen::Vector3f, 8> kColours{
-      Eigen::Vector3f{0.85f, 0.16f, 0.06f}, Eigen::Vector3f{0.04f, 0.30f, 0.75f},
+      Eigen::Vector3f{0.10f, 0.08f, 0.40f}, Eigen::Vector3f{0.04f, 0.30f, 0.75f},
       Eigen::Vector3f{0.90f, 0.55f, 0.03f}, Eigen::Vector3f{0.06f, 0.50f, 0.16f},
       Eigen::Vector3f{0.50f, 0.10f, 0.55f}, Eigen::Vector3f{0.02f, 0.55f, 0.55f},
       Eigen::Vector3f{0.80f, 0.12f, 0.35f}, Eigen::Vector3f{0.45f, 0.50f, 0.04f}};

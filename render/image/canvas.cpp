@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <mutex>
+#include <span>
 #include <stdexcept>
 
 #include "collision/assert.hpp"
@@ -17,7 +18,26 @@ namespace enfilade::render {
 namespace {
 
 constexpr const char* kFontFamily = "DejaVu Sans";
-constexpr double kDash = 3;  // of the thickness
+
+/// Lengths of dashes and gaps in turn, of the thickness. The round caps lengthen a dash by 1.
+std::span<const double> getDashes(LineKind kind) {
+  static constexpr std::array<double, 1> kDashed{3};
+  static constexpr std::array<double, 2> kLongDashes{7, 3}, kDotted{0.01, 2.5};
+  static constexpr std::array<double, 4> kDashDot{6, 2.5, 0.01, 2.5};
+  switch (kind) {
+    case LineKind::solid:
+      return {};
+    case LineKind::dashed:
+      return kDashed;
+    case LineKind::longDashes:
+      return kLongDashes;
+    case LineKind::dashDot:
+      return kDashDot;
+    case LineKind::dotted:
+      return kDotted;
+  }
+  return {};
+}
 
 void setColour(cairo_t* cairo, Colour c, double opacity = 1) {
   cairo_set_source_rgba(cairo, c[0] / 255.0, c[1] / 255.0, c[2] / 255.0, opacity);
@@ -129,9 +149,12 @@ struct Canvas::State {
   State(const State&) = delete;
   State& operator=(const State&) = delete;
 
-  void stroke(double thickness, Colour colour, bool dashed = false) const {
-    const double dash = kDash * thickness;
-    cairo_set_dash(cairo, &dash, dashed ? 1 : 0, 0);
+  void stroke(double thickness, Colour colour, LineKind kind = LineKind::solid) const {
+    const std::span<const double> shares = getDashes(kind);
+    std::array<double, 4> dashes{};
+    ENFILADE_ASSERT(shares.size() <= dashes.size());
+    std::ranges::transform(shares, dashes.begin(), [&](double share) { return share * thickness; });
+    cairo_set_dash(cairo, dashes.data(), static_cast<int>(shares.size()), 0);
     cairo_set_line_width(cairo, thickness);
     setColour(cairo, colour);
     cairo_stroke(cairo);
@@ -178,10 +201,11 @@ void Canvas::line(Point from, Point to, double thickness, Colour colour) {
   polyline(std::array{from, to}, thickness, colour);
 }
 
-void Canvas::polyline(std::span<const Point> points, double thickness, Colour colour, bool dashed) {
+void Canvas::polyline(std::span<const Point> points, double thickness, Colour colour,
+                      LineKind kind) {
   if (!std::ranges::all_of(points, isFinite)) return;
   for (const Point& p : points) cairo_line_to(state_->cairo, p.x, p.y);
-  state_->stroke(thickness, colour, dashed);
+  state_->stroke(thickness, colour, kind);
 }
 
 void Canvas::fill(std::span<const std::vector<Point>> loops, Colour colour, double opacity) {
@@ -196,11 +220,11 @@ void Canvas::fill(std::span<const std::vector<Point>> loops, Colour colour, doub
 }
 
 void Canvas::arc(Point centre, double radius, double from, double to, double thickness,
-                 Colour colour, bool dashed) {
+                 Colour colour, LineKind kind) {
   if (!isFinite(centre) || !(radius > 0)) return;
   cairo_new_sub_path(state_->cairo);
   cairo_arc(state_->cairo, centre.x, centre.y, radius, std::min(from, to), std::max(from, to));
-  state_->stroke(thickness, colour, dashed);
+  state_->stroke(thickness, colour, kind);
 }
 
 void Canvas::disc(Point centre, double radius, Colour colour) {
@@ -269,6 +293,31 @@ std::string Canvas::shorten(const std::string& text, const TextStyle& style, dou
     if (measure(cut, style).width <= width) return cut;
   }
   return "…";
+}
+
+std::vector<std::string> Canvas::wrap(const std::string& text, const TextStyle& style, double width,
+                                      std::size_t maxLines) const {
+  ENFILADE_ASSERT(maxLines > 0);
+  const std::string valid = toUtf8(text);
+  const Layout layout(state_->cairo, valid, style);
+  pango_layout_set_width(layout.get(), std::max(1, static_cast<int>(width * PANGO_SCALE)));
+  pango_layout_set_wrap(layout.get(), PANGO_WRAP_WORD_CHAR);
+  std::vector<std::string> lines;
+  const int count = pango_layout_get_line_count(layout.get());
+  for (int i = 0; i < count; ++i) {
+    const auto first =
+        static_cast<std::size_t>(pango_layout_get_line_readonly(layout.get(), i)->start_index);
+    if (lines.size() + 1 == maxLines) {
+      lines.push_back(shorten(valid.substr(first), style, width));
+      break;
+    }
+    const auto length =
+        static_cast<std::size_t>(pango_layout_get_line_readonly(layout.get(), i)->length);
+    std::string line = valid.substr(first, length);
+    line.erase(line.find_last_not_of(' ') + 1);
+    lines.push_back(std::move(line));
+  }
+  return lines;
 }
 
 void Canvas::beginClip(Point topLeft, double width, double height) {

@@ -30,6 +30,8 @@ struct TextStyle {
 
 enum class Align : std::uint8_t { left, centre, right };
 
+enum class LineKind : std::uint8_t { solid, dashed, longDashes, dashDot, dotted };
+
 struct TextSize {
   double width = 0, height = 0;  ///< units
 };
@@ -50,12 +52,12 @@ class Canvas {
 
   void line(Point from, Point to, double thickness, Colour colour);
   void polyline(std::span<const Point> points, double thickness, Colour colour,
-                bool dashed = false);
+                LineKind kind = LineKind::solid);
   /// Fills the loops by the even-odd rule.
   void fill(std::span<const std::vector<Point>> loops, Colour colour, double opacity = 1);
   /// Arc from angle `from` to `to`, radians, from +x towards +y.
   void arc(Point centre, double radius, double from, double to, double thickness, Colour colour,
-           bool dashed = false);
+           LineKind kind = LineKind::solid);
   void disc(Point centre, double radius, Colour colour);
   void rectangle(Point topLeft, double width, double height, double thickness, Colour colour);
   /// Draws the image scaled to `width` x `height` units.
@@ -69,6 +71,10 @@ class Canvas {
   TextSize measure(const std::string& text, const TextStyle& style) const;
   /// The text, cut to `width` units with an ellipsis.
   std::string shorten(const std::string& text, const TextStyle& style, double width) const;
+  /// Lines of at most `width` units: broken between words, or in a word that is longer. Of more
+  /// than `maxLines` the last is cut with an ellipsis.
+  std::vector<std::string> wrap(const std::string& text, const TextStyle& style, double width,
+                                std::size_t maxLines) const;
 
   /// Restricts drawing to a rectangle until the next call of endClip().
   void beginClip(Point topLeft, double width, double height);

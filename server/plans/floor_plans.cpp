@@ -2,14 +2,11 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
-#include <map>
-#include <set>
 
 #include "server/plans/floor_plan_section.hpp"
-#include "server/plans/label_names.hpp"
 #include "server/plans/plan_drawing.hpp"
+#include "server/plans/space_names.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -19,144 +16,10 @@ using render::Image;
 using render::TextStyle;
 using scene::Aabb;
 
-constexpr double kMinElevationRange = 0.5;  // metres between the lowest and the highest storey
-constexpr double kMinFloorNormalY = 0.94;   // minimum y of a floor's normal: within 20 degrees
-constexpr double kMinFloorArea = 0.5;       // square metres: minimum floor area of an object
-constexpr double kMinStoreyShare = 0.04;    // minimum share of all floor area for a storey
-constexpr std::size_t kMaxStoreys = 12;
-constexpr double kWallBottom = 0.3, kWallTop = 1.5;  // metres above a floor that a wall spans
-constexpr double kMaxFloorDistance = 0.6;  // metres between a stated elevation and its floor
-constexpr double kMaxNameDistance = 0.6;   // metres between a storey's floor and its objects
-constexpr double kMargin = 2.0;            // metres around the section
+constexpr double kMargin = 2.0;                        // metres around the section
 constexpr double kMaxWidth = 1600, kMaxHeight = 1200;  // pixels of the plan
 constexpr double kPointsPerMetre = 72 / 0.0254;        // of a page
 constexpr double kPageUnit = 0.7;                      // points of a thin line
-
-// ---- storeys ------------------------------------------------------------------------------------
-
-/// Adds the upward faces of an object, weighted by their projected area. For open shells both sides
-/// count, because their orientation is unknown.
-void addFloors(const scene::Scene& scene, std::uint32_t object,
-               std::vector<WeightedHeight>& heights) {
-  const scene::Shape& shape = scene.shape(object);
-  const Eigen::Affine3d& worldFromMesh = scene.model().objects[object].worldFromMesh;
-  const double mirror = worldFromMesh.linear().determinant() < 0 ? -1 : 1;
-  for (const scene::Shell& shell : shape.shells) {
-    const double outside = shell.inward ? -mirror : mirror;
-    for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-      std::array<Vec3, 3> p;
-      for (std::size_t k = 0; k < 3; ++k)
-        p[k] = worldFromMesh * shape.vertices[shape.triangles[t][k]].cast<double>();
-      const Vec3 normal = outside * (p[1] - p[0]).cross(p[2] - p[0]);
-      const double up = shell.bounds() ? normal.y() : std::abs(normal.y());
-      if (up > kMinFloorNormalY * normal.norm())
-        heights.push_back({(p[0].y() + p[1].y() + p[2].y()) / 3, 0.5 * up});
-    }
-  }
-}
-
-bool hasWallsAbove(const scene::Scene& scene, double floor) {
-  return std::any_of(scene.staticBoxes().begin(), scene.staticBoxes().end(), [&](const Aabb& box) {
-    return box.min.y() <= floor + kWallBottom && box.max.y() >= floor + kWallTop;
-  });
-}
-
-/// Area that the outlines of an object enclose, square metres: the largest less its holes.
-double computeSolidArea(const ObjectSection& section) {
-  double largest = 0, sum = 0;
-  for (const std::vector<Vec3>& loop : section.loops) {
-    double twice = 0;
-    for (std::size_t i = 0; i < loop.size(); ++i) {
-      const Vec3 &p = loop[i], &q = loop[(i + 1) % loop.size()];
-      twice += p.x() * q.z() - q.x() * p.z();
-    }
-    largest = std::max(largest, std::abs(twice) / 2);
-    sum += std::abs(twice) / 2;
-  }
-  return 2 * largest - sum;
-}
-
-/// Area of the floors at a height, square metres.
-double sumFloors(const std::vector<WeightedHeight>& heights, double height) {
-  constexpr double kSameFloor = 0.1;  // metres
-  double area = 0;
-  for (const WeightedHeight& one : heights)
-    if (std::abs(one.height - height) <= kSameFloor) area += one.weight;
-  return area;
-}
-
-/// Whether a cut above the floor goes through one solid that leaves no room on it, as a thick roof.
-/// `floorArea`: square metres of floor at this height.
-bool isCutSolid(const scene::Scene& scene, double floor, double floorArea) {
-  constexpr double kMaxSolidShare = 0.9;
-  double solid = 0;
-  for (const ObjectSection& section : cutStatic(scene, floor + kPlanCutHeight))
-    solid = std::max(solid, computeSolidArea(section));
-  return solid > kMaxSolidShare * floorArea;
-}
-
-/// Parses the storey name from an object path: the text between `Ifc...Storey` and the next '/';
-/// empty also for the name that converters give to a storey without one.
-std::string parseStoreyName(const std::string& path) {
-  const std::size_t word = path.find("IfcBuildingStorey");
-  if (word == std::string::npos) return "";
-  std::string name = path.substr(word + 17, path.find('/', word) - word - 17);
-  while (!name.empty() && (name.front() == '_' || name.front() == ':')) name.erase(0, 1);
-  name = removeGlobalId(name);
-  return name == "Undefined" ? "" : name;
-}
-
-/// Finds the storey name of most objects on this floor.
-std::string findStoreyName(const scene::Scene& scene, double floor) {
-  std::map<std::string, std::size_t> names;
-  for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
-    if (std::abs(scene.staticBoxes()[i].min.y() - floor) > kMaxNameDistance) continue;
-    const std::string name = parseStoreyName(scene.model().objects[scene.solidObjects()[i]].path);
-    if (!name.empty()) ++names[name];
-  }
-  const auto mostFrequent = std::max_element(
-      names.begin(), names.end(), [](const auto& a, const auto& b) { return a.second < b.second; });
-  return mostFrequent == names.end() ? "" : mostFrequent->first;
-}
-
-std::vector<WeightedHeight> collectFloors(const scene::Scene& scene) {
-  std::vector<WeightedHeight> heights;
-  for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
-    const Vec3 size = scene.staticBoxes()[i].size();
-    if (size.x() * size.z() >= kMinFloorArea) addFloors(scene, scene.solidObjects()[i], heights);
-  }
-  return heights;
-}
-
-/// The file states the elevation of a storey's structure or of its finish: the largest floor near
-/// it is the floor.
-double findFloorNear(const std::vector<WeightedHeight>& heights, double elevation) {
-  std::vector<WeightedHeight> near;
-  for (const WeightedHeight& one : heights)
-    if (std::abs(one.height - elevation) <= kMaxFloorDistance) near.push_back(one);
-  const std::vector<double> found = findStoreyHeights(near, 0, 1);
-  return found.empty() ? elevation : found.front();
-}
-
-std::vector<StoreyFloor> findStatedStoreys(const scene::Scene& scene,
-                                           const std::vector<WeightedHeight>& heights) {
-  const scene::Model& model = scene.model();
-  std::set<std::uint32_t> used;
-  for (const scene::Object& object : model.objects)
-    if (object.storey) used.insert(*object.storey);
-  // Storeys that all have one elevation, as some programs write, say nothing about heights.
-  const auto elevation = [&](std::uint32_t index) { return model.storeys[index].elevation; };
-  if (used.size() > 1 && elevation(*used.rbegin()) - elevation(*used.begin()) < kMinElevationRange)
-    return {};
-  std::vector<StoreyFloor> storeys;
-  for (const std::uint32_t index : used) {
-    const double height = findFloorNear(heights, model.storeys[index].elevation);
-    if (hasWallsAbove(scene, height)) storeys.push_back({height, model.storeys[index].name, index});
-  }
-  return storeys;
-}
-
-// ---- the sheet ----------------------------------------------------------------------------------
 
 /// The plan shows the bounds of the section, without lawns and roofs; without a section, the scene.
 Aabb computePlanArea(const scene::Scene& scene, double height) {
@@ -173,57 +36,69 @@ Aabb computePlanArea(const scene::Scene& scene, double height) {
   return drawn;
 }
 
-/// Space around a plan, thin lines: title above, numbers left and below, scale bar below these.
-constexpr double kLeft = 64, kTop = 62, kRight = 24, kBottom = 82;
+/// Space around a plan, thin lines: numbers left and below, scale bar below these.
+constexpr double kLeft = 64, kRight = 24, kBottom = 82;
 constexpr double kMinWidth = 560;  // thin lines, of a sheet
 
-/// Draws a line of text, smaller where it is too wide, and shortened where that does not suffice.
-void drawFittingLine(Canvas& canvas, render::Point at, const std::string& text, TextStyle style,
-                     double width) {
-  constexpr double kMinSizeShare = 0.6;  // legible
-  const double wanted = canvas.measure(text, style).width;
-  if (wanted > width) style.size *= std::max(kMinSizeShare, width / wanted);
-  canvas.text(at, canvas.shorten(text, style, width), style);
-}
-
-void drawTitle(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
-               const StoreyFloor& storey, const std::string& scale) {
+std::string formatTitle(const scene::Scene& scene, const StoreyFloor& storey) {
   const std::string& source = scene.model().source;
-  const double u = view.unit, width = canvas.width() - 32 * u;
   const std::string file = source.substr(source.find_last_of('/') + 1);
-  drawFittingLine(canvas, {16 * u, 10 * u}, storey.name.empty() ? file : file + ": " + storey.name,
-                  {.size = 18 * u, .colour = kPlanInk, .bold = true}, width);
-  drawFittingLine(canvas, {16 * u, 36 * u},
-                  formatFloorAndCut(storey.height) + (scale.empty() ? "" : ", " + scale) +
-                      "; metres of the scene; facing 0 looks right (+x), 90 up (-z)",
-                  {.size = 12 * u, .colour = kPlanInk}, width);
+  return storey.name.empty() ? file : file + ": " + storey.name;
 }
 
-void drawSheet(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
-               const StoreyFloor& storey, const PlanPicture& picture, const std::string& scale) {
-  drawPlanPicture(canvas, view, picture);
-  drawGrid(canvas, view);
-  drawCut(canvas, view, scene);
-  if (storey.storey) drawSpaceNames(canvas, view, scene.model(), *storey.storey);
-  const double below = view.topLeft.y + view.height();
-  drawScaleBar(canvas, view, {view.topLeft.x, below + 42 * view.unit}, scene.model().north);
-  drawTitle(canvas, view, scene, storey, scale);
-  reportMissingFont(canvas);
+std::string formatNote(const StoreyFloor& storey, const std::string& scale) {
+  return formatFloorAndCut(storey.height) + (scale.empty() ? "" : ", " + scale) +
+         "; metres of the scene; facing 0 looks right (+x), 90 up (-z)";
 }
+
+/// A plan with its heading, names of rooms and scale bar; their places are known before the canvas.
+class PlanSheet {
+ public:
+  PlanSheet(const scene::Scene& scene, const StoreyFloor& storey, const render::Camera& camera,
+            double unitsPerMetre, double unit, const std::string& scale)
+      : width_(std::max(kMinWidth * unit, (kLeft + kRight) * unit + camera.width * unitsPerMetre *
+                                                                        camera.heightY /
+                                                                        camera.height)),
+        heading_(
+            makePlanHeading(formatTitle(scene, storey), formatNote(storey, scale), width_, unit)),
+        view_(makePlanView(camera, storey.height, {kLeft * unit, heading_.height}, unitsPerMetre,
+                           unit)),
+        names_(view_.box(), unit, entries_) {
+    if (storey.storey)
+      placeSpaceNames(names_, Canvas(1, 1, kPlanPaper), view_, scene.model(), *storey.storey);
+  }
+
+  double width() const { return width_; }
+  double height() const {
+    return view_.topLeft.y + view_.height() + kBottom * view_.unit +
+           measureEntries(entries_, entriesWidth(), view_.unit);
+  }
+
+  void draw(Canvas& canvas, const scene::Scene& scene, const PlanPicture& picture) const {
+    drawPlanPicture(canvas, view_, picture);
+    drawGrid(canvas, view_);
+    drawCut(canvas, view_, scene);
+    names_.drawLeaders(canvas);
+    names_.drawTexts(canvas);
+    const double below = view_.topLeft.y + view_.height();
+    drawScaleBar(canvas, view_, {view_.topLeft.x, below + 42 * view_.unit}, scene.model().north);
+    drawEntries(canvas, entries_, {view_.topLeft.x, below + (kBottom - 4) * view_.unit},
+                entriesWidth(), view_.unit);
+    drawPlanHeading(canvas, heading_, view_.unit);
+    reportMissingFont(canvas);
+  }
+
+ private:
+  double entriesWidth() const { return width_ - (kLeft + kRight) * view_.unit; }
+
+  double width_;
+  PlanHeading heading_;
+  PlanView view_;
+  std::vector<CaptionEntry> entries_;  ///< names of rooms that have no space for them
+  CaptionList names_;
+};
 
 }  // namespace
-
-std::vector<StoreyFloor> findStoreys(const scene::Scene& scene) {
-  const std::vector<WeightedHeight> heights = collectFloors(scene);
-  std::vector<StoreyFloor> storeys = findStatedStoreys(scene, heights);
-  if (!storeys.empty()) return storeys;
-  for (const double height : findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys)) {
-    if (hasWallsAbove(scene, height) && !isCutSolid(scene, height, sumFloors(heights, height)))
-      storeys.push_back({height, findStoreyName(scene, height)});
-  }
-  if (storeys.empty() && !scene.bounds().empty()) storeys.push_back({scene.bounds().min.y(), ""});
-  return storeys;
-}
 
 std::optional<Image> drawStoreyPlan(const scene::Scene& scene, const StoreyFloor& storey,
                                     const PlanRenderer& renderPlan) {
@@ -231,11 +106,9 @@ std::optional<Image> drawStoreyPlan(const scene::Scene& scene, const StoreyFloor
       computePlanArea(scene, storey.height + kPlanCutHeight), storey.height, kMaxWidth, kMaxHeight);
   const std::optional<PlanPicture> picture = renderPlan(camera);
   if (!picture) return std::nullopt;
-  const PlanView view =
-      makePlanView(camera, storey.height, {kLeft, kTop}, camera.height / camera.heightY, 1);
-  Canvas canvas(static_cast<int>(std::max(kMinWidth, kLeft + camera.width + kRight)),
-                static_cast<int>(kTop + camera.height + kBottom), kPlanPaper);
-  drawSheet(canvas, view, scene, storey, *picture, "");
+  const PlanSheet sheet(scene, storey, camera, camera.height / camera.heightY, 1, "");
+  Canvas canvas(static_cast<int>(sheet.width()), static_cast<int>(sheet.height()), kPlanPaper);
+  sheet.draw(canvas, scene, *picture);
   return canvas.toImage();
 }
 
@@ -247,14 +120,11 @@ bool writeStoreyPage(const scene::Scene& scene, const StoreyFloor& storey,
                      2 * kMaxWidth, 2 * kMaxHeight);
   const std::optional<PlanPicture> picture = renderPlan(camera);
   if (!picture) return false;
-  const double u = kPageUnit, unitsPerMetre = kPointsPerMetre / scale;
-  const PlanView view =
-      makePlanView(camera, storey.height, {kLeft * u, kTop * u}, unitsPerMetre, u);
-  Canvas canvas(file, std::max(kMinWidth * u, kLeft * u + view.width() + kRight * u),
-                kTop * u + view.height() + kBottom * u, {255, 255, 255});
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "scale 1:%.10g", scale);
-  drawSheet(canvas, view, scene, storey, *picture, text.data());
+  const PlanSheet sheet(scene, storey, camera, kPointsPerMetre / scale, kPageUnit, text.data());
+  Canvas canvas(file, sheet.width(), sheet.height(), {255, 255, 255});
+  sheet.draw(canvas, scene, *picture);
   canvas.finish();
   return true;
 }

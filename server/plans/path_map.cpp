@@ -1,6 +1,6 @@
 // Steps: find the walked storeys (peaks of a histogram of the feet's heights); render a plan of
-// each, cut 1.2 m above its floor, around the walked area; draw paths, contacts and captures on
-// the plan of their nearest storey; stack the plans with a title and a legend.
+// each, cut 1.2 m above its floor, around the walked area; place marks and captions on the plan of
+// their nearest storey; stack the plans with a title, a legend and the captions without space.
 #include "server/plans/path_map.hpp"
 
 #include <algorithm>
@@ -8,15 +8,15 @@
 #include <cmath>
 #include <utility>
 
-#include "collision/assert.hpp"
 #include "server/plans/floor_plans.hpp"
+#include "server/plans/path_style.hpp"
 #include "server/plans/plan_drawing.hpp"
+#include "server/plans/storey_marks.hpp"
 
 namespace enfilade::server {
 namespace {
 
 using render::Canvas;
-using render::Colour;
 using render::Image;
 using render::Point;
 using render::TextStyle;
@@ -27,24 +27,17 @@ constexpr double kMapMargin = 4.0;                           // metres around th
 constexpr double kMaxMapWidth = 1600, kMaxMapHeight = 1100;  // pixels of one plan
 constexpr double kMaxStoreyDistance = 0.6;        // metres between a walked floor and a storey's
 constexpr double kBorder = 48, kLineHeight = 26;  // pixels
-constexpr double kMinSupportNormalY = 0.7;        // contacts with a larger y are floors and stairs
-
-constexpr Colour kContact{214, 40, 40}, kBlocked{120, 0, 120}, kCamera{20, 20, 24};
+constexpr double kTitleSize = 18, kHeadingSize = 14;  // pixels
+constexpr std::size_t kMaxTitleLines = 4;
 
 struct StoreyPlan {
   double floor = 0;
   render::Camera camera;
   PlanPicture picture;
+  const StoreyFloor* named = nullptr;  ///< the storey of the file; null: none is near
+  std::vector<std::string> heading;
   PlanView view;  ///< once it has a place on the sheet
 };
-
-const StoreyPlan& findNearestStorey(const std::vector<StoreyPlan>& storeys, double height) {
-  ENFILADE_ASSERT(!storeys.empty());
-  const auto distance = [&](const StoreyPlan& storey) { return std::abs(storey.floor - height); };
-  return *std::min_element(
-      storeys.begin(), storeys.end(),
-      [&](const StoreyPlan& a, const StoreyPlan& b) { return distance(a) < distance(b); });
-}
 
 scene::Aabb computeWalkedBounds(const std::vector<WalkedPath>& paths) {
   scene::Aabb bounds;
@@ -60,144 +53,78 @@ TextStyle makeStyle(double size, bool bold = false) {
   return style;
 }
 
-/// The colour of the path's avatar; half of it for an earlier walk.
-Colour colourOf(const WalkedPath& path) {
-  Colour colour = computeAvatarColour(path.id);
-  if (!path.isEarlier) return colour;
-  for (std::uint8_t& part : colour) part = static_cast<std::uint8_t>((part + 255) / 2);
-  return colour;
-}
-
-void drawDot(Canvas& canvas, Point at, double radius, Colour colour) {
-  canvas.disc(at, radius + 1.5, kPlanPaper);
-  canvas.disc(at, radius, colour);
-}
-
-/// The field of view at `eye` as a wedge along the unit vector (x, y).
-void drawWedge(Canvas& canvas, Point eye, double x, double y) {
-  constexpr double kLength = 18, kHalfWidth = 9;
-  const Point left{eye.x + kLength * x + kHalfWidth * y, eye.y + kLength * y - kHalfWidth * x};
-  const Point right{eye.x + kLength * x - kHalfWidth * y, eye.y + kLength * y + kHalfWidth * x};
-  canvas.polyline(std::array{left, eye, right}, 2, kCamera);
-  canvas.disc(eye, 3, kCamera);
-}
-
-/// Draws the marks of a walk on one storey.
-class StoreyMarks {
- public:
-  StoreyMarks(Canvas& canvas, const std::vector<StoreyPlan>& storeys, const StoreyPlan& storey)
-      : canvas_(canvas), storeys_(storeys), storey_(storey), captions_(storey.view) {}
-
-  void draw(const WalkTrace& trace) {
-    canvas_.beginClip(storey_.view.topLeft, storey_.view.width(), storey_.view.height());
-    for (const WalkedPath& path : trace.paths) drawPath(path);
-    for (const MapContact& blockedWalk : trace.blockedWalks)
-      if (isHere(blockedWalk.point.y())) drawDot(canvas_, at(blockedWalk.point), 6, kBlocked);
-    for (const MapContact& contact : trace.contacts) drawContact(contact);
-    for (const MapCapture& capture : trace.captures) drawCapture(capture);
-    for (const WalkedPath& path : trace.paths) drawName(path);
-    canvas_.endClip();
-  }
-
- private:
-  bool isHere(double height) const { return &findNearestStorey(storeys_, height) == &storey_; }
-  Point at(const Vec3& point) const { return storey_.view.at(point); }
-
-  /// Steps that change the storey end a line.
-  void drawPath(const WalkedPath& path) {
-    std::vector<Point> line;
-    const auto flush = [&] {
-      if (line.size() > 1) canvas_.polyline(line, 3, colourOf(path), path.isEarlier);
-      line.clear();
-    };
-    for (const Vec3& feet : path.footPositions) {
-      if (!isHere(feet.y())) {
-        flush();
-        continue;
-      }
-      const Point next = at(feet);
-      if (line.empty() || next.x != line.back().x || next.y != line.back().y) line.push_back(next);
-    }
-    flush();
-    if (startsHere(path)) drawDot(canvas_, at(path.footPositions.front()), 6, colourOf(path));
-  }
-
-  bool startsHere(const WalkedPath& path) const {
-    return !path.footPositions.empty() && isHere(path.footPositions.front().y());
-  }
-
-  void drawName(const WalkedPath& path) {
-    if (!startsHere(path)) return;
-    TextStyle style = makeStyle(13, true);
-    style.colour = colourOf(path), style.halo = 2;
-    captions_.draw(canvas_, at(path.footPositions.front()), path.avatar, style);
-  }
-
-  void drawCapture(const MapCapture& capture) {
-    if (!isHere(capture.eye.y() - 1.6)) return;
-    const Point eye = at(capture.eye);
-    const double length = std::hypot(capture.viewDirection.x(), capture.viewDirection.z());
-    const double x = length > 0 ? capture.viewDirection.x() / length : 1;
-    const double y = length > 0 ? capture.viewDirection.z() / length : 0;
-    drawWedge(canvas_, eye, x, y);
-    captions_.reserve({eye.x - 4, eye.y - 4}, 8, 8);
-    TextStyle style = makeStyle(11);
-    style.halo = 2;
-    captions_.draw(canvas_, eye, capture.name, style);
-  }
-
-  /// Contacts with walls and furniture. Floor contacts are omitted: they are permanent.
-  void drawContact(const MapContact& contact) {
-    if (std::abs(contact.normal.y()) > kMinSupportNormalY || !isHere(contact.point.y() - 0.8))
-      return;
-    drawDot(canvas_, at(contact.point), 3.5, kContact);
-  }
-
-  Canvas& canvas_;
-  const std::vector<StoreyPlan>& storeys_;
-  const StoreyPlan& storey_;
-  CaptionPlacer captions_;
-};
+// ---- legend -------------------------------------------------------------------------------------
 
 struct LegendEntry {
+  enum class Symbol : std::uint8_t { path, dot, wedge };
   std::string text;
-  Colour colour;
-  bool wedge;  ///< true: wedge of a capture; false: dot
+  Symbol symbol = Symbol::dot;
+  PathStyle style;
 };
 
 std::vector<LegendEntry> makeLegend(const WalkTrace& trace) {
+  using Symbol = LegendEntry::Symbol;
   std::vector<LegendEntry> entries;
-  for (const WalkedPath& path : trace.paths)
-    entries.push_back({path.avatar, colourOf(path), false});
+  const std::vector<PathStyle> styles = makePathStyles(trace.paths);
+  for (std::size_t i = 0; i < trace.paths.size(); ++i)
+    entries.push_back({trace.paths[i].avatar, Symbol::path, styles[i]});
   if (!trace.contacts.empty())
-    entries.push_back({"contact begins (without floors)", kContact, false});
-  if (!trace.blockedWalks.empty()) entries.push_back({"walk ends blocked", kBlocked, false});
+    entries.push_back({"contact begins (without floors)", Symbol::dot, {kContactColour}});
+  if (!trace.blockedWalks.empty())
+    entries.push_back({"walk ends blocked", Symbol::dot, {kBlockedColour}});
   if (!trace.captures.empty())
-    entries.push_back({"picture taken, towards the open end", kCamera, true});
+    entries.push_back({"picture taken, towards the open end", Symbol::wedge, {}});
   return entries;
 }
 
-constexpr double kLegendColumn = 320;  // pixels
+constexpr double kMinLegendColumn = 240, kLegendIndent = 40, kLegendGap = 24;  // pixels
+constexpr double kLegendSize = 14;
+
+/// As wide as the longest text, so that none is cut, and at most the legend.
+double computeLegendColumn(const std::vector<LegendEntry>& entries, double width) {
+  const Canvas measuring(1, 1, kPlanPaper);
+  double column = kMinLegendColumn;
+  for (const LegendEntry& entry : entries)
+    column = std::max(column, kLegendIndent + kLegendGap +
+                                  measuring.measure(entry.text, makeStyle(kLegendSize)).width);
+  return std::min(column, width);
+}
 
 std::size_t countLegendRows(const std::vector<LegendEntry>& entries, double width) {
-  const auto columns = static_cast<std::size_t>(std::max(1.0, width / kLegendColumn));
+  const auto columns =
+      static_cast<std::size_t>(std::max(1.0, width / computeLegendColumn(entries, width)));
   return (entries.size() + columns - 1) / columns;
 }
 
-void drawLegend(Canvas& canvas, const std::vector<LegendEntry>& entries, double top) {
-  const std::size_t rows = countLegendRows(entries, canvas.width());
-  const TextStyle style = makeStyle(14);
-  for (std::size_t i = 0; i < entries.size(); ++i) {
-    const double x = kBorder + 6 + static_cast<double>(i / rows) * kLegendColumn;
-    const double y = top + static_cast<double>(i % rows) * kLineHeight;
-    if (entries[i].wedge) {
-      drawWedge(canvas, {x - 8, y + 9}, 1, 0);
-    } else {
-      canvas.disc({x, y + 9}, 6, entries[i].colour);
-    }
-    canvas.text({x + 16, y}, canvas.shorten(entries[i].text, style, kLegendColumn - 40), style);
+void drawSymbol(Canvas& canvas, const LegendEntry& entry, Point middle) {
+  using Symbol = LegendEntry::Symbol;
+  switch (entry.symbol) {
+    case Symbol::path:
+      canvas.polyline(std::array{Point{middle.x - 14, middle.y}, Point{middle.x + 14, middle.y}}, 3,
+                      entry.style.colour, entry.style.line);
+      canvas.disc({middle.x - 14, middle.y}, 5, entry.style.colour);
+      return;
+    case Symbol::dot:
+      return canvas.disc(middle, 6, entry.style.colour);
+    case Symbol::wedge:
+      return drawWedge(canvas, makeWedge({middle.x - 10, middle.y}, 1, 0));
   }
 }
+
+void drawLegend(Canvas& canvas, const std::vector<LegendEntry>& entries, Point at, double width) {
+  const std::size_t rows = countLegendRows(entries, width);
+  const double column = computeLegendColumn(entries, width);
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const double x = at.x + static_cast<double>(i / rows) * column;
+    const double y = at.y + static_cast<double>(i % rows) * kLineHeight;
+    drawSymbol(canvas, entries[i], {x + 16, y + 9});
+    canvas.text({x + kLegendIndent, y},
+                canvas.shorten(entries[i].text, makeStyle(kLegendSize), column - kLegendIndent),
+                makeStyle(kLegendSize));
+  }
+}
+
+// ---- sheet --------------------------------------------------------------------------------------
 
 /// The storey of the file at this floor; null: none is near.
 const StoreyFloor* findStoreyAt(const std::vector<StoreyFloor>& storeys, double floor) {
@@ -207,51 +134,100 @@ const StoreyFloor* findStoreyAt(const std::vector<StoreyFloor>& storeys, double 
                                                                                : nullptr;
 }
 
-std::string formatHeading(const StoreyPlan& storey, const StoreyFloor* named) {
+/// The storey's name, if it has any, and its floor; in lines of at most `width` pixels.
+std::vector<std::string> makeHeading(const StoreyPlan& storey, double width) {
   const std::string text = formatFloorAndCut(storey.floor);
-  return named != nullptr && !named->name.empty() ? named->name + ": " + text : text;
+  const bool isNamed = storey.named != nullptr && !storey.named->name.empty();
+  return Canvas(1, 1, kPlanPaper)
+      .wrap(isNamed ? storey.named->name + ": " + text : text, makeStyle(kHeadingSize), width,
+            kMaxTitleLines);
+}
+
+void drawLines(Canvas& canvas, const std::vector<std::string>& lines, Point at,
+               const TextStyle& style) {
+  for (const std::string& line : lines) {
+    canvas.text(at, line, style);
+    at.y += kLineHeight;
+  }
+}
+
+double heightOf(const std::vector<std::string>& lines) {
+  return static_cast<double>(lines.size()) * kLineHeight;
 }
 
 /// Gives the storeys their places, one below the other, and returns the height of all.
 double placeStoreys(std::vector<StoreyPlan>& storeys, double top) {
   for (StoreyPlan& storey : storeys) {
-    storey.view = makePlanView(storey.camera, storey.floor, {kBorder, top + kLineHeight},
+    top += heightOf(storey.heading);
+    storey.view = makePlanView(storey.camera, storey.floor, {kBorder, top},
                                storey.camera.height / storey.camera.heightY, 1);
-    top += kLineHeight + storey.camera.height + kBorder;
+    top += storey.camera.height + kBorder;
   }
   return top;
 }
 
-Image composeMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
-                 const scene::Scene* scene) {
-  const std::vector<LegendEntry> legend = makeLegend(trace);
+double computeSheetWidth(const std::vector<StoreyPlan>& storeys) {
   double width = 640;
   for (const StoreyPlan& storey : storeys)
     width = std::max(width, storey.camera.width + 2 * kBorder);
-  const double legendTop = placeStoreys(storeys, kBorder + 2 * kLineHeight) + 2 * kLineHeight;
-  const double height =
-      legendTop + static_cast<double>(countLegendRows(legend, width)) * kLineHeight + kBorder;
-  const std::vector<StoreyFloor> namedStoreys =
-      scene ? findStoreys(*scene) : std::vector<StoreyFloor>();
-  Canvas canvas(static_cast<int>(width), static_cast<int>(height), kPlanPaper);
-  const TextStyle title = makeStyle(18, true), heading = makeStyle(14);
-  canvas.text({kBorder, kBorder}, canvas.shorten(trace.title, title, width - 2 * kBorder), title);
+  return width;
+}
+
+/// The places of all parts of a map; pixels.
+struct MapLayout {
+  double width = 0, legendTop = 0, entriesTop = 0, height = 0;
+  std::vector<std::string> title;
+  std::vector<StoreyMarks> marks;  ///< of each storey
+  std::vector<CaptionEntry> entries;
+  std::vector<LegendEntry> legend;
+
+  double inner() const { return width - 2 * kBorder; }
+};
+
+void layOutMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
+               const std::vector<double>& floors, const scene::Scene* scene, MapLayout& layout) {
+  layout.width = computeSheetWidth(storeys);
+  layout.title =
+      Canvas(1, 1, kPlanPaper)
+          .wrap(trace.title, makeStyle(kTitleSize, true), layout.inner(), kMaxTitleLines);
+  for (StoreyPlan& storey : storeys) storey.heading = makeHeading(storey, layout.inner());
+  layout.legendTop =
+      placeStoreys(storeys, kBorder + heightOf(layout.title) + kLineHeight) + 2 * kLineHeight;
   for (const StoreyPlan& storey : storeys) {
-    const PlanView& view = storey.view;
-    const StoreyFloor* const named = findStoreyAt(namedStoreys, storey.floor);
-    canvas.text({kBorder, view.topLeft.y - kLineHeight + 4},
-                canvas.shorten(formatHeading(storey, named), heading, width - 2 * kBorder),
-                heading);
-    drawPlanPicture(canvas, view, storey.picture);
+    std::optional<PlanStorey> rooms;
+    if (storey.named != nullptr && storey.named->storey)
+      rooms = PlanStorey{&scene->model(), *storey.named->storey};
+    layout.marks.emplace_back(storey.view, floors, trace, rooms, layout.entries);
+  }
+  layout.legend = makeLegend(trace);
+  layout.entriesTop =
+      layout.legendTop +
+      static_cast<double>(countLegendRows(layout.legend, layout.inner())) * kLineHeight;
+  layout.height = layout.entriesTop + measureEntries(layout.entries, layout.inner(), 1) + kBorder;
+}
+
+Image composeMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
+                 const std::vector<double>& floors, const scene::Scene* scene) {
+  const std::vector<StoreyFloor> named = scene ? findStoreys(*scene) : std::vector<StoreyFloor>();
+  for (StoreyPlan& storey : storeys) storey.named = findStoreyAt(named, storey.floor);
+  MapLayout layout;
+  layOutMap(trace, storeys, floors, scene, layout);
+  Canvas canvas(static_cast<int>(layout.width), static_cast<int>(layout.height), kPlanPaper);
+  drawLines(canvas, layout.title, {kBorder, kBorder}, makeStyle(kTitleSize, true));
+  for (std::size_t i = 0; i < storeys.size(); ++i) {
+    const PlanView& view = storeys[i].view;
+    const double above = heightOf(storeys[i].heading) - 4;
+    drawLines(canvas, storeys[i].heading, {kBorder, view.topLeft.y - above},
+              makeStyle(kHeadingSize));
+    drawPlanPicture(canvas, view, storeys[i].picture);
     drawGrid(canvas, view);
     if (scene) drawCut(canvas, view, *scene);
-    StoreyMarks(canvas, storeys, storey).draw(trace);
-    if (named != nullptr && named->storey)  // above the paths, which would strike them through
-      drawSpaceNames(canvas, view, scene->model(), *named->storey);
+    layout.marks[i].draw(canvas);
   }
-  drawScaleBar(canvas, storeys.front().view, {kBorder, legendTop - 1.6 * kLineHeight},
+  drawScaleBar(canvas, storeys.front().view, {kBorder, layout.legendTop - 1.6 * kLineHeight},
                scene ? scene->model().north : std::nullopt);
-  drawLegend(canvas, legend, legendTop);
+  drawLegend(canvas, layout.legend, {kBorder, layout.legendTop}, layout.inner());
+  drawEntries(canvas, layout.entries, {kBorder, layout.entriesTop}, layout.inner(), 1);
   reportMissingFont(canvas);
   return canvas.toImage();
 }
@@ -288,7 +264,7 @@ std::optional<Image> drawMap(const WalkTrace& trace, const MapBackground& backgr
     storeys.push_back(std::move(storey));
   }
   if (storeys.empty()) return std::nullopt;
-  return composeMap(trace, storeys, background.scene);
+  return composeMap(trace, storeys, floors, background.scene);
 }
 
 }  // namespace enfilade::server

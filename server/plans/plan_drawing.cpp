@@ -3,9 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 
-#include "scene/model/shapes/space_solid.hpp"
 #include "server/log/log.hpp"
 #include "server/plans/floor_plan_section.hpp"
 
@@ -21,10 +19,7 @@ constexpr double kCutWallBottom = 0.5, kCutWallTop = 2.0;  // metres above a flo
 constexpr double kMinGridSpacing = 70;  // thin lines between two numbers of the frame
 constexpr Colour kWall{52, 54, 62}, kFurniture{206, 210, 220}, kOutline{110, 114, 126},
     kDoor{150, 90, 30}, kGrid{214, 218, 228}, kAxis{180, 60, 40};
-constexpr double kTextSize = 13;       // thin lines
-constexpr double kSpaceNameSize = 12;  // thin lines
-constexpr double kSpaceLineHeight = 1.25;
-constexpr double kMinNameScale = 0.65;  // of a name in a narrow room; a longer one is cut
+constexpr double kTextSize = 13;  // thin lines
 
 std::vector<Point> toPage(const PlanView& view, const std::vector<Vec3>& points) {
   std::vector<Point> page;
@@ -91,7 +86,7 @@ void drawSwing(Canvas& canvas, const PlanView& view, const scene::BodySpec& door
   for (const double limit : {door.low, door.high}) {
     if (limit == 0) continue;
     const double open = closed + sign * limit;
-    canvas.arc(hinge, radius, closed, open, view.unit, kDoor, true);
+    canvas.arc(hinge, radius, closed, open, view.unit, kDoor, render::LineKind::dashed);
     canvas.line(hinge, {hinge.x + radius * std::cos(open), hinge.y + radius * std::sin(open)},
                 1.5 * view.unit, kDoor);
   }
@@ -104,7 +99,7 @@ void drawSlide(Canvas& canvas, const PlanView& view, const scene::BodySpec& door
   for (std::vector<Vec3> loop : section.loops) {
     loop.push_back(loop.front());
     for (Vec3& point : loop) point += limit * door.axis;
-    canvas.polyline(toPage(view, loop), view.unit, kDoor, true);
+    canvas.polyline(toPage(view, loop), view.unit, kDoor, render::LineKind::dashed);
   }
 }
 
@@ -284,62 +279,95 @@ void drawScaleBar(Canvas& canvas, const PlanView& view, Point at,
     drawNorthArrow(canvas, view, {origin.x + arm + 60 * view.unit, origin.y + 0.5 * arm}, *north);
 }
 
-bool CaptionPlacer::isFree(const Rectangle& r) const {
-  if (r.topLeft.x < view_.topLeft.x || r.topLeft.y < view_.topLeft.y ||
-      r.topLeft.x + r.width > view_.topLeft.x + view_.width() ||
-      r.topLeft.y + r.height > view_.topLeft.y + view_.height())
-    return false;
-  return std::ranges::none_of(taken_, [&](const Rectangle& t) {
-    return r.topLeft.x < t.topLeft.x + t.width && t.topLeft.x < r.topLeft.x + r.width &&
-           r.topLeft.y < t.topLeft.y + t.height && t.topLeft.y < r.topLeft.y + r.height;
-  });
+// ---- texts around a plan ------------------------------------------------------------------------
+
+namespace {
+
+// Thin lines.
+constexpr double kHeadingMargin = 16, kHeadingTop = 10, kHeadingBottom = 9;
+constexpr double kTitleLine = 26, kNoteLine = 17;
+
+}  // namespace
+
+PlanHeading makePlanHeading(const std::string& title, const std::string& note, double width,
+                            double unit) {
+  constexpr std::size_t kMaxLines = 6;  // of a name that fills no page
+  PlanHeading heading;
+  heading.titleStyle = {.size = 18 * unit, .colour = kPlanInk, .bold = true};
+  heading.noteStyle = {.size = 12 * unit, .colour = kPlanInk};
+  const Canvas measuring(1, 1, kPlanPaper);
+  const double inner = width - 2 * kHeadingMargin * unit;
+  heading.title = measuring.wrap(title, heading.titleStyle, inner, kMaxLines);
+  heading.note = measuring.wrap(note, heading.noteStyle, inner, kMaxLines);
+  heading.height = (kHeadingTop + static_cast<double>(heading.title.size()) * kTitleLine +
+                    static_cast<double>(heading.note.size()) * kNoteLine + kHeadingBottom) *
+                   unit;
+  return heading;
 }
 
-void drawSpaceNames(Canvas& canvas, const PlanView& view, const scene::Model& model,
-                    std::uint32_t storey) {
-  TextStyle style;
-  style.size = kSpaceNameSize * view.unit, style.colour = kPlanInk;
-  style.halo = 3 * view.unit, style.haloColour = kPlanPaper;
-  for (const scene::Space& space : model.spaces) {
-    if (space.storey != storey || space.box.empty()) continue;
-    const Vec3 low = space.box.min.cwiseMax(view.area.min),
-               high = space.box.max.cwiseMin(view.area.max);
-    if (low.x() >= high.x() || low.z() >= high.z()) continue;
-    const scene::SpaceMiddle middle = scene::findSpaceMiddle(space, view.area);
-    const Point centre = view.at(middle.point);
-    const double width = middle.width * view.unitsPerMetre;
-    std::vector<std::string> lines;
-    for (const std::string* text : {&space.longName, &space.name})
-      if (!text->empty() && (lines.empty() || lines[0] != *text)) lines.push_back(*text);
-    const double height = style.size * kSpaceLineHeight;
-    double top = centre.y - height * static_cast<double>(lines.size()) / 2;
-    for (std::size_t i = 0; i < lines.size(); ++i, top += height) {
-      TextStyle fitting = style;
-      fitting.bold = i == 0;
-      const double wanted = canvas.measure(lines[i], fitting).width;
-      if (wanted > width) fitting.size *= std::max(kMinNameScale, 0.99 * width / wanted);
-      canvas.text({centre.x, top}, canvas.shorten(lines[i], fitting, width), fitting,
-                  render::Align::centre);
-    }
+void drawPlanHeading(Canvas& canvas, const PlanHeading& heading, double unit) {
+  Point at{kHeadingMargin * unit, kHeadingTop * unit};
+  for (const std::string& line : heading.title) {
+    canvas.text(at, line, heading.titleStyle);
+    at.y += kTitleLine * unit;
+  }
+  for (const std::string& line : heading.note) {
+    canvas.text(at, line, heading.noteStyle);
+    at.y += kNoteLine * unit;
   }
 }
 
-void CaptionPlacer::draw(Canvas& canvas, Point at, const std::string& text,
-                         const TextStyle& style) {
-  const render::TextSize size = canvas.measure(text, style);
-  constexpr int kRings = 3, kDirections = 8;
-  for (int ring = 1; ring <= kRings; ++ring) {
-    for (int i = 0; i < kDirections; ++i) {
-      const double angle = (i + 0.5) * 2 * M_PI / kDirections;
-      const double distance = ring * 0.7 * size.height;
-      const Point anchor{at.x + distance * std::cos(angle), at.y + distance * std::sin(angle)};
-      const double left = std::cos(angle) > 0 ? anchor.x : anchor.x - size.width;
-      const Rectangle rectangle{{left, anchor.y - size.height / 2}, size.width, size.height};
-      if (!isFree(rectangle)) continue;
-      canvas.text(rectangle.topLeft, text, style);
-      taken_.push_back(rectangle);
-      return;
-    }
+namespace {
+
+constexpr double kEntryLine = 1.5, kEntryKey = 3.5, kEntryGap = 2;  // of the text size
+
+/// Columns as wide as the longest entry, so that none is cut.
+struct EntryColumns {
+  double width = 0;
+  std::size_t rows = 0;
+};
+
+EntryColumns computeColumns(const std::vector<CaptionEntry>& entries, double width,
+                            const TextStyle& style) {
+  const Canvas measuring(1, 1, kPlanPaper);
+  double column = 1;
+  for (const CaptionEntry& entry : entries)
+    column = std::max(
+        column, measuring.measure(entry.text, style).width +
+                    std::max(kEntryKey * style.size, measuring.measure(entry.key, style).width) +
+                    kEntryGap * style.size);
+  column = std::min(column, width);
+  const auto columns = static_cast<std::size_t>(std::max(1.0, width / column));
+  return {column, (entries.size() + columns - 1) / columns};
+}
+
+TextStyle makeEntryStyle(double unit) {
+  TextStyle style;
+  style.size = kTextSize * unit, style.colour = kPlanInk;
+  return style;
+}
+
+}  // namespace
+
+double measureEntries(const std::vector<CaptionEntry>& entries, double width, double unit) {
+  const TextStyle style = makeEntryStyle(unit);
+  return static_cast<double>(computeColumns(entries, width, style).rows) * kEntryLine * style.size;
+}
+
+void drawEntries(Canvas& canvas, const std::vector<CaptionEntry>& entries, Point at, double width,
+                 double unit) {
+  const TextStyle style = makeEntryStyle(unit);
+  TextStyle bold = style;
+  bold.bold = true;
+  const EntryColumns columns = computeColumns(entries, width, style);
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    const Point corner{at.x + static_cast<double>(i / columns.rows) * columns.width,
+                       at.y + static_cast<double>(i % columns.rows) * kEntryLine * style.size};
+    const double key =
+        std::max(kEntryKey * style.size, canvas.measure(entries[i].key + " ", bold).width);
+    canvas.text(corner, entries[i].key, bold);
+    canvas.text({corner.x + key, corner.y},
+                canvas.shorten(entries[i].text, style, columns.width - key), style);
   }
 }
 

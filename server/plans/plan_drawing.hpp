@@ -4,9 +4,11 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "render/image/canvas.hpp"
 #include "scene/world/data/scene.hpp"
+#include "server/plans/captions.hpp"
 #include "server/plans/plan_image.hpp"
 
 namespace enfilade::server {
@@ -19,6 +21,7 @@ struct PlanView {
   double unitsPerMetre = 1;
   double unit = 1;  ///< canvas units of a thin line: 1 on images, less on pages
 
+  CanvasBox box() const { return {topLeft, width(), height()}; }
   double width() const { return area.size().x() * unitsPerMetre; }
   double height() const { return area.size().z() * unitsPerMetre; }
   render::Point at(const Vec3& point) const {
@@ -38,12 +41,18 @@ void drawPlanPicture(render::Canvas& canvas, const PlanView& view, const PlanPic
 /// filled dark; others, as shelves and windows, are filled light.
 void drawCut(render::Canvas& canvas, const PlanView& view, const scene::Scene& scene);
 
-/// Writes the names of the storey's spaces into them: the long name, and below it the number.
-void drawSpaceNames(render::Canvas& canvas, const PlanView& view, const scene::Model& model,
-                    std::uint32_t storey);
-
 /// Draws grid lines and their coordinates outside of the view, and a frame around it.
 void drawGrid(render::Canvas& canvas, const PlanView& view);
+
+/// The lines above a plan, as many as its width needs.
+struct PlanHeading {
+  std::vector<std::string> title, note;
+  render::TextStyle titleStyle, noteStyle;
+  double height = 0;  ///< units, to the top of the plan
+};
+PlanHeading makePlanHeading(const std::string& title, const std::string& note, double width,
+                            double unit);
+void drawPlanHeading(render::Canvas& canvas, const PlanHeading& heading, double unit);
 
 /// The words for a plan's floor and cut: "floor at y = 0.00 m, cut 1.1 m above".
 std::string formatFloorAndCut(double floor);
@@ -56,28 +65,9 @@ void drawScaleBar(render::Canvas& canvas, const PlanView& view, render::Point at
 /// Warns in the log if letters of a plan have no font here.
 void reportMissingFont(const render::Canvas& canvas);
 
-/// Places captions so that no two overlap.
-class CaptionPlacer {
- public:
-  explicit CaptionPlacer(const PlanView& view) : view_(view) {}
-  /// Draws the text next to the point, or as near as space allows. A caption without space is left
-  /// out.
-  void draw(render::Canvas& canvas, render::Point at, const std::string& text,
-            const render::TextStyle& style);
-  /// No caption covers this rectangle.
-  void reserve(render::Point topLeft, double width, double height) {
-    taken_.push_back({topLeft, width, height});
-  }
-
- private:
-  struct Rectangle {
-    render::Point topLeft;
-    double width, height;
-  };
-  bool isFree(const Rectangle& rectangle) const;
-
-  const PlanView& view_;
-  std::vector<Rectangle> taken_;
-};
+/// The lines of the list below a plan, in columns.
+double measureEntries(const std::vector<CaptionEntry>& entries, double width, double unit);
+void drawEntries(render::Canvas& canvas, const std::vector<CaptionEntry>& entries, render::Point at,
+                 double width, double unit);
 
 }  // namespace enfilade::server

@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "server/plans/plan_drawing.hpp"
+#include "server/plans/space_names.hpp"
 #include "tests/scene/prism_space.hpp"
 
 namespace enfilade::server {
@@ -24,7 +24,10 @@ TEST(SpaceNames, OfARoomShapedLikeAnLDoNotLieInItsNeighbour) {
   PlanView view;
   view.area = {scene::Vec3(0, 0, 0), scene::Vec3(6, 3, 6)};
   view.unitsPerMetre = kPixelsPerMetre;
-  drawSpaceNames(canvas, view, model, 0);
+  std::vector<CaptionEntry> entries;
+  CaptionList captions(view.box(), view.unit, entries);
+  placeSpaceNames(captions, canvas, view, model, 0);
+  captions.drawTexts(canvas);
   const render::Image image = canvas.toImage();
   std::size_t inside = 0, outside = 0;
   for (std::size_t i = 0; i < image.rgb.size(); ++i) {

@@ -1,0 +1,66 @@
+// Headings of plans are whole, however narrow the plan is.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <fstream>
+#include <iterator>
+
+#include "server/plans/floor_plans.hpp"
+#include "server/plans/plan_drawing.hpp"
+#include "tests/scene/box_scene.hpp"
+#include "tests/support/temporary_folder.hpp"
+
+namespace enfilade::server {
+namespace {
+
+std::optional<PlanPicture> renderBlank(const render::Camera& camera) {
+  const auto pixels = static_cast<std::size_t>(camera.width * camera.height);
+  PlanPicture plan{{camera.width, camera.height, {}}, std::vector<std::uint32_t>(pixels, 1)};
+  plan.colour.rgb.assign(3 * pixels, 200);
+  return plan;
+}
+
+/// Width and height of an SVG page.
+std::array<double, 2> readPageSize(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  const std::string text{std::istreambuf_iterator<char>(stream), {}};
+  const auto read = [&](const std::string& name) {
+    return std::stod(text.substr(text.find(name + "=\"") + name.size() + 2));
+  };
+  return {read("width"), read("height")};
+}
+
+TEST(PlanHeadings, ANarrowPageHasMoreLinesAboveThePlan) {
+  const auto scene = scene::testing::boxScene(
+      {{"floor", {0, -0.2, 0}, {4, 0, 4}}, {"wall", {0, 0, 0}, {0.2, 3, 4}}});
+  const tests::TemporaryFolder folder;
+  const auto sizeAt = [&](const std::string& name) {
+    const auto file = folder.path() / "page.svg";
+    EXPECT_TRUE(writeStoreyPage(*scene, {0, name}, renderBlank, 100, file));
+    return readPageSize(file);
+  };
+  const std::array<double, 2> shortName = sizeAt("EG"),
+                              longName = sizeAt("Erdgeschoss mit Werkstatt, Lager und Anlieferung");
+  EXPECT_EQ(shortName[0], longName[0]);
+  EXPECT_GT(longName[1], shortName[1] + 10);
+}
+
+TEST(PlanHeadings, NoLineIsCut) {
+  for (const double width : {200.0, 400.0, 1200.0}) {
+    const PlanHeading heading = makePlanHeading(
+        "House.ifc: Erdgeschoss mit Werkstatt und Lager",
+        formatFloorAndCut(0) + ", scale 1:100; facing 0 looks right (+x), 90 up (-z)", width, 0.7);
+    std::string all;
+    for (const auto* lines : {&heading.title, &heading.note})
+      for (const std::string& line : *lines) all += line + " ";
+    EXPECT_EQ(all.find("…"), std::string::npos) << all;
+    EXPECT_NE(all.find("Lager"), std::string::npos) << all;
+    EXPECT_NE(all.find("90 up (-z)"), std::string::npos) << all;
+    const render::Canvas measuring(1, 1, kPlanPaper);
+    for (const std::string& line : heading.note)
+      EXPECT_LE(measuring.measure(line, heading.noteStyle).width, width) << line;
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::server
