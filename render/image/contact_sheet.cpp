@@ -11,7 +11,8 @@ namespace {
 constexpr int kMaxCellWidth = 400, kMaxCellHeight = 400;
 constexpr int kMargin = 16, kCaptionGap = 5;
 constexpr double kTitleSize = 20, kCaptionSize = 11;
-constexpr int kTitleHeight = 40, kCaptionHeight = kCaptionGap + 15;
+constexpr int kTitleLine = 26, kTitleGap = 14, kCaptionLine = 15;
+constexpr std::size_t kMaxTitleLines = 4, kMaxCaptionLines = 3;
 
 constexpr Colour kBackground{24, 26, 31}, kTitle{240, 238, 230}, kCaption{176, 180, 188};
 constexpr Colour kRule{70, 75, 86};
@@ -38,6 +39,28 @@ Size computeCellSize(const std::vector<CaptionedImage>& pictures) {
   return cell;
 }
 
+TextStyle makeStyle(double size, Colour colour, bool bold) {
+  TextStyle style;
+  style.size = size, style.colour = colour, style.bold = bold;
+  return style;
+}
+
+using Lines = std::vector<std::string>;
+
+void drawLines(Canvas& sheet, const Lines& lines, Point at, double lineHeight,
+               const TextStyle& style) {
+  for (std::size_t i = 0; i < lines.size(); ++i)
+    sheet.text({at.x, at.y + static_cast<double>(i) * lineHeight}, lines[i], style);
+}
+
+void drawPicture(Canvas& sheet, const Image& image, Point at, Size cell) {
+  if (image.rgb.empty()) return;
+  const Size size = fitSize(image, cell);
+  sheet.image(resizeImage(image, size.width, size.height),
+              {at.x + (cell.width - size.width) / 2.0, at.y + (cell.height - size.height) / 2.0},
+              size.width, size.height);
+}
+
 }  // namespace
 
 Image makeContactSheet(const std::vector<CaptionedImage>& pictures, const std::string& title,
@@ -46,29 +69,33 @@ Image makeContactSheet(const std::vector<CaptionedImage>& pictures, const std::s
   const int count = static_cast<int>(pictures.size());
   const int across = std::clamp(columns, 1, std::max(1, count));
   const int down = (count + across - 1) / across;
-  const int stepX = cell.width + kMargin, stepY = cell.height + kCaptionHeight + kMargin;
-  Canvas sheet(kMargin + across * stepX, 2 * kMargin + kTitleHeight + down * stepY, kBackground);
+  const int stepX = cell.width + kMargin, width = kMargin + across * stepX;
+  const TextStyle titleStyle = makeStyle(kTitleSize, kTitle, true),
+                  captionStyle = makeStyle(kCaptionSize, kCaption, false);
 
-  const double room = sheet.width() - 2 * kMargin;
-  TextStyle titleStyle, captionStyle;
-  titleStyle.size = kTitleSize, titleStyle.bold = true, titleStyle.colour = kTitle;
-  captionStyle.size = kCaptionSize, captionStyle.colour = kCaption;
-  sheet.text({kMargin, kMargin}, sheet.shorten(title, titleStyle, room), titleStyle);
-  const double rule = kMargin + kTitleHeight - 6;
+  const Canvas measuring(1, 1, kBackground);
+  const Lines titleLines = measuring.wrap(title, titleStyle, width - 2 * kMargin, kMaxTitleLines);
+  std::vector<Lines> captions;
+  std::size_t captionRows = 1;
+  for (const CaptionedImage& picture : pictures) {
+    captions.push_back(measuring.wrap(picture.caption, captionStyle, cell.width, kMaxCaptionLines));
+    captionRows = std::max(captionRows, captions.back().size());
+  }
+  const int titleHeight = static_cast<int>(titleLines.size()) * kTitleLine + kTitleGap;
+  const int stepY =
+      cell.height + kCaptionGap + static_cast<int>(captionRows) * kCaptionLine + kMargin;
+
+  Canvas sheet(width, 2 * kMargin + titleHeight + down * stepY, kBackground);
+  drawLines(sheet, titleLines, {kMargin, kMargin}, kTitleLine, titleStyle);
+  const double rule = kMargin + titleHeight - 6;
   sheet.line({kMargin, rule}, {sheet.width() - kMargin, rule}, 1, kRule);
-
   for (int i = 0; i < count; ++i) {
-    const CaptionedImage& picture = pictures[static_cast<std::size_t>(i)];
-    const int left = kMargin + i % across * stepX;
-    const int top = 2 * kMargin + kTitleHeight + i / across * stepY;
-    if (!picture.image.rgb.empty()) {
-      const Size size = fitSize(picture.image, cell);
-      sheet.image(resizeImage(picture.image, size.width, size.height),
-                  {left + (cell.width - size.width) / 2.0, top + (cell.height - size.height) / 2.0},
-                  size.width, size.height);
-    }
-    sheet.text({static_cast<double>(left), static_cast<double>(top + cell.height + kCaptionGap)},
-               sheet.shorten(picture.caption, captionStyle, cell.width), captionStyle);
+    const auto index = static_cast<std::size_t>(i);
+    const double left = kMargin + i % across * stepX;
+    const double top = 2 * kMargin + titleHeight + i / across * stepY;
+    drawPicture(sheet, pictures[index].image, {left, top}, cell);
+    drawLines(sheet, captions[index], {left, top + cell.height + kCaptionGap}, kCaptionLine,
+              captionStyle);
   }
   return sheet.toImage();
 }

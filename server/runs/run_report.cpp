@@ -1,5 +1,7 @@
 #include "server/runs/run_report.hpp"
 
+#include <fmt/core.h>
+
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -209,12 +211,10 @@ void RunReport::writePictures(const RunSummary& runSummary, const MapBackground&
   if (!pictures_.empty()) {
     std::vector<render::CaptionedImage> captioned;
     for (const Picture& picture : pictures_) {
-      char caption[160];
-      std::snprintf(caption, sizeof caption, "%s  %s  tick %llu  (%.1f, %.1f, %.1f)",
-                    picture.name.c_str(), picture.avatar.c_str(),
-                    static_cast<unsigned long long>(picture.tick), picture.footPosition.x(),
-                    picture.footPosition.y(), picture.footPosition.z());
-      captioned.push_back({picture.image, caption});
+      captioned.push_back(
+          {picture.image, fmt::format("{}  {}  tick {}  ({:.1f}, {:.1f}, {:.1f})", picture.name,
+                                      picture.avatar, picture.tick, picture.footPosition.x(),
+                                      picture.footPosition.y(), picture.footPosition.z())});
     }
     render::writePng(folder_ / "sheet.png",
                      render::makeContactSheet(captioned, title, kSheetColumns));

@@ -190,6 +190,43 @@ TEST(Canvas, TextIsAlignedMeasuredAndShortened) {
   EXPECT_NEAR(right, 300, 3);
 }
 
+TEST(Canvas, WrapsBetweenWordsAndKeepsEveryLetter) {
+  const Canvas canvas(1, 1, kBlack);
+  TextStyle style;
+  style.size = 16;
+  const auto join = [](const std::vector<std::string>& lines) {
+    std::string all;
+    for (const std::string& line : lines) all += (all.empty() ? "" : " ") + line;
+    return all;
+  };
+  const std::string text = "Grundriß der Küche und des Flurs";
+  const double width = canvas.measure("Grundriß der", style).width + 1;
+  const std::vector<std::string> lines = canvas.wrap(text, style, width, 9);
+  EXPECT_GT(lines.size(), 2u);
+  EXPECT_EQ(lines[0], "Grundriß der");
+  EXPECT_EQ(join(lines), text);
+  for (const std::string& line : lines) EXPECT_LE(canvas.measure(line, style).width, width) << line;
+  // A word without spaces is broken; of too many lines the last is cut.
+  EXPECT_GT(canvas.wrap(std::string(80, 'm'), style, width, 40).size(), 3u);
+  const std::vector<std::string> two = canvas.wrap(text, style, width, 2);
+  ASSERT_EQ(two.size(), 2u);
+  EXPECT_TRUE(two[1].ends_with("…")) << two[1];
+  EXPECT_EQ(canvas.wrap("Flur", style, width, 1), std::vector<std::string>{"Flur"});
+}
+
+TEST(Canvas, KindsOfLinesDifferInTheirInk) {
+  std::vector<double> areas;
+  for (const LineKind kind : {LineKind::dotted, LineKind::dashed, LineKind::dashDot,
+                              LineKind::longDashes, LineKind::solid}) {
+    Canvas canvas(320, 20, kBlack);
+    canvas.polyline(std::array{Point{10, 10}, Point{310, 10}}, 3, kWhite, kind);
+    areas.push_back(areaOf(canvas));
+  }
+  EXPECT_TRUE(std::ranges::is_sorted(areas));
+  EXPECT_LT(areas[0], 0.7 * areas.back());
+  EXPECT_LT(areas[3], 0.95 * areas.back());
+}
+
 TEST(Canvas, NamesTheFirstTextWithoutAFont) {
   Canvas canvas(200, 100, {255, 255, 255});
   canvas.text({10, 10}, "Grüße, Ωμέγα", {});
@@ -244,6 +281,16 @@ TEST(ContactSheet, ShowsEveryPictureOnceInAGrid) {
   }
   for (int i = 0; i < 5; ++i) EXPECT_EQ(count[static_cast<std::size_t>(i)], (100 + 20 * i) * 80);
   EXPECT_GT(makeContactSheet({}, "empty", 3).rgb.size(), 0u);
+}
+
+TEST(ContactSheet, LongTextsHaveMoreLines) {
+  const auto heightOf = [](const std::string& title, const std::string& caption) {
+    return makeContactSheet({{plain(320, 240), caption}}, title, 4).height;
+  };
+  const int small = heightOf("es.jsonl", "lamp");
+  EXPECT_GT(heightOf("es.jsonl in schependomlaan_establishment.ifc", "lamp"), small);
+  EXPECT_GT(heightOf("es.jsonl", "lamp  ann  tick 123456  (-1234.5, 12.3, -2345.6), from the door"),
+            small);
 }
 
 }  // namespace
