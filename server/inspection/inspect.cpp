@@ -1,5 +1,6 @@
 #include "server/inspection/inspect.hpp"
 
+#include <cmath>
 #include <filesystem>
 
 #include "protocol/mcap/reader.hpp"
@@ -28,7 +29,9 @@ void writePlans(const std::shared_ptr<const scene::Scene>& scene, const InspectC
     } else {
       writeStoreyPage(*scene, storey, picture, command.planScale, file);
     }
-    logInfo("floor at {:.2f} m: {}", storey.height, file.string());
+    // Without the sign of a zero.
+    const double rounded = std::round(100 * storey.height) / 100 + 0.0;
+    logInfo("floor at {:.2f} m: {}", rounded, file.string());
   }
 }
 

@@ -1,3 +1,6 @@
+// Steps: take the storeys of the file at their floors. If it states none: find the heights with
+// much floor and walls, and for each the indoor floor near it. A lawn is larger than the floor of
+// the house on it, but has no ceiling.
 #include "server/plans/storeys.hpp"
 
 #include <algorithm>
@@ -7,6 +10,7 @@
 #include <set>
 
 #include "server/plans/floor_plan_section.hpp"
+#include "server/plans/indoor_floors.hpp"
 #include "server/plans/label_names.hpp"
 #include "server/plans/plan_image.hpp"
 
@@ -24,10 +28,9 @@ constexpr double kWallBottom = 0.3, kWallTop = 1.5;  // metres above a floor tha
 constexpr double kMaxFloorDistance = 0.6;  // metres between a stated elevation and its floor
 constexpr double kMaxNameDistance = 0.6;   // metres between a storey's floor and its objects
 
-/// Adds the upward faces of an object, weighted by their projected area. For open shells both sides
-/// count, because their orientation is unknown.
-void addFloors(const scene::Scene& scene, std::uint32_t object,
-               std::vector<WeightedHeight>& heights) {
+/// Adds the upward faces of an object. For open shells both sides count, because their orientation
+/// is unknown.
+void addFloors(const scene::Scene& scene, std::uint32_t object, std::vector<FloorFace>& faces) {
   const scene::Shape& shape = scene.shape(object);
   const Eigen::Affine3d& worldFromMesh = scene.model().objects[object].worldFromMesh;
   const double mirror = worldFromMesh.linear().determinant() < 0 ? -1 : 1;
@@ -39,8 +42,7 @@ void addFloors(const scene::Scene& scene, std::uint32_t object,
         p[k] = worldFromMesh * shape.vertices[shape.triangles[t][k]].cast<double>();
       const Vec3 normal = outside * (p[1] - p[0]).cross(p[2] - p[0]);
       const double up = shell.bounds() ? normal.y() : std::abs(normal.y());
-      if (up > kMinFloorNormalY * normal.norm())
-        heights.push_back({(p[0].y() + p[1].y() + p[2].y()) / 3, 0.5 * up});
+      if (up > kMinFloorNormalY * normal.norm()) faces.push_back({p, 0.5 * up});
     }
   }
 }
@@ -109,13 +111,32 @@ std::string findStoreyName(const scene::Scene& scene, double floor) {
   return mostFrequent == names.end() ? "" : mostFrequent->first;
 }
 
-std::vector<WeightedHeight> collectFloors(const scene::Scene& scene) {
-  std::vector<WeightedHeight> heights;
+std::vector<FloorFace> collectFloors(const scene::Scene& scene) {
+  std::vector<FloorFace> faces;
   for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
     const Vec3 size = scene.staticBoxes()[i].size();
-    if (size.x() * size.z() >= kMinFloorArea) addFloors(scene, scene.solidObjects()[i], heights);
+    if (size.x() * size.z() >= kMinFloorArea) addFloors(scene, scene.solidObjects()[i], faces);
   }
+  return faces;
+}
+
+std::vector<WeightedHeight> weighFloors(const std::vector<FloorFace>& faces) {
+  std::vector<WeightedHeight> heights;
+  for (const FloorFace& face : faces) heights.push_back({face.height(), face.area});
   return heights;
+}
+
+/// The heights with much floor, each moved to the indoor floor near it.
+std::vector<double> findFloorHeights(const scene::Scene& scene, const std::vector<FloorFace>& faces,
+                                     const std::vector<WeightedHeight>& heights) {
+  std::vector<double> found;
+  for (const double height : findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys))
+    found.push_back(hasWallsAbove(scene, height) ? findIndoorFloor(scene, faces, height) : height);
+  std::ranges::sort(found);
+  const auto same = std::ranges::unique(
+      found, [](double a, double b) { return std::abs(a - b) < kMinElevationRange; });
+  found.erase(same.begin(), same.end());
+  return found;
 }
 
 /// The file states the elevation of a storey's structure or of its finish: the largest floor near
@@ -149,10 +170,11 @@ std::vector<StoreyFloor> findStatedStoreys(const scene::Scene& scene,
 }  // namespace
 
 std::vector<StoreyFloor> findStoreys(const scene::Scene& scene) {
-  const std::vector<WeightedHeight> heights = collectFloors(scene);
+  const std::vector<FloorFace> faces = collectFloors(scene);
+  const std::vector<WeightedHeight> heights = weighFloors(faces);
   std::vector<StoreyFloor> storeys = findStatedStoreys(scene, heights);
   if (!storeys.empty()) return storeys;
-  for (const double height : findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys)) {
+  for (const double height : findFloorHeights(scene, faces, heights)) {
     if (hasWallsAbove(scene, height) && !isCutSolid(scene, height, sumFloors(heights, height)))
       storeys.push_back({height, findStoreyName(scene, height)});
   }

@@ -26,6 +26,30 @@ TEST(StoreyPlans, ASolidOnTheRoofMakesNoStorey) {
   EXPECT_EQ(heightsOf(boxes), (std::vector<double>{0}));
 }
 
+TEST(StoreyPlans, AHouseOnALargeLawnIsCutAboveItsOwnFloor) {
+  const auto heightOf = [](const std::vector<NamedBox>& boxes) {
+    const std::vector<StoreyFloor> storeys = findStoreys(*boxScene(boxes));
+    EXPECT_EQ(storeys.size(), 1u);
+    return storeys.at(0).height;
+  };
+  std::vector<NamedBox> boxes = roofedRooms(1);
+  boxes[0].min.y() = -0.45;
+  boxes.push_back({"lawn", {-30, -0.6, -30}, {40, -0.45, 30}});
+  boxes.push_back({"tree", {20, -0.45, 20}, {20.3, 4, 20.3}});
+  EXPECT_NEAR(heightOf(boxes), 0, 1e-6);
+  // A table in the house is no floor, however much of it there is on the lawn.
+  boxes.push_back({"table", {1, 0.7, -1}, {3, 0.8, 1}});
+  EXPECT_NEAR(heightOf(boxes), 0, 1e-6);
+  // Without a roof the floor below the walls counts.
+  std::erase_if(boxes, [](const NamedBox& box) { return box.path == "roof"; });
+  EXPECT_NEAR(heightOf(boxes), 0, 1e-6);
+  // A pavilion on the lawn has no other floor.
+  std::erase_if(boxes, [](const NamedBox& box) { return box.path == "floor"; });
+  for (NamedBox& box : boxes)
+    if (box.min.y() == 0) box.min.y() = -0.45;
+  EXPECT_NEAR(heightOf(boxes), -0.45, 1e-6);
+}
+
 TEST(StoreyPlans, NamesComeFromPathsWithoutGlobalIdsAndPlaceholders) {
   const auto nameOf = [](const std::string& storey) {
     std::vector<NamedBox> boxes = roofedRooms(1);

@@ -1,0 +1,23 @@
+// Floors with a ceiling, as opposed to lawns, terraces and roofs.
+#pragma once
+
+#include <array>
+#include <span>
+
+#include "server/plans/plan_image.hpp"
+
+namespace enfilade::server {
+
+/// An upward triangle; scene frame, metres.
+struct FloorFace {
+  std::array<Vec3, 3> corners;
+  double area = 0;  ///< square metres, projected to the ground
+
+  double height() const { return (corners[0].y() + corners[1].y() + corners[2].y()) / 3; }
+};
+
+/// The height with most indoor floor that is less than a storey away from `height`; `height`
+/// itself if the floor there is mostly indoors, or if no floor near it is.
+double findIndoorFloor(const scene::Scene& scene, std::span<const FloorFace> faces, double height);
+
+}  // namespace enfilade::server
