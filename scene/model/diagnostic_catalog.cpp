@@ -23,15 +23,20 @@ constexpr std::array kCatalog{
         "the file states no up axis, and no level is clearly the largest: give it with --up"},
     DiagnosticKind{"ignored_extension", error,
                    "a glTF extension that is not read, so shapes may differ; export without it"},
+    DiagnosticKind{"ignored_appearance", warning,
+                   "a glTF extension of materials, textures or lights that the file requires is "
+                   "not read: it looks different"},
     DiagnosticKind{"mended_text", note, "the text was repaired in memory; export the file again"},
     DiagnosticKind{"missing_material_file", warning, "put the .mtl file next to the model"},
     DiagnosticKind{"no_unit", warning, "the file defines no unit; set it with --unit"},
     DiagnosticKind{"other_scenes", note,
                    "scenes of the file that were not read; --gltf-scene chooses one"},
+    DiagnosticKind{"trailing_data", warning,
+                   "data after the announced triangles or elements is not read; export it again"},
     DiagnosticKind{"unit_assumed", warning, "the file's unit is doubtful; set it with --unit"},
     // placement
     DiagnosticKind{"broken_transform_dropped", error,
-                   "its transform is not finite or out of range: ignored"},
+                   "its transform is malformed, not finite or out of range: ignored"},
     DiagnosticKind{"coarse_coordinates", warning,
                    "far from its own origin: its vertices have low precision"},
     DiagnosticKind{"coarse_placement", warning,
@@ -41,6 +46,10 @@ constexpr std::array kCatalog{
                    "so far that it cannot belong to the scene: ignored"},
     DiagnosticKind{"far_reaching_object", warning, "extends far beyond all others; check its size"},
     DiagnosticKind{"flat_object", warning, "scaled to zero along an axis: it has no inside"},
+    DiagnosticKind{"rescaled_rotation", warning,
+                   "a rotation that is no unit quaternion: its length was ignored"},
+    DiagnosticKind{"unmatched_node", error,
+                   "its children are invalid: transforms below are coarse, bodies are not read"},
     DiagnosticKind{"mirrored_object", note, "mirrored: its faces were flipped to face outwards"},
     // surfaces
     DiagnosticKind{"broken_triangle_dropped", error,
@@ -70,6 +79,8 @@ constexpr std::array kCatalog{
                    "the same shape twice in the same place; delete one, they flicker"},
     // appearance
     DiagnosticKind{"emissive_texture_ignored", warning, "emissive textures are not drawn"},
+    DiagnosticKind{"missing_material", warning,
+                   "a mesh names a material that the file lacks: drawn in a plain colour"},
     DiagnosticKind{
         "missing_texture", warning,
         "missing, or of a kind that is not decoded: drawn without it; put a PNG next to the model"},

@@ -97,7 +97,8 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
   worldFromRoot.linear() = makeYUpRotation(model.upAxis) * model.metresPerUnit *
                            computeAssimpFromFile(input.metadata, input.format).inverse();
   worldFromRoot.translate(input.shift);
-  const GltfNodes exact = gltf ? readGltfNodes(scene, input.gltfJson) : GltfNodes();
+  const GltfNodes exact =
+      gltf ? readGltfNodes(scene, input.gltfJson, model.diagnostics) : GltfNodes();
   NodeTransforms transforms;
   const bool bodies = gltf && mayHaveGltfBodies(input.gltfJson);
   std::vector<ImportedNode> importedNodes =

@@ -8,13 +8,17 @@
 #include <optional>
 
 #include "scene/import/gltf/encoding/gltf_json.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
 
-constexpr double kMatchTolerance = 1e-4;  // of the largest entry; covers the rounding to floats
+/// Of a rotation's length from 1; three rounded digits make less.
+constexpr double kMaxLengthError = 0.01;
+constexpr double kMaxLastRowError =
+    1e-6;  ///< of a matrix from 0, 0, 0, 1; covers the rounding to floats
 
 /// `count` finite numbers, or nullopt.
 template <std::size_t count>
@@ -28,17 +32,6 @@ std::optional<std::array<double, count>> readNumbers(const Json& node, const cha
     if (!std::isfinite(numbers[i])) return std::nullopt;
   }
   return numbers;
-}
-
-bool isSameTransform(const Eigen::Affine3d& exact, const aiMatrix4x4& rounded) {
-  Eigen::Matrix<double, 3, 4> other;
-  other << rounded.a1, rounded.a2, rounded.a3, rounded.a4, rounded.b1, rounded.b2, rounded.b3,
-      rounded.b4, rounded.c1, rounded.c2, rounded.c3, rounded.c4;
-  const Eigen::Matrix<double, 3, 4> exactRows = exact.matrix().topRows<3>();
-  const double largest = std::max(exactRows.leftCols<3>().cwiseAbs().maxCoeff(), 1e-30);
-  const double maxTranslation = exactRows.col(3).cwiseAbs().maxCoeff();
-  return ((exactRows - other).leftCols<3>().cwiseAbs().maxCoeff() <= kMatchTolerance * largest) &&
-         ((exactRows - other).col(3).cwiseAbs().maxCoeff() <= kMatchTolerance * maxTranslation);
 }
 
 /// The extras whose names begin with "_" and whose values are numbers: own attributes of instances.
@@ -61,8 +54,8 @@ std::vector<ObjectAttribute> readOwnAttributes(const Json& node) {
 /// The data that the import needs of a node of the JSON. A file may have a million nodes, so they
 /// are read one by one, and their JSON is not kept.
 struct PlainNode {
-  bool isObject = false, hasChildList = true;
-  Eigen::Affine3d parentFromNode = Eigen::Affine3d::Identity();
+  bool isObject = false;
+  StatedTransform transform;
   std::vector<std::size_t> children;  ///< kNoIndex: not a number
   std::vector<ObjectAttribute> attributes;
 };
@@ -79,12 +72,9 @@ PlainNode readPlainNode(const Json& json) {
   PlainNode node;
   if (!json.is_object()) return node;
   node.isObject = true;
-  node.parentFromNode = readNodeTransform(json);
+  node.transform = readNodeTransform(json);
   node.attributes = readOwnAttributes(json);
-  if (const Json* children = findMember(&json, "children")) {
-    node.hasChildList = children->is_array();
-    if (node.hasChildList) node.children = readIndices(*children);
-  }
+  node.children = readIndices(getArray(json, "children"));
   return node;
 }
 
@@ -106,51 +96,95 @@ Json parseScenesAndNodes(const std::string& text, std::vector<PlainNode>& nodes)
   return Json::parse(text, keep, false);
 }
 
+/// Matches the file's tree to assimp's by structure: assimp keeps the order of children.
 class NodeMatcher {
  public:
-  NodeMatcher(const std::vector<PlainNode>& nodes, GltfNodes& matchedNodes)
-      : nodes_(nodes), matchedNodes_(matchedNodes) {}
+  NodeMatcher(const std::vector<PlainNode>& nodes, GltfNodes& matchedNodes,
+              std::vector<Diagnostic>& diagnostics)
+      : nodes_(nodes), matchedNodes_(matchedNodes), diagnostics_(diagnostics) {}
 
-  /// Stops where the trees differ; assimp's transforms are used there.
+  /// Stops where the trees differ, and reports it; assimp's transforms are used there.
   void visit(std::size_t index, const aiNode& node, int depth) {
-    if (index >= nodes_.size() || depth > kMaxNodeDepth || !nodes_[index].isObject) return;
+    if (depth > kMaxNodeDepth) return;  // refused by the reader of the tree
+    if (index >= nodes_.size() || !nodes_[index].isObject) return reportUnmatched(node);
     const PlainNode& plain = nodes_[index];
-    if (!isSameTransform(plain.parentFromNode, node.mTransformation)) return;
-    matchedNodes_.emplace(&node, GltfNode{plain.parentFromNode, index, plain.attributes});
-    if (plain.hasChildList) visitChildren(plain.children, node, depth + 1);
+    reportTransform(plain.transform, index, node);
+    matchedNodes_.emplace(&node, GltfNode{plain.transform.parentFromNode, index, plain.attributes});
+    visitChildren(plain.children, node, depth + 1);
   }
 
   void visitChildren(const std::vector<std::size_t>& indices, const aiNode& parent, int depth) {
-    if (indices.size() != parent.mNumChildren) return;
+    if (indices.size() != parent.mNumChildren) return reportUnmatched(parent);
     for (std::size_t i = 0; i < indices.size(); ++i) visit(indices[i], *parent.mChildren[i], depth);
   }
 
  private:
+  void reportUnmatched(const aiNode& node) {
+    addDiagnostic(diagnostics_, "unmatched_node", node.mName.C_Str());
+  }
+
+  void reportTransform(const StatedTransform& transform, std::size_t index, const aiNode& node) {
+    if (transform.fault == nullptr && transform.rotationLength == 1) return;
+    const std::string name = "nodes[" + std::to_string(index) + "] '" + node.mName.C_Str() + "': ";
+    if (transform.fault != nullptr)
+      addDiagnostic(diagnostics_, "broken_transform_dropped", name + transform.fault);
+    if (std::abs(transform.rotationLength - 1) > kMaxLengthError)
+      addDiagnostic(diagnostics_, "rescaled_rotation",
+                    name + "of length " + std::to_string(transform.rotationLength));
+  }
+
   const std::vector<PlainNode>& nodes_;
   GltfNodes& matchedNodes_;
+  std::vector<Diagnostic>& diagnostics_;
 };
+
+Eigen::Affine3d readMatrix(const std::array<double, 16>& numbers, const char*& fault) {
+  Eigen::Affine3d transform;
+  for (int i = 0; i < 16; ++i)
+    transform.matrix()(i % 4, i / 4) = numbers[static_cast<std::size_t>(i)];
+  const Eigen::RowVector4d lastRow = transform.matrix().row(3);
+  if ((lastRow - Eigen::RowVector4d(0, 0, 0, 1)).cwiseAbs().maxCoeff() > kMaxLastRowError)
+    fault = "the last row of its matrix is not 0, 0, 0, 1";
+  transform.makeAffine();
+  return transform;
+}
 
 }  // namespace
 
-Eigen::Affine3d readNodeTransform(const Json& node) {
-  Eigen::Affine3d result = Eigen::Affine3d::Identity();
+StatedTransform readNodeTransform(const Json& node) {
+  StatedTransform result;
   if (const auto m = readNumbers<16>(node, "matrix")) {
-    for (int i = 0; i < 16; ++i) result.matrix()(i % 4, i / 4) = (*m)[static_cast<std::size_t>(i)];
-    result.makeAffine();
+    result.parentFromNode = readMatrix(*m, result.fault);
     return result;
   }
+  if (node.contains("matrix")) result.fault = "its matrix is not 16 numbers";
   if (const auto t = readNumbers<3>(node, "translation")) {
-    result.translate(Vec3((*t)[0], (*t)[1], (*t)[2]));
+    result.parentFromNode.translate(Vec3((*t)[0], (*t)[1], (*t)[2]));
+  } else if (node.contains("translation")) {
+    result.fault = "its translation is not 3 numbers";
   }
   if (const auto r = readNumbers<4>(node, "rotation")) {
     const Eigen::Quaterniond rotation((*r)[3], (*r)[0], (*r)[1], (*r)[2]);
-    if (rotation.norm() > 0) result.rotate(rotation.normalized());
+    result.rotationLength = rotation.norm();
+    if (result.rotationLength > 0) {
+      result.parentFromNode.rotate(rotation.normalized());
+    } else {
+      result.rotationLength = 1;
+      result.fault = "its rotation is 0";
+    }
+  } else if (node.contains("rotation")) {
+    result.fault = "its rotation is not 4 numbers";
   }
-  if (const auto s = readNumbers<3>(node, "scale")) result.scale(Vec3((*s)[0], (*s)[1], (*s)[2]));
+  if (const auto s = readNumbers<3>(node, "scale")) {
+    result.parentFromNode.scale(Vec3((*s)[0], (*s)[1], (*s)[2]));
+  } else if (node.contains("scale")) {
+    result.fault = "its scale is not 3 numbers";
+  }
   return result;
 }
 
-GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson) {
+GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson,
+                        std::vector<Diagnostic>& diagnostics) {
   GltfNodes transforms;
   std::vector<PlainNode> nodes;
   const Json json = parseScenesAndNodes(gltfJson, nodes);
@@ -160,7 +194,7 @@ GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson) {
   if (index >= scenes.size()) return transforms;
   const std::vector<std::size_t> roots = readIndices(getArray(scenes[index], "nodes"));
   transforms.reserve(nodes.size());
-  NodeMatcher walker(nodes, transforms);
+  NodeMatcher walker(nodes, transforms, diagnostics);
   // assimp adds a root node above several roots, but not above a single one.
   if (roots.size() == 1) {
     walker.visit(roots[0], *scene.mRootNode, 0);

@@ -28,11 +28,18 @@ struct GltfNode {
 using GltfNodes = std::unordered_map<const aiNode*, GltfNode>;
 
 /// The transform of a node of the file's JSON, in doubles.
-Eigen::Affine3d readNodeTransform(const nlohmann::json& node);
+struct StatedTransform {
+  Eigen::Affine3d parentFromNode = Eigen::Affine3d::Identity();
+  const char* fault = nullptr;  ///< what glTF does not allow in it and was ignored; null: nothing
+  double rotationLength = 1;    ///< of the stated quaternion, which is normalised
+};
+
+StatedTransform readNodeTransform(const nlohmann::json& node);
 
 /// Reads the nodes of a glTF file's JSON in doubles. Nodes without a matching assimp node are left
-/// out.
-GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson);
+/// out and reported, as are transforms that glTF does not allow.
+GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson,
+                        std::vector<Diagnostic>& diagnostics);
 
 /// The path and world transform of a glTF node.
 struct NodeTransform {

@@ -32,7 +32,8 @@ class NodeHierarchy {
   Affine3d worldFromNode(std::size_t node) const {
     Affine3d transform = Affine3d::Identity();
     for (int depth = 0; node != kNoIndex && depth < kMaxNodeDepth; ++depth) {
-      if (nodes_[node].is_object()) transform = readNodeTransform(nodes_[node]) * transform;
+      if (nodes_[node].is_object())
+        transform = readNodeTransform(nodes_[node]).parentFromNode * transform;
       node = parents_[node];
     }
     return transform;
