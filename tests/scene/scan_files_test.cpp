@@ -367,7 +367,7 @@ TEST(ScanColours, OfFacesSplitTheVerticesWhereTheyDiffer) {
   const VertexColour red{255, 0, 0, 255}, green{0, 128, 0, 255};
   for (const std::string& text :
        {makeColouredTextPly("uchar", 255), makeColouredTextPly("float", 1),
-        makeColouredBinaryPly<std::uint8_t>("uchar", 255, false),
+        makeColouredTextPly("float", 255), makeColouredBinaryPly<std::uint8_t>("uchar", 255, false),
         makeColouredBinaryPly<std::uint8_t>("uchar", 255, true),
         makeColouredBinaryPly<std::uint16_t>("ushort", 65535, true),
         makeColouredBinaryPly<float>("float", 1, false),
@@ -407,6 +407,69 @@ TEST(ScanColours, OfVerticesArePreferredToThoseOfFaces) {
   EXPECT_EQ(model.meshes.at(0).colours, std::vector<VertexColour>(7, {0, 0, 255, 255}));
   EXPECT_EQ(diagnosticText(model, "vertex_colours_ignored"),
             "mesh: those of its faces, because its vertices have colours, too");
+}
+
+TEST(ScanColours, FloatsCountTo255IfOneIsAboveOneAndMayHaveShortNames) {
+  const TemporaryFolder folder;
+  const auto colourOf = [&](const std::string& first, const std::string& last) {
+    const std::string text =
+        "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+        "property float z\nproperty float r\nproperty float g\nproperty float b\n"
+        "element face 1\nproperty list uchar int vertex_indices\nend_header\n0 0 0 " +
+        first + "\n1 0 0 " + first + "\n0 1 0 " + last + "\n3 0 1 2\n";
+    return importModel(folder.write("a.ply", text)).meshes.at(0).colours;
+  };
+  const VertexColour dark{0, 1, 0, 255};
+  EXPECT_EQ(colourOf("0 1 0.2", "128 64 255"),
+            (std::vector<VertexColour>{dark, dark, {128, 64, 255, 255}}));
+  const VertexColour bright{0, 255, 51, 255};
+  EXPECT_EQ(colourOf("0 1 0.2", "1.0005 0 0"),
+            (std::vector<VertexColour>{bright, bright, {255, 0, 0, 255}}));
+}
+
+TEST(ScanColours, OfStlFacetsAreReported) {
+  const TemporaryFolder folder;
+  const std::string plain = makeBinaryStl(makeRoom());
+  EXPECT_EQ(countOf(importModel(folder.write("a.stl", plain)), "vertex_colours_ignored"), 0u);
+  std::string magics = plain, visCam = plain;
+  magics.replace(20, 6, "COLOR=");
+  visCam[plain.size() - 1] = '\x80';
+  for (const std::string& text : {magics, visCam})
+    EXPECT_EQ(countOf(importModel(folder.write("a.stl", text)), "vertex_colours_ignored"), 1u);
+}
+
+TEST(ScanSizes, DataAfterWhatTheHeaderAnnouncesIsReported) {
+  const TemporaryFolder folder;
+  const auto trailing = [&](const char* name, const std::string& text) {
+    return diagnosticText(importModel(folder.write(name, text)), "trailing_data");
+  };
+  std::string stl = makeBinaryStl(makeRoom());
+  stl[80] = 11;
+  EXPECT_EQ(trailing("less.stl", stl).find("mesh: "), 0u);
+  const std::string text = makeTextPly(makeRoom());
+  EXPECT_NE(trailing("more.ply", text + "3 0 1 2\n"), "");
+  EXPECT_NE(trailing("more.ply", makeBinaryPly(makeRoom(), true) + "\1"), "");
+  EXPECT_EQ(trailing("blank.ply", text + " \n\n"), "");
+  EXPECT_EQ(trailing("filled.ply", makeBinaryPly(makeRoom(), false) + std::string("\n\0\0", 3)),
+            "");
+}
+
+TEST(ScanStl, TextMayBeginWithAByteOrderMarkOrABlankLine) {
+  const TemporaryFolder folder;
+  for (const char* start : {"\xEF\xBB\xBF", "\r\n", "\xEF\xBB\xBF\n "}) {
+    const Model model = importModel(folder.write("a.stl", start + makeTextStl(makeRoom())));
+    ASSERT_EQ(model.objects.size(), 1u);
+    EXPECT_EQ(model.objects[0].path, "room");
+    EXPECT_EQ(model.meshes.at(0).triangleCount(), 12u);
+  }
+}
+
+TEST(ScanStl, ABinaryFileMayBeginWithSolidAndHaveDataBehind) {
+  const TemporaryFolder folder;
+  const Model model =
+      importModel(folder.write("a.stl", makeBinaryStl(makeRoom()) + "made by a program"));
+  EXPECT_EQ(model.meshes.at(0).triangleCount(), 12u);
+  EXPECT_EQ(countOf(model, "trailing_data"), 1u);
 }
 
 TEST(ScanSizes, ACountThatTheFileCannotHoldIsRefused) {

@@ -126,9 +126,12 @@ Material makeScanMaterial(const ScanMesh& scan, const std::string& name,
   if (!scan.textureFile.empty())
     addDiagnostic(diagnostics, "missing_texture",
                   scan.textureFile + ": textures of PLY are not read");
-  if (scan.hasUnusedFaceColours)
-    addDiagnostic(diagnostics, "vertex_colours_ignored",
-                  name + ": those of its faces, because its vertices have colours, too");
+  if (!scan.unusedColours.empty())
+    addDiagnostic(diagnostics, "vertex_colours_ignored", name + ": " + scan.unusedColours);
+  if (scan.trailingBytes > 0)
+    addDiagnostic(diagnostics, "trailing_data",
+                  name + ": " + std::to_string(scan.trailingBytes) +
+                      " bytes after what the header announces");
   if (scan.hasColours()) material.baseColour.setOnes();
   return material;
 }

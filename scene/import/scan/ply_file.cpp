@@ -32,6 +32,7 @@ class PlyValues {
 
   double read(PlyType type) { return isText_ ? text_.readNumber() : readBinary(type); }
   std::size_t remaining() const { return isText_ ? text_.remaining() : binary_.remaining(); }
+  std::string_view rest() const { return isText_ ? text_.rest() : binary_.rest(); }
   bool failed() const { return isText_ ? text_.failed() : binary_.failed(); }
   /// Bytes that `count` values take at least.
   std::size_t computeMinSize(PlyType type, std::size_t count) const {
@@ -75,6 +76,9 @@ std::size_t findPlyField(const std::string& name) {
   static constexpr std::array<std::string_view, kPlyFields> kNames{
       "x", "y", "z", "nx", "ny", "nz", "red", "green", "blue"};
   if (name.starts_with("diffuse_")) return findPlyField(name.substr(8));
+  constexpr std::string_view kShortColours = "rgb";  // of some scanners
+  if (const std::size_t channel = kShortColours.find(name); name.size() == 1 && channel < 3)
+    return static_cast<std::size_t>(PlyField::red) + channel;
   return static_cast<std::size_t>(std::find(kNames.begin(), kNames.end(), name) - kNames.begin());
 }
 
@@ -82,6 +86,16 @@ std::size_t findPlyField(const std::string& name) {
 double getFullColour(PlyType type) {
   if (type == PlyType::float32 || type == PlyType::float64) return 1;
   return type == PlyType::uint16 ? 65535 : 255;
+}
+
+constexpr double kMaxUnitColour = 1.001;  // rounded ones stay ones
+
+/// A colour that was taken for one of floats to 1, in an element whose floats count to 255.
+VertexColour countToBytes(const VertexColour& colour) {
+  const auto channel = [&](std::size_t i) {
+    return static_cast<std::uint8_t>((colour[i] + 127) / 255);
+  };
+  return {channel(0), channel(1), channel(2), colour[3]};
 }
 
 /// The fields of an element.
@@ -100,6 +114,15 @@ struct PlyLayout {
   }
   bool hasNormals() const { return has[3] && has[4] && has[5]; }
   bool hasColours() const { return has[6] && has[7] && has[8]; }
+  /// Floats count to 1, in some files to 255. Returns whether this is the first colour that says
+  /// so: earlier ones were taken for floats to 1.
+  bool noticeBytes(const PlyFieldValues& values) {
+    if (fullColour != 1 || !hasColours() ||
+        !(std::max({values[6], values[7], values[8]}) > kMaxUnitColour))
+      return false;
+    fullColour = 255;
+    return true;
+  }
   /// Writers of PLY give sRGB. Their alpha is left out: the surface of a scan is opaque.
   VertexColour makeColour(const PlyFieldValues& values) const {
     const auto channel = [&](std::size_t field) { return toByte(values[field] / fullColour); };
@@ -125,6 +148,7 @@ class PlyReader {
     if (mesh_.positions.empty()) failPly("contains no vertices");
     addFaces();
     mesh_.textureFile = header_.textureFile;
+    mesh_.trailingBytes = countDataBytes(values_.rest());
     return std::move(mesh_);
   }
 
@@ -144,7 +168,7 @@ class PlyReader {
   }
 
   void readVertices(const PlyElement& element) {
-    const PlyLayout layout(element);
+    PlyLayout layout(element);
     if (!layout.has[0] || !layout.has[1] || !layout.has[2])
       failPly("its vertices have no x, y and z");
     mesh_.positions.reserve(element.count);
@@ -161,6 +185,8 @@ class PlyReader {
         }
       }
       requireData(element, i);
+      if (layout.noticeBytes(vertex))
+        for (VertexColour& colour : mesh_.colours) colour = countToBytes(colour);
       addVertex(layout, vertex);
     }
   }
@@ -192,9 +218,10 @@ class PlyReader {
 
   void readOthers(const PlyElement& element) {
     const bool face = element.name == "face", strips = element.name == "tristrips";
-    const PlyLayout layout(element);
+    PlyLayout layout(element);
     const bool coloured = (face || strips) && layout.hasColours();
     hasFaceColours_ |= coloured;
+    const std::size_t firstOfElement = runs_.size();
     for (std::size_t i = 0; i < element.count; ++i) {
       const std::size_t firstRun = runs_.size();
       PlyFieldValues values{};
@@ -211,6 +238,9 @@ class PlyReader {
       }
       requireData(element, i);
       if (!coloured) continue;
+      if (layout.noticeBytes(values))
+        for (std::size_t r = firstOfElement; r < firstRun; ++r)
+          runs_[r].colour = countToBytes(runs_[r].colour);
       for (std::size_t r = firstRun; r < runs_.size(); ++r)
         runs_[r].colour = layout.makeColour(values);
     }
@@ -250,7 +280,8 @@ class PlyReader {
   }
 
   void addFaces() {
-    mesh_.hasUnusedFaceColours = hasFaceColours_ && !mesh_.colours.empty();
+    if (hasFaceColours_ && !mesh_.colours.empty())
+      mesh_.unusedColours = "those of its faces, because its vertices have colours, too";
     const bool coloured = hasFaceColours_ && mesh_.colours.empty();
     for (std::size_t i = 0; i < runs_.size(); ++i) {
       const std::size_t end = i + 1 < runs_.size() ? runs_[i + 1].first : corners_.size();

@@ -10,6 +10,17 @@
 
 namespace enfilade::scene {
 
+/// White space of the text formats.
+constexpr bool isBlank(char c) {
+  return c == ' ' || c == '\n' || c == '\r' || c == '\t' || c == '\v' || c == '\f';
+}
+
+/// Bytes at the end of a file that fill it up are no data.
+inline std::size_t countDataBytes(std::string_view rest) {
+  while (!rest.empty() && (rest.back() == '\0' || isBlank(rest.back()))) rest.remove_suffix(1);
+  return rest.size();
+}
+
 /// Reads binary numbers; after the end, failed() is true and all numbers are zero.
 class BinaryCursor {
  public:
@@ -35,6 +46,7 @@ class BinaryCursor {
     bytes_.remove_prefix(size > bytes_.size() ? bytes_.size() : size);
   }
   std::size_t remaining() const { return bytes_.size(); }
+  std::string_view rest() const { return bytes_; }
   bool failed() const { return failed_; }
 
  private:
@@ -78,13 +90,10 @@ class TextCursor {
     return value;
   }
   std::size_t remaining() const { return text_.size(); }
+  std::string_view rest() const { return text_; }
   bool failed() const { return failed_; }
 
  private:
-  static bool isBlank(char c) {
-    return c == ' ' || c == '\n' || c == '\r' || c == '\t' || c == '\v' || c == '\f';
-  }
-
   std::string_view text_;
   bool failed_ = false;
 };

@@ -19,9 +19,10 @@ struct ScanMesh {
   std::vector<std::uint32_t> indices;    ///< three per triangle, each below positions.size()
   /// Empty, or one per triangle; never together with `colours`.
   std::vector<VertexColour> triangleColours;
-  std::string textureFile;            ///< not read; empty: none
-  bool hasUnusedFaceColours = false;  ///< left out, because the vertices have colours, too
-  std::size_t brokenFaces = 0;        ///< left out: an index out of range or a vertex not finite
+  std::string textureFile;        ///< not read; empty: none
+  std::string unusedColours;      ///< those of faces that are left out, and why; empty: none
+  std::size_t brokenFaces = 0;    ///< left out: an index out of range or a vertex not finite
+  std::size_t trailingBytes = 0;  ///< after the elements that the header announces; not read
 
   bool hasColours() const { return !colours.empty() || !triangleColours.empty(); }
 };

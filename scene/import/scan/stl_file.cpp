@@ -1,7 +1,7 @@
 // A binary file has a header of 80 bytes, a count, and 50 bytes per triangle; programs disagree on
 // whether a text file may begin with anything but "solid", and some binary headers do begin with
-// it. So a file whose size fits its count is binary, and any other that begins with "solid" is
-// text.
+// it. So a file whose size fits its count is binary, and any other that begins with "solid" and
+// has no zero bytes is text.
 #include "scene/import/scan/stl_file.hpp"
 
 #include <algorithm>
@@ -17,6 +17,7 @@ namespace enfilade::scene {
 namespace {
 
 constexpr std::size_t kStlHeader = 80, kStlFacet = 50;  // bytes
+constexpr unsigned kStlHasColour = 1U << 15;            // of a facet's attribute, in VisCAM
 constexpr double kMaxStlCoordinate = 1e9;               // file units; a greater one is invalid
 
 [[noreturn]] void failStl(const std::string& message) {
@@ -69,6 +70,7 @@ std::vector<ScanMesh> parseBinaryStl(std::string_view bytes, std::size_t count) 
   std::vector<ScanMesh> meshes(1);
   meshes[0].indices.reserve(count * 3);
   StlWelder welder(meshes[0]);
+  bool coloured = bytes.substr(0, kStlHeader).find("COLOR=") != std::string_view::npos;  // Magics
   BinaryCursor cursor(bytes.substr(kStlHeader + 4), false);
   for (std::size_t i = 0; i < count; ++i) {
     cursor.skip(3 * sizeof(float));  // the normal: often zero or wrong
@@ -76,9 +78,12 @@ std::vector<ScanMesh> parseBinaryStl(std::string_view bytes, std::size_t count) 
     for (Vec3& corner : corners) {
       for (int axis = 0; axis < 3; ++axis) corner[axis] = static_cast<double>(cursor.read<float>());
     }
-    cursor.skip(2);
+    const auto attribute = cursor.read<std::uint16_t>();
+    coloured = coloured || (attribute & kStlHasColour) != 0;
     welder.addTriangle(corners);
   }
+  if (coloured) meshes[0].unusedColours = "those of its facets: programs disagree on their form";
+  meshes[0].trailingBytes = countDataBytes(cursor.rest());
   return meshes;
 }
 
@@ -126,6 +131,13 @@ std::vector<ScanMesh> parseTextStl(std::string_view bytes) {
   return meshes;
 }
 
+/// The bytes after a byte order mark and blanks.
+std::string_view findStlText(std::string_view bytes) {
+  if (bytes.starts_with("\xEF\xBB\xBF")) bytes.remove_prefix(3);
+  while (!bytes.empty() && isBlank(bytes.front())) bytes.remove_prefix(1);
+  return bytes;
+}
+
 }  // namespace
 
 std::vector<ScanMesh> parseStl(std::string_view bytes) {
@@ -134,7 +146,10 @@ std::vector<ScanMesh> parseStl(std::string_view bytes) {
       bytes.size() >= kStlHeader + 4 && count <= (bytes.size() - kStlHeader - 4) / kStlFacet;
   const bool fits = holds && bytes.size() - kStlHeader - 4 == count * kStlFacet;
   if (fits) return parseBinaryStl(bytes, count);
-  if (isKeyword(bytes.substr(0, 5), "solid")) return parseTextStl(bytes);
+  const std::string_view text = findStlText(bytes);
+  if (isKeyword(text.substr(0, 5), "solid") &&
+      text.substr(0, 2 * kStlHeader).find('\0') == std::string_view::npos)
+    return parseTextStl(text);
   if (!holds)
     failStl("cut off: " + std::to_string(count) + " triangles announced, " +
             std::to_string(bytes.size()) + " bytes present");
