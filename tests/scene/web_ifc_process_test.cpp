@@ -24,8 +24,8 @@ class ScriptedNode {
   ScriptedNode(const ScriptedNode&) = delete;
   ScriptedNode& operator=(const ScriptedNode&) = delete;
 
-  std::filesystem::path house() const {
-    return folder_.write("house.ifc", tests::IfcHouse().text());
+  std::filesystem::path house(const std::string& text = tests::IfcHouse().text()) const {
+    return folder_.write("house.ifc", text);
   }
 
  private:
@@ -80,6 +80,59 @@ setTimeout(() => {}, first === 0 ? 10000 : 0);
   EXPECT_EQ(left.objects[0].ifcClass, "IfcDoor");
   EXPECT_NE(exampleOf(left, "missing_product").find("was killed"), std::string::npos)
       << exampleOf(left, "missing_product");
+}
+
+/// A reader that gives no triangles of the wall, and a sheet for the door: x from 2.2 to 3.1, y up.
+constexpr char kDoorAlone[] = R"(
+send('T', words(first));
+const at = [[2.2, 0], [3.1, 0], [2.2, 2.1], [3.1, 2.1]];
+const vertices = Buffer.from(new Float32Array(at.flatMap(p => [p[0], p[1], -0.1, 0, 0, 1])).buffer);
+send('G', Buffer.concat([words(7, 4, 6), vertices, words(0, 1, 2, 2, 1, 3)]));
+const numbers = new Float64Array([1,0,0,1, 1,0,0,0, 0,1,0,0, 0,0,1,0, 0,0,0,1]);
+send('O', Buffer.concat([words(320, 1), words(7), Buffer.from(numbers.buffer)]));
+send('D', Buffer.alloc(0));
+)";
+
+/// The house with its hole at 0.2 m and its door at 2.2 m, so that ifcplusplus leaves the wall
+/// closed behind the door. `width` and `height`: stated by the door, in metres.
+std::string makeClosedHouse(double width, double height) {
+  const tests::IfcHouse house;
+  std::string text = house.text();
+  const auto replace = [&](const std::string& what, const std::string& with) {
+    const std::size_t at = text.find(what);
+    ASSERT_NE(at, std::string::npos) << what;
+    text.replace(at, what.size(), with);
+  };
+  replace("#200=IFCCARTESIANPOINT((" + house.length(1.5),
+          "#200=IFCCARTESIANPOINT((" + house.length(0.2));
+  replace("#300=IFCCARTESIANPOINT((" + house.length(0),
+          "#300=IFCCARTESIANPOINT((" + house.length(2));
+  replace("#315,$," + house.length(2.1) + "," + house.length(0.9),
+          "#315,$," + house.length(height) + "," + house.length(width));
+  return text;
+}
+
+TEST(WebIfcProcess, AWallThatNoReaderCutsStaysSolidAndIsReported) {
+  const ScriptedNode node(kDoorAlone);
+  ENFILADE_NEED_WEB_IFC();
+  const Model model = importModel(node.house(makeClosedHouse(0.9, 2.1)));
+  EXPECT_EQ(model.reader, "web-ifc");
+  EXPECT_EQ(model.objects.size(), 2u);
+  EXPECT_NE(exampleOf(model, "solid_product").find("000000000000000000Wall"), std::string::npos);
+  EXPECT_NE(exampleOf(model, "openings_unverified").find("000000000000000000Wall"),
+            std::string::npos);
+  EXPECT_EQ(exampleOf(model, "cut_away_product"), "");
+}
+
+TEST(WebIfcProcess, AFramesWallThatIsNoLargerThanItsDoorIsLeftOutAndReported) {
+  const ScriptedNode node(kDoorAlone);
+  ENFILADE_NEED_WEB_IFC();
+  const Model model = importModel(node.house(makeClosedHouse(4, 3)));
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.objects[0].ifcClass, "IfcDoor");
+  EXPECT_NE(exampleOf(model, "cut_away_product").find("000000000000000000Wall"), std::string::npos);
+  EXPECT_EQ(exampleOf(model, "solid_product"), "");
+  EXPECT_EQ(exampleOf(model, "missing_product"), "");
 }
 
 TEST(WebIfcProcess, ARunawayIsStoppedByItsMemoryLimit) {
