@@ -54,6 +54,8 @@ std::vector<Damage> damagedFiles() {
   std::string deep = R"({"name":"0","children":[1]})";
   for (int i = 1; i < 3000; ++i) deep += R"(,{"children":[)" + std::to_string(i + 1) + "]}";
   deep += R"(,{"mesh":0})";
+  std::string longJson = glb;
+  longJson.replace(12, 4, "\xf0\xff\xff\xff");
   return {
       {"BufferViewBeyondItsBuffer",
        "a.gltf",
@@ -99,7 +101,27 @@ std::vector<Damage> damagedFiles() {
        {"2000 levels", "flatter tree"}},
       {"GlbCalledGltf", "a.gltf", glb, {"rename it to .glb"}},
       {"GltfCalledGlb", "a.glb", box, {"rename", ".gltf"}},
-      {"NoJsonAtAll", "a.gltf", std::string(4000, '['), {}},
+      {"NoJsonAtAll", "a.gltf", std::string(4000, '['), {"its JSON is damaged (byte 4001)"}},
+      {"JsonCutOff", "a.gltf", box.substr(0, 100), {"its JSON is damaged (byte 101)"}},
+      {"JsonWithAComment", "a.gltf", "/* by hand */" + box, {"its JSON is damaged (byte 1)"}},
+      {"JsonInUtf16", "a.gltf", std::string("\xff\xfe{\0", 4), {"its JSON is damaged (byte 1)"}},
+      {"JsonWithNan",
+       "a.gltf",
+       replaced(box, R"("count":8)", R"("count":NaN)"),
+       {"its JSON is damaged (byte "}},
+      {"JsonWithAHugeNumber",
+       "a.gltf",
+       replaced(box, R"("count":8)", R"("count":1e400)"),
+       {"its JSON has a number that is too large"}},
+      {"VersionThatIsANumber",
+       "a.gltf",
+       replaced(box, R"("version":"2.0")", R"("version":2.0)"),
+       {"its JSON states no glTF version"}},
+      {"JsonOfAList", "a.gltf", "[1]", {"its JSON is not an object"}},
+      {"JsonLengthOfAGlbThatLies",
+       "a.glb",
+       longJson,
+       {"announces 4294967280 bytes of JSON", "copy or export it again"}},
       {"BinaryCalledText", "a.obj", glb, {}},
       {"LengthOfAGlbThatLies",
        "a.glb",
@@ -209,6 +231,15 @@ TEST(MalformedFiles, AnUnreadableFileIsReportedAsSuch) {
   };
   EXPECT_EXIT(asUnprivileged(), ::testing::ExitedWithCode(0), "Permission denied");
   fs::permissions(below.parent_path(), fs::perms::owner_all);
+}
+
+TEST(MalformedFiles, AGltfNameInAnotherEncodingThanUtf8IsMendedAndReported) {
+  const TemporaryFolder folder;
+  const std::string text = replaced(boxGltf(), R"("name":"box")", "\"name\":\"T\xFCr\"");
+  const Model model = importModel(folder.write("a.gltf", text));
+  EXPECT_EQ(model.objects.at(0).path, "T%FCr");
+  EXPECT_EQ(countOf(model, "mended_text"), 1u);
+  expectSize(model, {1, 2, 3});
 }
 
 TEST(MalformedFiles, AnExtensionInCapitalsIsOne) {

@@ -1,5 +1,9 @@
 #include "scene/import/assembly/path_names.hpp"
 
+#include <algorithm>
+#include <cstdint>
+#include <cstring>
+
 namespace enfilade::scene {
 namespace {
 
@@ -41,6 +45,23 @@ std::string encodePathSegment(std::string_view name) {
     }
   }
   return result;
+}
+
+std::size_t replaceInvalidUtf8(std::string& text) {
+  constexpr std::uint64_t kHighBits = 0x8080808080808080u;
+  std::size_t replaced = 0;
+  for (std::size_t i = 0; i < text.size();) {
+    std::uint64_t eight = kHighBits;
+    if (i + sizeof eight <= text.size()) std::memcpy(&eight, text.data() + i, sizeof eight);
+    const bool ascii = (eight & kHighBits) == 0;
+    const std::size_t length = ascii ? sizeof eight : utf8SequenceLength(text, i);
+    if (length == 0) {
+      text[i] = '?';
+      ++replaced;
+    }
+    i += std::max<std::size_t>(length, 1);
+  }
+  return replaced;
 }
 
 std::string SiblingNames::makeUnique(const std::string& name) {

@@ -11,6 +11,9 @@ namespace enfilade::scene {
 /// One path segment: '/', '%', control characters and invalid UTF-8 are percent-encoded.
 std::string encodePathSegment(std::string_view name);
 
+/// Replaces each byte that is not part of UTF-8 by '?'. Returns their number.
+std::size_t replaceInvalidUtf8(std::string& text);
+
 /// Makes names unique below one parent.
 class SiblingNames {
  public:

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <string_view>
 
+#include "scene/import/assembly/path_names.hpp"
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/gltf/encoding/gltf_binary.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
@@ -38,13 +39,19 @@ constexpr std::array<std::string_view, 11> kRewrittenTexts{"\"skins\"",
                                                            "\"sparse\"",
                                                            "\"EXT_texture_avif\""};
 
-/// Parses only the sections needed here and skips the nodes, of which there may be a million.
 constexpr int kMaxJsonDepth = 512;
 
-/// Sets `tooDeep` if copies and dumps of the whole text would need much stack.
-Json parseMeshSections(const std::string& text, bool& tooDeep, ExtensionNames& extensions) {
+[[noreturn]] void failJson(const std::filesystem::path& file, const std::string& fault) {
+  throw ImportError(file.string() + ": its JSON " + fault + "; export it again");
+}
+
+/// Parses only the sections needed here and skips the nodes, of which there may be a million.
+/// Refuses a text whose copies and dumps would need much stack.
+Json parseMeshSections(const std::string& text, const std::filesystem::path& file,
+                       ExtensionNames& extensions) {
+  int deepest = 0;
   const auto wanted = [&](int depth, Json::parse_event_t event, Json& value) {
-    tooDeep = tooDeep || depth > kMaxJsonDepth;
+    deepest = std::max(deepest, depth);
     if (event != Json::parse_event_t::key) return true;
     extensions.seeKey(depth, value.get_ref<const std::string&>());
     if (depth != 1) return true;
@@ -52,15 +59,38 @@ Json parseMeshSections(const std::string& text, bool& tooDeep, ExtensionNames& e
            value == "meshes" || value == "accessors" || value == "bufferViews" ||
            value == "buffers" || value == "scenes" || value == "scene" || value == "materials";
   };
-  return Json::parse(text, wanted, false);
+  Json sections;
+  try {
+    sections = Json::parse(text, wanted);
+  } catch (const Json::parse_error& error) {
+    failJson(file, "is damaged (byte " + std::to_string(error.byte) + ")");
+  } catch (const Json::out_of_range&) {
+    failJson(file, "has a number that is too large");
+  }
+  if (deepest > kMaxJsonDepth)
+    failJson(file, "is nested deeper than " + std::to_string(kMaxJsonDepth) + " levels");
+  if (!sections.is_object()) failJson(file, "is not an object");
+  return sections;
+}
+
+/// The JSON text of a file. Old exporters write names in the encoding of their computer; bytes
+/// that are not UTF-8 are replaced and reported.
+std::string readMendedJson(const std::filesystem::path& file, ModelFormat format,
+                           std::vector<Diagnostic>& problems) {
+  std::string text = readGltfJson(file, format);
+  const std::size_t replaced = replaceInvalidUtf8(text);
+  addDiagnostic(problems, "mended_text", "replaced bytes that are not UTF-8", replaced);
+  return text;
 }
 
 /// glTF 1.0 has dictionaries where 2.0 has arrays.
 void requireVersion2(const Json& gltf, const std::filesystem::path& file) {
-  const Json* version = findMember(findMember(&gltf, "asset"), "version");
-  const bool isOld = version != nullptr && version->is_string() &&
-                     !version->get_ref<const std::string&>().starts_with("2");
-  const Json* minimum = findMember(findMember(&gltf, "asset"), "minVersion");
+  const Json* asset = findMember(&gltf, "asset");
+  const Json* version = findMember(asset, "version");
+  if ((asset != nullptr && !asset->is_object()) || (version != nullptr && !version->is_string()))
+    failJson(file, "states no glTF version");
+  const bool isOld = version != nullptr && !version->get_ref<const std::string&>().starts_with("2");
+  const Json* minimum = findMember(asset, "minVersion");
   if (minimum != nullptr && minimum->is_string() && *minimum != "2.0")
     throw ImportError(file.string() + ": needs a reader of glTF " + minimum->get<std::string>() +
                       "; export it as glTF 2.0");
@@ -199,7 +229,7 @@ class MeshRewriter {
     } catch (const ImportError& error) {
       fault = error.what();
     } catch (const Json::exception& error) {
-      fault = std::string("its JSON is not valid glTF: ") + error.what();
+      fault = std::string("its JSON is not valid glTF: ") + error.what() + "; export it again";
     }
     if (firstError_.empty()) firstError_ = fault;
     if (fault.find(place) == std::string::npos) fault = place + ": " + fault;
@@ -298,8 +328,7 @@ void removeReadExtensions(Json& gltf) {
 }
 
 void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGltf& to) {
-  const Json original = Json::parse(to.json, nullptr, false);
-  if (!original.is_object()) return;
+  const Json original = Json::parse(to.json);
   GltfBuffers buffers(file, format, original);
   GltfBinary binary;
   Json gltf = original;
@@ -373,20 +402,17 @@ bool chooseScene(const Json& sections, const std::string& choice, const std::fil
 PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
                         const GltfChoice& choice) {
   PlainGltf plain;
-  plain.json = readGltfJson(file, format);
-  bool tooDeep = false;
+  std::vector<Diagnostic> problems;
+  plain.json = readMendedJson(file, format, problems);
   ExtensionNames extensions;
-  Json sections = parseMeshSections(plain.json, tooDeep, extensions);
-  if (tooDeep)
-    throw ImportError(file.string() + ": its JSON is nested deeper than " +
-                      std::to_string(kMaxJsonDepth) + " levels; export it again");
-  if (!sections.is_object()) return plain;
+  Json sections = parseMeshSections(plain.json, file, extensions);
   requireVersion2(sections, file);
   plain.problems = checkGltfExtensions(sections, extensions, file);
+  plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());
   const bool other = chooseScene(sections, choice.scene, file, plain);
   if (other || choice.rewrite || needsRewriting(plain.json, sections, file.parent_path())) {
     rewriteGltf(file, format, plain);
-    sections = parseMeshSections(plain.json, tooDeep, extensions);
+    sections = parseMeshSections(plain.json, file, extensions);
   }
   plain.triangles = countGltfTriangles(sections);
   return plain;

@@ -18,7 +18,7 @@ namespace enfilade::scene {
 
 /// A glTF file for assimp.
 struct PlainGltf {
-  std::string json;                      ///< as assimp reads it; empty or invalid if the file is
+  std::string json;                      ///< as assimp reads it
   std::string glb;                       ///< the rewritten file; empty: the file itself is plain
   std::optional<std::size_t> triangles;  ///< in all meshes, each once; nullopt: unknown
   std::vector<std::string> scenes;       ///< names of all scenes; some may be empty
@@ -32,8 +32,9 @@ struct GltfChoice {
   bool rewrite = false;    ///< rewrite the file also if assimp should read it right
 };
 
-/// Throws ImportError for missing buffers, for glTF 1.0, for required extensions that are not read,
-/// and if no mesh can be read. Of several meshes, one that cannot be read is reported.
+/// Throws ImportError for damaged JSON, for missing buffers, for glTF 1.0, for required extensions
+/// that are not read, and if no mesh can be read. Of several meshes, one that cannot be read is
+/// reported.
 PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
                         const GltfChoice& choice = {});
 

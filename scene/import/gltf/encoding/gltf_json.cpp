@@ -1,30 +1,50 @@
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 
-#include <array>
 #include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <iterator>
 
+#include "scene/import/file/import_options.hpp"
+
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kGlbHeader = 20;  // bytes: file header and header of the first chunk
+constexpr std::size_t kGlbHeader = 20;     // bytes: file header and header of the first chunk
+constexpr std::size_t kJsonLengthAt = 12;  // bytes: length of the first chunk
+
+/// A number of 32 bits at `at`; 0 beyond the end of the file.
+std::uint32_t readGlbWord(std::ifstream& in, std::size_t at) {
+  std::uint32_t value = 0;
+  in.seekg(static_cast<std::streamoff>(at));
+  in.read(reinterpret_cast<char*>(&value), sizeof value);
+  return in ? value : 0;
+}
 
 }  // namespace
 
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format) {
   std::ifstream in(file, std::ios::binary);
   if (format == ModelFormat::gltf) return {std::istreambuf_iterator<char>(in), {}};
-  std::array<char, kGlbHeader> header{};
-  in.read(header.data(), header.size());
-  std::uint32_t length = 0;
-  std::memcpy(&length, header.data() + 12, sizeof length);
+  const std::size_t length = readGlbWord(in, kJsonLengthAt);
   std::error_code error;
-  if (!in || length > file_size(file, error)) return {};
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (error || kGlbHeader + length > size)
+    throw ImportError(file.string() + ": its header announces " + std::to_string(length) +
+                      " bytes of JSON, the file has " + std::to_string(size) +
+                      "; copy or export it again");
   std::string text(length, '\0');
-  in.read(text.data(), length);
+  in.seekg(kGlbHeader);
+  in.read(text.data(), static_cast<std::streamsize>(length));
   return text;
+}
+
+std::size_t readGlbBinarySize(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  const std::size_t second = kGlbHeader + readGlbWord(in, kJsonLengthAt);
+  const std::size_t length = readGlbWord(in, second);
+  std::error_code error;
+  return second + 8 + length <= std::filesystem::file_size(file, error) && !error ? length : 0;
 }
 
 bool mentions(const std::string& text, std::string_view words) {

@@ -17,8 +17,11 @@ inline constexpr int kMaxNodeDepth = 2000;
 
 inline constexpr std::size_t kNoIndex = ~std::size_t{0};  ///< in place of a member that is missing
 
-/// The JSON text of a glTF or GLB file; empty if it cannot be read.
+/// The JSON text of a glTF or GLB file. Throws ImportError if a GLB file is too short for it.
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format);
+
+/// Bytes of the second chunk of a GLB file, its first buffer; 0 if it is missing or cut off.
+std::size_t readGlbBinarySize(const std::filesystem::path& file);
 
 /// Whether the text contains the words. Several times as fast as std::string::find if the text has
 /// many characters like the first of them, as JSON has quotes.
