@@ -182,6 +182,44 @@ TEST(GltfRestPose, MorphTargetsHaveTheWeightsOfTheMeshOrOfTheNode) {
   EXPECT_TRUE(model.diagnostics.empty());
 }
 
+/// Makes node 0 two instances: one in its place and one 20 m along x.
+void addInstances(GltfWriter& file) {
+  const unsigned moves = file.addPoints({{0, 0, 0}, {20, 0, 0}});
+  file.json["nodes"][0]["extensions"]["EXT_mesh_gpu_instancing"]["attributes"] = {
+      {"TRANSLATION", moves}};
+  file.use("EXT_mesh_gpu_instancing");
+}
+
+TEST(GltfRestPose, InstancesAreCopiesOfTheMorphedMesh) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  addTargets(file);
+  file.json["nodes"][0]["weights"] = {0.5, 0};
+  addInstances(file);
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i)
+    expectMoved(model, model.objects[i], [&](const Vec3& p, std::size_t) {
+      return Vec3(p + Vec3(20.0 * static_cast<double>(i), 1, 0));
+    });
+  EXPECT_EQ(model.meshes.size(), 1u) << "instances share the mesh in its pose";
+}
+
+TEST(GltfRestPose, InstancesAreCopiesOfTheSkinnedMesh) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  bindToJoints(file, {});
+  addInstances(file);
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 2u);
+  const std::vector<Affine3d> identities(2, Affine3d::Identity());
+  for (std::size_t i = 0; i < 2; ++i)
+    expectMoved(model, model.objects[i], [&](const Vec3& p, std::size_t v) {
+      // The node scales its instances' places by 2.
+      return Vec3(blend(identities, p, v) + Vec3(40.0 * static_cast<double>(i), 0, 0));
+    });
+}
+
 TEST(GltfRestPose, AMorphTargetOfAnotherLengthIsAnError) {
   const TemporaryFolder folder;
   GltfWriter file = tests::plainTerrace();

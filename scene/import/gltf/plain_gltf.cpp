@@ -256,14 +256,13 @@ std::vector<bool> findUsedMeshes(const Json& gltf) {
 }
 
 /// Throws ImportError if no mesh that nodes use can be read.
-void rewriteMeshes(Json& gltf, GltfBuffers& buffers, GltfBinary& binary,
-                   std::vector<Diagnostic>& problems) {
+void rewriteMeshes(Json& gltf, const std::map<std::size_t, RestPose>& poses, GltfBuffers& buffers,
+                   GltfBinary& binary, std::vector<Diagnostic>& problems) {
   const Json original{{"accessors", getArray(gltf, "accessors")},
                       {"materials", getArray(gltf, "materials")}};
   MeshRewriter rewriter(original, buffers, binary, problems);
   const auto meshes = gltf.find("meshes");
   if (meshes == gltf.end() || !meshes->is_array()) return;
-  const std::map<std::size_t, RestPose> poses = separatePosedMeshes(gltf, buffers, problems);
   const std::vector<bool> used = findUsedMeshes(gltf);
   bool readAny = false;
   for (std::size_t m = 0; m < meshes->size(); ++m) {
@@ -334,8 +333,10 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   Json gltf = original;
   gltf["scene"] = to.scene;
   try {
+    // Instances are copies of the posed mesh, so all instances of a node share one.
+    const auto poses = separatePosedMeshes(gltf, buffers, to.problems);
     expandInstances(gltf, buffers, to.problems);
-    rewriteMeshes(gltf, buffers, binary, to.problems);
+    rewriteMeshes(gltf, poses, buffers, binary, to.problems);
     rewriteImages(gltf, buffers, binary);
     removeAnimation(gltf);
     simplifyTextures(gltf);
