@@ -288,6 +288,27 @@ TEST(GltfExtensions, UnlistedOnesAreReportedUnlessTheyChangeNoShape) {
   EXPECT_EQ(diagnosticText(model, "ignored_extension"), "KHR_node_visibility");
 }
 
+TEST(GltfExtensions, ThoseThatAreRequiredAndNotReadAreRefusedUnlessTheyChangeLooksAlone) {
+  const TemporaryFolder folder;
+  for (const char* name :
+       {"OMI_physics_shape", "MSFT_lod", "VRM", "AGI_articulations", "EXT_structural_metadata"}) {
+    GltfWriter file = tests::plainTerrace();
+    file.use(name, true);
+    const std::string text = failureOf(folder.write("a.glb", file.glb()));
+    EXPECT_NE(text.find(std::string("requires the glTF extension ") + name), std::string::npos)
+        << text;
+  }
+  for (const auto& [name, count] :
+       {std::pair{"KHR_texture_basisu", 1u}, std::pair{"MSFT_texture_dds", 1u},
+        std::pair{"KHR_lights_punctual", 1u}, std::pair{"KHR_texture_transform", 0u}}) {
+    GltfWriter file = tests::plainTerrace();
+    file.use(name, true);
+    const Model model = importModel(folder.write("a.glb", file.glb()));
+    EXPECT_EQ(countOf(model, "ignored_appearance"), count) << name;
+    EXPECT_EQ(countOf(model, "ignored_extension"), 0u) << name;
+  }
+}
+
 TEST(GltfExtensions, GltfOneIsRefusedInWords) {
   const TemporaryFolder folder;
   GltfWriter file = tests::plainTerrace();

@@ -122,6 +122,10 @@ std::vector<Damage> damagedFiles() {
        "a.glb",
        longJson,
        {"announces 4294967280 bytes of JSON", "copy or export it again"}},
+      {"RequiredExtensionsThatAreNoList",
+       "a.gltf",
+       replaced(box, R"({"asset")", R"({"extensionsRequired":"FOO","asset")"),
+       {"extensionsRequired is not a list of names"}},
       {"BinaryCalledText", "a.obj", glb, {}},
       {"LengthOfAGlbThatLies",
        "a.glb",
@@ -294,7 +298,9 @@ TEST(MalformedFiles, RequiredExtensionsOfLooksAloneAreNoHindrance) {
                         replaced(boxGltf(), R"({"asset")",
                                  R"({"extensionsRequired":[")" + extension + R"("],"asset")"));
   };
-  expectSize(importModel(requiring("KHR_materials_unlit")), {1, 2, 3});
+  const Model unlit = importModel(requiring("KHR_materials_unlit"));
+  expectSize(unlit, {1, 2, 3});
+  EXPECT_EQ(countOf(unlit, "ignored_appearance"), 1u);
   EXPECT_NE(failureOf(requiring("ACME_bent_meshes")).find("export without it"), std::string::npos);
 }
 

@@ -10,67 +10,87 @@
 namespace enfilade::scene {
 namespace {
 
-/// Extensions that are read; their names in full.
-constexpr std::array<std::string_view, 7> kReadExtensions{
-    "KHR_draco_mesh_compression", "KHR_mesh_quantization",   "EXT_meshopt_compression",
-    "KHR_meshopt_compression",    "EXT_mesh_gpu_instancing", "KHR_physics_rigid_bodies",
-    "KHR_implicit_shapes"};
+using Json = nlohmann::json;
 
-/// Beginnings of names of extensions that change neither shapes nor places: appearance, metadata,
-/// animation, and alternatives to what the core of the file describes.
-constexpr std::array<std::string_view, 35> kHarmlessExtensions{"MOZ_",
+/// Extensions that are read; their names in full.
+constexpr std::array<std::string_view, 10> kReadExtensions{
+    "KHR_draco_mesh_compression", "KHR_mesh_quantization",
+    "EXT_meshopt_compression",    "KHR_meshopt_compression",
+    "EXT_mesh_gpu_instancing",    "KHR_physics_rigid_bodies",
+    "KHR_implicit_shapes",        "KHR_texture_transform",
+    "EXT_texture_webp",           "KHR_materials_pbrSpecularGlossiness"};
+
+/// Beginnings of names of extensions that change the appearance or the animation alone.
+constexpr std::array<std::string_view, 9> kAppearanceExtensions{
+    "KHR_materials_", "KHR_texture_", "KHR_lights_",  "KHR_animation_pointer", "EXT_materials_",
+    "EXT_texture_",   "EXT_lights_",  "MSFT_texture", "NV_materials_"};
+
+/// Beginnings of names of other extensions that change neither shapes nor places if they are
+/// optional: metadata, physics, and alternatives to what the core of the file describes.
+constexpr std::array<std::string_view, 25> kHarmlessExtensions{"MOZ_",
                                                                "OMI_",
-                                                               "NV_materials_",
                                                                "ASOBO_",
                                                                "MPEG_media",
                                                                "BLENDER_",
-                                                               "KHR_materials_",
-                                                               "KHR_texture_",
-                                                               "KHR_lights_",
                                                                "KHR_xmp",
-                                                               "KHR_animation_pointer",
                                                                "KHR_audio",
                                                                "KHR_techniques",
                                                                "KHR_interactivity",
                                                                "KHR_node_hoverability",
                                                                "KHR_physics_",
                                                                "KHR_node_selectability",
-                                                               "EXT_texture_",
-                                                               "EXT_lights_",
-                                                               "EXT_materials_",
+                                                               "KHR_implicit_",
                                                                "EXT_mesh_features",
                                                                "EXT_mesh_manifold",
                                                                "EXT_instance_features",
                                                                "EXT_structural_metadata",
                                                                "EXT_feature_metadata",
                                                                "CESIUM_primitive_outline",
-                                                               "MSFT_texture",
                                                                "MSFT_lod",
                                                                "MSFT_packing",
-                                                               "AGI_",
+                                                               "AGI_stk_metadata",
                                                                "ADOBE_",
                                                                "FB_",
-                                                               "GODOT_",
-                                                               "VRM",
-                                                               "KHR_implicit_"};
+                                                               "GODOT_"};
 
-bool isSupportedExtension(const std::string& extension) {
-  const auto begins = [&](std::string_view start) { return extension.starts_with(start); };
-  return std::find(kReadExtensions.begin(), kReadExtensions.end(), extension) !=
-             kReadExtensions.end() ||
-         std::any_of(kHarmlessExtensions.begin(), kHarmlessExtensions.end(), begins);
+template <class Beginnings>
+bool beginsWithAny(const std::string& name, const Beginnings& beginnings) {
+  return std::ranges::any_of(beginnings,
+                             [&](std::string_view start) { return name.starts_with(start); });
 }
 
-/// The unsupported names in a list of the file.
-std::set<std::string> findUnsupported(const nlohmann::json& gltf, const char* list) {
+bool isRead(const std::string& name) {
+  return std::ranges::find(kReadExtensions, name) != kReadExtensions.end();
+}
+
+bool changesAppearanceAlone(const std::string& name) {
+  return beginsWithAny(name, kAppearanceExtensions);
+}
+
+/// Whether the file describes the same shapes to a reader that does not know the extension.
+bool mayBeIgnored(const std::string& name) {
+  return isRead(name) || changesAppearanceAlone(name) || name.starts_with("VRM") ||
+         beginsWithAny(name, kHarmlessExtensions);
+}
+
+/// The names in a list of the file. Throws ImportError if it is no list of names.
+std::set<std::string> readRequired(const Json& gltf, const std::filesystem::path& file) {
   std::set<std::string> names;
-  const auto found = gltf.find(list);
-  if (found == gltf.end() || !found->is_array()) return names;
-  for (const nlohmann::json& name : *found) {
-    if (name.is_string() && !isSupportedExtension(name.get<std::string>()))
-      names.insert(name.get<std::string>());
-  }
+  const auto found = gltf.find("extensionsRequired");
+  if (found == gltf.end()) return names;
+  const bool isList =
+      found->is_array() &&
+      std::all_of(found->begin(), found->end(), [](const Json& name) { return name.is_string(); });
+  if (!isList)
+    throw ImportError(file.string() +
+                      ": extensionsRequired is not a list of names; export the file again");
+  for (const Json& name : *found) names.insert(name.get<std::string>());
   return names;
+}
+
+void addProblem(const char* kind, const std::set<std::string>& names,
+                std::vector<Diagnostic>& problems) {
+  if (!names.empty()) problems.push_back({kind, names.size(), *names.begin()});
 }
 
 }  // namespace
@@ -84,17 +104,28 @@ void ExtensionNames::seeKey(int depth, const std::string& key) {
   if (key == "extras") extras_ = depth;
 }
 
-std::vector<Diagnostic> checkGltfExtensions(const nlohmann::json& gltf, const ExtensionNames& inUse,
+std::vector<Diagnostic> checkGltfExtensions(const Json& gltf, const ExtensionNames& inUse,
                                             const std::filesystem::path& file) {
-  for (const std::string& name : findUnsupported(gltf, "extensionsRequired")) {
-    throw ImportError(file.string() + ": requires the glTF extension " + name +
-                      ", which is not supported; export without it");
+  std::set<std::string> appearance, ignored;
+  for (const std::string& name : readRequired(gltf, file)) {
+    if (isRead(name)) continue;
+    if (!changesAppearanceAlone(name))
+      throw ImportError(file.string() + ": requires the glTF extension " + name +
+                        ", which is not supported; export without it");
+    appearance.insert(name);
   }
-  std::set<std::string> ignored = findUnsupported(gltf, "extensionsUsed");
+  const auto used = gltf.find("extensionsUsed");
+  if (used != gltf.end() && used->is_array()) {
+    for (const Json& name : *used)
+      if (name.is_string() && !mayBeIgnored(name.get<std::string>()))
+        ignored.insert(name.get<std::string>());
+  }
   for (const std::string& name : inUse.names())
-    if (!isSupportedExtension(name)) ignored.insert(name);
-  if (ignored.empty()) return {};
-  return {{"ignored_extension", ignored.size(), *ignored.begin()}};
+    if (!mayBeIgnored(name)) ignored.insert(name);
+  std::vector<Diagnostic> problems;
+  addProblem("ignored_extension", ignored, problems);
+  addProblem("ignored_appearance", appearance, problems);
+  return problems;
 }
 
 }  // namespace enfilade::scene

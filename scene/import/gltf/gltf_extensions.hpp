@@ -27,8 +27,9 @@ class ExtensionNames {
   std::set<std::string> names_;
 };
 
-/// Throws ImportError for a required extension that is neither read nor without effect on shapes.
-/// Returns a diagnostic `ignored_extension` for the optional ones, listed or not.
+/// Throws ImportError for a required extension that is not read, unless it changes the appearance
+/// alone: that is reported (`ignored_appearance`). Optional ones, listed or not, are reported if
+/// they could change shapes (`ignored_extension`).
 std::vector<Diagnostic> checkGltfExtensions(const nlohmann::json& gltf, const ExtensionNames& inUse,
                                             const std::filesystem::path& file);
 
