@@ -168,7 +168,30 @@ TEST(GltfUris, DataIsBase64OrPercentEncoded) {
   expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 0);
 }
 
-// ---- instances ----------------------------------------------------------------------------------
+TEST(GltfUris, DataMayHaveLineEndsAndTheAlphabetOfUrls) {
+  const TemporaryFolder folder;
+  const GltfWriter plain = tests::plainTerrace();
+  std::string url = tests::base64(plain.binary);
+  std::ranges::replace(url, '+', '-');
+  std::ranges::replace(url, '/', '_');
+  const std::string lines = "data:;BASE64," + url.insert(40, "\r\n ") + "\n";
+  const Model model = importModel(folder.write("a.gltf", plain.gltf(lines)));
+  expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 0);
+}
+
+TEST(GltfUris, ACharacterThatIsNotBase64IsAnError) {
+  const TemporaryFolder folder;
+  const GltfWriter plain = tests::plainTerrace();
+  for (const char* foreign : {"!", "=", "%"}) {
+    std::string digits = tests::base64(plain.binary);
+    digits.replace(40, 1, foreign);
+    const std::string text =
+        failureOf(folder.write("a.gltf", plain.gltf("data:;base64," + digits)));
+    EXPECT_NE(text.find("buffers[0]: character 41 of its data URI is not Base64"),
+              std::string::npos)
+        << text;
+  }
+}
 
 TEST(GltfUris, AMissingOrShortBufferAndAMissingSceneAreNamed) {
   const TemporaryFolder folder;
@@ -187,6 +210,8 @@ TEST(GltfUris, AMissingOrShortBufferAndAMissingSceneAreNamed) {
   const std::string bare = failureOf(folder.write("b.gltf", file.gltf("a.bin")));
   EXPECT_NE(bare.find("has no scene; export it with one"), std::string::npos) << bare;
 }
+
+// ---- instances ----------------------------------------------------------------------------------
 
 TEST(GltfInstances, EachIsAnObjectWhetherTheExtensionIsRequiredOrNot) {
   const TemporaryFolder folder;
@@ -396,6 +421,62 @@ TEST(GltfTextures, KtxIsReportedAsMissing) {
   const Model model = importModel(folder.write("a.glb", file.glb()));
   EXPECT_EQ(model.materials.at(0).baseColourTexture, -1);
   EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+}
+
+TEST(GltfTextures, OnesWithoutAnImageThatIsReadAreReportedAsMissing) {
+  const TemporaryFolder folder;
+  const auto expectMissing = [&](const GltfWriter& file, const std::string& words) {
+    const Model model = importModel(folder.write("a.glb", file.glb()));
+    EXPECT_EQ(model.materials.at(0).baseColourTexture, -1);
+    EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+    EXPECT_NE(diagnosticText(model, "missing_texture").find(words), std::string::npos)
+        << diagnosticText(model, "missing_texture");
+  };
+  for (const char* extension : {"MSFT_texture_dds", "EXT_texture_foo"})
+    expectMissing(texturedTerrace(extension, makeWebp(), "image/webp"), extension);
+  GltfWriter file = tests::plainTerrace();
+  file.json["materials"] = {{{"pbrMetallicRoughness", {{"baseColorTexture", {{"index", 0}}}}}}};
+  file.json["meshes"][0]["primitives"][0]["material"] = 0;
+  expectMissing(file, "materials[0]: its baseColorTexture has no image");
+  file.json["textures"] = {{{"sampler", 0}}};
+  file.json["samplers"] = {Json::object()};
+  expectMissing(file, "materials[0]: its baseColorTexture has no image");
+  file.json["textures"] = {{{"source", 9}}};
+  expectMissing(file, "materials[0]: its baseColorTexture has no image");
+}
+
+TEST(GltfTextures, AnEmissiveOneWithoutAnImageIsReportedAndDoesNotGlow) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  file.json["textures"] = {Json::object()};
+  file.json["materials"] = {{{"emissiveTexture", {{"index", 0}}}, {"emissiveFactor", {1, 1, 1}}}};
+  file.json["meshes"][0]["primitives"][0]["material"] = 0;
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+  EXPECT_TRUE(model.materials.at(0).emissive.isZero(0));
+}
+
+TEST(GltfMaterials, TheDiffuseColourAndTextureOfSpecularGlossinessAreRead) {
+  const TemporaryFolder folder;
+  GltfWriter file = texturedTerrace("EXT_texture_webp", makeWebp(), "image/webp");
+  Json& material = file.json["materials"][0];
+  material["extensions"]["KHR_materials_pbrSpecularGlossiness"] = {
+      {"diffuseFactor", {0.25, 0.5, 1, 0.75}},
+      {"diffuseTexture", {{"index", 0}}},
+      {"glossinessFactor", 0.75}};
+  const Json metallic = material["pbrMetallicRoughness"];
+  material.erase("pbrMetallicRoughness");
+  file.use("KHR_materials_pbrSpecularGlossiness");
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_TRUE(model.diagnostics.empty()) << model.diagnostics[0].kind;
+  const Material& read = model.materials.at(0);
+  EXPECT_EQ(read.baseColour, Eigen::Vector4f(0.25f, 0.5f, 1, 0.75f));
+  EXPECT_EQ(read.baseColourTexture, 0);
+  EXPECT_EQ(read.metallic, 0);
+  EXPECT_FLOAT_EQ(read.roughness, 0.25f);
+  material["pbrMetallicRoughness"] = metallic;
+  const Model both = importModel(folder.write("b.glb", file.glb()));
+  EXPECT_EQ(both.materials.at(0).baseColour, Eigen::Vector4f(1, 1, 1, 1)) << "the core's";
 }
 
 TEST(GltfTextures, TheTransformIsAppliedToCoordinates) {

@@ -131,17 +131,64 @@ GltfWriter makeDamaged(
   return file;
 }
 
+/// Gives `accessor` a view of its own, with one member replaced.
+void changeView(GltfWriter& file, Json& accessor, const char* member, const Json& value) {
+  Json view = file.json["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+  view[member] = value;
+  file.json["bufferViews"].push_back(view);
+  accessor["bufferView"] = file.json["bufferViews"].size() - 1;
+}
+
+/// Gives `primitive` an accessor of indices of its own, with one member replaced.
+void changeIndices(GltfWriter& file, Json& primitive, const char* member, const Json& value) {
+  Json accessor = file.json["accessors"][primitive["indices"].get<std::size_t>()];
+  accessor[member] = value;
+  file.json["accessors"].push_back(accessor);
+  primitive["indices"] = file.json["accessors"].size() - 1;
+}
+
 TEST(GltfMeshes, WhatGltfDoesNotAllowIsNotReadInSilence) {
   const TemporaryFolder folder;
   const std::pair<const char*, GltfWriter> files[] = {
+      {"extends beyond its buffer view",
+       makeDamaged([](auto&, Json& accessor, Json&) { accessor["byteOffset"] = 12; })},
+      {"extends beyond its buffer view", makeDamaged([](GltfWriter& file, Json& accessor, Json&) {
+         changeView(file, accessor, "byteLength", 64 * 12 - 1);
+       })},
+      {"extends beyond its buffer of", makeDamaged([](GltfWriter& file, Json& accessor, Json&) {
+         changeView(file, accessor, "byteOffset", file.binary.size() - 12);
+       })},
+      {"byteOffset is not a valid whole number",
+       makeDamaged([](GltfWriter& file, Json& accessor, Json&) {
+         changeView(file, accessor, "byteOffset", -12);
+       })},
+      {"byteOffset is not a valid whole number",
+       makeDamaged([](GltfWriter& file, Json&, Json& primitive) {
+         changeIndices(file, primitive, "byteOffset", -12);
+       })},
+      {"extends beyond its buffer view", makeDamaged([](GltfWriter& file, Json&, Json& primitive) {
+         changeIndices(file, primitive, "byteOffset", 12);
+       })},
+      {"not of unsigned integers", makeDamaged([](GltfWriter& file, Json&, Json& primitive) {
+         changeIndices(file, primitive, "componentType", 5126);
+       })},
+      {"has an index beyond its vertices",
+       makeDamaged([](GltfWriter& file, Json&, Json& primitive) {
+         primitive["indices"] = file.addIndices({64, 65, 66, 0, 1, 4294967295});
+       })},
       {"mode 99 is not 0 to 6",
        makeDamaged([](auto&, Json&, Json& primitive) { primitive["mode"] = 99; })},
+      {"has no whole triangle", makeDamaged([](GltfWriter& file, Json&, Json& primitive) {
+         changeIndices(file, primitive, "count", 2);
+       })},
+      {"mode -1 is not 0 to 6",
+       makeDamaged([](auto&, Json&, Json& primitive) { primitive["mode"] = -1; })},
+      {"its indices are not an accessor",
+       makeDamaged([](auto&, Json&, Json& primitive) { primitive["indices"] = "1"; })},
       {"is not of type VEC3",
        makeDamaged([](auto&, Json& accessor, Json&) { accessor["type"] = "VEC2"; })},
       {"byteStride is smaller", makeDamaged([](GltfWriter& file, Json& accessor, Json&) {
-         file.json["bufferViews"].push_back(file.json["bufferViews"][0]);
-         file.json["bufferViews"].back()["byteStride"] = 4;
-         accessor["bufferView"] = file.json["bufferViews"].size() - 1;
+         changeView(file, accessor, "byteStride", 4);
        })}};
   for (const auto& [fault, file] : files) {
     const Model model = importModel(folder.write("a.glb", file.glb()));
@@ -150,6 +197,40 @@ TEST(GltfMeshes, WhatGltfDoesNotAllowIsNotReadInSilence) {
     EXPECT_NE(diagnosticText(model, "solid_mesh").find(fault), std::string::npos)
         << diagnosticText(model, "solid_mesh");
   }
+}
+
+TEST(GltfMeshes, OneWithoutPrimitivesIsMissingAndReported) {
+  const TemporaryFolder folder;
+  GltfWriter file = makeHalfBroken(true);
+  file.json["meshes"][1]["primitives"] = Json::array();
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  EXPECT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(diagnosticText(model, "missing_mesh"), "meshes[1] has no primitives");
+}
+
+TEST(GltfMeshes, OneWithAMaterialThatDoesNotExistIsReadWithoutIt) {
+  const TemporaryFolder folder;
+  const GltfWriter file =
+      makeDamaged([](auto&, Json&, Json& primitive) { primitive["material"] = 9; });
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 2u);
+  EXPECT_EQ(model.meshes.at(model.objects[1].meshes.at(0)).triangleCount(), kTriangles);
+  EXPECT_EQ(diagnosticText(model, "missing_material"), "meshes[1].primitives[0]");
+}
+
+TEST(GltfMeshes, OneOfABufferThatIsCutOffIsNotReadBeyondIt) {
+  const TemporaryFolder folder;
+  GltfWriter file = makeHalfBroken(true);
+  file.json["accessors"].back()["byteOffset"] = 0;
+  const std::size_t size = file.binary.size();
+  changeView(file, file.json["accessors"].back(), "byteOffset", size);
+  std::string glb = file.glb();
+  const std::string stated = "\"byteLength\":" + std::to_string(size) + "}";
+  const std::size_t at = glb.find(stated);
+  ASSERT_NE(at, std::string::npos);
+  glb.replace(at, stated.size(), "\"byteLength\":9" + std::to_string(size).substr(1) + "}");
+  const Model model = importModel(folder.write("a.glb", glb));
+  EXPECT_EQ(countOf(model, "solid_mesh"), 1u);
 }
 
 TEST(GltfMeshes, AnIncompleteLastTriangleIsLeftOutAndReported) {

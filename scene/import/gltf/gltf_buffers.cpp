@@ -10,6 +10,7 @@
 
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/file/uri.hpp"
+#include "scene/import/gltf/encoding/data_uri.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/encoding/meshopt_view.hpp"
 
@@ -79,31 +80,6 @@ std::vector<Number> convertElements(const GltfElements& elements, bool normalise
   return values;
 }
 
-int decodeBase64Digit(char letter) {
-  if (letter >= 'A' && letter <= 'Z') return letter - 'A';
-  if (letter >= 'a' && letter <= 'z') return letter - 'a' + 26;
-  if (letter >= '0' && letter <= '9') return letter - '0' + 52;
-  if (letter == '+') return 62;
-  return letter == '/' ? 63 : -1;
-}
-
-/// Decodes RFC 4648; the first character outside its alphabet ends the text.
-std::string decodeBase64(std::string_view text) {
-  std::string bytes;
-  unsigned accumulator = 0;
-  int bits = 0;
-  for (const char letter : text) {
-    const int six = decodeBase64Digit(letter);
-    if (six < 0) break;
-    accumulator = (accumulator << 6U | static_cast<unsigned>(six)) & 0xFFFFFFU;
-    bits += 6;
-    if (bits < 8) continue;
-    bits -= 8;
-    bytes += static_cast<char>(accumulator >> static_cast<unsigned>(bits) & 255U);
-  }
-  return bytes;
-}
-
 std::string readFileBytes(const std::filesystem::path& file, std::size_t from) {
   std::error_code error;
   const auto size = std::filesystem::file_size(file, error);
@@ -127,14 +103,6 @@ std::string readBinaryChunk(const std::filesystem::path& file) {
   const std::size_t start = second + kChunkHeaderSize;
   if (start > all.size() || start + word(second) > all.size()) return {};
   return all.substr(start, word(second));
-}
-
-/// The bytes of a data URI (RFC 2397), in Base64 or percent-encoded.
-std::string decodeDataUri(std::string_view uri) {
-  const std::size_t comma = uri.find(',');
-  if (comma == std::string_view::npos) return "";
-  const std::string_view kind = uri.substr(0, comma), data = uri.substr(comma + 1);
-  return kind.ends_with(";base64") ? decodeBase64(data) : decodePercent(data);
 }
 
 }  // namespace
@@ -184,7 +152,12 @@ std::string GltfBuffers::readBuffer(std::size_t index) {
     return format_ == ModelFormat::glb && index == 0 ? readBinaryChunk(file_) : "";
   if (!buffer["uri"].is_string()) fail("a buffer's uri is not a string");
   const std::string uri = buffer["uri"].get<std::string>();
-  if (uri.starts_with("data:")) return decodeDataUri(uri);
+  if (uri.starts_with("data:")) {
+    std::string fault;
+    std::string bytes = decodeDataUri(uri, fault);
+    if (!fault.empty()) fail("buffers[" + std::to_string(index) + "]: " + fault);
+    return bytes;
+  }
   for (const std::string& name : {uri, decodePercent(uri)}) {
     const std::filesystem::path path = file_.parent_path() / name;
     dependencies_.push_back(path.string());

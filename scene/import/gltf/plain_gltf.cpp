@@ -1,7 +1,6 @@
 #include "scene/import/gltf/plain_gltf.hpp"
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <nlohmann/json.hpp>
 #include <string_view>
@@ -13,10 +12,11 @@
 #include "scene/import/gltf/gltf_buffers.hpp"
 #include "scene/import/gltf/gltf_extensions.hpp"
 #include "scene/import/gltf/gltf_instances.hpp"
+#include "scene/import/gltf/gltf_materials.hpp"
 #include "scene/import/gltf/gltf_metadata.hpp"
 #include "scene/import/gltf/gltf_rest_pose.hpp"
+#include "scene/import/gltf/plain_check.hpp"
 #include "scene/import/gltf/plain_primitives.hpp"
-#include "scene/import/gltf/texture_mapping.hpp"
 #include "scene/import/gltf/unreadable_mesh.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
@@ -24,20 +24,6 @@ namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
-
-/// Texts in the JSON of a file that may need rewriting. Exporters sometimes forget to list an
-/// extension in extensionsUsed, so the whole text is searched.
-constexpr std::array<std::string_view, 11> kRewrittenTexts{"\"skins\"",
-                                                           "\"targets\"",
-                                                           "\"EXT_meshopt_compression\"",
-                                                           "\"KHR_meshopt_compression\"",
-                                                           "\"KHR_draco_mesh_compression\"",
-                                                           "\"EXT_mesh_gpu_instancing\"",
-                                                           "\"KHR_texture_basisu\"",
-                                                           "\"EXT_texture_webp\"",
-                                                           "\"KHR_texture_transform\"",
-                                                           "\"sparse\"",
-                                                           "\"EXT_texture_avif\""};
 
 constexpr int kMaxJsonDepth = 512;
 
@@ -57,7 +43,8 @@ Json parseMeshSections(const std::string& text, const std::filesystem::path& fil
     if (depth != 1) return true;
     return value == "asset" || value == "extensionsRequired" || value == "extensionsUsed" ||
            value == "meshes" || value == "accessors" || value == "bufferViews" ||
-           value == "buffers" || value == "scenes" || value == "scene" || value == "materials";
+           value == "buffers" || value == "scenes" || value == "scene" || value == "materials" ||
+           value == "textures";
   };
   Json sections;
   try {
@@ -101,84 +88,6 @@ void requireVersion2(const Json& gltf, const std::filesystem::path& file) {
                     " cannot be read; export it as glTF 2.0");
 }
 
-// ---- does the file need rewriting? --------------------------------------------------------------
-
-/// Whether assimp reads the accessor of an attribute right: `width` floats each in a buffer view.
-/// It does not check the type and the stride.
-bool isPlainAttribute(const Json& sections, const Json* accessor, std::size_t width) {
-  static constexpr std::array<const char*, 5> kTypes{"", "SCALAR", "VEC2", "VEC3", "VEC4"};
-  const Json* type = findMember(accessor, "type");
-  const Json* view =
-      findEntry(getArray(sections, "bufferViews"), findMember(accessor, "bufferView"));
-  const std::size_t bytes = width * sizeof(float);
-  return type != nullptr && *type == kTypes.at(width) && view != nullptr &&
-         readIndexMember(accessor, "componentType") == 5126 &&
-         readIndexMember(view, "byteStride").value_or(bytes) >= bytes;
-}
-
-/// Whether the corners of a primitive make whole triangles.
-bool hasWholeTriangles(const Json& primitive, const Json& accessors, const Json* positions) {
-  const Json* indices = findMember(&primitive, "indices");
-  const Json* corners = indices == nullptr ? positions : findEntry(accessors, indices);
-  return readIndexMember(corners, "count").value_or(1) % 3 == 0;
-}
-
-/// Whether assimp reads a primitive right, without a word of what it left out.
-bool isPlainPrimitive(const Json& primitive, const Json& sections) {
-  const std::size_t mode = readIndexMember(&primitive, "mode").value_or(4);
-  if (mode > 4) return false;  // strips, fans and modes that glTF does not know
-  const Json* attributes = findMember(&primitive, "attributes");
-  if (attributes == nullptr || !attributes->is_object()) return false;
-  const Json& accessors = getArray(sections, "accessors");
-  const Json* positions = findEntry(accessors, findMember(attributes, "POSITION"));
-  if (mode == 4 && !hasWholeTriangles(primitive, accessors, positions)) return false;
-  return std::all_of(attributes->items().begin(), attributes->items().end(), [&](const auto& item) {
-    const std::string& name = item.key();
-    const Json* accessor = findEntry(accessors, &item.value());
-    if (name == "POSITION" || name == "NORMAL") return isPlainAttribute(sections, accessor, 3);
-    if (name.starts_with("TEXCOORD_")) return isPlainAttribute(sections, accessor, 2);
-    return name != "COLOR_0" ||
-           (isPlainAttribute(sections, accessor, 4) &&
-            readIndexMember(accessor, "count") == readIndexMember(positions, "count"));
-  });
-}
-
-/// assimp reads data URIs in Base64 only. It does not say well that a file is missing or cut off.
-bool isPlainBuffer(const Json& buffer, const std::filesystem::path& folder) {
-  const Json* uri = findMember(&buffer, "uri");
-  if (uri == nullptr || !uri->is_string()) return true;
-  const auto& text = uri->get_ref<const std::string&>();
-  if (text.starts_with("data:")) return text.substr(0, text.find(',')).ends_with(";base64");
-  std::error_code error;
-  const std::uintmax_t size = std::filesystem::file_size(folder / text, error);
-  return !error && size >= readIndexMember(&buffer, "byteLength").value_or(0);
-}
-
-/// The import takes the first set of texture coordinates from assimp.
-bool usesFirstTexCoords(const Json& sections) {
-  for (std::size_t i = 0; i < getArray(sections, "materials").size(); ++i)
-    if (readTextureMapping(sections, i).set != 0) return false;
-  return true;
-}
-
-bool needsRewriting(const std::string& text, const Json& sections,
-                    const std::filesystem::path& folder) {
-  if (std::any_of(kRewrittenTexts.begin(), kRewrittenTexts.end(),
-                  [&](std::string_view mark) { return mentions(text, mark); }))
-    return true;
-  const Json& buffers = getArray(sections, "buffers");
-  if (!std::all_of(buffers.begin(), buffers.end(),
-                   [&](const Json& buffer) { return isPlainBuffer(buffer, folder); }))
-    return true;
-  if (!usesFirstTexCoords(sections)) return true;
-  for (const Json& mesh : getArray(sections, "meshes")) {
-    if (!mesh.is_object()) continue;
-    for (const Json& primitive : getArray(mesh, "primitives"))
-      if (!isPlainPrimitive(primitive, sections)) return true;
-  }
-  return false;
-}
-
 // ---- rewriting ----------------------------------------------------------------------------------
 
 /// Rewrites the primitives of a file one by one. One that cannot be read is replaced or removed.
@@ -214,6 +123,7 @@ class MeshRewriter {
 
  private:
   Json rewritePrimitive(Json& primitive, const std::string& place, const RestPose* pose) {
+    dropMissingMaterial(primitive, place);
     const Json original = primitive;
     std::string fault;
     try {
@@ -235,6 +145,14 @@ class MeshRewriter {
     if (fault.find(place) == std::string::npos) fault = place + ": " + fault;
     return replaceUnreadable({original, pose, fault}, getArray(original_, "accessors"), buffers_,
                              binary_, problems_);
+  }
+
+  void dropMissingMaterial(Json& primitive, const std::string& place) {
+    const Json* material = findMember(&primitive, "material");
+    if (material == nullptr || findEntry(getArray(original_, "materials"), material) != nullptr)
+      return;
+    primitive.erase("material");
+    addDiagnostic(problems_, "missing_material", place);
   }
 
   const Json& original_;
@@ -317,10 +235,7 @@ void removeReadExtensions(Json& gltf) {
   if (used == gltf.end() || !used->is_array()) return;
   Json kept = Json::array();
   for (const Json& name : *used) {
-    const bool read = name.is_string() &&
-                      std::any_of(kRewrittenTexts.begin(), kRewrittenTexts.end(), [&](auto text) {
-                        return text == "\"" + name.template get<std::string>() + "\"";
-                      });
+    const bool read = name.is_string() && isRewrittenExtension(name.get<std::string>());
     if (!read) kept.push_back(name);
   }
   *used = std::move(kept);
@@ -333,13 +248,14 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   Json gltf = original;
   gltf["scene"] = to.scene;
   try {
+    replaceSpecularGlossiness(gltf);
     // Instances are copies of the posed mesh, so all instances of a node share one.
     const auto poses = separatePosedMeshes(gltf, buffers, to.problems);
     expandInstances(gltf, buffers, to.problems);
     rewriteMeshes(gltf, poses, buffers, binary, to.problems);
     rewriteImages(gltf, buffers, binary);
     removeAnimation(gltf);
-    simplifyTextures(gltf);
+    simplifyMaterials(gltf, to.problems);
     removeReadExtensions(gltf);
     binary.install(gltf);
   } catch (const Json::exception& error) {
@@ -411,7 +327,7 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   plain.problems = checkGltfExtensions(sections, extensions, file);
   plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());
   const bool other = chooseScene(sections, choice.scene, file, plain);
-  if (other || choice.rewrite || needsRewriting(plain.json, sections, file.parent_path())) {
+  if (other || choice.rewrite || needsRewriting(plain.json, sections, file, format)) {
     rewriteGltf(file, format, plain);
     sections = parseMeshSections(plain.json, file, extensions);
   }

@@ -1,5 +1,6 @@
 #include "scene/import/gltf/plain_primitives.hpp"
 
+#include <algorithm>
 #include <array>
 #include <functional>
 #include <numeric>
@@ -152,21 +153,38 @@ const PlainPrimitives::WrittenDraco& PlainPrimitives::writeDraco(const Json& ext
   return to;
 }
 
+/// assimp leaves out triangles whose indices are out of range, and refuses a file of which a mesh
+/// keeps no triangle.
+void PlainPrimitives::requireTriangle(const std::vector<std::uint32_t>& corners,
+                                      std::size_t vertices, const std::string& name) const {
+  const auto exists = [&](std::uint32_t corner) { return corner < vertices; };
+  for (auto at = corners.begin(); corners.end() - at >= 3; at += 3)
+    if (std::all_of(at, at + 3, exists)) return;
+  buffers_.fail(name + (corners.size() < 3
+                            ? ": has no whole triangle"
+                            : ": each of its triangles has an index beyond its vertices"));
+}
+
 void PlainPrimitives::rewriteIndices(Json& primitive, std::size_t vertices,
                                      const std::string& name) {
-  const std::size_t mode = readIndexMember(&primitive, "mode").value_or(kTriangleMode);
-  if (mode > kFanMode) buffers_.fail(name + ": mode " + std::to_string(mode) + " is not 0 to 6");
+  const Json stated = primitive.value("mode", Json(kTriangleMode));
+  const std::size_t mode = stated.is_number_unsigned() ? stated.get<std::size_t>() : kFanMode + 1;
+  if (mode > kFanMode)
+    buffers_.fail(name + ": mode " + (stated.is_number() ? stated.dump() : "") + " is not 0 to 6");
   const bool unroll = mode == kStripMode || mode == kFanMode;
   const auto accessor = readIndexMember(&primitive, "indices");
+  if (!accessor && primitive.contains("indices"))
+    buffers_.fail(name + ": its indices are not an accessor");
   const bool isCut = mode == kTriangleMode && (accessor ? countElements(*accessor) : vertices) % 3;
   if (isCut)
     addDiagnostic(problems_, "broken_triangle_dropped", name + ": its last triangle is incomplete");
   if (!accessor && !unroll && !isCut) return;
-  const std::string key = (accessor ? std::to_string(*accessor) + " indices "
-                                    : std::to_string(vertices) + " corners ") +
-                          (unroll  ? std::to_string(mode)
-                           : isCut ? "cut"
-                                   : "");
+  const std::string key =
+      (accessor ? std::to_string(*accessor) + " indices of " : std::string("corners of ")) +
+      std::to_string(vertices) +
+      (unroll  ? " mode " + std::to_string(mode)
+       : isCut ? " cut"
+               : "");
   auto known = written_.find(key);
   if (known == written_.end()) {
     std::vector<std::uint32_t> indices;
@@ -178,8 +196,7 @@ void PlainPrimitives::rewriteIndices(Json& primitive, std::size_t vertices,
     }
     if (unroll) indices = unrollTriangles(indices, mode);
     if (isCut) indices.resize(indices.size() - indices.size() % 3);
-    // glTF forbids accessors without elements. Its one index makes no triangle.
-    if (indices.empty()) indices.push_back(0);
+    if (mode >= kTriangleMode) requireTriangle(indices, vertices, name);
     known = written_.emplace(key, binary_.addIndices(indices)).first;
   }
   primitive["indices"] = known->second;

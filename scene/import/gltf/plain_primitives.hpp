@@ -54,6 +54,8 @@ class PlainPrimitives {
                           std::size_t width, const TextureMapping& mapping);
   bool tryAttribute(const std::string& attribute, const std::string& name,
                     const std::function<void()>& read);
+  void requireTriangle(const std::vector<std::uint32_t>& corners, std::size_t vertices,
+                       const std::string& name) const;
   void rewriteIndices(nlohmann::json& primitive, std::size_t vertices, const std::string& name);
   bool isNormalised(const nlohmann::json& accessor) const;
   std::size_t countElements(std::size_t accessor) const;

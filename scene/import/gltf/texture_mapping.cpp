@@ -62,28 +62,4 @@ TextureMapping readTextureMapping(const Json& gltf, std::size_t material) {
   return mapping;
 }
 
-void simplifyTextures(Json& gltf) {
-  const auto materials = gltf.find("materials");
-  if (materials != gltf.end() && materials->is_array()) {
-    for (Json& material : *materials) {
-      if (findBaseColourTexture(material) == nullptr) continue;
-      Json& texture = material["pbrMetallicRoughness"]["baseColorTexture"];
-      if (!texture.is_object()) continue;
-      texture.erase("texCoord");
-      if (texture.contains("extensions") && texture["extensions"].is_object())
-        texture["extensions"].erase(kTextureTransform);
-    }
-  }
-  const auto textures = gltf.find("textures");
-  if (textures == gltf.end() || !textures->is_array()) return;
-  for (Json& texture : *textures) {
-    if (!texture.is_object() || texture.contains("source")) continue;
-    for (const char* name : {"EXT_texture_webp", "KHR_texture_basisu", "EXT_texture_avif"}) {
-      const auto source =
-          readIndexMember(findMember(findMember(&texture, "extensions"), name), "source");
-      if (source && !texture.contains("source")) texture["source"] = *source;
-    }
-  }
-}
-
 }  // namespace enfilade::scene

@@ -23,8 +23,4 @@ struct TextureMapping {
 /// The mapping of the material's base colour texture.
 TextureMapping readTextureMapping(const nlohmann::json& gltf, std::size_t material);
 
-/// Removes the mappings that were applied to the coordinates of all primitives, and gives each
-/// texture without a PNG or JPEG image the image of EXT_texture_webp or KHR_texture_basisu.
-void simplifyTextures(nlohmann::json& gltf);
-
 }  // namespace enfilade::scene
