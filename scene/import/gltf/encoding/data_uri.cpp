@@ -2,8 +2,8 @@
 
 #include <algorithm>
 
-#include "scene/import/file/ascii.hpp"
 #include "scene/import/file/uri.hpp"
+#include "scene/model/ascii.hpp"
 
 namespace enfilade::scene {
 namespace {
