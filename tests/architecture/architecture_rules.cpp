@@ -399,7 +399,8 @@ Faults sourcesWithoutHeader(const Sources& sources) {
 Faults crowdedFolders(const Sources& sources, int maxFiles) {
   std::map<std::string, int> counts;
   for (const auto& [path, text] : sources)
-    if (isCode(path) && kMayInclude.count(folderOf(path)) != 0 && folderOf(path) != "assets")
+    if (endsWith(path, ".ts") || endsWith(path, ".py") ||
+        (isCode(path) && kMayInclude.count(folderOf(path)) != 0 && folderOf(path) != "assets"))
       ++counts[roomOf(path)];
   Faults faults;
   for (const auto& [room, count] : counts)

@@ -172,6 +172,8 @@ TEST(ArchitectureRules, ACrowdedFolderIsAFault) {
                         {"scene/model/README.md", ""}};
   EXPECT_EQ(crowdedFolders(sources, 2), Faults{"scene/model/: 3 sources"});
   EXPECT_EQ(crowdedFolders(sources, 3), Faults{});
+  EXPECT_EQ(crowdedFolders({{"server/page/src/a.ts", ""}, {"server/page/src/b.ts", ""}}, 1),
+            Faults{"server/page/src/: 2 sources"});
 }
 
 TEST(ArchitectureRules, AnOddWordIsAFault) {

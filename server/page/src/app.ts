@@ -1,15 +1,15 @@
 // The state that the parts of the page share, and the news by which they learn of changes.
-import { EntityTable } from "./entities";
+import { EntityTable } from "./world/entities";
 import {
   Role, type AvatarState, type Clock, type ContactEvent, type NavigationProgress, type Notice, type Replay, type State,
   type TickEvents, type Welcome,
 } from "./generated/enfilade_pb";
-import { SceneModel } from "./scene";
-import { parseScene, readEntities } from "./scene_file";
+import { SceneModel } from "./view/scene";
+import { parseScene, readEntities } from "./world/scene_file";
 import { Signal } from "./signal";
-import type { MakeSource, Trouble, WorldSource } from "./source";
-import { View } from "./view";
-import { WorldState } from "./world_state";
+import type { MakeSource, Trouble, WorldSource } from "./world/source";
+import { View } from "./view/view";
+import { WorldState } from "./world/world_state";
 
 export class App {
   readonly view = new View();

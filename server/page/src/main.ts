@@ -1,5 +1,5 @@
 // The page of a server: a live world, or a recording that the server plays.
-import { Connection } from "./connection";
+import { Connection } from "./world/connection";
 import { startPage } from "./page";
 
 const TOKEN_KEY = "enfilade token";

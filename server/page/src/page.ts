@@ -1,24 +1,24 @@
 // Puts the page together: of a live world, or of a recording in a file.
 import { App } from "./app";
-import { Avatars } from "./avatars";
-import { CameraRig } from "./camera_rig";
-import { Contacts } from "./contacts";
-import { button, element, isTyping, setText } from "./dom";
-import { Input } from "./input";
-import { MetricsPanel } from "./metrics";
-import { Minimap } from "./minimap";
-import { renderIds } from "./offscreen";
-import { makeHelp, makeTabs, makeToasts, makeTroubleDialog, type Tab } from "./panel";
-import { People } from "./people";
-import { Card, pick, rayThrough } from "./pick";
-import { readSharedView, shareLink } from "./share";
-import type { MakeSource } from "./source";
-import { proposeStarts } from "./start_place";
+import { Avatars } from "./view/avatars";
+import { CameraRig } from "./view/camera_rig";
+import { Contacts } from "./panels/contacts";
+import { button, element, isTyping, setText } from "./panels/dom";
+import { Input } from "./walk/input";
+import { MetricsPanel } from "./panels/metrics";
+import { Minimap } from "./panels/minimap";
+import { renderIds } from "./view/offscreen";
+import { makeHelp, makeTabs, makeToasts, makeTroubleDialog, type Tab } from "./panels/panel";
+import { People } from "./panels/people";
+import { Card, pick, rayThrough } from "./panels/pick";
+import { readSharedView, shareLink } from "./panels/share";
+import type { MakeSource } from "./world/source";
+import { proposeStarts } from "./walk/start_place";
 import "./style.css";
-import { Timeline } from "./timeline";
-import { Tree } from "./tree";
-import { NoWebGl } from "./view";
-import { Walk } from "./walk";
+import { Timeline } from "./panels/timeline";
+import { Tree } from "./panels/tree";
+import { NoWebGl } from "./view/view";
+import { Walk } from "./walk/walk";
 
 export interface PageOptions {
   makeSource: MakeSource;

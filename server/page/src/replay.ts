@@ -1,11 +1,11 @@
 // The page of a recording in one file. Its data are blocks in the file: base64, compressed by gzip.
 import type { App } from "./app";
-import { button, element } from "./dom";
-import { clockTime } from "./format";
+import { button, element } from "./panels/dom";
+import { clockTime } from "./panels/format";
 import { startPage } from "./page";
-import type { Tab } from "./panel";
-import { RecordedWorld, splitMessages } from "./recorded_world";
-import type { Timeline } from "./timeline";
+import type { Tab } from "./panels/panel";
+import { RecordedWorld, splitMessages } from "./world/recorded_world";
+import type { Timeline } from "./panels/timeline";
 
 interface Picture {
   avatar: string;

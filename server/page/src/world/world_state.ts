@@ -1,6 +1,6 @@
 // The states that the server sends, interpolated for display.
 import { Quaternion, Vector3 } from "three";
-import type { AvatarState, BodyState, State } from "./generated/enfilade_pb";
+import type { AvatarState, BodyState, State } from "../generated/enfilade_pb";
 
 const DELAY = 0.05; // seconds of wall-clock time: three ticks, so that a late message stalls nothing
 const KEPT_MILLISECONDS = 6; // less than a frame

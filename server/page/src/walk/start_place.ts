@@ -1,7 +1,7 @@
 // Start places: free places on the floor of rooms in the middle of the scene. Scenes differ, so the places are only
 // proposals; the server decides whether an avatar fits.
 import { Box3, Vector3 } from "three";
-import type { SceneModel } from "./scene";
+import type { SceneModel } from "../view/scene";
 
 export interface StartPlace {
   feet: Vector3;

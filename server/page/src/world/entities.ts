@@ -1,5 +1,5 @@
 // The table of entities: objects of the scene by id, with path, class, GlobalId and storey.
-import { Entity_Kind } from "./generated/enfilade_pb";
+import { Entity_Kind } from "../generated/enfilade_pb";
 import type { WorldSource } from "./source";
 
 export interface Entity {

@@ -1,7 +1,7 @@
 // The frame of the page: header, side panel with tabs, messages, and the dialog for troubles.
-import type { App } from "./app";
+import type { App } from "../app";
 import { button, element, setText } from "./dom";
-import type { Trouble } from "./source";
+import type { Trouble } from "../world/source";
 
 const TOAST_SECONDS = 6;
 

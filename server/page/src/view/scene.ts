@@ -5,11 +5,11 @@ import {
 } from "three";
 import type { GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshBVH, type HitPointInfo } from "three-mesh-bvh";
-import type { EntityTable } from "./entities";
+import type { EntityTable } from "../world/entities";
 import { drawnMaterial, EntityFlags } from "./entity_material";
-import type { Body } from "./generated/enfilade_pb";
-import { mergePieces, sortMeshes, type Piece } from "./scene_file";
-import { vector, type Pose } from "./world_state";
+import type { Body } from "../generated/enfilade_pb";
+import { mergePieces, sortMeshes, type Piece } from "../world/scene_file";
+import { vector, type Pose } from "../world/world_state";
 
 export interface Hit {
   entity: number;

@@ -1,7 +1,7 @@
 // The objects as a tree, by storey and class or by path, with search, hide, isolate and show all.
-import type { App } from "./app";
+import type { App } from "../app";
 import { button, element, setText } from "./dom";
-import type { Entity } from "./entities";
+import type { Entity } from "../world/entities";
 import { lastName, shortName } from "./format";
 
 const MAX_ROWS = 300; // children shown at once; more are shown on request

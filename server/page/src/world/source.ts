@@ -2,7 +2,7 @@
 import type { MessageInitShape } from "@bufbuild/protobuf";
 import type {
   ClientMessageSchema, ClockChange, ContactEvent, NavigationProgress, Replay, ServerMessage, State, TickEvents, Welcome,
-} from "./generated/enfilade_pb";
+} from "../generated/enfilade_pb";
 
 type RequestBody = NonNullable<MessageInitShape<typeof ClientMessageSchema>["body"]>;
 export type RequestName = Exclude<NonNullable<RequestBody["case"]>, "hello" | "bye">;

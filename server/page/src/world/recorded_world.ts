@@ -5,7 +5,7 @@ import {
   EntityNamesSchema, PairStateSchema, ReplaySchema, SeekReplySchema, ServerMessageSchema, SetClockReplySchema,
   StateSchema, StepReplySchema, SubscribeReplySchema, TouchingReplySchema, type ContactEvent, type State,
   type TickEvents, type Welcome,
-} from "./generated/enfilade_pb";
+} from "../generated/enfilade_pb";
 import type { CommandFields, Listener, ReplyOf, RequestFields, RequestName, WorldSource } from "./source";
 
 const LENGTHS = 8; // bytes before a message: total, header_length

@@ -3,10 +3,10 @@ import {
   CanvasTexture, Color, DynamicDrawUsage, InstancedMesh, Matrix4, Mesh, MeshBasicMaterial, MeshLambertMaterial,
   Quaternion, Sprite, SpriteMaterial, Vector3,
 } from "three";
-import type { App } from "./app";
+import type { App } from "../app";
 import type { CameraRig } from "./camera_rig";
 import { FIGURE_HEIGHT, figureGeometry, PRISM_RADIUS, prismGeometry } from "./figure";
-import type { AvatarPose } from "./world_state";
+import type { AvatarPose } from "../world/world_state";
 
 const NEAR_CAMERA = 1.6; // metres
 const MAX_LABELS = 16; // the nearest avatars

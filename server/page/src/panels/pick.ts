@@ -1,12 +1,12 @@
 // Picking: the object or avatar under a pixel, and the card that describes it.
 import { Vector2, Vector3 } from "three";
-import type { App } from "./app";
-import type { Avatars } from "./avatars";
-import type { CameraRig } from "./camera_rig";
+import type { App } from "../app";
+import type { Avatars } from "../view/avatars";
+import type { CameraRig } from "../view/camera_rig";
 import { button, element, setText } from "./dom";
 import { lastName, metres, shortName } from "./format";
-import { Verdict, type PairState } from "./generated/enfilade_pb";
-import type { Walk } from "./walk";
+import { Verdict, type PairState } from "../generated/enfilade_pb";
+import type { Walk } from "../walk/walk";
 
 const TOUCH_SECONDS = 1; // between questions for what touches the selected object
 const MAX_TOUCHING = 12;

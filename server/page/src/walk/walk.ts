@@ -1,11 +1,11 @@
 // The page's own avatar: its spawn, and the orders that keys and the minimap give.
 import { Vector3 } from "three";
-import type { App } from "./app";
-import type { CameraRig } from "./camera_rig";
-import { Clock_Mode, Notice_Kind, Role, type Notice } from "./generated/enfilade_pb";
+import type { App } from "../app";
+import type { CameraRig } from "../view/camera_rig";
+import { Clock_Mode, Notice_Kind, Role, type Notice } from "../generated/enfilade_pb";
 import type { Action, Input } from "./input";
 import { proposeStarts, type StartPlace } from "./start_place";
-import { plain, vector } from "./world_state";
+import { plain, vector } from "../world/world_state";
 
 const WALK_SPEED = 1.4; // metres per second, as the server's default
 const RUN_SPEED = 3.5;

@@ -1,10 +1,10 @@
 // The list of avatars: follow one, in first or third person.
-import type { App } from "./app";
-import { colorOf, type Avatars } from "./avatars";
-import type { CameraRig } from "./camera_rig";
+import type { App } from "../app";
+import { colorOf, type Avatars } from "../view/avatars";
+import type { CameraRig } from "../view/camera_rig";
 import { button, element } from "./dom";
-import type { AvatarState } from "./generated/enfilade_pb";
-import type { Walk } from "./walk";
+import type { AvatarState } from "../generated/enfilade_pb";
+import type { Walk } from "../walk/walk";
 
 const MAX_ROWS = 200;
 

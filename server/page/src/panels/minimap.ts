@@ -1,13 +1,13 @@
 // The plan of the storey: the scene from above, cut above the floor of the avatar or camera. Walls that are cut are
 // dark, because the inner sides of their triangles are visible there. A click walks there.
 import { DoubleSide, OrthographicCamera, ShaderMaterial, Vector3 } from "three";
-import type { App } from "./app";
-import { colorOf } from "./avatars";
-import type { CameraRig } from "./camera_rig";
+import type { App } from "../app";
+import { colorOf } from "../view/avatars";
+import type { CameraRig } from "../view/camera_rig";
 import { button, element } from "./dom";
-import { renderOffscreen } from "./offscreen";
-import type { Walk } from "./walk";
-import { vector } from "./world_state";
+import { renderOffscreen } from "../view/offscreen";
+import type { Walk } from "../walk/walk";
+import { vector } from "../world/world_state";
 
 const CUT_HEIGHT = 1.2; // metres above the floor
 const CUT_DEPTH = 2.2; // metres below the cut that are drawn

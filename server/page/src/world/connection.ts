@@ -1,7 +1,7 @@
 // The connection to the server: one world, typed requests, reconnection with back-off.
 import { createRegistry } from "@bufbuild/protobuf";
 import { connect, ConnectionFailed, schemasOf, ServerError, type Client } from "enfilade-client";
-import { file_enfilade } from "./generated/enfilade_pb";
+import { file_enfilade } from "../generated/enfilade_pb";
 import { fetchScene } from "./scene_file";
 import type { CommandFields, Listener, ReplyOf, RequestFields, RequestName, Trouble, WorldSource } from "./source";
 

@@ -1,8 +1,8 @@
 // The camera: free flight, the eyes of an avatar, or behind it.
 import { Euler, Vector3, type Box3 } from "three";
-import type { App } from "./app";
-import type { Input } from "./input";
-import type { AvatarPose } from "./world_state";
+import type { App } from "../app";
+import type { Input } from "../walk/input";
+import type { AvatarPose } from "../world/world_state";
 
 export type ViewMode = "free" | "first" | "third";
 

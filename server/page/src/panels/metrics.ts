@@ -1,5 +1,5 @@
 // Numbers of the server and of the page.
-import type { App } from "./app";
+import type { App } from "../app";
 import { element } from "./dom";
 import { metres } from "./format";
 

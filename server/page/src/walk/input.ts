@@ -1,5 +1,5 @@
 // Keys, mouse and touch as intentions: a direction of motion, a turn of the view, a pick, and actions.
-import { isTyping } from "./dom";
+import { isTyping } from "../panels/dom";
 
 const LOOK_PER_PIXEL = 0.0035; // radians
 const CLICK_PIXELS = 5; // a press that moves less is a click

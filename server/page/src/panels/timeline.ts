@@ -1,10 +1,10 @@
 // Time: play, pause, step, speed; for a recording a scrubber with its events, and take over.
-import type { App } from "./app";
+import type { App } from "../app";
 import { classOf, wordOf } from "./contacts";
 import { button, element, setText } from "./dom";
 import { clockTime, shortName } from "./format";
-import { Clock_Mode, ContactEvent_Kind as Kind, ContactEvent_Phase as Phase, type ContactEvent } from "./generated/enfilade_pb";
-import type { Walk } from "./walk";
+import { Clock_Mode, ContactEvent_Kind as Kind, ContactEvent_Phase as Phase, type ContactEvent } from "../generated/enfilade_pb";
+import type { Walk } from "../walk/walk";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 10];
 const SEEK_INTERVAL = 60; // milliseconds between seeks while the slider moves

@@ -1,6 +1,6 @@
 // The share link: camera and tick in the fragment of the address. A fragment never reaches the server's log.
 import { Vector3 } from "three";
-import type { CameraRig } from "./camera_rig";
+import type { CameraRig } from "../view/camera_rig";
 
 export interface SharedView {
   position: Vector3;

@@ -1,14 +1,14 @@
 // Contacts and near misses: a list by time, and markers around the avatar in focus.
 import { ArrowHelper, Group, Mesh, MeshBasicMaterial, SphereGeometry, Vector3, type Material } from "three";
-import type { App } from "./app";
-import type { CameraRig } from "./camera_rig";
+import type { App } from "../app";
+import type { CameraRig } from "../view/camera_rig";
 import { button, element, setText } from "./dom";
 import { clockTime, metres, shortName } from "./format";
 import {
   ContactEvent_Kind as Kind, ContactEvent_Phase as Phase, ContactEvent_Reason as Reason, Verdict, type ContactEvent,
   type PairState,
-} from "./generated/enfilade_pb";
-import { vector } from "./world_state";
+} from "../generated/enfilade_pb";
+import { vector } from "../world/world_state";
 
 const MAX_LISTED = 400;
 const MAX_ROWS = 120;
