@@ -1,7 +1,6 @@
 #include "server/messages/name_suggestions.hpp"
 
 #include <algorithm>
-#include <ranges>
 #include <span>
 #include <vector>
 
@@ -22,6 +21,14 @@ std::string findSimilarName(const std::string& typed, std::span<const std::strin
   return longer == names.end() ? "" : *longer;
 }
 
+template <class Named>
+std::vector<std::string> collectNames(const std::vector<Named>& all) {
+  std::vector<std::string> names;
+  for (const Named& one : std::span(all).first(std::min(kMaxCompared, all.size())))
+    names.push_back(one.name);
+  return names;
+}
+
 std::string suggestName(const std::string& typed, std::span<const std::string> names,
                         const std::string& what, const std::string& without) {
   if (names.empty()) return without;
@@ -29,7 +36,7 @@ std::string suggestName(const std::string& typed, std::span<const std::string> n
     return "; did you mean '" + similar + "'?";
   constexpr std::size_t kMaxListed = 5;
   std::string list;
-  for (const std::string& name : names | std::views::take(kMaxListed))
+  for (const std::string& name : names.first(std::min(kMaxListed, names.size())))
     list += (list.empty() ? "'" : ", '") + name + "'";
   return "; the " + what + " are " + list + (names.size() > kMaxListed ? ", ..." : "");
 }
@@ -38,18 +45,13 @@ std::string suggestName(const std::string& typed, std::span<const std::string> n
 
 std::string suggestAvatar(const scene::World& world, const std::string& name) {
   if (world.data().findAvatarByName(name)) return "";  // it has entered since
-  std::vector<std::string> names;
-  for (const scene::Avatar& avatar : world.data().avatars | std::views::take(kMaxCompared))
-    names.push_back(avatar.name);
-  return suggestName(name, names, "avatars", "; spawn it first");
+  return suggestName(name, collectNames(world.data().avatars), "avatars", "; spawn it first");
 }
 
 std::string suggestBody(const scene::World& world, const std::string& name) {
   if (world.data().findBodyByName(name)) return "";
-  std::vector<std::string> names;
-  for (const scene::BodySpec& body : world.scene().model().bodies | std::views::take(kMaxCompared))
-    names.push_back(body.name);
-  return suggestName(name, names, "bodies", "; the scene has no bodies");
+  return suggestName(name, collectNames(world.scene().model().bodies), "bodies",
+                     "; the scene has no bodies");
 }
 
 std::string suggestBodies(const scene::World& world, const v1::Command& command) {

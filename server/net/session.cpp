@@ -1,7 +1,8 @@
 #include "server/net/session.hpp"
 
+#include <algorithm>
 #include <boost/asio/post.hpp>
-#include <ranges>
+#include <span>
 #include <utility>
 
 #include "collision/assert.hpp"
@@ -33,7 +34,7 @@ std::string listWorlds(const WorldRegistry& worlds) {
   constexpr std::size_t kMaxListed = 10;
   const auto all = worlds.allWorlds();
   std::string list;
-  for (const auto& world : all | std::views::take(kMaxListed))
+  for (const auto& world : std::span(all).first(std::min(kMaxListed, all.size())))
     list += (list.empty() ? "'" : ", '") + world->identity().name + "'";
   return list + (all.size() > kMaxListed ? ", ..." : "");
 }

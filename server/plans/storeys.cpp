@@ -133,9 +133,8 @@ std::vector<double> findFloorHeights(const scene::Scene& scene, const std::vecto
   for (const double height : findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys))
     found.push_back(hasWallsAbove(scene, height) ? findIndoorFloor(scene, faces, height) : height);
   std::ranges::sort(found);
-  const auto same = std::ranges::unique(
-      found, [](double a, double b) { return std::abs(a - b) < kMinElevationRange; });
-  found.erase(same.begin(), same.end());
+  const auto isSame = [](double a, double b) { return std::abs(a - b) < kMinElevationRange; };
+  found.erase(std::unique(found.begin(), found.end(), isSame), found.end());
   return found;
 }
 
