@@ -439,7 +439,7 @@ TEST(GltfTextures, OnesWithoutAnImageThatIsReadAreReportedAsMissing) {
   file.json["meshes"][0]["primitives"][0]["material"] = 0;
   expectMissing(file, "materials[0]: its baseColorTexture has no image");
   file.json["textures"] = {{{"sampler", 0}}};
-  file.json["samplers"] = {Json::object()};
+  file.json["samplers"] = Json::array({Json::object()});
   expectMissing(file, "materials[0]: its baseColorTexture has no image");
   file.json["textures"] = {{{"source", 9}}};
   expectMissing(file, "materials[0]: its baseColorTexture has no image");
@@ -448,7 +448,7 @@ TEST(GltfTextures, OnesWithoutAnImageThatIsReadAreReportedAsMissing) {
 TEST(GltfTextures, AnEmissiveOneWithoutAnImageIsReportedAndDoesNotGlow) {
   const TemporaryFolder folder;
   GltfWriter file = tests::plainTerrace();
-  file.json["textures"] = {Json::object()};
+  file.json["textures"] = Json::array({Json::object()});
   file.json["materials"] = {{{"emissiveTexture", {{"index", 0}}}, {"emissiveFactor", {1, 1, 1}}}};
   file.json["meshes"][0]["primitives"][0]["material"] = 0;
   const Model model = importModel(folder.write("a.glb", file.glb()));
