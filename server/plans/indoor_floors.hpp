@@ -4,6 +4,7 @@
 #include <array>
 #include <span>
 
+#include "scene/world/data/scene.hpp"
 #include "server/plans/plan_image.hpp"
 
 namespace enfilade::server {
