@@ -128,11 +128,14 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
   return doors;
 }
 
+bool isLastOnLine(const std::vector<DoorOnPath>& doors, std::size_t index) {
+  return index + 1 == doors.size() || doors[index + 1].point != doors[index].point;
+}
+
 double computeOpeningSeconds(const std::vector<DoorOnPath>& doors) {
   double seconds = 0;
   for (std::size_t i = 0; i < doors.size(); ++i)
-    if (i + 1 == doors.size() || doors[i + 1].point != doors[i].point)
-      seconds += doors[i].secondsToOpen;
+    if (isLastOnLine(doors, i)) seconds += doors[i].secondsToOpen;
   return seconds;
 }
 

@@ -36,8 +36,10 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
                                         const Snapshot& snapshot, const NavigationAgent& agent,
                                         const std::vector<Vec3>& points);
 
-/// Seconds that a walk waits for the doors in all. Doors on one line, as the leaves of one, open
-/// together: the last one counts.
+/// False: the next door stands on the same line. Such doors, as the leaves of one, open together.
+bool isLastOnLine(const std::vector<DoorOnPath>& doors, std::size_t index);
+
+/// Seconds that a walk waits for the doors in all: of those on one line the last one counts.
 double computeOpeningSeconds(const std::vector<DoorOnPath>& doors);
 
 }  // namespace enfilade::scene

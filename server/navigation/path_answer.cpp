@@ -72,7 +72,7 @@ struct PathWriter {
       if (door.point < at || door.point >= end) continue;
       walkTo(door.point);
       // Doors on the same line, as the leaves of one, are legs without a length but for the last.
-      const bool isLast = i + 1 == doors.size() || doors[i + 1].point != door.point;
+      const bool isLast = scene::isLastOnLine(doors, i);
       const double length = isLast ? lengthOf(door.point, door.point + 1) : 0;
       addLeg(v1::NavigationLeg::KIND_DOOR, door.point, length,
              length / speed + (isLast ? door.secondsToOpen : 0), door.body, message);

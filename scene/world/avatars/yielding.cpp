@@ -61,6 +61,12 @@ double computeMinCosine(const GroundWalk& walk, const GroundWalk& other) {
   return walk.heading.dot(other.heading) > kSameDirectionCosine ? kAheadCosine : 2;
 }
 
+/// Metres between the boxes of two walkers, on the ground.
+double computeGap(const Avatar& a, const GroundWalk& walkOfA, const Avatar& b,
+                  const GroundWalk& walkOfB) {
+  return computeGroundDistance(a.footPosition, b.footPosition) - walkOfA.reach - walkOfB.reach;
+}
+
 /// Metres between the avatars if `avatar` must yield to `other`; otherwise infinite.
 double computeGapAhead(const Avatar& avatar, const GroundWalk& walk, const Avatar& other,
                        const GroundWalk& otherWalk) {
@@ -72,7 +78,7 @@ double computeGapAhead(const Avatar& avatar, const GroundWalk& walk, const Avata
   const double distanceOfOther = computeGroundDistance(other.footPosition, *walk.goal);
   const bool isCloser =
       distanceOfOther < walk.distance || (distanceOfOther == walk.distance && other.id < avatar.id);
-  return isCloser ? between - walk.reach - otherWalk.reach : kNone;
+  return isCloser ? computeGap(avatar, walk, other, otherWalk) : kNone;
 }
 
 /// Walks that wedge one another, as in the arch that a crowd forms in front of a door: one that
@@ -84,8 +90,7 @@ double computeGapToUnwedge(const Avatar& avatar, const GroundWalk& walk, const A
   if (!otherWalk.goal || walk.heading.dot(otherWalk.heading) < kOpposedCosine) return kNone;
   const bool isCloser = otherWalk.distance < walk.distance ||
                         (otherWalk.distance == walk.distance && other.id < avatar.id);
-  const double between = computeGroundDistance(avatar.footPosition, other.footPosition);
-  return isCloser ? between - walk.reach - otherWalk.reach : kNone;
+  return isCloser ? computeGap(avatar, walk, other, otherWalk) : kNone;
 }
 
 bool isStalled(const WorldSettings& settings, const Avatar& avatar) {
