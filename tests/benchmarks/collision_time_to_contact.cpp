@@ -3,6 +3,9 @@
 //
 //   collision_time_to_contact [--quick] [--out FILE]
 //
+// Also times of impact of thin bodies that pass through each other at a time that is no double,
+// compared with the exact time.
+//
 // Lin (1993, section 5.1) uses the closing speed of the closest points and the maximum acceleration
 // of any vertex. A bound is broken if the bodies provably meet before it. `rod` is a
 // counter-example to it: a rod along a wall rotates about its middle, which is closest and at rest.
@@ -14,6 +17,7 @@
 #include "collision/shapes/hull.hpp"
 #include "tests/benchmarks/building_workload.hpp"
 #include "tests/benchmarks/measurement.hpp"
+#include "tests/support/exact_crossing.hpp"
 
 namespace {
 
@@ -146,6 +150,50 @@ void measure(const char* motion, const std::vector<MovingPair>& pairs, Results& 
   printRow("ours: time of impact", impacts, pairs.size());
 }
 
+struct ThinKind {
+  const char* name;
+  int verticesA, verticesB;
+};
+
+/// Random thin bodies that translate past or through each other within 3 seconds.
+void measureCrossings(const ThinKind& kind, std::size_t count, Results& results) {
+  testing::Random random(6);
+  std::array<std::vector<Vec3>, 2> points;
+  std::vector<double> hits, misses;  ///< nanoseconds
+  std::size_t proved = 0, late = 0, falseHits = 0;
+  for (std::size_t k = 0; k < count; ++k) {
+    MovingBody a, b;
+    testing::makeThinPair(random, kind.verticesA, kind.verticesB, points, a, b);
+    const auto exact = testing::findFirstTime(a, b);
+    FeatureCache cache;
+    const auto start = Clock::now();
+    const MotionResult impact = computeTimeOfImpact(a, b, 3, cache);
+    const double ns = 1e9 * secondsSince(start);
+    const bool isContact = impact.outcome == MotionOutcome::contact;
+    if (!exact || *exact > 3) {
+      misses.push_back(ns);
+      falseHits += isContact;
+      continue;
+    }
+    hits.push_back(ns);
+    proved += isContact && mpq_class(impact.hi) >= *exact;
+    late += mpq_class(impact.lo) > *exact;
+  }
+  std::printf(
+      "crossing     %-22s | %5zu of %5zu hits proved, %zu late | %zu of %zu false | %9.0f ns\n",
+      kind.name, proved, hits.size(), late, falseHits, misses.size(), quantile(hits, 0.5));
+  results.add({{"bench", "crossing"},
+               {"kind", kind.name},
+               {"hits", hits.size()},
+               {"proved", proved},
+               {"late", late},
+               {"misses", misses.size()},
+               {"false", falseHits},
+               {"hit_ns", number(quantile(hits, 0.5))},
+               {"hit_p99_ns", number(quantile(hits, 0.99))},
+               {"miss_ns", number(quantile(misses, 0.5))}});
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -161,4 +209,8 @@ int main(int argc, char** argv) {
   measure("translation", some([&] { return flight(random, false); }), results);
   measure("turning", some([&] { return flight(random, true); }), results);
   measure("rod", some([&] { return rod(random); }), results);
+  for (const ThinKind& kind :
+       {ThinKind{"point, triangle", 1, 3}, ThinKind{"edge, edge", 2, 2},
+        ThinKind{"edge, triangle", 2, 3}, ThinKind{"triangle, triangle", 3, 3}})
+    measureCrossings(kind, 10 * count, results);
 }

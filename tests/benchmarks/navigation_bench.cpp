@@ -1,23 +1,31 @@
-// Benchmark of navigation: random pairs of places, the time of a path with its proof, and a check
-// by the world: an avatar walks each path that was found.
+// Benchmark of navigation: avatars go between random places as clients' avatars do, through closed
+// doors, by lifts and over edges; the time of a path with its proof; and its islands and lengths
+// against a flood fill.
 //
-//   navigation_bench [--quick] [--out FILE] SCENE..
+//   navigation_bench [--quick] [--pairs N] [--out FILE] SCENE[@METRES_PER_UNIT]..
 //
 // A path counts as wrong if its walk is blocked, leaves the scene or penetrates anything. FILE gets
 // a JSON line per scene.
 #include <algorithm>
+#include <array>
 #include <cstdio>
-#include <filesystem>
 #include <fstream>
-#include <map>
 #include <nlohmann/json.hpp>
+#include <optional>
+#include <random>
+#include <stdexcept>
 #include <string>
+#include <variant>
 #include <vector>
 
-#include "scene/import/import_model.hpp"
 #include "scene/import/import_worker.hpp"
-#include "scene/navigation/navigation.hpp"
+#include "scene/world/world.hpp"
 #include "server/base/load_scene.hpp"
+#include "server/messages/order_messages.hpp"
+#include "server/messages/world_messages.hpp"
+#include "server/navigation/go_order.hpp"
+#include "server/navigation/navigation_service.hpp"
+#include "tests/benchmarks/flood_fill.hpp"
 #include "tests/benchmarks/measurement.hpp"
 
 namespace {
@@ -26,34 +34,96 @@ using namespace enfilade;
 using namespace enfilade::benchmarks;
 using scene::Vec3;
 
-constexpr int kMaxTicks = 60 * 3600;  // an hour
+constexpr int kMaxTicks = 60 * 3600;           // an hour
+constexpr int kWalksOfWorld = 25;              // then doors and lifts are again as in the file
+constexpr std::size_t kMaxPlaces = 4'000'000;  // of a flood fill: 1,600 square metres
 
-struct Walked {
-  bool arrived = false;
-  double penetration = 0;
-  std::string text;
+struct Effort {
+  int pairs = 10'000;
+  int compared = 1000;  ///< pairs per kind that are compared with a flood fill
+  int lengths = 100;    ///< pairs of which lengths are compared
 };
 
-Walked walk(scene::World& world, int number, const scene::NavigationPath& path,
-            const scene::NavigationAgent& agent) {
+struct Bench {
+  std::shared_ptr<const scene::Scene> scene;
+  server::NavigationService service;
+  scene::World atRest;  ///< never ticks
+
+  v1::NavigationReply ask(const v1::NavigationQuery& query, const scene::World& world) {
+    std::vector<std::uint8_t> attachment;
+    const auto answer = service.answer(query, {world.snapshot(), world.settings()}, attachment);
+    if (const auto* error = std::get_if<v1::Error>(&answer))
+      throw std::runtime_error(error->message());
+    return std::get<v1::NavigationReply>(answer);
+  }
+
+  /// Places to stand, at most 10,000; of an island, or of those that are drawn from.
+  std::vector<Vec3> drawPlaces(int count, std::uint64_t seed, v1::NavigationQuery::Doors doors,
+                               std::optional<std::uint32_t> island = std::nullopt) {
+    v1::NavigationQuery query;
+    query.set_doors(doors);
+    query.mutable_random()->set_count(static_cast<std::uint32_t>(count));
+    query.mutable_random()->set_seed(seed);
+    if (island) query.mutable_random()->set_island(*island);
+    std::vector<Vec3> places;
+    const v1::NavigationReply reply = ask(query, atRest);
+    for (const v1::NavigationSpot& spot : reply.spots())
+      if (spot.found()) places.push_back(server::vectorFromProto(spot.at()));
+    return places;
+  }
+
+  v1::NavigationPath findPath(const Vec3& from, const Vec3& to, v1::NavigationQuery::Doors doors) {
+    v1::NavigationQuery query;
+    query.set_doors(doors);
+    *query.mutable_path()->mutable_from()->mutable_point() = server::toProto(from);
+    *query.mutable_path()->add_to()->mutable_point() = server::toProto(to);
+    return ask(query, atRest).paths(0);
+  }
+};
+
+struct Walked {
+  bool isFound = false, isArrived = false;
+  double penetration = 0;
+  std::string text;
+  bool hasDoors = false, hasLifts = false, hasDrops = false;  ///< on the path
+};
+
+/// The walk of an order Go. In a sixth of them the avatar may fall by up to 2 m.
+Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const Vec3& to) {
   const std::string name = "walker" + std::to_string(number);
   scene::Spawn spawn;
-  spawn.position = path.points.front();
-  spawn.radius = agent.radius;
-  spawn.height = agent.height;
+  spawn.position = from;
   submitAvatarCommand(world, {name, spawn, 0});
-  scene::Walk order;
-  order.waypoints.assign(path.points.begin() + 1, path.points.end());
-  order.speed = agent.speed;
-  if (const auto error = submitAvatarCommand(world, {name, order, 0})) return {false, 0, *error};
+  v1::Command command;
+  command.set_avatar(name);
+  *command.mutable_go()->mutable_to()->mutable_point() = server::toProto(to);
+  command.mutable_go()->set_doors(v1::NavigationQuery::DOORS_OPEN);
+  command.mutable_go()->set_lifts(true);
+  if (number % 6 == 0) command.mutable_go()->set_max_drop(2);
   Walked walked;
-  for (int tick = 0; tick < kMaxTicks && walked.text.empty(); ++tick) {
+  const auto query = server::makePathQuery(world, command);
+  const v1::NavigationReply reply = bench.ask(std::get<v1::NavigationQuery>(query), world);
+  for (const v1::NavigationLeg& leg : reply.paths(0).legs()) {
+    walked.hasDoors |= leg.kind() == v1::NavigationLeg::KIND_DOOR;
+    walked.hasLifts |= leg.kind() == v1::NavigationLeg::KIND_LIFT;
+    walked.hasDrops |= leg.kind() == v1::NavigationLeg::KIND_DROP;
+  }
+  const auto made = server::makeGoOrder(command, reply);
+  if (const auto* error = std::get_if<v1::Error>(&made)) {
+    walked.text = error->message();
+  } else {
+    walked.isFound = true;
+    auto order = server::commandFromProto(std::get<v1::Command>(made));
+    walked.text =
+        submitAvatarCommand(world, std::get<scene::Command>(std::move(order))).value_or("");
+  }
+  for (int tick = 0; tick < kMaxTicks && walked.text.empty() && !walked.isArrived; ++tick) {
     const scene::TickReport report = tickWorld(world);
     walked.penetration = std::max(walked.penetration, report.maxPenetration);
     for (const scene::Notice& notice : report.notices) {
       if (notice.avatar != name) continue;
       using Kind = scene::Notice::Kind;
-      if (notice.kind == Kind::arrived) walked = {true, walked.penetration, "arrived"};
+      walked.isArrived |= notice.kind == Kind::arrived;
       if (notice.kind == Kind::blocked || notice.kind == Kind::refused || notice.kind == Kind::left)
         walked.text = notice.text + " " + findEntityName(world, notice.obstacle);
     }
@@ -64,65 +134,161 @@ Walked walk(scene::World& world, int number, const scene::NavigationPath& path,
   return walked;
 }
 
-void measure(const std::string& file, int pairs, nlohmann::json& row) {
-  server::ModelOptions options;
-  options.file = file;
-  options.doors = scene::IfcDoors::open;
-  const auto scene = server::loadSceneTimed(options).scene;
-  const scene::WorldSettings settings;
-  const scene::NavigationAgent agent;
-  scene::Navigation navigation(scene, settings, agent);
-  scene::World world(scene, settings);
-  std::mt19937_64 random(1);
-  std::vector<double> seconds, foundSeconds, ratios;
-  std::map<std::string, int> reasons;
-  int found = 0, wrong = 0, sameIslandUnfound = 0;
-  double penetration = 0, metres = 0;
-  for (int i = 0; i < pairs; ++i) {
-    const auto from = navigation.findRandomPlace(random, {});
-    const auto to = navigation.findRandomPlace(random, {});
-    if (!from || !to) break;
-    const auto start = Clock::now();
-    const scene::NavigationPath path = navigation.findPath(*from, *to);
-    seconds.push_back(secondsSince(start));
-    if (!path.found()) {
-      ++reasons[path.reason];
-      if (navigation.islandOf(*from) == navigation.islandOf(*to)) ++sameIslandUnfound;
-      continue;
-    }
-    ++found;
-    foundSeconds.push_back(seconds.back());
-    metres += path.length;
-    const Walked walked = walk(world, i, path, agent);
+void measureWalks(Bench& bench, const Effort& effort, nlohmann::json& row) {
+  const auto starts = bench.drawPlaces(effort.pairs, 1, v1::NavigationQuery::DOORS_OPEN);
+  const auto goals = bench.drawPlaces(effort.pairs, 2, v1::NavigationQuery::DOORS_OPEN);
+  std::optional<scene::World> world;
+  int found = 0, wrong = 0, silent = 0, doors = 0, lifts = 0, drops = 0;
+  double penetration = 0;
+  const std::size_t pairs = std::min(starts.size(), goals.size());
+  for (std::size_t i = 0; i < pairs; ++i) {
+    if (i % kWalksOfWorld == 0 && (i == 0 || !bench.scene->model().bodies.empty()))
+      world.emplace(bench.scene);
+    const Walked walked = go(bench, *world, static_cast<int>(i), starts[i], goals[i]);
     penetration = std::max(penetration, walked.penetration);
-    if (walked.arrived && walked.penetration == 0) continue;
+    found += walked.isFound ? 1 : 0;
+    doors += walked.hasDoors ? 1 : 0;
+    lifts += walked.hasLifts ? 1 : 0;
+    drops += walked.hasDrops ? 1 : 0;
+    silent += !walked.isFound && walked.text.size() < 10 ? 1 : 0;
+    if (!walked.isFound || (walked.isArrived && walked.penetration == 0)) continue;
     if (++wrong <= 5)
-      std::printf("  wrong: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %s\n", from->x(),
-                  from->y(), from->z(), to->x(), to->y(), to->z(), walked.text.c_str());
+      std::printf("  wrong: pair %zu, (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %s\n", i,
+                  starts[i].x(), starts[i].y(), starts[i].z(), goals[i].x(), goals[i].y(),
+                  goals[i].z(), walked.text.c_str());
   }
-  const auto report = navigation.report();
-  row = {{"scene", std::filesystem::path(file).filename().string()},
-         {"build_seconds", report.seconds},
-         {"polygons", report.polygons},
-         {"area", report.area},
-         {"islands", report.islandAreas.size()},
-         {"megabytes", static_cast<double>(report.bytes) * 1e-6},
-         {"pairs", seconds.size()},
-         {"found", found},
-         {"wrong", wrong},
-         {"not_found_on_one_island", sameIslandUnfound},
-         {"mean_metres", found > 0 ? metres / found : 0},
-         {"max_penetration", penetration},
-         {"median_us", number(1e6 * quantile(foundSeconds, 0.5))},
-         {"p99_us", number(1e6 * quantile(foundSeconds, 0.99))},
-         {"all_p99_us", number(1e6 * quantile(seconds, 0.99))}};
-  std::printf("%s\n", row.dump().c_str());
-  std::vector<std::pair<int, std::string>> often;
-  for (const auto& [reason, count] : reasons) often.emplace_back(count, reason);
-  std::sort(often.rbegin(), often.rend());
-  for (std::size_t i = 0; i < std::min<std::size_t>(4, often.size()); ++i)
-    std::printf("  %d not found: %s\n", often[i].first, often[i].second.c_str());
-  std::fflush(stdout);
+  row["pairs"] = pairs;
+  row["found"] = found;
+  row["wrong"] = wrong;
+  row["without_reason"] = silent;
+  row["max_penetration"] = penetration;
+  row["walked_doors"] = doors;
+  row["walked_lifts"] = lifts;
+  row["walked_drops"] = drops;
+}
+
+void measureTimes(Bench& bench, const Effort& effort, nlohmann::json& row) {
+  const auto doors = v1::NavigationQuery::DOORS_AS_THEY_ARE;
+  const int count = std::min(effort.pairs, 2000);
+  const auto starts = bench.drawPlaces(count, 3, doors), goals = bench.drawPlaces(count, 4, doors);
+  std::vector<double> found, notFound;
+  for (std::size_t i = 0; i < std::min(starts.size(), goals.size()); ++i) {
+    const auto start = Clock::now();
+    const bool isFound = bench.findPath(starts[i], goals[i], doors).found();
+    (isFound ? found : notFound).push_back(1e6 * secondsSince(start));
+  }
+  row["median_us"] = number(quantile(found, 0.5));
+  row["p99_us"] = number(quantile(found, 0.99));
+  row["not_found_p99_us"] = number(quantile(notFound, 0.99));
+}
+
+/// Places on all islands, and among them any that the flood fill found.
+std::vector<Vec3> drawAnywhere(Bench& bench, int count) {
+  const auto doors = v1::NavigationQuery::DOORS_AS_THEY_ARE;
+  std::vector<Vec3> places = bench.drawPlaces(count, 5, doors);
+  v1::NavigationQuery query;
+  query.mutable_islands()->set_count(20);
+  const int islands = bench.ask(query, bench.atRest).islands_size();
+  for (int island = 0; island < islands; ++island)
+    for (const Vec3& place : bench.drawPlaces(count / 20, 6, doors, island))
+      places.push_back(place);
+  return places;
+}
+
+struct Comparison {
+  int compared = 0, skipped = 0;
+  int wrong = 0;
+  int nearWidth = 0;  ///< half a centimetre of the radius decides
+};
+
+/// Compares whether a path is found with whether the fill connects the pair. `fills`: for an agent
+/// 5 mm thinner, for the agent, and 5 mm wider.
+void comparePair(Bench& bench, const std::array<const FloodFill*, 3>& fills, const Vec3& from,
+                 const Vec3& to, Comparison& result) {
+  const auto& [narrow, same, wide] = fills;
+  const auto isConnected = [&](const FloodFill& fill) -> std::optional<bool> {
+    const auto a = fill.findComponent(from), b = fill.findComponent(to);
+    if (!a || !b) return std::nullopt;
+    if (a->number == b->number) return true;
+    if (!a->isWhole || !b->isWhole) return std::nullopt;
+    return false;
+  };
+  const auto expected = isConnected(*same);
+  if (!expected) {
+    ++result.skipped;
+    return;
+  }
+  ++result.compared;
+  const v1::NavigationPath path = bench.findPath(from, to, v1::NavigationQuery::DOORS_AS_THEY_ARE);
+  if (path.found() == *expected) return;
+  // A thinner avatar passes where a path was found, a wider one does not where none was.
+  if (isConnected(path.found() ? *narrow : *wide) != *expected) {
+    ++result.nearWidth;
+    return;
+  }
+  if (++result.wrong <= 5)
+    std::printf("  reach: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): path %d, fill %d: %s\n",
+                from.x(), from.y(), from.z(), to.x(), to.y(), to.z(), path.found(), *expected,
+                path.reason().c_str());
+}
+
+void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
+  const scene::NavigationAgent agent;
+  const std::vector<Vec3> places = drawAnywhere(bench, effort.compared);
+  const auto fillFor = [&](double wider) {
+    scene::NavigationAgent other = agent;
+    other.radius += wider;
+    return FloodFill(bench.atRest.data(), other, places, kMaxPlaces);
+  };
+  const FloodFill narrow = fillFor(-0.005), same = fillFor(0), wide = fillFor(0.005);
+  std::mt19937_64 random(7);
+  const auto any = [&](std::size_t count) { return static_cast<std::size_t>(random() % count); };
+  Comparison result;
+  std::vector<double> ratios;
+  for (int i = 0; i < 2 * effort.compared && !places.empty() && same.size() > 0; ++i) {
+    const bool isOfFill = i % 2 == 1;
+    const Vec3 from = isOfFill ? same.at(any(same.size())) : places[any(places.size())];
+    const Vec3 to = isOfFill ? same.at(any(same.size())) : places[any(places.size())];
+    comparePair(bench, {&narrow, &same, &wide}, from, to, result);
+    if (isOfFill || static_cast<int>(ratios.size()) >= effort.lengths) continue;
+    const v1::NavigationPath path =
+        bench.findPath(from, to, v1::NavigationQuery::DOORS_AS_THEY_ARE);
+    const auto shortest = path.found() ? same.measureShortest(from, to) : std::nullopt;
+    if (!shortest || *shortest < 1) continue;
+    ratios.push_back(path.length() / *shortest);
+    if (ratios.back() > 1.02)
+      std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f\n", from.x(),
+                  from.y(), from.z(), to.x(), to.y(), to.z(), ratios.back());
+  }
+  row["fill_places"] = same.size();
+  row["reach_compared"] = result.compared;
+  row["reach_skipped"] = result.skipped;
+  row["reach_near_width"] = result.nearWidth;
+  row["reach_wrong"] = result.wrong;
+  row["lengths"] = ratios.size();
+  row["length_median"] = number(quantile(ratios, 0.5));
+  row["length_max"] = number(quantile(ratios, 1));
+  row["length_above"] = std::ranges::count_if(ratios, [](double ratio) { return ratio > 1.02; });
+}
+
+nlohmann::json measure(const std::string& file, const Effort& effort) {
+  server::ModelOptions options;
+  options.file = file.substr(0, file.find('@'));
+  if (const auto at = file.find('@'); at != std::string::npos)
+    options.import.metresPerUnit = std::stod(file.substr(at + 1));
+  const auto scene = server::loadSceneTimed(options).scene;
+  Bench bench{scene, server::NavigationService(scene), scene::World(scene)};
+  nlohmann::json row = {{"scene", options.file.filename().string()}};
+  v1::NavigationQuery query;
+  query.mutable_islands()->set_count(1);
+  const v1::NavigationReply islands = bench.ask(query, bench.atRest);
+  row["build_seconds"] = islands.build_seconds();
+  row["area"] = islands.navigable_area();
+  row["islands"] = islands.island_areas_size();
+  measureTimes(bench, effort, row);
+  compareWithFill(bench, effort, row);
+  measureWalks(bench, effort, row);
+  return row;
 }
 
 }  // namespace
@@ -130,12 +296,14 @@ void measure(const std::string& file, int pairs, nlohmann::json& row) {
 int main(int argc, char** argv) {
   if (const auto status = scene::runImportWorker(argc, argv)) return *status;
   std::string out;
-  int pairs = 10'000;
+  Effort effort;
   std::vector<std::string> scenes;
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--quick") {
-      pairs = 200;
+      effort = {200, 100, 20};
+    } else if (argument == "--pairs" && i + 1 < argc) {
+      effort.pairs = std::atoi(argv[++i]);
     } else if (argument == "--out" && i + 1 < argc) {
       out = argv[++i];
     } else {
@@ -143,13 +311,15 @@ int main(int argc, char** argv) {
     }
   }
   if (scenes.empty()) {
-    std::fprintf(stderr, "usage: %s [--quick] [--out FILE] SCENE..\n", argv[0]);
+    std::fprintf(stderr, "usage: %s [--quick] [--pairs N] [--out FILE] SCENE[@METRES_PER_UNIT]..\n",
+                 argv[0]);
     return 2;
   }
   std::ofstream file(out);
   for (const std::string& name : scenes) {
-    nlohmann::json row;
-    measure(name, pairs, row);
-    if (!out.empty()) file << row.dump() << "\n";
+    const nlohmann::json row = measure(name, effort);
+    std::printf("%s\n", row.dump().c_str());
+    std::fflush(stdout);
+    if (!out.empty()) file << row.dump() << "\n" << std::flush;
   }
 }

@@ -8,114 +8,18 @@
 #include <array>
 #include <cmath>
 #include <optional>
-#include <set>
 
 #include "collision/motion/time_of_impact.hpp"
 #include "tests/collision/random_shapes.hpp"
+#include "tests/support/exact_crossing.hpp"
 
 namespace enfilade::collision {
 namespace {
 
 using namespace testing;
 
-Motion translate(const Vec3& velocity) {
-  return {velocity, Vec3::Zero(), Vec3::Zero()};
-}
-
 const std::vector<Vec3> kPoint{{0, 0, 0}};
 const std::vector<Vec3> kTriangle{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
-
-using ExactVec3 = std::array<mpq_class, 3>;
-
-ExactVec3 toExact(const Vec3& v) {
-  return {mpq_class(v.x()), mpq_class(v.y()), mpq_class(v.z())};
-}
-
-ExactVec3 operator-(const ExactVec3& a, const ExactVec3& b) {
-  return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
-}
-
-ExactVec3 cross(const ExactVec3& a, const ExactVec3& b) {
-  return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
-}
-
-mpq_class dot(const ExactVec3& a, const ExactVec3& b) {
-  return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-}
-
-ExactVec3 computeExactPosition(const Vec3& vertex, const Vec3& translation, const Vec3& velocity,
-                               const mpq_class& time) {
-  ExactVec3 at = toExact(vertex);
-  for (int k = 0; k < 3; ++k) at[k] += mpq_class(translation[k]) + mpq_class(velocity[k]) * time;
-  return at;
-}
-
-/// A body of one to three vertices that translates uniformly.
-struct ExactBody {
-  const MovingBody& body;
-
-  ExactVec3 at(std::size_t i, const mpq_class& time) const {
-    return computeExactPosition(body.body.vertices[i], body.body.translation, body.motion.velocity,
-                                time);
-  }
-  std::size_t size() const { return body.body.vertices.size(); }
-};
-
-/// Time at which det(u, v, q) vanishes, for a q that moves uniformly.
-std::optional<mpq_class> findZero(const mpq_class& atZero, const mpq_class& atOne) {
-  if (atZero == atOne) return std::nullopt;
-  return mpq_class(atZero / (atZero - atOne));
-}
-
-bool isInside(const ExactVec3& p, const std::array<ExactVec3, 3>& t, const ExactVec3& normal) {
-  for (int k = 0; k < 3; ++k)
-    if (dot(cross(t[(k + 1) % 3] - t[k], p - t[k]), normal) < 0) return false;
-  return true;
-}
-
-using Times = std::set<mpq_class>;
-
-void addVertexTimes(const ExactBody& triangle, const ExactBody& points, Times& times) {
-  if (triangle.size() < 3) return;
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    const auto cornersAt = [&](const mpq_class& time) {
-      return std::array{triangle.at(0, time), triangle.at(1, time), triangle.at(2, time)};
-    };
-    const auto start = cornersAt(0), end = cornersAt(1);
-    const ExactVec3 normal = cross(start[1] - start[0], start[2] - start[0]);
-    const auto time =
-        findZero(dot(points.at(i, 0) - start[0], normal), dot(points.at(i, 1) - end[0], normal));
-    if (time && *time >= 0 && isInside(points.at(i, *time), cornersAt(*time), normal))
-      times.insert(*time);
-  }
-}
-
-void addEdgeTimes(const ExactBody& a, const ExactBody& b, Times& times) {
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const std::size_t nextA = (i + 1) % a.size(), nextB = (j + 1) % b.size();
-      const ExactVec3 u = a.at(nextA, 0) - a.at(i, 0), v = b.at(nextB, 0) - b.at(j, 0);
-      const ExactVec3 normal = cross(u, v);
-      const auto time =
-          findZero(dot(b.at(j, 0) - a.at(i, 0), normal), dot(b.at(j, 1) - a.at(i, 1), normal));
-      if (!time || *time < 0) continue;
-      const ExactVec3 q = b.at(j, *time) - a.at(i, *time);
-      // a + s u = b + r v: s and r in 0..1.
-      const mpq_class size = dot(normal, normal);
-      const mpq_class s = dot(cross(q, v), normal) / size, r = dot(cross(q, u), normal) / size;
-      if (s >= 0 && s <= 1 && r >= 0 && r <= 1) times.insert(*time);
-    }
-  }
-}
-
-/// The exact first time at which bodies that are separated at time 0 meet.
-std::optional<mpq_class> findFirstTime(const MovingBody& a, const MovingBody& b) {
-  Times times;
-  addVertexTimes({a}, {b}, times);
-  addVertexTimes({b}, {a}, times);
-  if (a.body.vertices.size() > 1 && b.body.vertices.size() > 1) addEdgeTimes({a}, {b}, times);
-  return times.empty() ? std::nullopt : std::optional(*times.begin());
-}
 
 MotionResult findImpact(const MovingBody& a, const MovingBody& b, double horizon) {
   FeatureCache cache;
@@ -173,15 +77,6 @@ TEST(Crossing, EdgesThatMissByOneUlpAreNoContact) {
   const std::vector<Vec3> alongX{{-1, 0, 0}, {1, 0, 0}}, alongY{{0, 0x1p-56, 0}, {0, 1, 0}};
   const MovingBody a{{alongX, {0, 0, -1}}, translate({0, 0, 1.0 / 3})};
   EXPECT_EQ(findImpact(a, {{alongY}, {}}, 10).outcome, MotionOutcome::clear);
-}
-
-/// Two bodies of one to three vertices that approach each other.
-void makeThinPair(Random& random, int sizeA, int sizeB, std::array<std::vector<Vec3>, 2>& points,
-                  MovingBody& a, MovingBody& b) {
-  points = {randomPoints(random, sizeA, 0.5), randomPoints(random, sizeB, 0.5)};
-  const Vec3 start = randomPoint(random, 1).normalized() * uniform(random, 1.8, 4);
-  a = {{points[0], start}, translate(randomPoint(random, 0.4) - start)};
-  b = {{points[1], randomPoint(random, 0.1)}, translate(randomPoint(random, 0.2))};
 }
 
 TEST(Crossing, ThinBodiesMeetAtTheExactTime) {

@@ -1,0 +1,217 @@
+#include "tests/benchmarks/flood_fill.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <queue>
+#include <unordered_map>
+#include <utility>
+
+#include "scene/navigation/stand.hpp"
+#include "scene/world/data/scene.hpp"
+
+namespace enfilade::benchmarks {
+
+using scene::Vec3;
+
+namespace {
+
+constexpr std::array<std::pair<int, int>, 8> kNeighbours{
+    {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}};
+constexpr std::size_t kStraightNeighbours = 4;  // the first ones
+
+}  // namespace
+
+FloodFill::FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
+                     const std::vector<Vec3>& starts, std::size_t maxPlaces)
+    : stepHeight_(world.settings.stepHeight) {
+  const scene::Aabb bounds = world.scene->bounds();
+  corner_ = bounds.min - Vec3(1, 0, 1);
+  const Vec3 size = bounds.size() + Vec3(2, 0, 2);
+  width_ = static_cast<std::int32_t>(std::ceil(size.x() / kSpacing));
+  depth_ = static_cast<std::int32_t>(std::ceil(size.z() / kSpacing));
+  first_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(depth_), -1);
+  scene::Walker walker(world, agent);
+  std::int32_t component = 0;
+  for (const Vec3& start : starts) {
+    if (places_.size() >= maxPlaces) return;
+    const std::int32_t column = columnOf(start.x(), start.z());
+    if (column < 0 || findNearest(start) >= 0) continue;
+    const Vec3 centre = positionOf(add(column, start.y(), component));
+    const auto standing = stepTo(walker, centre, centre.x(), centre.z());
+    if (!standing) {
+      first_[static_cast<std::size_t>(column)] = places_.back().next;
+      places_.pop_back();
+      continue;
+    }
+    places_.back().height = static_cast<float>(standing->y());
+    fill(walker, static_cast<std::int32_t>(places_.size()) - 1, maxPlaces);
+    if (places_.size() >= maxPlaces) unfinished_ = component;
+    ++component;
+  }
+}
+
+std::int32_t FloodFill::columnOf(double x, double z) const {
+  const double column = std::floor((x - corner_.x()) / kSpacing);
+  const double row = std::floor((z - corner_.z()) / kSpacing);
+  if (!(column >= 1 && row >= 1 && column < width_ - 1 && row < depth_ - 1)) return -1;
+  return static_cast<std::int32_t>(row) * width_ + static_cast<std::int32_t>(column);
+}
+
+Vec3 FloodFill::positionOf(std::int32_t place) const {
+  const Place& at = places_[static_cast<std::size_t>(place)];
+  return {corner_.x() + (at.column % width_ + 0.5) * kSpacing, at.height,
+          corner_.z() + (at.column / width_ + 0.5) * kSpacing};
+}
+
+/// The place of a column that is within a step of `height`, and closest to it; -1: none.
+std::int32_t FloodFill::findPlace(std::int32_t column, double height) const {
+  std::int32_t best = -1;
+  double least = stepHeight_ + 2e-3;
+  for (std::int32_t at = first_[static_cast<std::size_t>(column)]; at >= 0;
+       at = places_[static_cast<std::size_t>(at)].next) {
+    const double difference = std::abs(places_[static_cast<std::size_t>(at)].height - height);
+    if (difference > least) continue;
+    least = difference;
+    best = at;
+  }
+  return best;
+}
+
+std::int32_t FloodFill::findNearest(const Vec3& point) const {
+  const std::int32_t column = columnOf(point.x(), point.z());
+  if (column < 0) return -1;
+  if (const std::int32_t here = findPlace(column, point.y()); here >= 0) return here;
+  std::int32_t best = -1;
+  double least = 0.03;
+  for (const auto& [dx, dz] : kNeighbours) {
+    const std::int32_t place = findPlace(column + dx + dz * width_, point.y());
+    if (place < 0) continue;
+    const Vec3 away = positionOf(place) - point;
+    const double distance = std::hypot(away.x(), away.z());
+    if (distance >= least) continue;
+    least = distance;
+    best = place;
+  }
+  return best;
+}
+
+std::int32_t FloodFill::add(std::int32_t column, double height, std::int32_t component) {
+  std::int32_t& first = first_[static_cast<std::size_t>(column)];
+  places_.push_back({column, static_cast<float>(height), component, first});
+  first = static_cast<std::int32_t>(places_.size()) - 1;
+  return first;
+}
+
+/// Where an avatar stands at (x, z) that comes from `from` over at most a step. It is put down a
+/// little above the floor, so that a low ceiling does not stop it, and higher where that fails.
+std::optional<Vec3> FloodFill::stepTo(scene::Walker& walker, const Vec3& from, double x,
+                                      double z) const {
+  for (const double lift : {2e-3, 0.03, 0.1, 0.5 * stepHeight_, stepHeight_}) {
+    const auto standing = scene::standAt(walker, {x, from.y() + lift, z}, lift + stepHeight_);
+    if (!standing) continue;
+    if (std::abs(standing->y() - from.y()) <= stepHeight_ + 1e-3) return standing;
+  }
+  return std::nullopt;
+}
+
+void FloodFill::fill(scene::Walker& walker, std::int32_t start, std::size_t maxPlaces) {
+  std::queue<std::int32_t> open;
+  open.push(start);
+  const std::int32_t component = places_[static_cast<std::size_t>(start)].component;
+  while (!open.empty() && places_.size() < maxPlaces) {
+    const Vec3 from = positionOf(open.front());
+    const std::int32_t column = places_[static_cast<std::size_t>(open.front())].column;
+    open.pop();
+    for (std::size_t k = 0; k < kStraightNeighbours; ++k) {
+      const auto [dx, dz] = kNeighbours[k];
+      const double x = from.x() + dx * kSpacing, z = from.z() + dz * kSpacing;
+      if (columnOf(x, z) < 0) continue;
+      const std::int32_t next = column + dx + dz * width_;
+      if (findPlace(next, from.y()) >= 0) continue;
+      if (const auto standing = stepTo(walker, from, x, z))
+        open.push(add(next, standing->y(), component));
+    }
+  }
+}
+
+std::optional<FloodFill::Component> FloodFill::findComponent(const Vec3& place) const {
+  const std::int32_t at = findNearest(place);
+  if (at < 0) return std::nullopt;
+  const std::int32_t number = places_[static_cast<std::size_t>(at)].component;
+  return Component{number, number != unfinished_};
+}
+
+/// A* over the filled places; with both ends, or empty.
+std::vector<std::int32_t> FloodFill::findWay(std::int32_t from, std::int32_t to) const {
+  struct Known {
+    double length;
+    std::int32_t before;
+  };
+  const Vec3 goal = positionOf(to);
+  std::unordered_map<std::int32_t, Known> known{{from, {0, -1}}};
+  using Entry = std::pair<double, std::int32_t>;  // length through the place, place
+  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  open.emplace((goal - positionOf(from)).norm(), from);
+  while (!open.empty() && open.top().second != to) {
+    const auto [through, at] = open.top();
+    open.pop();
+    const Vec3 here = positionOf(at);
+    const double length = known[at].length;
+    if (through > length + (goal - here).norm() + 1e-9) continue;  // a longer way to it
+    for (const auto& [dx, dz] : kNeighbours) {
+      const std::int32_t next =
+          findPlace(places_[static_cast<std::size_t>(at)].column + dx + dz * width_, here.y());
+      if (next < 0) continue;
+      const Vec3 there = positionOf(next);
+      const double longer = length + (there - here).norm();
+      const auto [entry, isNew] = known.try_emplace(next, Known{longer, at});
+      if (!isNew && entry->second.length <= longer) continue;
+      entry->second = {longer, at};
+      open.emplace(longer + (goal - there).norm(), next);
+    }
+  }
+  std::vector<std::int32_t> way;
+  if (open.empty()) return way;
+  for (std::int32_t at = to; at >= 0; at = known.at(at).before) way.push_back(at);
+  std::reverse(way.begin(), way.end());
+  return way;
+}
+
+bool FloodFill::isStraight(const Vec3& from, const Vec3& to) const {
+  const int count = std::max(1, static_cast<int>(std::ceil((to - from).norm() / (0.5 * kSpacing))));
+  double height = from.y();
+  for (int i = 0; i <= count; ++i) {
+    const Vec3 at = from + (to - from) * (static_cast<double>(i) / count);
+    const std::int32_t column = columnOf(at.x(), at.z());
+    const std::int32_t place = column < 0 ? -1 : findPlace(column, height);
+    if (place < 0) return false;
+    height = places_[static_cast<std::size_t>(place)].height;
+  }
+  return true;
+}
+
+std::optional<double> FloodFill::measureShortest(const Vec3& from, const Vec3& to) const {
+  const std::int32_t start = findNearest(from), goal = findNearest(to);
+  if (start < 0 || goal < 0) return std::nullopt;
+  const std::vector<std::int32_t> way = findWay(start, goal);
+  if (way.empty()) return std::nullopt;
+  std::vector<Vec3> points{from};
+  const std::size_t stride = std::max<std::size_t>(1, way.size() / 200);
+  for (std::size_t i = stride; i + 1 < way.size(); i += stride)
+    points.push_back(positionOf(way[i]));
+  points.push_back(to);
+  // The shortest chain of points of which neighbours see each other.
+  std::vector<double> best(points.size(), std::numeric_limits<double>::infinity());
+  best[0] = 0;
+  for (std::size_t j = 1; j < points.size(); ++j)
+    for (std::size_t i = j; i-- > 0;) {
+      const double length = best[i] + (points[j] - points[i]).norm();
+      if (length < best[j] && (i + 1 == j || isStraight(points[i], points[j]))) best[j] = length;
+    }
+  return best.back();
+}
+
+}  // namespace enfilade::benchmarks

@@ -1,0 +1,63 @@
+// Where an upright avatar comes to by steps of 2 cm, found without a navigation mesh: every place
+// of a grid is tried by standing there. The reference of the benchmark of navigation.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "scene/navigation/walker.hpp"
+
+namespace enfilade::benchmarks {
+
+class FloodFill {
+ public:
+  static constexpr double kSpacing = 0.02;  ///< metres between places
+
+  /// Fills from each of `starts`, until `maxPlaces` places are found.
+  FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
+            const std::vector<scene::Vec3>& starts, std::size_t maxPlaces);
+
+  std::size_t size() const { return places_.size(); }
+  scene::Vec3 at(std::size_t place) const { return positionOf(static_cast<std::int32_t>(place)); }
+
+  struct Component {
+    std::int32_t number = 0;
+    bool isWhole = true;  ///< the fill ended before `maxPlaces`
+  };
+  /// The connected places around a place to stand; nullopt: no place of the grid is within 3 cm.
+  std::optional<Component> findComponent(const scene::Vec3& place) const;
+
+  /// Length of the shortest way on the grid, pulled straight where all places below the straight
+  /// line are filled, metres. nullopt: there is none.
+  std::optional<double> measureShortest(const scene::Vec3& from, const scene::Vec3& to) const;
+
+ private:
+  struct Place {
+    std::int32_t column;  ///< of the grid
+    float height;         ///< metres
+    std::int32_t component;
+    std::int32_t next;  ///< another place of the column, or -1
+  };
+
+  std::int32_t columnOf(double x, double z) const;
+  scene::Vec3 positionOf(std::int32_t place) const;
+  std::int32_t findPlace(std::int32_t column, double height) const;
+  std::int32_t findNearest(const scene::Vec3& point) const;
+  std::int32_t add(std::int32_t column, double height, std::int32_t component);
+  std::optional<scene::Vec3> stepTo(scene::Walker& walker, const scene::Vec3& from, double x,
+                                    double z) const;
+  void fill(scene::Walker& walker, std::int32_t start, std::size_t maxPlaces);
+  std::vector<std::int32_t> findWay(std::int32_t from, std::int32_t to) const;
+  bool isStraight(const scene::Vec3& from, const scene::Vec3& to) const;
+
+  double stepHeight_;
+  scene::Vec3 corner_;
+  std::int32_t width_ = 0, depth_ = 0;
+  std::vector<std::int32_t> first_;  ///< by column: its first place, or -1
+  std::vector<Place> places_;
+  std::int32_t unfinished_ = -1;  ///< component
+};
+
+}  // namespace enfilade::benchmarks

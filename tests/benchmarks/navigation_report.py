@@ -1,0 +1,72 @@
+#!/usr/bin/env python3
+"""Makes the report of navigation: navigation.md.
+
+navigation_report.py RESULTS_FOLDER REPORT_FOLDER [--quick]
+
+Reads navigation.jsonl, as navigation_bench writes it.
+"""
+
+import datetime
+import sys
+from pathlib import Path
+
+from report import machine, read, short, table
+
+
+def walks(row):
+    return [row["scene"], f"{row['pairs']:,}", f"{row['found']:,}", row["wrong"], row["without_reason"],
+            short(row["max_penetration"]), row["walked_doors"], row["walked_lifts"], row["walked_drops"]]
+
+
+def fills(row):
+    return [row["scene"], f"{row['fill_places']:,}", row["reach_compared"], row["reach_wrong"],
+            row["reach_near_width"], row["reach_skipped"], row["lengths"], short(row["length_median"]),
+            f"{row['length_max']:.4f}" if row["length_max"] else "–", row["length_above"]]
+
+
+def times(row):
+    return [row["scene"], short(row["area"]), row["islands"], short(row["build_seconds"]),
+            short(row["median_us"]), short(row["p99_us"]), short(row["not_found_p99_us"])]
+
+
+def main():
+    results, report = Path(sys.argv[1]), Path(sys.argv[2])
+    rows = read(results, "navigation")
+    report.mkdir(parents=True, exist_ok=True)
+    (report / "navigation.md").write_text(f"""# Navigation: paths that are walked
+
+Made by `./dev bench navigation{" --quick" if "--quick" in sys.argv else ""}` on \
+{datetime.date.today().isoformat()}: {machine()}.
+An agent of 0.3 m radius and 1.75 m height.
+
+## Walks
+
+An avatar enters at a random place and goes to another one with the order `go`, which opens doors and rides
+lifts; in every sixth pair it may fall by up to 2 m. Doors and lifts are as in the file again after 25 walks. A walk is
+*wrong* if it is blocked, refused, leaves the scene or penetrates anything. *Silent*: no path and no reason.
+
+{table(["scene", "pairs", "paths", "wrong", "silent", "penetration m", "with doors", "with lifts",
+        "with drops"], [walks(row) for row in rows])}
+
+## Reach and length
+
+A flood fill tries every place of a grid of 2 cm by standing there (`flood_fill.hpp`): it uses no navigation
+mesh. A pair of places, drawn on all islands or anywhere in the fill, is *wrong* if a path is found and the fill
+does not connect it, or the other way round. *Near*: half a centimetre of radius decides. *Skipped*: an end is
+at no place of the fill, or the fill of a large scene ended at its limit. Lengths are those of paths as a share of the
+shortest way in the fill, pulled straight.
+
+{table(["scene", "places of the fill", "compared", "wrong", "near", "skipped", "lengths", "median share",
+        "largest", "above 1.02"], [fills(row) for row in rows])}
+
+## Time
+
+Of a query for a path, with its proof, doors as they are, answered in process on one thread.
+
+{table(["scene", "navigable m²", "islands", "build s", "µs a path, median", "99 %", "µs without a path, 99 %"],
+       [times(row) for row in rows])}
+""")
+
+
+if __name__ == "__main__":
+    main()
