@@ -130,10 +130,9 @@ void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, dou
     return number;
   };
   for (std::uint32_t number = 1; number < joinedTo.size(); ++number) {
-    if (!list.islands[number].isDrawn) continue;
     for (const IslandNeighbour& near : findNeighbours(mesh, list, number, reach, heightReach)) {
       const std::uint32_t a = findFirst(number), b = findFirst(near.number);
-      if (a == b || !list.islands[near.number].isDrawn || !isJoined(near.from, near.to)) continue;
+      if (a == b || !isJoined(near.from, near.to)) continue;
       joinedTo[std::max(a, b)] = std::min(a, b);
     }
   }

@@ -33,7 +33,7 @@ struct IslandList {
 /// `bounds`: of the scene.
 IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb& bounds);
 
-/// Makes one of islands that are drawn, close to each other, and joined. Portals of a mesh need
+/// Makes one of islands that are close to each other and joined. Portals of a mesh need
 /// some centimetres more than an agent, so a gap that it just passes separates them at first.
 /// `isJoined(from, to)`: an agent walks from one side of a gap to the other.
 void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,

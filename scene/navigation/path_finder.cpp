@@ -212,47 +212,36 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
   return path;
 }
 
-/// Finds what is in the way on the mesh for anything thinner and without bodies.
-void explain(const PathFinder& finder, const Vec3& from, const Vec3& to, NavigationPath& path) {
+/// The corners of a line on a mesh.
+struct Line {
+  std::vector<Vec3> corners;  ///< with the goal, without the start
+  std::vector<Vec3> middles;  ///< of its portals, with both ends
+};
+
+std::optional<Line> findUnobstructedLine(const PathFinder& finder, const Vec3& from,
+                                         const Vec3& to) {
   const NavigationMesh& mesh = finder.unobstructed();
   const Vec3 extent(2 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
                     2 * finder.agent.radius);
   const auto first = mesh.findNearest(from, extent);
   const auto last = mesh.findNearest(to, extent);
   const auto corridor = first && last ? mesh.findCorridor(*first, *last) : std::nullopt;
-  if (!corridor) {
-    path.reason = "no floor, step or stair leads there";
-    return;
-  }
-  std::vector<Vec3> corners = mesh.straighten(*corridor, first->point, last->point);
-  corners.push_back(to);
-  Vec3 at = from;
-  for (const Vec3& corner : corners) {
-    const auto place = standNear(finder.walker, corner);
-    if (!place) continue;
-    GridSearch search{kCoarseSpacing, 1, 20'000};
-    finder.walker.returnTo(at);
-    const WalkOutcome outcome = finder.walker.walkTo(*place);
-    if (outcome.kind == WalkOutcome::Kind::arrived ||
-        findGridPath(finder.walker, at, *place, search)) {
-      at = *place;
-      continue;
-    }
-    path.obstruction = Obstruction{outcome.obstacle, outcome.footPosition, 0};
-    std::vector<Vec3> middles{first->point};
-    for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
-      middles.push_back(mesh.portalMiddle(corridor->polygons[i - 1], corridor->polygons[i]));
-    middles.push_back(last->point);
-    const double width = measureNarrowest(finder.world, finder.agent, middles, outcome.footPosition,
-                                          kMaxWidthDistance)
-                             .clearWidth;
-    if (width < 2 * finder.agent.radius) path.obstruction->clearWidth = width;
-    break;
-  }
-  if (!path.obstruction) {
-    path.reason = "no way was found within the limits of the search";
-    return;
-  }
+  if (!corridor) return std::nullopt;
+  Line line{mesh.straighten(*corridor, first->point, last->point), {first->point}};
+  line.corners.push_back(to);
+  for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
+    line.middles.push_back(mesh.portalMiddle(corridor->polygons[i - 1], corridor->polygons[i]));
+  line.middles.push_back(last->point);
+  return line;
+}
+
+void explain(const PathFinder& finder, const Line& line, const WalkOutcome& stop,
+             NavigationPath& path) {
+  path.obstruction = Obstruction{stop.obstacle, stop.footPosition, 0};
+  const double width = measureNarrowest(finder.world, finder.agent, line.middles, stop.footPosition,
+                                        kMaxWidthDistance)
+                           .clearWidth;
+  if (width < 2 * finder.agent.radius) path.obstruction->clearWidth = width;
   const std::string name = finder.world.findEntityName(path.obstruction->entity);
   path.reason = (name.empty() ? std::string("the floor ends") : name + " is in the way");
   if (path.obstruction->clearWidth > 0) {
@@ -261,6 +250,46 @@ void explain(const PathFinder& finder, const Vec3& from, const Vec3& to, Navigat
                   path.obstruction->clearWidth, 2 * finder.agent.radius);
     path.reason += text.data();
   }
+}
+
+/// Walks along the line of the mesh for anything thinner and without bodies. Finds what is in the
+/// way, or, where the agent passes a place that is too narrow for its own meshes, the path.
+NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, const Vec3& to,
+                                    Proof& proof) {
+  NavigationPath path;
+  const std::optional<Line> line = findUnobstructedLine(finder, from, to);
+  if (!line) {
+    path.reason = "no floor, step or stair leads there";
+    if (!proof.met.empty()) path.obstruction = proof.met.front();
+    return path;
+  }
+  std::vector<Vec3> places{from};
+  finder.walker.takeCrossedSteps();
+  for (const Vec3& corner : line->corners) {
+    const auto place =
+        &corner == &line->corners.back() ? std::optional(to) : standNear(finder.walker, corner);
+    if (!place) continue;
+    GridSearch search{kCoarseSpacing, 1, 20'000};
+    finder.walker.returnTo(places.back());
+    const WalkOutcome outcome = finder.walker.walkTo(*place);
+    if (outcome.kind == WalkOutcome::Kind::arrived) {
+      places.push_back(finder.walker.footPosition());
+      continue;
+    }
+    const auto around = findGridPath(finder.walker, places.back(), *place, search);
+    if (!around) {
+      explain(finder, *line, outcome, path);
+      return path;
+    }
+    places.insert(places.end(), around->begin() + 1, around->end());
+  }
+  path.points = shortenPath(finder.walker, places, Shortcuts::all);
+  path.length = computeLength(path.points);
+  if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof)) return path;
+  path = {};
+  path.obstruction = proof.met.back();
+  path.reason = "no way was found within the limits of the search";
+  return path;
 }
 
 }  // namespace
@@ -291,11 +320,8 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
     NavigationPath other = findPathOn(finder, finder.scarce, Clearance::scarce, start, goal, proof);
     if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
   }
-  if (!best.found() && finder.unobstructed) {
-    if (!proof.met.empty()) best.obstruction = proof.met.front();
-    explain(finder, start, goal, best);
-  }
-  return best;
+  if (best.found() || !finder.unobstructed) return best;
+  return findUnobstructedPath(finder, start, goal, proof);
 }
 
 }  // namespace enfilade::scene

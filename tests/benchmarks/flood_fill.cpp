@@ -21,6 +21,8 @@ namespace {
 constexpr std::array<std::pair<int, int>, 8> kNeighbours{
     {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}};
 constexpr std::size_t kStraightNeighbours = 4;  // the first ones
+constexpr double kEvenFloor = 0.01;             // metres between the heights of two places
+constexpr double kLift = FloodFill::kLift;
 
 }  // namespace
 
@@ -106,13 +108,22 @@ std::int32_t FloodFill::add(std::int32_t column, double height, std::int32_t com
 }
 
 /// Where an avatar stands at (x, z) that comes from `from` over at most a step. It is put down a
-/// little above the floor, so that a low ceiling does not stop it, and higher where that fails.
+/// little above the floor, so that a low ceiling does not stop it, and higher where that fails. Up
+/// or down a step it must also walk there.
 std::optional<Vec3> FloodFill::stepTo(scene::Walker& walker, const Vec3& from, double x,
                                       double z) const {
-  for (const double lift : {2e-3, 0.03, 0.1, 0.5 * stepHeight_, stepHeight_}) {
+  for (const double lift : {kLift, 0.03, 0.1, 0.5 * stepHeight_, stepHeight_}) {
     const auto standing = scene::standAt(walker, {x, from.y() + lift, z}, lift + stepHeight_);
     if (!standing) continue;
-    if (std::abs(standing->y() - from.y()) <= stepHeight_ + 1e-3) return standing;
+    const double climb = std::abs(standing->y() - from.y());
+    if (climb > stepHeight_ + 1e-3) continue;
+    // As a place of its own: not one that only a fall beside something leads to.
+    if (!scene::standAt(walker, *standing + Vec3(0, kLift, 0), stepHeight_)) continue;
+    if (climb < kEvenFloor) return standing;
+    walker.returnTo(from);
+    const bool isWalked = walker.walkTo(*standing).kind == scene::WalkOutcome::Kind::arrived &&
+                          std::abs(walker.footPosition().y() - standing->y()) < kEvenFloor;
+    return isWalked ? standing : std::nullopt;
   }
   return std::nullopt;
 }

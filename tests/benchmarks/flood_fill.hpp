@@ -14,8 +14,10 @@ namespace enfilade::benchmarks {
 class FloodFill {
  public:
   static constexpr double kSpacing = 0.02;  ///< metres between places
+  static constexpr double kLift = 2e-3;  ///< metres above a place: an avatar can be put down there
 
-  /// Fills from each of `starts`, until `maxPlaces` places are found.
+  /// Fills from each of `starts` that is not filled yet, until `maxPlaces` places are found. A
+  /// place that can be left but not reached again is in the component of its start.
   FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
             const std::vector<scene::Vec3>& starts, std::size_t maxPlaces);
 

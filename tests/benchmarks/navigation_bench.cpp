@@ -35,6 +35,7 @@ using namespace enfilade::benchmarks;
 using scene::Vec3;
 
 constexpr int kMaxTicks = 60 * 3600;           // an hour
+constexpr double kNearWidth = 0.005;           // metres of radius
 constexpr int kWalksOfWorld = 25;              // then doors and lifts are again as in the file
 constexpr std::size_t kMaxPlaces = 4'000'000;  // of a flood fill: 1,600 square metres
 
@@ -70,6 +71,19 @@ struct Bench {
     for (const v1::NavigationSpot& spot : reply.spots())
       if (spot.found()) places.push_back(server::vectorFromProto(spot.at()));
     return places;
+  }
+
+  /// nullopt: on none.
+  std::array<std::optional<std::uint32_t>, 2> findIslands(const std::array<Vec3, 2>& places) {
+    v1::NavigationQuery query;
+    query.set_doors(v1::NavigationQuery::DOORS_AS_THEY_ARE);
+    for (const Vec3& place : places) *query.mutable_snap()->add_points() = server::toProto(place);
+    const v1::NavigationReply reply = ask(query, atRest);
+    std::array<std::optional<std::uint32_t>, 2> islands;
+    for (int i = 0; i < 2; ++i)
+      if (reply.spots(i).has_island())
+        islands[static_cast<std::size_t>(i)] = reply.spots(i).island();
+    return islands;
   }
 
   v1::NavigationPath findPath(const Vec3& from, const Vec3& to, v1::NavigationQuery::Doors doors) {
@@ -198,73 +212,103 @@ std::vector<Vec3> drawAnywhere(Bench& bench, int count) {
 struct Comparison {
   int compared = 0, skipped = 0;
   int wrong = 0;
-  int nearWidth = 0;  ///< half a centimetre of the radius decides
+  int nearWidth = 0;     ///< half a centimetre of the radius decides
+  int islandsWrong = 0;  ///< a path is found between two islands, or none on one
 };
 
-/// Compares whether a path is found with whether the fill connects the pair. `fills`: for an agent
-/// 5 mm thinner, for the agent, and 5 mm wider.
-void comparePair(Bench& bench, const std::array<const FloodFill*, 3>& fills, const Vec3& from,
-                 const Vec3& to, Comparison& result) {
-  const auto& [narrow, same, wide] = fills;
-  const auto isConnected = [&](const FloodFill& fill) -> std::optional<bool> {
-    const auto a = fill.findComponent(from), b = fill.findComponent(to);
-    if (!a || !b) return std::nullopt;
-    if (a->number == b->number) return true;
-    if (!a->isWhole || !b->isWhole) return std::nullopt;
-    return false;
-  };
-  const auto expected = isConnected(*same);
+/// Whether a fill connects two places; nullopt: not known.
+std::optional<bool> isConnected(const FloodFill& fill, const Vec3& from, const Vec3& to) {
+  const auto a = fill.findComponent(from), b = fill.findComponent(to);
+  if (!a || !b) return std::nullopt;
+  if (a->number == b->number) return true;
+  if (!a->isWhole || !b->isWhole) return std::nullopt;
+  return false;
+}
+
+/// A pair of places for which a path is found and the fill does not connect them, or the other way
+/// round.
+struct Disagreement {
+  Vec3 from, to;
+  bool isFound;
+  std::string reason;
+};
+
+void comparePair(Bench& bench, const FloodFill& fill, const Vec3& from, const Vec3& to,
+                 Comparison& result, std::vector<Disagreement>& disagreements) {
+  const auto expected = isConnected(fill, from, to);
   if (!expected) {
     ++result.skipped;
     return;
   }
   ++result.compared;
   const v1::NavigationPath path = bench.findPath(from, to, v1::NavigationQuery::DOORS_AS_THEY_ARE);
-  if (path.found() == *expected) return;
-  // A thinner avatar passes where a path was found, a wider one does not where none was.
-  if (isConnected(path.found() ? *narrow : *wide) != *expected) {
-    ++result.nearWidth;
-    return;
+  const auto islands = bench.findIslands({from, to});
+  const bool isOneIsland = islands[0] == islands[1];
+  if (islands[0] && islands[1] && path.found() != isOneIsland && ++result.islandsWrong <= 5)
+    std::printf("  islands: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): path %d\n", from.x(),
+                from.y(), from.z(), to.x(), to.y(), to.z(), path.found());
+  if (path.found() != *expected) disagreements.push_back({from, to, path.found(), path.reason()});
+}
+
+/// Counts disagreements. Components have no direction, but an avatar may get down where it does not
+/// get up: the fill of the start alone decides. A thinner avatar passes where a path was found, a
+/// wider one does not where none was: then half a centimetre decides.
+void judge(const Bench& bench, const std::vector<Vec3>& places,
+           const std::vector<Disagreement>& disagreements, Comparison& result) {
+  std::array<std::optional<FloodFill>, 2> others;  // for thinner avatars, and for wider ones
+  for (const auto& [from, to, isFound, reason] : disagreements) {
+    const FloodFill onward(bench.atRest.data(), {}, {from}, kMaxPlaces);
+    if (onward.findComponent(to).has_value() == isFound) continue;
+    auto& other = others[isFound ? 0 : 1];
+    if (!other) {
+      scene::NavigationAgent agent;
+      agent.radius += isFound ? -kNearWidth : kNearWidth;
+      other.emplace(bench.atRest.data(), agent, places, kMaxPlaces);
+    }
+    if (isConnected(*other, from, to) != !isFound) {
+      ++result.nearWidth;
+      continue;
+    }
+    if (++result.wrong <= 5)
+      std::printf("  reach: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): path %d: %s\n",
+                  from.x(), from.y(), from.z(), to.x(), to.y(), to.z(), isFound, reason.c_str());
   }
-  if (++result.wrong <= 5)
-    std::printf("  reach: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): path %d, fill %d: %s\n",
-                from.x(), from.y(), from.z(), to.x(), to.y(), to.z(), path.found(), *expected,
-                path.reason().c_str());
 }
 
 void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
-  const scene::NavigationAgent agent;
   const std::vector<Vec3> places = drawAnywhere(bench, effort.compared);
-  const auto fillFor = [&](double wider) {
-    scene::NavigationAgent other = agent;
-    other.radius += wider;
-    return FloodFill(bench.atRest.data(), other, places, kMaxPlaces);
-  };
-  const FloodFill narrow = fillFor(-0.005), same = fillFor(0), wide = fillFor(0.005);
+  const FloodFill fill(bench.atRest.data(), {}, places, kMaxPlaces);
   std::mt19937_64 random(7);
   const auto any = [&](std::size_t count) { return static_cast<std::size_t>(random() % count); };
   Comparison result;
+  std::vector<Disagreement> disagreements;
   std::vector<double> ratios;
-  for (int i = 0; i < 2 * effort.compared && !places.empty() && same.size() > 0; ++i) {
+  for (int i = 0; i < 2 * effort.compared && !places.empty() && fill.size() > 0; ++i) {
     const bool isOfFill = i % 2 == 1;
-    const Vec3 from = isOfFill ? same.at(any(same.size())) : places[any(places.size())];
-    const Vec3 to = isOfFill ? same.at(any(same.size())) : places[any(places.size())];
-    comparePair(bench, {&narrow, &same, &wide}, from, to, result);
+    // Places of the fill are kept in single precision: a little above the floor.
+    const auto draw = [&] {
+      return isOfFill ? Vec3(fill.at(any(fill.size())) + Vec3(0, FloodFill::kLift, 0))
+                      : places[any(places.size())];
+    };
+    const Vec3 from = draw(), to = draw();
+    comparePair(bench, fill, from, to, result, disagreements);
     if (isOfFill || static_cast<int>(ratios.size()) >= effort.lengths) continue;
     const v1::NavigationPath path =
         bench.findPath(from, to, v1::NavigationQuery::DOORS_AS_THEY_ARE);
-    const auto shortest = path.found() ? same.measureShortest(from, to) : std::nullopt;
+    const auto shortest = path.found() ? fill.measureShortest(from, to) : std::nullopt;
     if (!shortest || *shortest < 1) continue;
     ratios.push_back(path.length() / *shortest);
     if (ratios.back() > 1.02)
       std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f\n", from.x(),
                   from.y(), from.z(), to.x(), to.y(), to.z(), ratios.back());
   }
-  row["fill_places"] = same.size();
+  judge(bench, places, disagreements, result);
+  row["fill_places"] = fill.size();
   row["reach_compared"] = result.compared;
   row["reach_skipped"] = result.skipped;
   row["reach_near_width"] = result.nearWidth;
   row["reach_wrong"] = result.wrong;
+  row["islands_wrong"] = result.islandsWrong;
   row["lengths"] = ratios.size();
   row["length_median"] = number(quantile(ratios, 0.5));
   row["length_max"] = number(quantile(ratios, 1));

@@ -20,7 +20,7 @@ def walks(row):
 
 def fills(row):
     return [row["scene"], f"{row['fill_places']:,}", row["reach_compared"], row["reach_wrong"],
-            row["reach_near_width"], row["reach_skipped"], row["lengths"], short(row["length_median"]),
+            row["reach_near_width"], row["reach_skipped"], row["islands_wrong"], row["lengths"], short(row["length_median"]),
             f"{row['length_max']:.4f}" if row["length_max"] else "–", row["length_above"]]
 
 
@@ -53,10 +53,11 @@ lifts; in every sixth pair it may fall by up to 2 m. Doors and lifts are as in t
 A flood fill tries every place of a grid of 2 cm by standing there (`flood_fill.hpp`): it uses no navigation
 mesh. A pair of places, drawn on all islands or anywhere in the fill, is *wrong* if a path is found and the fill
 does not connect it, or the other way round. *Near*: half a centimetre of radius decides. *Skipped*: an end is
-at no place of the fill, or the fill of a large scene ended at its limit. Lengths are those of paths as a share of the
+at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: a path is
+found between two islands, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight.
 
-{table(["scene", "places of the fill", "compared", "wrong", "near", "skipped", "lengths", "median share",
+{table(["scene", "places of the fill", "compared", "wrong", "near", "skipped", "islands", "lengths", "median share",
         "largest", "above 1.02"], [fills(row) for row in rows])}
 
 ## Time

@@ -323,7 +323,7 @@ Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) con
   Float3 point{};
   dtRandomPointInConvexPoly(corners.data(), polygon->vertCount, areas.data(), static_cast<float>(s),
                             static_cast<float>(t), point.data());
-  return toVec3(point.data());
+  return closestPoint(index, toVec3(point.data()));
 }
 
 std::vector<Vec3> NavigationMesh::corners(std::uint32_t index) const {

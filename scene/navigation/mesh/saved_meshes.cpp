@@ -14,7 +14,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::string_view kMagic = "EnfMesh2";
+constexpr std::string_view kMagic = "EnfMesh3";
 constexpr std::size_t kWordBytes = 8;
 constexpr int kMaxCount = 1 << 22;  // of anything in a tile
 

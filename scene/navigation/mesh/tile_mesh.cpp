@@ -25,6 +25,7 @@ constexpr double kMaxColumns = 1e8;     // of cells: a quarter of a square kilom
 constexpr double kCellRounding = 1e-6;  // of a number of cells
 constexpr float kMaxContourError = 1.0f;  // cells
 constexpr int kMinRegionCells = 8, kMergeRegionCells = 400;
+constexpr float kHeightSpacing = 0.5f, kMaxHeightError = 0.1f;  // metres, of the detail mesh
 /// Meshes with more triangles are searched by their trees, not triangle by triangle.
 constexpr std::size_t kMaxListedTriangles = 512;
 
@@ -39,6 +40,13 @@ using Heightfield = std::unique_ptr<rcHeightfield, FreeBy<rcFreeHeightField>>;
 using CompactHeightfield = std::unique_ptr<rcCompactHeightfield, FreeBy<rcFreeCompactHeightfield>>;
 using ContourSet = std::unique_ptr<rcContourSet, FreeBy<rcFreeContourSet>>;
 using PolyMesh = std::unique_ptr<rcPolyMesh, FreeBy<rcFreePolyMesh>>;
+using DetailMesh = std::unique_ptr<rcPolyMeshDetail, FreeBy<rcFreePolyMeshDetail>>;
+
+/// Polygons are flat in plan alone; the detail mesh has the heights of the floor within them.
+struct Polygons {
+  PolyMesh flat;
+  DetailMesh heights;
+};
 
 /// Sizes in cells.
 struct CellSizes {
@@ -101,7 +109,7 @@ Heightfield rasterize(TileBuild& build, const std::vector<float>& triangles) {
   return field;
 }
 
-PolyMesh buildPolygons(TileBuild& build, rcHeightfield& field, const CellSizes& sizes) {
+Polygons buildPolygons(TileBuild& build, rcHeightfield& field, const CellSizes& sizes) {
   rcContext* context = &build.context;
   CompactHeightfield compact(rcAllocCompactHeightfield());
   build.require(
@@ -119,7 +127,11 @@ PolyMesh buildPolygons(TileBuild& build, rcHeightfield& field, const CellSizes& 
   PolyMesh polygons(rcAllocPolyMesh());
   build.require(polygons && rcBuildPolyMesh(context, *contours, DT_VERTS_PER_POLYGON, *polygons),
                 "the polygons");
-  return polygons;
+  DetailMesh heights(rcAllocPolyMeshDetail());
+  build.require(heights && rcBuildPolyMeshDetail(context, *polygons, *compact, kHeightSpacing,
+                                                 kMaxHeightError, *heights),
+                "the heights");
+  return {std::move(polygons), std::move(heights)};
 }
 
 /// Whether nothing solid is above the floor of a polygon at a place. The polygon is flat: the floor
@@ -158,7 +170,8 @@ void setFlags(const rcHeightfield& field, rcPolyMesh& mesh) {
   }
 }
 
-std::vector<std::uint8_t> serialize(TileBuild& build, rcPolyMesh& mesh) {
+std::vector<std::uint8_t> serialize(TileBuild& build, const Polygons& polygons) {
+  const rcPolyMesh& mesh = *polygons.flat;
   if (mesh.npolys == 0) return {};
   dtNavMeshCreateParams params{};
   params.verts = mesh.verts;
@@ -168,6 +181,11 @@ std::vector<std::uint8_t> serialize(TileBuild& build, rcPolyMesh& mesh) {
   params.polyAreas = mesh.areas;
   params.polyCount = mesh.npolys;
   params.nvp = mesh.nvp;
+  params.detailMeshes = polygons.heights->meshes;
+  params.detailVerts = polygons.heights->verts;
+  params.detailVertsCount = polygons.heights->nverts;
+  params.detailTris = polygons.heights->tris;
+  params.detailTriCount = polygons.heights->ntris;
   params.tileX = build.tileX;
   params.tileY = build.tileZ;
   std::copy_n(mesh.bmin, 3, params.bmin);
@@ -302,9 +320,9 @@ std::vector<TileMesh> buildTileMeshes(const WorldData& world, const NavigationAg
     if (clearances[i] == Clearance::ample)
       rcFilterLedgeSpans(&build.context, sizes.height, sizes.climb, *field);
     rcFilterWalkableLowHeightSpans(&build.context, sizes.height, *field);
-    const PolyMesh polygons = buildPolygons(build, *field, sizes);
-    setFlags(*field, *polygons);
-    tiles[i] = serialize(build, *polygons);
+    const Polygons polygons = buildPolygons(build, *field, sizes);
+    setFlags(*field, *polygons.flat);
+    tiles[i] = serialize(build, polygons);
   }
   return tiles;
 }
