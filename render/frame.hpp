@@ -49,6 +49,7 @@ struct FrameOptions {
 
 /// A frame to render.
 struct View {
+  const scene::Snapshot* snapshot = nullptr;  ///< required
   Camera camera;
   FrameOptions options;
 };

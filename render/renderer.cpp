@@ -16,6 +16,7 @@ std::size_t countSamplesPerPass(const Camera& camera, std::size_t samples) {
 }
 
 void validateView(const View& view) {
+  if (!view.snapshot) throw RenderError("Renderer::render: no snapshot");
   if (const auto error = validateCamera(view.camera)) throw RenderError(*error);
   if (!isSampleCount(view.options.samples))
     throw RenderError("samples is " + std::to_string(view.options.samples) + "; it must be " +
@@ -26,9 +27,9 @@ bool hasSeveralSamples(const View& view) {
   return view.options.samples > 1 && view.options.channels.rgb;
 }
 
-void describeFrame(const scene::Snapshot& snapshot, const View& view, Frame& frame) {
+void describeFrame(const View& view, Frame& frame) {
   frame.camera = view.camera;
-  frame.tick = snapshot.tick;
+  frame.tick = view.snapshot->tick;
   frame.avatars = view.options.avatars;
   frame.shadows = view.options.shadows && view.options.channels.rgb;
   frame.samples = hasSeveralSamples(view) ? view.options.samples : 1;
@@ -38,33 +39,33 @@ void describeFrame(const scene::Snapshot& snapshot, const View& view, Frame& fra
 
 Frame Renderer::render(const scene::Snapshot& snapshot, const Camera& camera,
                        const FrameOptions& options) {
-  const View view{camera, options};
-  return std::move(render(snapshot, std::span(&view, 1)).front());
+  const View view{&snapshot, camera, options};
+  return std::move(render(std::span(&view, 1)).front());
 }
 
-std::vector<Frame> Renderer::render(const scene::Snapshot& snapshot, std::span<const View> views) {
+std::vector<Frame> Renderer::render(std::span<const View> views) {
   std::vector<View> single;  // with one sample
   for (const View& view : views) {
     validateView(view);
     if (!hasSeveralSamples(view)) single.push_back(view);
   }
-  std::vector<Frame> once = renderOnce(snapshot, single), frames;
+  std::vector<Frame> once = renderOnce(single), frames;
   ENFILADE_ASSERT(once.size() == single.size());
   auto next = once.begin();
   for (const View& view : views) {
-    frames.push_back(hasSeveralSamples(view) ? renderSamples(snapshot, view) : std::move(*next++));
-    describeFrame(snapshot, view, frames.back());
+    frames.push_back(hasSeveralSamples(view) ? renderSamples(view) : std::move(*next++));
+    describeFrame(view, frames.back());
   }
   return frames;
 }
 
-Frame Renderer::renderSamples(const scene::Snapshot& snapshot, const View& view) {
+Frame Renderer::renderSamples(const View& view) {
   View others = view;
   others.options.channels.rgb = false;
   std::optional<Frame> frame;
   const Channels& channels = others.options.channels;
   if (channels.ids || channels.depth || channels.normals)
-    frame = std::move(renderOnce(snapshot, std::span(&others, 1)).front());
+    frame = std::move(renderOnce(std::span(&others, 1)).front());
   MeanColour mean(std::size_t{3} * countPixels(view.camera));
   std::vector<View> pass;
   const auto positions = getSamplePositions(static_cast<int>(view.options.samples));
@@ -75,7 +76,7 @@ Frame Renderer::renderSamples(const scene::Snapshot& snapshot, const View& view)
       pass[i].camera = shiftCamera(view.camera, positions[from + i]);
       pass[i].options.channels = {true, false, false, false};
     }
-    for (Frame& sample : renderOnce(snapshot, pass)) {
+    for (Frame& sample : renderOnce(pass)) {
       mean.add(sample.rgb);
       if (!frame) frame = std::move(sample);
     }

@@ -1,6 +1,7 @@
 // The kinds of renderers, and the rule that chooses between them.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -15,6 +16,12 @@ struct ViewRequest {
   Camera camera;
   FrameOptions options;
   RendererKind renderer = RendererKind::automatic;
+};
+
+/// A frame to render, of a snapshot.
+struct RenderRequest {
+  std::shared_ptr<const scene::Snapshot> snapshot;  ///< required
+  ViewRequest view;
 };
 
 /// "auto", "gl" or "rays".

@@ -111,12 +111,25 @@ struct OcclusionCuller::Search {
     return result == Visibility::visible;
   }
 
-  void testItem(std::uint32_t item, const scene::Aabb& box, std::uint64_t untested) {
+  void testItem(std::uint32_t item, std::size_t v, const scene::Aabb& box) {
+    const View& view = views[v];
+    if (culler.items_[item].object + 1 == view.hiddenEntity) return;
+    if (count(v, view.visibility.test(view.visibility.toEyeSpace(box), view.depth), 1))
+      found[v].items.push_back(item);
+  }
+
+  void testStaticItem(std::uint32_t item, std::uint64_t untested) {
+    forEachBit(untested & ~culler.getMarkedViews(culler.itemMarks_[item]),
+               [&](std::size_t v) { testItem(item, v, culler.items_[item].box); });
+  }
+
+  void testDynamicItem(std::uint32_t item, std::uint64_t untested) {
+    const std::vector<BodyPlacement>* bodies = nullptr;  // to which `box` belongs
+    scene::Aabb box;
     forEachBit(untested & ~culler.getMarkedViews(culler.itemMarks_[item]), [&](std::size_t v) {
-      const View& view = views[v];
-      if (culler.items_[item].object + 1 == view.hiddenEntity) return;
-      if (count(v, view.visibility.test(view.visibility.toEyeSpace(box), view.depth), 1))
-        found[v].items.push_back(item);
+      if (bodies != &views[v].bodies) box = computeItemAabb(culler.items_[item], views[v].bodies);
+      bodies = &views[v].bodies;
+      testItem(item, v, box);
     });
   }
 
@@ -145,8 +158,7 @@ struct OcclusionCuller::Search {
       const auto [branch, untested] = stack[--height];
       if (branch.isLeaf()) {
         for (std::uint32_t i = 0; i < branch.count; ++i) {
-          const std::uint32_t item = culler.itemOfTreeEntry_[branch.first + i];
-          testItem(item, culler.items_[item].box, untested);
+          testStaticItem(culler.itemOfTreeEntry_[branch.first + i], untested);
         }
         continue;
       }
@@ -159,7 +171,7 @@ struct OcclusionCuller::Search {
 };
 
 std::vector<OcclusionCuller::CullingResult> OcclusionCuller::findVisible(
-    std::span<const View> views, const std::vector<BodyPlacement>& bodies) {
+    std::span<const View> views) {
   ENFILADE_ASSERT(!views.empty() && views.size() <= kMaxViews);
   ++generation_;
   std::uint64_t all = 0;
@@ -169,8 +181,7 @@ std::vector<OcclusionCuller::CullingResult> OcclusionCuller::findVisible(
   }
   Search search(*this, views);
   search.testTree(all);
-  for (const std::uint32_t item : dynamicItems_)
-    search.testItem(item, computeItemAabb(items_[item], bodies), all);
+  for (const std::uint32_t item : dynamicItems_) search.testDynamicItem(item, all);
   for (CullingResult& result : search.found) std::sort(result.items.begin(), result.items.end());
   return std::move(search.found);
 }

@@ -22,6 +22,7 @@ class OcclusionCuller {
     const BoxVisibility& visibility;
     const DepthPyramid& depth;                ///< contains some or all of the drawn items
     const std::vector<std::uint32_t>& drawn;  ///< known to be visible
+    const std::vector<BodyPlacement>& bodies;
     scene::EntityId hiddenEntity;
   };
   struct CullingResult {
@@ -30,8 +31,7 @@ class OcclusionCuller {
   };
   static constexpr std::size_t kMaxViews = 64;
   /// One result per view, of 1..kMaxViews. All views share one traversal.
-  std::vector<CullingResult> findVisible(std::span<const View> views,
-                                         const std::vector<BodyPlacement>& bodies);
+  std::vector<CullingResult> findVisible(std::span<const View> views);
 
  private:
   std::uint32_t linkNodes(std::uint32_t node);

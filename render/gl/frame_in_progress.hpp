@@ -1,9 +1,10 @@
-// The views of a snapshot that GlRenderer draws together, and their read-back.
+// The views that GlRenderer draws together, and their read-back.
 #pragma once
 
 #include <vector>
 
 #include "render/culling/visible_items.hpp"
+#include "render/gl/dynamic_instances.hpp"
 #include "render/gl/render_target.hpp"
 
 namespace enfilade::render {
@@ -11,6 +12,7 @@ namespace enfilade::render {
 /// State of a view being rendered.
 struct FrameInProgress {
   const scene::Snapshot& snapshot;
+  const DynamicInstances& dynamic;  ///< of the snapshot
   const Camera& camera;
   const FrameOptions& options;
   int layer;        ///< of the target

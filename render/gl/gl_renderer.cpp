@@ -15,8 +15,9 @@
 // In a small scene with little occlusion, all items in the frustum are drawn in one forward pass
 // instead.
 //
-// Views of one size are drawn together, each in a layer of the target. They share the uploads, the
-// read-back after each step, and the traversal of the items in step 2.
+// Views of one size are drawn together, of one snapshot or of several, each in a layer of the
+// target. They share the uploads, the read-back after each step, and the traversal of the items in
+// step 2.
 //
 // With shadows, the shadow mask is computed between depth and colour. The forward pass is then
 // preceded by a depth prepass, too.
@@ -86,8 +87,8 @@ struct GlRenderer::State {
   SceneBuffers buffers;
   std::vector<DrawItem> items;
   std::optional<OcclusionCuller> culler;
-  std::optional<SurfacePass> surfacePass;  // empty: the scene is not uploaded yet
-  DynamicInstances dynamicInstances;
+  std::optional<SurfacePass> surfacePass;         // empty: the scene is not uploaded yet
+  std::deque<DynamicInstances> dynamicInstances;  // one per snapshot of the views drawn together
   RenderTarget target;
   VisibilityCache visibilityCache;
   std::deque<DepthPyramid> depthPyramids;     // one per layer
@@ -101,10 +102,10 @@ struct GlRenderer::State {
   ~State();
   void prepareScene();
   void prepareTarget(const Camera& camera, std::size_t layers);
-  std::deque<FrameInProgress> beginViews(const scene::Snapshot& snapshot,
-                                         std::span<const View* const> views);
-  SceneItems sceneItems() const {
-    return {items, dynamicInstances.bodyPlacements(), dynamicInstances.avatars().items};
+  std::vector<const DynamicInstances*> updateInstances(std::span<const View* const> views);
+  std::deque<FrameInProgress> beginViews(std::span<const View* const> views);
+  SceneItems sceneItems(const FrameInProgress& view) const {
+    return {items, view.dynamic.bodyPlacements(), view.dynamic.avatars().items};
   }
   bool isTransparent(const FrameInProgress& view, std::uint32_t item) const;
   void select(const FrameInProgress& view);
@@ -121,8 +122,7 @@ struct GlRenderer::State {
   void drawDisoccluded(FrameInProgress& view);
   void shadeVisible(FrameInProgress& view);
   void drawViews(const FramesInProgress& views);
-  std::vector<Frame> renderTogether(const scene::Snapshot& snapshot,
-                                    std::span<const View* const> views);
+  std::vector<Frame> renderTogether(std::span<const View* const> views);
 };
 
 GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const DeviceChoice& device,
@@ -162,18 +162,36 @@ void GlRenderer::State::prepareTarget(const Camera& camera, std::size_t layers) 
   while (depthPyramids.size() < layers) depthPyramids.emplace_back();
 }
 
+/// The instances of each view's snapshot.
+std::vector<const DynamicInstances*> GlRenderer::State::updateInstances(
+    std::span<const View* const> views) {
+  std::vector<const scene::Snapshot*> snapshots;  // by index into `dynamicInstances`
+  std::vector<const DynamicInstances*> ofViews;
+  for (const View* view : views) {
+    const auto known = std::ranges::find(snapshots, view->snapshot);
+    const auto i = static_cast<std::size_t>(known - snapshots.begin());
+    if (known == snapshots.end()) {
+      snapshots.push_back(view->snapshot);
+      if (dynamicInstances.size() < snapshots.size()) dynamicInstances.emplace_back();
+      dynamicInstances[i].update(*scene, *view->snapshot, view->options.avatars);
+    }
+    ofViews.push_back(&dynamicInstances[i]);
+  }
+  return ofViews;
+}
+
 /// Gives each view a cleared layer.
-std::deque<FrameInProgress> GlRenderer::State::beginViews(const scene::Snapshot& snapshot,
-                                                          std::span<const View* const> views) {
+std::deque<FrameInProgress> GlRenderer::State::beginViews(std::span<const View* const> views) {
+  const std::vector<const DynamicInstances*> instances = updateInstances(views);
   prepareTarget(views.front()->camera, views.size());
   selected = nullptr;
   std::deque<FrameInProgress> begun;
   for (std::size_t i = 0; i < views.size(); ++i) {
     const View& view = *views[i];
-    FrameInProgress& frame = begun.emplace_back(
-        FrameInProgress{snapshot, view.camera, view.options, static_cast<int>(i),
-                        planeDepth && (view.options.channels.depth || view.options.channels.rgb),
-                        BoxVisibility(view.camera), depthPyramids[i]});
+    FrameInProgress& frame = begun.emplace_back(FrameInProgress{
+        *view.snapshot, *instances[i], view.camera, view.options, static_cast<int>(i),
+        planeDepth && (view.options.channels.depth || view.options.channels.rgb),
+        BoxVisibility(view.camera), depthPyramids[i]});
     if (frame.needsShadows() && !shadowMask)
       throw RenderError("GlRenderer: shadows need a shadow mask");
     target.select(frame.layer);
@@ -198,14 +216,14 @@ void GlRenderer::State::select(const FrameInProgress& view) {
 /// Draws the surfaces; returns the transparent items, which are drawn last.
 DrawList GlRenderer::State::drawSurfaces(const FrameInProgress& view,
                                          const VisibleSet& visibleSet) {
-  DrawLists lists = buildDrawLists({scene->model(), items, buffers.ranges, buffers.materials},
-                                   dynamicInstances.bodyPlacements(), view.camera, view.options,
-                                   visibleSet.items);
+  DrawLists lists =
+      buildDrawLists({scene->model(), items, buffers.ranges, buffers.materials},
+                     view.dynamic.bodyPlacements(), view.camera, view.options, visibleSet.items);
   surfacePass->draw(lists.surfaces, {buffers.vertices.name(), buffers.indices.name(),
                                      buffers.colours.name(), buffers.textures});
   surfacePass->draw(
-      buildAvatarDrawList(dynamicInstances.avatars(), view.camera, visibleSet.avatarItems),
-      dynamicInstances.avatarGeometry(buffers.textures));
+      buildAvatarDrawList(view.dynamic.avatars(), view.camera, visibleSet.avatarItems),
+      view.dynamic.avatarGeometry(buffers.textures));
   return std::move(lists.transparent);
 }
 
@@ -242,7 +260,7 @@ bool GlRenderer::State::isMostlyVisible(const FrameInProgress& view, const Visib
   const CachedView* cached = visibilityCache.findNearest(view.camera);
   return cached &&
          countTriangles(all.items) <=
-             2 * countTriangles(predictVisible(sceneItems(), view.makeTests(), *cached).items);
+             2 * countTriangles(predictVisible(sceneItems(view), view.makeTests(), *cached).items);
 }
 
 void GlRenderer::State::drawAllInFrustum(FrameInProgress& view, const VisibleSet& all) {
@@ -263,7 +281,7 @@ void GlRenderer::State::drawAllInFrustum(FrameInProgress& view, const VisibleSet
 bool GlRenderer::State::tryDrawAll(FrameInProgress& view) {
   const bool isRequested = view.options.culling != Culling::occlusion;
   if (!isRequested && items.size() > kSmallSceneThreshold) return false;
-  const VisibleSet all = findInFrustum(sceneItems(), view.makeTests());
+  const VisibleSet all = findInFrustum(sceneItems(view), view.makeTests());
   if (!isRequested && !isMostlyVisible(view, all)) return false;
   drawAllInFrustum(view, all);
   return true;
@@ -272,7 +290,7 @@ bool GlRenderer::State::tryDrawAll(FrameInProgress& view) {
 /// Draws what an earlier frame showed into the depth.
 void GlRenderer::State::drawPredicted(FrameInProgress& view) {
   view.cached = &visibilityCache.lookup(view.camera, ++frameNumber);
-  view.drawn = predictVisible(sceneItems(), view.makeTests(), *view.cached);
+  view.drawn = predictVisible(sceneItems(view), view.makeTests(), *view.cached);
   const Channels& channels = view.options.channels;
   view.isComplete = !channels.rgb && !channels.normals;
   target.setDrawChannels({false, view.isComplete && channels.ids, false, false},
@@ -285,15 +303,14 @@ void GlRenderer::State::drawPredicted(FrameInProgress& view) {
 void GlRenderer::State::findDisoccluded(const FramesInProgress& views) {
   std::vector<OcclusionCuller::View> tested;
   for (const FrameInProgress* view : views)
-    tested.push_back(
-        {view->visibility, view->pyramid, view->drawn.items, view->options.hiddenEntity});
-  std::vector<OcclusionCuller::CullingResult> found =
-      culler->findVisible(tested, dynamicInstances.bodyPlacements());
+    tested.push_back({view->visibility, view->pyramid, view->drawn.items,
+                      view->dynamic.bodyPlacements(), view->options.hiddenEntity});
+  std::vector<OcclusionCuller::CullingResult> found = culler->findVisible(tested);
   for (std::size_t i = 0; i < views.size(); ++i) {
     FrameInProgress& view = *views[i];
     view.statistics.frustumCulled = found[i].culled;
     view.disoccluded = {std::move(found[i].items),
-                        findDisoccludedAvatars(sceneItems(), view.makeTests(), view.drawn)};
+                        findDisoccludedAvatars(sceneItems(view), view.makeTests(), view.drawn)};
   }
 }
 
@@ -301,7 +318,7 @@ void GlRenderer::State::findDisoccluded(const FramesInProgress& views) {
 /// drawn items, those that are visible remain.
 void GlRenderer::State::refineFrontToBack(FrameInProgress& view) {
   const auto toEyeSpace = [&](std::uint32_t item) {
-    return view.visibility.toEyeSpace(sceneItems().computeAabb(item));
+    return view.visibility.toEyeSpace(sceneItems(view).computeAabb(item));
   };
   std::vector<std::pair<double, std::uint32_t>> remaining;  // squared distance to the nearest point
   for (const std::uint32_t item : view.disoccluded.items) {
@@ -330,7 +347,7 @@ void GlRenderer::State::refineFrontToBack(FrameInProgress& view) {
     });
   }
   mergeSorted(view.drawn.avatarItems, view.disoccluded.avatarItems);
-  view.drawn = filterVisible(sceneItems(), view.makeTests(), view.drawn);
+  view.drawn = filterVisible(sceneItems(view), view.makeTests(), view.drawn);
 }
 
 /// Completes the view's depth.
@@ -359,12 +376,12 @@ void GlRenderer::State::drawDisoccluded(FrameInProgress& view) {
 
 /// Shades the visible items at their complete depth.
 void GlRenderer::State::shadeVisible(FrameInProgress& view) {
-  const VisibleSet shaded = filterVisible(sceneItems(), view.makeTests(), view.drawn);
+  const VisibleSet shaded = filterVisible(sceneItems(view), view.makeTests(), view.drawn);
   if (!view.isComplete) {
     beginShading(view);
     view.transparent = drawSurfaces(view, shaded);
   }
-  updateCachedView(sceneItems(), view.makeTests(), view.drawn, *view.cached);
+  updateCachedView(sceneItems(view), view.makeTests(), view.drawn, *view.cached);
   view.statistics.drawn = static_cast<std::uint32_t>(shaded.items.size());
   const std::size_t seen = view.statistics.drawn + view.statistics.frustumCulled;
   ENFILADE_ASSERT(seen <= items.size());
@@ -406,10 +423,8 @@ void GlRenderer::State::drawViews(const FramesInProgress& views) {
 }
 
 /// `views` have one size and one form of avatars.
-std::vector<Frame> GlRenderer::State::renderTogether(const scene::Snapshot& snapshot,
-                                                     std::span<const View* const> views) {
-  dynamicInstances.update(*scene, snapshot, views.front()->options.avatars);
-  std::deque<FrameInProgress> begun = beginViews(snapshot, views);
+std::vector<Frame> GlRenderer::State::renderTogether(std::span<const View* const> views) {
+  std::deque<FrameInProgress> begun = beginViews(views);
   FramesInProgress all;
   for (FrameInProgress& view : begun) all.push_back(&view);
   drawViews(all);
@@ -424,8 +439,7 @@ GlRenderer::GlRenderer(std::shared_ptr<const scene::Scene> scene, const DeviceCh
 
 GlRenderer::~GlRenderer() = default;
 
-std::vector<Frame> GlRenderer::renderOnce(const scene::Snapshot& snapshot,
-                                          std::span<const View> views) {
+std::vector<Frame> GlRenderer::renderOnce(std::span<const View> views) {
   State& s = *state_;
   s.context.makeCurrent();
   s.prepareScene();
@@ -433,7 +447,7 @@ std::vector<Frame> GlRenderer::renderOnce(const scene::Snapshot& snapshot,
   for (const std::vector<std::size_t>& group : groupViews(views)) {
     std::vector<const View*> together;
     for (const std::size_t i : group) together.push_back(&views[i]);
-    std::vector<Frame> rendered = s.renderTogether(snapshot, together);
+    std::vector<Frame> rendered = s.renderTogether(together);
     for (std::size_t i = 0; i < rendered.size(); ++i) frames[group[i]] = std::move(rendered[i]);
   }
   for (Frame& frame : frames) frame.renderer = deviceName(), frame.software = software();

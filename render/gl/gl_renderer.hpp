@@ -28,8 +28,7 @@ class GlRenderer final : public Renderer {
   const std::string& deviceWarning() const override;
 
  private:
-  std::vector<Frame> renderOnce(const scene::Snapshot& snapshot,
-                                std::span<const View> views) override;
+  std::vector<Frame> renderOnce(std::span<const View> views) override;
 
   struct State;
   std::unique_ptr<State> state_;

@@ -340,19 +340,19 @@ RayRenderer::RayRenderer(std::shared_ptr<const scene::Scene> scene, const RayOpt
 
 RayRenderer::~RayRenderer() = default;
 
-std::vector<Frame> RayRenderer::renderOnce(const scene::Snapshot& snapshot,
-                                           std::span<const View> views) {
+std::vector<Frame> RayRenderer::renderOnce(std::span<const View> views) {
   State& s = *state_;
   std::vector<Frame> frames;
   for (std::size_t from = 0; from < views.size();) {
-    // The trees hold one form of the avatars.
+    // The trees hold one snapshot, and one form of the avatars.
     std::size_t to = from + 1, pixels = countPixels(views[from].camera);
     const auto joins = [&](const View& view) {
       pixels += countPixels(view.camera);
       return pixels <= kMaxPixelsTogether && !view.camera.lens &&
+             view.snapshot == views[from].snapshot &&
              view.options.avatars == views[from].options.avatars;
     };
-    s.scene.update(snapshot, views[from].options.avatars);
+    s.scene.update(*views[from].snapshot, views[from].options.avatars);
     if (views[from].camera.lens) {
       frames.push_back(traceThroughLens(s, views[from]));
     } else {

@@ -35,8 +35,7 @@ class RayRenderer final : public Renderer {
                                               const std::vector<float>& depth);
 
  private:
-  std::vector<Frame> renderOnce(const scene::Snapshot& snapshot,
-                                std::span<const View> views) override;
+  std::vector<Frame> renderOnce(std::span<const View> views) override;
 
   struct State;
   std::unique_ptr<State> state_;

@@ -10,8 +10,7 @@ namespace enfilade::render {
 
 struct RenderThread::State {
   struct Job {
-    std::shared_ptr<const scene::Snapshot> snapshot;
-    std::vector<ViewRequest> views;
+    std::vector<RenderRequest> requests;
     std::function<void(Frames)> done;
   };
 
@@ -82,34 +81,33 @@ struct RenderThread::State {
     if (!waitForFirstRequest()) return;
     const std::unique_ptr<RendererSelector> renderer =
         createRenderer(std::move(scene), device, kind);
-    while (auto job = takeJob()) job->done(renderAll(renderer.get(), *job));
+    while (auto job = takeJob()) job->done(renderAll(renderer.get(), job->requests));
   }
 
-  std::vector<Frame> renderTogether(RendererSelector* renderer, const Job& job,
-                                    std::span<const ViewRequest> views) const {
+  std::vector<Frame> renderTogether(RendererSelector* renderer,
+                                    std::span<const RenderRequest> requests) const {
     if (!renderer) throw RendererUnavailable(unavailableReason);
-    if (!job.snapshot) throw RenderError("RenderThread::render: no snapshot");
-    return renderer->render(*job.snapshot, views);
+    return renderer->render(requests);
   }
 
-  Frames renderAll(RendererSelector* renderer, const Job& job) const {
+  Frames renderAll(RendererSelector* renderer, std::span<const RenderRequest> requests) const {
     Frames frames;
     try {
-      for (Frame& frame : renderTogether(renderer, job, job.views)) {
+      for (Frame& frame : renderTogether(renderer, requests)) {
         std::promise<Frame> promise;
         promise.set_value(std::move(frame));
         frames.push_back(promise.get_future());
       }
     } catch (...) {
-      if (job.views.size() == 1) {
+      if (requests.size() == 1) {
         std::promise<Frame> promise;
         promise.set_exception(std::current_exception());
         frames.push_back(promise.get_future());
         return frames;
       }
       // One by one, so that an error concerns only its own view.
-      for (const ViewRequest& view : job.views)
-        frames.push_back(std::move(renderAll(renderer, {job.snapshot, {view}, {}}).front()));
+      for (const RenderRequest& request : requests)
+        frames.push_back(std::move(renderAll(renderer, std::span(&request, 1)).front()));
     }
     return frames;
   }
@@ -135,7 +133,7 @@ RenderThread::~RenderThread() {
 std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
                                         Camera camera, FrameOptions options, RendererKind kind) {
   const auto promise = std::make_shared<std::promise<Frame>>();
-  render(std::move(snapshot), {{std::move(camera), options, kind}}, [promise](Frames frames) {
+  render({{std::move(snapshot), {std::move(camera), options, kind}}}, [promise](Frames frames) {
     try {
       promise->set_value(frames.front().get());
     } catch (...) {
@@ -145,9 +143,8 @@ std::future<Frame> RenderThread::render(std::shared_ptr<const scene::Snapshot> s
   return promise->get_future();
 }
 
-void RenderThread::render(std::shared_ptr<const scene::Snapshot> snapshot,
-                          std::vector<ViewRequest> views, std::function<void(Frames)> done) {
-  state_->enqueue({std::move(snapshot), std::move(views), std::move(done)});
+void RenderThread::render(std::vector<RenderRequest> requests, std::function<void(Frames)> done) {
+  state_->enqueue({std::move(requests), std::move(done)});
 }
 
 const std::string& RenderThread::deviceName() const {

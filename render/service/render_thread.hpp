@@ -29,8 +29,7 @@ class RenderThread {
   using Frames = std::vector<std::future<Frame>>;
   /// As above, of several views together. Calls `done` on this object's thread, so that no thread
   /// has to wait. `done` must not throw.
-  void render(std::shared_ptr<const scene::Snapshot> snapshot, std::vector<ViewRequest> views,
-              std::function<void(Frames)> done);
+  void render(std::vector<RenderRequest> requests, std::function<void(Frames)> done);
   // As in Renderer. These functions create the renderer if necessary and wait for it.
   const std::string& deviceName() const;  ///< "" without a renderer
   bool software() const;

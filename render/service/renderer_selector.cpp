@@ -1,7 +1,9 @@
 #include "render/service/renderer_selector.hpp"
 
+#include <algorithm>
 #include <chrono>
 #include <map>
+#include <thread>
 #include <utility>
 
 #include "collision/assert.hpp"
@@ -9,6 +11,14 @@
 #include "render/raytrace/ray_renderer.hpp"
 
 namespace enfilade::render {
+namespace {
+
+/// More threads have too little work each at the usual sizes.
+int countRayThreads() {
+  return std::clamp(static_cast<int>(std::thread::hardware_concurrency()), 1, 8);
+}
+
+}  // namespace
 
 struct RendererSelector::State {
   std::shared_ptr<const scene::Scene> scene;
@@ -44,7 +54,8 @@ struct RendererSelector::State {
 
   /// The ray renderer; it computes the shadow masks of both renderers.
   RayRenderer& shadowTracer() {
-    if (!rays) rays = std::make_unique<RayRenderer>(scene);
+    if (!rays)
+      rays = std::make_unique<RayRenderer>(scene, RayOptions{.threads = countRayThreads()});
     return *rays;
   }
 
@@ -114,29 +125,31 @@ RendererSelector::~RendererSelector() = default;
 
 Frame RendererSelector::render(const scene::Snapshot& snapshot, const Camera& camera,
                                const FrameOptions& options, RendererKind kind) {
-  const ViewRequest request{camera, options, kind};
-  return std::move(render(snapshot, std::span(&request, 1)).front());
+  // The request does not own the snapshot.
+  const RenderRequest request{{std::shared_ptr<const scene::Snapshot>(), &snapshot},
+                              {camera, options, kind}};
+  return std::move(render(std::span(&request, 1)).front());
 }
 
-std::vector<Frame> RendererSelector::render(const scene::Snapshot& snapshot,
-                                            std::span<const ViewRequest> views) {
-  std::map<RendererKind, std::vector<std::size_t>> viewsByKind;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    const auto& [camera, options, kind] = views[i];
-    viewsByKind[state_->chooseKind(camera, options, kind)].push_back(i);
+std::vector<Frame> RendererSelector::render(std::span<const RenderRequest> requests) {
+  std::map<RendererKind, std::vector<std::size_t>> requestsByKind;
+  for (std::size_t i = 0; i < requests.size(); ++i) {
+    const auto& [camera, options, kind] = requests[i].view;
+    requestsByKind[state_->chooseKind(camera, options, kind)].push_back(i);
   }
-  std::vector<Frame> frames(views.size());
-  for (const auto& [kind, indices] : viewsByKind) {
+  std::vector<Frame> frames(requests.size());
+  for (const auto& [kind, indices] : requestsByKind) {
     Renderer& renderer = state_->findOrCreate(kind);
     std::vector<View> together;
     for (const std::size_t i : indices) {
-      const ViewRequest& view = views[i];
-      together.push_back({view.camera, state_->decideShadows(renderer, view.camera, view.options)});
+      const ViewRequest& view = requests[i].view;
+      together.push_back({requests[i].snapshot.get(), view.camera,
+                          state_->decideShadows(renderer, view.camera, view.options)});
     }
     // The time excludes the creation of the renderer.
     using Clock = std::chrono::steady_clock;
     const Clock::time_point start = Clock::now();
-    std::vector<Frame> rendered = renderer.render(snapshot, together);
+    std::vector<Frame> rendered = renderer.render(together);
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
     for (std::size_t i = 0; i < rendered.size(); ++i) {
       rendered[i].statistics.seconds = seconds / static_cast<double>(rendered.size());

@@ -30,7 +30,7 @@ class RendererSelector {
   Frame render(const scene::Snapshot& snapshot, const Camera& camera,
                const FrameOptions& options = {}, RendererKind kind = RendererKind::automatic);
   /// As above, of several views, which take less time together.
-  std::vector<Frame> render(const scene::Snapshot& snapshot, std::span<const ViewRequest> views);
+  std::vector<Frame> render(std::span<const RenderRequest> requests);
 
   /// Frame::renderer of such a frame.
   const std::string& deviceNameFor(const Camera& camera, const FrameOptions& options);

@@ -104,15 +104,13 @@ void checkFrame(const scene::Scene& scene, const CaptureFrame& captureFrame, std
   counts.framesInsideSolids.push_back(index);
 }
 
-/// The end of the frames from `from` on that show one snapshot and are rendered together.
+/// The end of the frames from `from` on that are rendered together.
 std::size_t findGroupEnd(const CapturePlan& plan, const std::vector<std::size_t>& missing,
                          std::size_t from) {
-  const CaptureFrame& first = plan.frames[missing[from]];
-  std::size_t pixels = render::countPixels(first.camera), end = from + 1;
+  std::size_t pixels = 0, end = from;
   for (; end < missing.size(); ++end) {
-    const CaptureFrame& next = plan.frames[missing[end]];
-    pixels += render::countPixels(next.camera);
-    if (next.snapshot != first.snapshot || pixels > render::kMaxPixelsTogether) break;
+    pixels += render::countPixels(plan.frames[missing[end]].camera);
+    if (end > from && pixels > render::kMaxPixelsTogether) break;
   }
   return end;
 }
@@ -125,20 +123,20 @@ void renderFrames(const CaptureCommand& command, const scene::Scene& scene, cons
   EncodeQueue queue(kEncoderThreads, kMaxPendingFrames);
   for (std::size_t from = 0; from < missing.size() && !isInterrupted();) {
     const std::size_t to = findGroupEnd(plan, missing, from);
-    std::vector<render::ViewRequest> views;
+    std::vector<render::RenderRequest> requests;
     for (std::size_t i = from; i < to; ++i) {
       const CaptureFrame& captureFrame = plan.frames[missing[i]];
       render::FrameOptions options = makeFrameOptions(captureFrame, command.pictures);
       options.channels.depth |= reports != nullptr;
-      views.push_back({captureFrame.camera, options});
+      requests.push_back({captureFrame.snapshot, {captureFrame.camera, options}});
     }
-    std::vector<render::Frame> frames =
-        renderer.render(*plan.frames[missing[from]].snapshot, views);
+    std::vector<render::Frame> frames = renderer.render(requests);
     for (std::size_t i = from; i < to; ++i) {
       const std::size_t index = missing[i];
       const CaptureFrame& captureFrame = plan.frames[index];
       const auto frame = std::make_shared<const render::Frame>(std::move(frames[i - from]));
-      if (reports) reports->measure(index, *frame, *captureFrame.snapshot, views[i - from].options);
+      if (reports)
+        reports->measure(index, *frame, *captureFrame.snapshot, requests[i - from].view.options);
       checkFrame(scene, captureFrame, index, *frame, counts);
       queue.post([&, index, frame] {
         const auto overlay = [&](const render::Frame& drawn) {

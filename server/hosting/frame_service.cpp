@@ -44,7 +44,7 @@ EncodedMessage encodeFrameReply(PendingFrame& pending, const scene::Scene& scene
 
 namespace {
 
-/// Frames of one snapshot that are rendered together.
+/// Frames that are rendered together, of any worlds of the scene.
 using FrameGroup = std::vector<PendingFrame>;
 
 /// Frames that wait to be rendered. Owners take turns; one owner's frames keep their order.
@@ -57,16 +57,14 @@ class FrameTurns {
     if (queue == queues_.end()) queue = queues_.insert(queues_.end(), OwnerQueue{owner, {}});
     queue->frames.push_back(std::move(pending));
   }
-  /// The next frame, and the next frames of all owners as long as they show the same snapshot;
-  /// empty: none waits. The owners that had their turn go to the end.
+  /// The next frame, and the next frames of all owners up to a number of pixels; empty: none waits.
+  /// The owners that had their turn go to the end.
   FrameGroup pop() {
     FrameGroup group;
     std::size_t pixels = 0;
     const auto joins = [&](const PendingFrame& frame) {
       const std::size_t sum = pixels + render::countPixels(frame.job.view.camera);
-      if (!group.empty() &&
-          (sum > render::kMaxPixelsTogether || frame.job.snapshot != group.front().job.snapshot))
-        return false;
+      if (!group.empty() && sum > render::kMaxPixelsTogether) return false;
       pixels = sum;
       return true;
     };
@@ -206,20 +204,20 @@ void FrameService::State::startNext() {
     if (group->empty()) return idle.notify_all();
     rendering = true;
   }
-  std::vector<render::ViewRequest> views;
-  for (const PendingFrame& pending : *group) views.push_back(pending.job.view);
-  renderer->render(group->front().job.snapshot, std::move(views),
-                   [this, group](render::RenderThread::Frames frames) {
-                     for (std::size_t i = 0; i < frames.size(); ++i) {
-                       (*group)[i].frame = std::move(frames[i]);
-                       deliver(std::make_shared<PendingFrame>(std::move((*group)[i])));
-                     }
-                     {
-                       const std::lock_guard lock(mutex);
-                       rendering = false;
-                     }
-                     startNext();
-                   });
+  std::vector<render::RenderRequest> requests;
+  for (const PendingFrame& pending : *group)
+    requests.push_back({pending.job.snapshot, pending.job.view});
+  renderer->render(std::move(requests), [this, group](render::RenderThread::Frames frames) {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      (*group)[i].frame = std::move(frames[i]);
+      deliver(std::make_shared<PendingFrame>(std::move((*group)[i])));
+    }
+    {
+      const std::lock_guard lock(mutex);
+      rendering = false;
+    }
+    startNext();
+  });
 }
 
 void FrameService::renderFrame(FrameJob job, std::function<void(EncodedMessage)> done) {

@@ -21,7 +21,8 @@ namespace {
 constexpr std::array<std::pair<int, int>, 8> kNeighbours{
     {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {1, 1}, {1, -1}, {-1, 1}, {-1, -1}}};
 constexpr std::size_t kStraightNeighbours = 4;  // the first ones
-constexpr double kEvenFloor = 0.01;             // metres between the heights of two places
+constexpr double kEvenFloor = 1e-3;             // metres between the heights of two places
+constexpr double kSameHeight = 0.01;            // metres between feet at one place
 constexpr double kLift = FloodFill::kLift;
 
 }  // namespace
@@ -122,7 +123,7 @@ std::optional<Vec3> FloodFill::stepTo(scene::Walker& walker, const Vec3& from, d
     if (climb < kEvenFloor) return standing;
     walker.returnTo(from);
     const bool isWalked = walker.walkTo(*standing).kind == scene::WalkOutcome::Kind::arrived &&
-                          std::abs(walker.footPosition().y() - standing->y()) < kEvenFloor;
+                          std::abs(walker.footPosition().y() - standing->y()) < kSameHeight;
     return isWalked ? standing : std::nullopt;
   }
   return std::nullopt;

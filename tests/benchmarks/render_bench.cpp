@@ -131,19 +131,19 @@ void measureTogether(const std::shared_ptr<const scene::Scene>& scene, const std
   constexpr std::size_t kViews = 16;
   constexpr int kRounds = 12;
   const std::vector<tests::WalkStop> stops = walkIn(scene, name, 4 * kViews);
+  if (stops.empty()) return;
+  const scene::Snapshot& snapshot = *stops.front().snapshot;
   std::vector<render::View> views;
   for (std::size_t i = 0; i < stops.size() && views.size() < kViews; i += 4) {
-    views.push_back({stops[i].camera, {.channels = {coloured, true, true, false}}});
+    views.push_back({&snapshot, stops[i].camera, {.channels = {coloured, true, true, false}}});
     views.back().camera.width = size.width;
     views.back().camera.height = size.height;
   }
-  if (views.empty()) return;
-  const scene::Snapshot& snapshot = *stops.front().snapshot;
   double together = 0, alone = 0;
   std::size_t different = 0;
   for (int round = -2; round < kRounds; ++round) {  // the first two fill the caches
     const auto begin = Clock::now();
-    const std::vector<render::Frame> frames = renderer.render(snapshot, views);
+    const std::vector<render::Frame> frames = renderer.render(views);
     const auto middle = Clock::now();
     std::vector<render::Frame> each;
     for (const render::View& view : views)

@@ -28,14 +28,16 @@ std::shared_ptr<const scene::Snapshot> twoAvatars() {
 }
 
 /// Views of several sizes, channels and kinds of cameras, from the same and from other places.
-std::vector<View> manyViews() {
+std::vector<View> manyViews(const std::vector<const scene::Snapshot*>& snapshots) {
   std::vector<View> views;
   std::mt19937 random(11);
   const auto number = [&](double size) {
     return size * (static_cast<double>(random() % 2001) / 1000 - 1);
   };
   for (int i = 0; i < 14; ++i) {
-    View view{squareCamera(i % 3 == 0 ? 48 : 64), {}};
+    View view{snapshots[static_cast<std::size_t>(i) % snapshots.size()],
+              squareCamera(i % 3 == 0 ? 48 : 64),
+              {}};
     view.camera.eye = {number(4), number(2), number(4) + 6};
     view.camera.forward = {number(1), number(0.3), -1};
     if (i % 5 == 1) view.camera.projection = Camera::Projection::orthographic;
@@ -68,26 +70,55 @@ void expectSame(const Frame& a, const Frame& b, std::size_t i) {
   EXPECT_EQ(a.avatars, b.avatars);
 }
 
-void expectFramesOfEachAlone(Renderer& together, Renderer& alone) {
-  const auto snapshot = twoAvatars();
-  const std::vector<View> views = manyViews();
+void expectFramesOfEachAlone(const std::vector<View>& views, Renderer& together, Renderer& alone) {
   for (int round = 0; round < 3; ++round) {  // the second knows what the first saw
-    const std::vector<Frame> frames = together.render(*snapshot, views);
+    const std::vector<Frame> frames = together.render(views);
     ASSERT_EQ(frames.size(), views.size());
     for (std::size_t i = 0; i < views.size(); ++i)
-      expectSame(frames[i], alone.render(*snapshot, views[i].camera, views[i].options), i);
+      expectSame(frames[i], alone.render(*views[i].snapshot, views[i].camera, views[i].options), i);
   }
-  EXPECT_TRUE(together.render(*snapshot, std::span<const View>()).empty());
+  EXPECT_TRUE(together.render(std::span<const View>()).empty());
 }
 
 TEST(Views, TogetherHaveTheFramesOfEachAlone) {
+  const auto snapshot = twoAvatars();
+  const std::vector<View> views = manyViews({snapshot.get()});
   for (const DepthSource depthSource : {DepthSource::buffer, DepthSource::plane}) {
     const DeviceChoice device{.device = "", .depthSource = depthSource};
     GlRenderer together(heap(), device), alone(heap(), device);
-    expectFramesOfEachAlone(together, alone);
+    expectFramesOfEachAlone(views, together, alone);
   }
   RayRenderer together(heap()), alone(heap());
-  expectFramesOfEachAlone(together, alone);
+  expectFramesOfEachAlone(views, together, alone);
+}
+
+/// A heap whose second box is a lift.
+std::shared_ptr<const scene::Scene> heapWithLift() {
+  scene::Model model = heap()->model();
+  scene::BodySpec lift;
+  lift.name = "lift";
+  lift.kind = scene::BodyKind::lift;
+  lift.objects = {1};
+  lift.high = 3;
+  lift.stops = {0, 3};
+  model.bodies.push_back(lift);
+  return std::make_shared<const scene::Scene>(std::move(model));
+}
+
+TEST(Views, OfSeveralWorldsHaveTheFramesOfEachAlone) {
+  const auto scene = heapWithLift();
+  std::vector<scene::Snapshot> snapshots;
+  std::vector<const scene::Snapshot*> shown;
+  for (const double height : {0.0, 0.6, 1.2, 3.0}) {
+    snapshots.push_back(snapshotOfLift(*scene, height));
+    if (height != 1.2) snapshots.back().avatars = {avatarAt(1000, {1 - height, -4, -6})};
+  }
+  for (const scene::Snapshot& snapshot : snapshots) shown.push_back(&snapshot);
+  const std::vector<View> views = manyViews(shown);
+  GlRenderer together(scene), alone(scene);
+  expectFramesOfEachAlone(views, together, alone);
+  RayRenderer raysTogether(scene), raysAlone(scene);
+  expectFramesOfEachAlone(views, raysTogether, raysAlone);
 }
 
 /// A few panes before a few boxes on a floor: fewer items than a renderer culls.
@@ -104,9 +135,10 @@ std::shared_ptr<const scene::Scene> room() {
 
 /// Views that take each of the renderer's ways, in one order and in the other.
 TEST(Views, NoneLeavesItsStateToAnother) {
-  View drawsAll{squareCamera(64), {}};
+  const auto snapshot = twoAvatars();
+  View drawsAll{snapshot.get(), squareCamera(64), {}};
   drawsAll.options.culling = Culling::frustum;
-  View culled{squareCamera(64), {}};
+  View culled{snapshot.get(), squareCamera(64), {}};
   culled.camera.forward = {0.4, -0.1, -1};
   View shadowed = drawsAll;
   shadowed.options.shadows = true;
@@ -123,9 +155,9 @@ TEST(Views, NoneLeavesItsStateToAnother) {
          {std::vector{culled, drawsAll, depthAlone, shadowed}, std::vector{drawsAll, depthAlone}}) {
       const auto together = makeRenderer(), alone = makeRenderer();
       for (int turn = 0; turn < 12; ++turn) {
-        const std::vector<Frame> frames = together->render(*twoAvatars(), order);
+        const std::vector<Frame> frames = together->render(order);
         for (std::size_t i = 0; i < order.size(); ++i)
-          expectSame(frames[i], alone->render(*twoAvatars(), order[i].camera, order[i].options), i);
+          expectSame(frames[i], alone->render(*snapshot, order[i].camera, order[i].options), i);
         if (turn == 5) std::swap(order[0], order[1]);
         std::rotate(order.begin(), order.begin() + 1, order.end());
         if (turn % 4 != 3) continue;  // the same places again: nothing is disoccluded
@@ -138,20 +170,21 @@ TEST(Views, NoneLeavesItsStateToAnother) {
 TEST(Views, MoreThanATraversalTakesAreDivided) {
   GlRenderer renderer(heap());
   const auto snapshot = twoAvatars();
-  std::vector<View> views(OcclusionCuller::kMaxViews + 3, View{squareCamera(16), {}});
+  std::vector<View> views(OcclusionCuller::kMaxViews + 3,
+                          View{snapshot.get(), squareCamera(16), {}});
   for (std::size_t i = 0; i < views.size(); ++i)
     views[i].camera.forward = Vec3(0.02 * static_cast<double>(i) - 0.7, 0, -1);
-  const std::vector<Frame> frames = renderer.render(*snapshot, views);
+  const std::vector<Frame> frames = renderer.render(views);
   for (std::size_t i = 0; i < views.size(); ++i)
     expectSame(frames[i], renderer.render(*snapshot, views[i].camera, views[i].options), i);
 }
 
 TEST(Views, ARefusedViewFailsAndTheOthersAreRendered) {
   RenderThread renders(heap());
-  std::vector<ViewRequest> requests(3, ViewRequest{squareCamera(16), {}});
-  requests[1].camera.eye.x() = std::numeric_limits<double>::quiet_NaN();
+  std::vector<RenderRequest> requests(3, {twoAvatars(), {squareCamera(16), {}}});
+  requests[1].view.camera.eye.x() = std::numeric_limits<double>::quiet_NaN();
   std::promise<RenderThread::Frames> promise;
-  renders.render(twoAvatars(), requests,
+  renders.render(requests,
                  [&](RenderThread::Frames frames) { promise.set_value(std::move(frames)); });
   RenderThread::Frames frames = promise.get_future().get();
   ASSERT_EQ(frames.size(), 3u);

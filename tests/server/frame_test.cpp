@@ -304,12 +304,13 @@ TEST(FrameOrder, RawImagesDoNotOvertakeEncodedOnes) {
   EXPECT_EQ(order, (std::vector<std::uint64_t>{1, 2, 3, 4}));
 }
 
-TEST(FrameOrder, ImagesOfOneTickThatWaitAreDrawnTogether) {
+TEST(FrameOrder, ImagesThatWaitAreDrawnTogetherAlsoOfSeveralWorlds) {
   FrameService service(smallRoom());
   ENFILADE_NEED_PICTURES(service.deviceName());
   const scene::World world(smallRoom());
   std::mutex mutex;
   std::vector<double> seconds;  // views drawn together share their time equally
+  std::vector<std::uint64_t> ticks;
   const auto request = [&](const std::shared_ptr<const scene::Snapshot>& snapshot, unsigned size) {
     FrameJob job;
     job.snapshot = snapshot;
@@ -320,19 +321,20 @@ TEST(FrameOrder, ImagesOfOneTickThatWaitAreDrawnTogether) {
     job.onRendered = [&](const v1::Frame& frame, std::span<const std::uint8_t>) {
       const std::lock_guard lock(mutex);
       seconds.push_back(frame.drawing_seconds());
+      ticks.push_back(frame.tick());
     };
     service.renderFrame(std::move(job), [](const EncodedMessage& reply) { EXPECT_TRUE(reply); });
   };
-  const auto later = std::make_shared<const scene::Snapshot>(*world.snapshot());
+  const auto elsewhere = std::make_shared<scene::Snapshot>(*world.snapshot());
+  elsewhere->tick = 5;
   request(world.snapshot(), 1024);  // the others wait for it
   for (int i = 0; i < 3; ++i) request(world.snapshot(), 16);
-  for (int i = 0; i < 2; ++i) request(later, 16);
+  for (int i = 0; i < 2; ++i) request(elsewhere, 16);
   service.finish();
   ASSERT_EQ(seconds.size(), 6u);
-  EXPECT_EQ(seconds[1], seconds[2]);
-  EXPECT_EQ(seconds[1], seconds[3]);
-  EXPECT_NE(seconds[3], seconds[4]);
-  EXPECT_EQ(seconds[4], seconds[5]);
+  EXPECT_NE(seconds[0], seconds[1]);
+  for (std::size_t i = 2; i < 6; ++i) EXPECT_EQ(seconds[1], seconds[i]) << i;
+  EXPECT_EQ(ticks, (std::vector<std::uint64_t>{0, 0, 0, 0, 5, 5}));
 }
 
 }  // namespace
