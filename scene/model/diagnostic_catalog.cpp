@@ -12,6 +12,8 @@ constexpr std::array kCatalog{
     // file
     DiagnosticKind{"cut_off_file", error, "the file ends too early; copy or export it again"},
     DiagnosticKind{"damaged_statement", error, "lines that are not STEP were ignored"},
+    DiagnosticKind{"duplicate_key", warning,
+                   "a key twice in one object of the file's JSON: the last value counts"},
     DiagnosticKind{"ifc_reader_absent", warning,
                    "a reader is not installed: another one read the file; ./dev installs all"},
     DiagnosticKind{"ifc_reader_failed", warning,
@@ -37,6 +39,9 @@ constexpr std::array kCatalog{
     // placement
     DiagnosticKind{"broken_transform_dropped", error,
                    "its transform is malformed, not finite or out of range: ignored"},
+    DiagnosticKind{
+        "shared_node", warning,
+        "a glTF node has several parents, which glTF does not allow: it stands below each"},
     DiagnosticKind{"coarse_coordinates", warning,
                    "far from its own origin: its vertices have low precision"},
     DiagnosticKind{"coarse_placement", warning,
@@ -48,6 +53,9 @@ constexpr std::array kCatalog{
     DiagnosticKind{"flat_object", warning, "scaled to zero along an axis: it has no inside"},
     DiagnosticKind{"rescaled_rotation", warning,
                    "a rotation that is no unit quaternion: its length was ignored"},
+    DiagnosticKind{"missing_camera", warning, "a node names a camera that the file lacks"},
+    DiagnosticKind{"missing_node", error,
+                   "a scene or node names a node that the file lacks: it is missing"},
     DiagnosticKind{"unmatched_node", error,
                    "its children are invalid: transforms below are coarse, bodies are not read"},
     DiagnosticKind{"mirrored_object", note, "mirrored: its faces were flipped to face outwards"},
@@ -67,7 +75,7 @@ constexpr std::array kCatalog{
         "inward_shell", warning,
         "a closed shell whose faces look inwards; if it is not a room, flip its normals"},
     DiagnosticKind{"missing_mesh", error,
-                   "a mesh cannot be read, and its extent is not stated: it is missing"},
+                   "a mesh does not exist, or cannot be read and states no extent: it is missing"},
     DiagnosticKind{"solid_mesh", error,
                    "a mesh cannot be read: it is a solid box of the extent that the file states"},
     DiagnosticKind{"non_manifold_edge", note,
@@ -92,7 +100,8 @@ constexpr std::array kCatalog{
     DiagnosticKind{
         "vertex_colours_ignored", warning,
         "colours that cannot be read, or of faces whose vertices have colours, are not drawn"},
-    DiagnosticKind{"skin_ignored", error, "its node has no size: it is not posed by its skin"},
+    DiagnosticKind{"skin_ignored", error,
+                   "its node has no size, or the skin does not exist: it is not posed by its skin"},
     DiagnosticKind{"instance_attributes_ignored", warning,
                    "an attribute of instances cannot be read: its objects lack it"},
     // of IFC

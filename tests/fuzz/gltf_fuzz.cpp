@@ -27,6 +27,9 @@ void requirePlainFile(const scene::PlainGltf& plain) {
     require(count * 4 <= length, "accessors lie within their views");
     require(!accessor.contains("sparse"), "accessors are dense");
   }
+  for (const auto& node : json.value("nodes", nlohmann::json::array()))
+    if (node.is_object() && node.contains("mesh"))
+      require(node["mesh"].get<std::size_t>() < json.at("meshes").size(), "a node's mesh exists");
 }
 
 }  // namespace

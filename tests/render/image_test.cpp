@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <fstream>
 #include <random>
@@ -235,6 +236,19 @@ TEST(Canvas, NamesTheFirstTextWithoutAFont) {
   canvas.text({10, 30}, "a" + privateUse, {});
   canvas.text({10, 50}, privateUse, {});
   EXPECT_EQ(canvas.textWithoutFont(), "a" + privateUse);
+}
+
+TEST(Canvas, DrawsLettersOfChineseJapaneseAndKorean) {
+  std::vector<double> areas;
+  for (const char* letter : {"客", "厅", "リ", "ビ", "ん", "거", "실"}) {
+    Canvas canvas(60, 60, kBlack);
+    canvas.text({10, 10}, letter, {.size = 30, .colour = kWhite});
+    EXPECT_EQ(canvas.textWithoutFont(), "") << letter;
+    areas.push_back(areaOf(canvas));
+    EXPECT_GT(areas.back(), 20) << letter << " is blank";
+  }
+  std::ranges::sort(areas);
+  EXPECT_EQ(std::ranges::adjacent_find(areas), areas.end()) << "two letters look alike";
 }
 
 TEST(Canvas, PagesAreWrittenWhole) {

@@ -53,7 +53,10 @@ TEST(GltfNodes, WhatGltfDoesNotAllowInATransformIsIgnoredAndReported) {
        {R"("translation":[1,2])", R"("translation":"up")", R"("translation":{"x":1})",
         R"("rotation":[0,0,1])", R"("rotation":[0,0,0,0])", R"("scale":2)", R"("scale":[1,"1",1])",
         R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0])", R"("matrix":[1,0,0,0.5,0,1,0,0,0,0,1,0,0,0,0,1])",
-        R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,2])"}) {
+        R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,2])",
+        R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"translation":[9,0,0])",
+        R"("rotation":[0,1,0,0],"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1])",
+        R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"scale":[2,2,2])"}) {
     const Model model = modelWith(transform);
     EXPECT_EQ(countOf(model, "broken_transform_dropped"), 1u) << transform;
     EXPECT_EQ(diagnosticText(model, "broken_transform_dropped").find("nodes[0] 'box': "), 0u);
@@ -68,6 +71,81 @@ TEST(GltfNodes, AChildThatIsNoIndexIsReportedWithItsParent) {
       modelOf(R"({"name":"box","mesh":0,"children":[1.0]},{"name":"lost","mesh":0})");
   EXPECT_EQ(countOf(model, "unmatched_node"), 1u);
   EXPECT_EQ(diagnosticText(model, "unmatched_node"), "box");
+}
+
+// ---- keys twice in one object -------------------------------------------------------------------
+
+TEST(GltfNodes, AKeyTwiceInOneObjectIsReportedWithItsPathAndTheLastCounts) {
+  const Model model = modelWith(R"("translation":[1,0,0],"translation":[5,0,0])");
+  EXPECT_EQ(countOf(model, "duplicate_key"), 1u);
+  EXPECT_EQ(diagnosticText(model, "duplicate_key"), "nodes[0].translation");
+  EXPECT_NEAR(model.objects.at(0).worldFromMesh.translation().x() + model.offset.x(), 5, 1e-12);
+  const Model deep = modelWith(
+      R"("extras":{"a":[1,[2],{"b":2},{"c":{"d":1,"e":[{"d":1},{"d":2}],"d":2,"d":3}}]})");
+  EXPECT_EQ(countOf(deep, "duplicate_key"), 2u);
+  EXPECT_EQ(diagnosticText(deep, "duplicate_key"), "nodes[0].extras.a[3].c.d");
+}
+
+TEST(GltfNodes, ASectionTwiceIsReadFromTheLast) {
+  const TemporaryFolder folder;
+  for (const char* first : {R"("meshes":[{"primitives":[{"attributes":{"POSITION":1}}]}],)",
+                            R"("accessors":[],)", R"("nodes":[{"mesh":0,"scale":[7,7,7]}],)"}) {
+    std::string text = tests::gltf(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
+    const Model model = importModel(folder.write("a.gltf", text.insert(1, first)));
+    EXPECT_EQ(countOf(model, "duplicate_key"), 1u) << first;
+    expectSize(model, {1, 2, 3});
+  }
+}
+
+TEST(GltfNodes, TheSameKeyInSeveralObjectsIsNoDuplicate) {
+  const Model model = modelOf(R"({"name":"box","mesh":0,"extras":{"name":{"name":1},"mesh":[{}]},)"
+                              R"("children":[1]},{"name":"box","mesh":0})");
+  EXPECT_EQ(countOf(model, "duplicate_key"), 0u);
+}
+
+// ---- references to nothing ----------------------------------------------------------------------
+
+TEST(GltfNodes, ANodeWithTwoParentsIsReportedAndStandsBelowEach) {
+  const TemporaryFolder folder;
+  const Model model = importModel(folder.write("a.gltf", tests::gltf(BoxMesh({1, 2, 3}), "0,1",
+                                                                     R"({"name":"a","children":[2]},
+                               {"name":"b","translation":[5,0,0],"children":[2]},
+                               {"name":"box","mesh":0})")));
+  EXPECT_EQ(model.objects.size(), 2u);
+  EXPECT_EQ(countOf(model, "shared_node"), 1u);
+  EXPECT_EQ(diagnosticText(model, "shared_node"), "nodes[2] 'box' has several parents");
+}
+
+TEST(GltfNodes, AReferenceToNothingCostsItselfAlone) {
+  struct Row {
+    const char *scene, *members, *kind, *text;
+  };
+  const TemporaryFolder folder;
+  for (const Row& row : std::vector<Row>{
+           {"0,1", R"("mesh":7)", "missing_mesh", "nodes[1] 'b': mesh 7 does not exist"},
+           {"0,1", R"("mesh":-1)", "missing_mesh", "nodes[1] 'b': mesh -1 does not exist"},
+           {"0,1", R"("mesh":"7")", "missing_mesh", "nodes[1] 'b': mesh is not an index"},
+           {"0,1", R"("camera":4)", "missing_camera", "nodes[1] 'b': camera 4 does not exist"},
+           {"0,1", R"("mesh":0,"skin":2)", "skin_ignored", "nodes[1] 'b': skin 2 does not exist"},
+           {"0,1", R"("children":[17])", "missing_node", "nodes[1] 'b': node 17 does not exist"},
+           {"0,9", R"("mesh":0)", "missing_node", "scenes[0]: node 9 does not exist"}}) {
+    const std::string nodes =
+        R"({"name":"a","mesh":0},{"name":"b",)" + std::string(row.members) + "}";
+    const Model model =
+        importModel(folder.write("a.gltf", tests::gltf(BoxMesh({1, 2, 3}), row.scene, nodes)));
+    EXPECT_EQ(countOf(model, row.kind), 1u) << row.members;
+    EXPECT_EQ(diagnosticText(model, row.kind), row.text);
+    expectSize(model, {1, 2, 3});
+  }
+}
+
+TEST(GltfNodes, ASkinThatDoesNotExistDoesNotRefuseAFileThatHasSkins) {
+  const TemporaryFolder folder;
+  std::string text = tests::gltf(BoxMesh({1, 2, 3}), "0", R"({"name":"box","mesh":0,"skin":1})");
+  const Model model =
+      importModel(folder.write("a.gltf", text.insert(1, R"("skins":[{"joints":[0]}],)")));
+  EXPECT_EQ(diagnosticText(model, "skin_ignored"), "nodes[0] 'box': skin 1 does not exist");
+  expectSize(model, {1, 2, 3});
 }
 
 }  // namespace

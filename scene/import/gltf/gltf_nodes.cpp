@@ -2,6 +2,7 @@
 
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
@@ -101,14 +102,23 @@ class NodeMatcher {
  public:
   NodeMatcher(const std::vector<PlainNode>& nodes, GltfNodes& matchedNodes,
               std::vector<Diagnostic>& diagnostics)
-      : nodes_(nodes), matchedNodes_(matchedNodes), diagnostics_(diagnostics) {}
+      : nodes_(nodes),
+        matchedNodes_(matchedNodes),
+        diagnostics_(diagnostics),
+        isVisited_(nodes.size(), false) {}
 
   /// Stops where the trees differ, and reports it; assimp's transforms are used there.
   void visit(std::size_t index, const aiNode& node, int depth) {
     if (depth > kMaxNodeDepth) return;  // refused by the reader of the tree
     if (index >= nodes_.size() || !nodes_[index].isObject) return reportUnmatched(node);
     const PlainNode& plain = nodes_[index];
-    reportTransform(plain.transform, index, node);
+    if (isVisited_[index]) {
+      addDiagnostic(diagnostics_, "shared_node",
+                    describeNode(index, node) + " has several parents");
+    } else {
+      reportTransform(plain.transform, index, node);
+    }
+    isVisited_[index] = true;
     matchedNodes_.emplace(&node, GltfNode{plain.transform.parentFromNode, index, plain.attributes});
     visitChildren(plain.children, node, depth + 1);
   }
@@ -119,13 +129,17 @@ class NodeMatcher {
   }
 
  private:
+  static std::string describeNode(std::size_t index, const aiNode& node) {
+    return "nodes[" + std::to_string(index) + "] '" + node.mName.C_Str() + "'";
+  }
+
   void reportUnmatched(const aiNode& node) {
     addDiagnostic(diagnostics_, "unmatched_node", node.mName.C_Str());
   }
 
   void reportTransform(const StatedTransform& transform, std::size_t index, const aiNode& node) {
     if (transform.fault == nullptr && transform.rotationLength == 1) return;
-    const std::string name = "nodes[" + std::to_string(index) + "] '" + node.mName.C_Str() + "': ";
+    const std::string name = describeNode(index, node) + ": ";
     if (transform.fault != nullptr)
       addDiagnostic(diagnostics_, "broken_transform_dropped", name + transform.fault);
     if (std::abs(transform.rotationLength - 1) > kMaxLengthError)
@@ -136,6 +150,7 @@ class NodeMatcher {
   const std::vector<PlainNode>& nodes_;
   GltfNodes& matchedNodes_;
   std::vector<Diagnostic>& diagnostics_;
+  std::vector<bool> isVisited_;  ///< by node
 };
 
 Eigen::Affine3d readMatrix(const std::array<double, 16>& numbers, const char*& fault) {
@@ -155,6 +170,9 @@ StatedTransform readNodeTransform(const Json& node) {
   StatedTransform result;
   if (const auto m = readNumbers<16>(node, "matrix")) {
     result.parentFromNode = readMatrix(*m, result.fault);
+    if (std::ranges::any_of(std::array{"translation", "rotation", "scale"},
+                            [&](const char* member) { return node.contains(member); }))
+      result.fault = "its matrix counts, and its translation, rotation and scale do not";
     return result;
   }
   if (node.contains("matrix")) result.fault = "its matrix is not 16 numbers";

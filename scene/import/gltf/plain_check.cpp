@@ -18,7 +18,8 @@ using Json = nlohmann::json;
 
 /// Texts in the JSON of a file that may need rewriting. Exporters sometimes forget to list an
 /// extension in extensionsUsed, so the whole text is searched.
-constexpr std::array<std::string_view, 12> kRewrittenTexts{
+constexpr std::array<std::string_view, 13> kRewrittenTexts{
+    "\"skin\"",  // assimp ignores one that does not exist if the file has no skins
     "\"skins\"",
     "\"targets\"",
     "\"EXT_meshopt_compression\"",

@@ -7,8 +7,10 @@
 
 #include "scene/import/assembly/path_names.hpp"
 #include "scene/import/file/import_options.hpp"
+#include "scene/import/gltf/encoding/duplicate_keys.hpp"
 #include "scene/import/gltf/encoding/gltf_binary.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
+#include "scene/import/gltf/encoding/missing_references.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
 #include "scene/import/gltf/gltf_extensions.hpp"
 #include "scene/import/gltf/gltf_instances.hpp"
@@ -25,8 +27,6 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr int kMaxJsonDepth = 512;
-
 [[noreturn]] void failJson(const std::filesystem::path& file, const std::string& fault) {
   throw ImportError(file.string() + ": its JSON " + fault + "; export it again");
 }
@@ -34,10 +34,11 @@ constexpr int kMaxJsonDepth = 512;
 /// Parses only the sections needed here and skips the nodes, of which there may be a million.
 /// Refuses a text whose copies and dumps would need much stack.
 Json parseMeshSections(const std::string& text, const std::filesystem::path& file,
-                       ExtensionNames& extensions) {
+                       ExtensionNames& extensions, DuplicateKeys& duplicates) {
   int deepest = 0;
   const auto wanted = [&](int depth, Json::parse_event_t event, Json& value) {
     deepest = std::max(deepest, depth);
+    duplicates.see(depth, event, value);
     if (event != Json::parse_event_t::key) return true;
     extensions.seeKey(depth, value.get_ref<const std::string&>());
     if (depth != 1) return true;
@@ -248,6 +249,7 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   Json gltf = original;
   gltf["scene"] = to.scene;
   try {
+    dropMissingReferences(gltf, to.problems);
     replaceSpecularGlossiness(gltf);
     // Instances are copies of the posed mesh, so all instances of a node share one.
     const auto poses = separatePosedMeshes(gltf, buffers, to.problems);
@@ -322,14 +324,18 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   std::vector<Diagnostic> problems;
   plain.json = readMendedJson(file, format, problems);
   ExtensionNames extensions;
-  Json sections = parseMeshSections(plain.json, file, extensions);
+  DuplicateKeys duplicates;
+  Json sections = parseMeshSections(plain.json, file, extensions, duplicates);
+  addDiagnostic(problems, "duplicate_key", duplicates.firstPath(), duplicates.count());
   requireVersion2(sections, file);
   plain.problems = checkGltfExtensions(sections, extensions, file);
   plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());
   const bool other = chooseScene(sections, choice.scene, file, plain);
-  if (other || choice.rewrite || needsRewriting(plain.json, sections, file, format)) {
+  // Rewriting leaves one value of a duplicate key, so that assimp reads the one checked here.
+  if (other || choice.rewrite || duplicates.count() > 0 ||
+      needsRewriting(plain.json, sections, file, format)) {
     rewriteGltf(file, format, plain);
-    sections = parseMeshSections(plain.json, file, extensions);
+    sections = parseMeshSections(plain.json, file, extensions, duplicates);
   }
   plain.triangles = countGltfTriangles(sections);
   return plain;

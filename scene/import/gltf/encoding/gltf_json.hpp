@@ -15,6 +15,9 @@ namespace enfilade::scene {
 /// Levels of nodes that importers follow; more means a broken or malicious file.
 inline constexpr int kMaxNodeDepth = 2000;
 
+/// Levels of JSON that importers follow: copies and dumps of more would need much stack.
+inline constexpr int kMaxJsonDepth = 512;
+
 inline constexpr std::size_t kNoIndex = ~std::size_t{0};  ///< in place of a member that is missing
 
 /// The JSON text of a glTF or GLB file. Throws ImportError if a GLB file is too short for it.
