@@ -314,7 +314,8 @@ std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
 std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named,
                                             const std::optional<Vec3>& start) {
   const std::lock_guard lock(mutex_);
-  if (const auto island = start ? islandAt(*start) : std::nullopt)
+  const auto standing = start ? standAt(*walker_, *start) : std::nullopt;
+  if (const auto island = standing ? islandAt(*standing) : std::nullopt)
     if (const auto place = findPlaceOn(named, island)) return place;
   return findPlaceOn(named, std::nullopt);
 }
@@ -332,7 +333,7 @@ std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance) {
 /// Places come from the mesh alone: a place without mesh, as on the rim of a table, would have the
 /// island of the mesh below.
 std::optional<Vec3> Navigation::snapTo(const Vec3& point, const SnapTarget& wanted) {
-  constexpr double kExact = 2e-3, kMaxHeightError = 0.3;  // metres
+  constexpr double kExact = 2e-3;  // metres
   constexpr std::size_t kMaxCandidates = 16;
   const std::lock_guard lock(mutex_);
   if (!wanted.island)
@@ -352,7 +353,7 @@ std::optional<Vec3> Navigation::snapTo(const Vec3& point, const SnapTarget& want
   candidates.resize(std::min(candidates.size(), kMaxCandidates));
   for (const auto& [distance, closest] : candidates) {
     const auto place = standNear(*walker_, closest);
-    if (place && std::abs(place->y() - closest.y()) < kMaxHeightError &&
+    if (place && std::abs(place->y() - closest.y()) < kHeightError &&
         collision::contains(box, {*place, *place}))
       return place;
   }
@@ -372,8 +373,10 @@ std::optional<ObstacleDistance> Navigation::findObstacle(const Vec3& point, doub
   return measureObstacle(world_.data(), agent_, *place, maxDistance);
 }
 
-NavigationMap Navigation::drawMap(double cell, double height) {
-  constexpr double kMaxCells = 4e6, kFloorDistance = 0.5;  // metres
+/// The mesh lies up to a voxel above level floor, and up to 15 cm off over stairs: where that
+/// decides, an agent is put down.
+NavigationMap Navigation::drawMap(double cell, double height, double tolerance) {
+  constexpr double kMaxCells = 4e6;
   const std::lock_guard lock(mutex_);
   const Aabb& bounds = world_.scene().bounds();
   const double width = std::ceil(bounds.size().x() / cell);
@@ -388,11 +391,16 @@ NavigationMap Navigation::drawMap(double cell, double height) {
                     static_cast<std::uint32_t>(std::max(1.0, depth)),
                     {}};
   map.cells.assign(std::size_t{map.width} * map.height, 0);
+  const CellGrid grid{bounds.min.x(), bounds.min.z(), cell, map.width, map.height};
+  const double highest = height + tolerance + grid_.cellHeight;
+  const auto measureFloor = [&](const Vec3& onMesh, double top) {
+    const Vec3 above(onMesh.x(), top + kHeightError, onMesh.z());
+    const auto place = standAt(*walker_, above, above.y() - onMesh.y() + kHeightError);
+    return place ? place->y() : onMesh.y();
+  };
   for (std::uint32_t polygon = 0; polygon < ample_->polygonCount(); ++polygon)
-    if (islands_.numberOf[polygon] != kNoIsland &&
-        std::abs(ample_->centre(polygon).y() - height) <= kFloorDistance)
-      ample_->rasterize(polygon, bounds.min.x(), bounds.min.z(), cell, map.width, map.height,
-                        map.cells);
+    if (islands_.numberOf[polygon] != kNoIsland)
+      ample_->rasterize(polygon, grid, height - tolerance, highest, measureFloor, map.cells);
   return map;
 }
 
@@ -409,16 +417,26 @@ std::vector<Vec3> Navigation::collectTriangles(const std::optional<std::uint32_t
   return triangles;
 }
 
-std::optional<std::uint32_t> Navigation::islandAt(const Vec3& point) const {
-  const auto nearest = ample_->findNearest(
-      point, Vec3(2 * agent_.radius, 0.5 + world_.settings().stepHeight, 2 * agent_.radius));
-  if (!nearest || islands_.numberOf[nearest->polygon] == kNoIsland) return std::nullopt;
-  return islands_.numberOf[nearest->polygon];
+/// The mesh ends at a distance from the rim of a floor. A place there has the island of the mesh at
+/// its own height, never that of a floor below: as in snapTo(), the rim of a table without mesh has
+/// none.
+std::optional<std::uint32_t> Navigation::islandAt(const Vec3& place) const {
+  double least = std::numeric_limits<double>::infinity();
+  std::uint32_t number = kNoIsland;
+  for (const std::uint32_t polygon :
+       ample_->findPolygons(place, Vec3(2 * agent_.radius, kHeightError, 2 * agent_.radius))) {
+    const Vec3 closest = ample_->closestPoint(polygon, place);
+    const double distance = (closest - place).norm();
+    if (!(distance < least) || std::abs(closest.y() - place.y()) > kHeightError) continue;
+    least = distance;
+    number = islands_.numberOf[polygon];
+  }
+  return number == kNoIsland ? std::nullopt : std::optional(number);
 }
 
-std::optional<std::uint32_t> Navigation::islandOf(const Vec3& point) {
+std::optional<std::uint32_t> Navigation::islandOf(const Vec3& place) {
   const std::lock_guard lock(mutex_);
-  return islandAt(point);
+  return islandAt(place);
 }
 
 std::vector<Island> Navigation::islands() {

@@ -31,6 +31,8 @@ struct NavigationReport {
   double seconds = 0;  ///< to build or load the meshes
 };
 
+inline constexpr double kMapTolerance = 0.5;  ///< metres: habitat-sim's default
+
 /// The walkable cells of a map seen from above.
 struct NavigationMap {
   Vec3 corner = Vec3::Zero();           ///< of cell 0, scene frame, metres: smallest x and z
@@ -104,13 +106,14 @@ class Navigation {
   std::optional<Vec3> tryStep(const Vec3& from, const Vec3& to, bool slides);
   /// nullopt: there is no place to stand at `point`.
   std::optional<ObstacleDistance> findObstacle(const Vec3& point, double maxDistance);
-  /// The walkable cells at floors within 0.5 m of `height`. Throws std::invalid_argument for more
-  /// than 4 million cells.
-  NavigationMap drawMap(double cell, double height);
+  /// The cells with a floor within `tolerance` metres of `height`, and some with one up to 5 cm
+  /// higher. Throws std::invalid_argument for more than 4 million cells.
+  NavigationMap drawMap(double cell, double height, double tolerance = kMapTolerance);
   /// The triangles of the mesh, three corners each, or of one island: scene frame, metres.
   std::vector<Vec3> collectTriangles(const std::optional<std::uint32_t>& island);
-  /// Number of the island at a point, 0 for the largest; nullopt: no polygon is near.
-  std::optional<std::uint32_t> islandOf(const Vec3& point);
+  /// Number of the island of a place where an agent stands, 0 for the largest; nullopt: no polygon
+  /// of its floor is near.
+  std::optional<std::uint32_t> islandOf(const Vec3& place);
   /// By number.
   std::vector<Island> islands();
   /// Islands next to an island, the closest first, with places to stand near the gap between both.
@@ -122,7 +125,7 @@ class Navigation {
   void joinIslands();
   bool isGapPassable(const Vec3& from, const Vec3& to, const std::vector<std::uint32_t>& scarce);
   NavigationMesh buildUnobstructed(int threads) const;
-  std::optional<std::uint32_t> islandAt(const Vec3& point) const;
+  std::optional<std::uint32_t> islandAt(const Vec3& place) const;
   Aabb computeBox(const NamedPlace& named) const;
   /// As findPlaceIn(), on an island, or anywhere.
   std::optional<Vec3> findPlaceOn(const NamedPlace& named,

@@ -282,6 +282,7 @@ v1::AvatarState toProto(const scene::World& world, const scene::AvatarSnapshot& 
   message.set_stands_on(avatar.groundEntity);
   message.set_height(avatar.height);
   message.set_facing(avatar.facing);
+  message.set_last_stopped_tick(avatar.lastStoppedTick);
   for (const scene::JointSnapshot& joint : avatar.joints) {
     v1::JointState& state = *message.add_joints();
     state.set_value(joint.value);

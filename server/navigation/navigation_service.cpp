@@ -190,10 +190,12 @@ struct Answer {
                                     std::vector<std::uint8_t>& attachment) const {
     if (auto error = validateNumber("map.cell", query.cell(), 0.01, 10)) return error;
     if (auto error = validateNumber("map.height", query.height(), -1e7, 1e7)) return error;
+    const double tolerance = query.has_tolerance() ? query.tolerance() : scene::kMapTolerance;
+    if (auto error = validateNumber("map.tolerance", tolerance, 0, 100)) return error;
     if (!v1::NavigationQuery::Map::Format_IsValid(query.format()))
       return makeNavigationError("map.format", "give BYTES, BITS or PNG");
     try {
-      scene::NavigationMap map = navigation.drawMap(query.cell(), query.height());
+      scene::NavigationMap map = navigation.drawMap(query.cell(), query.height(), tolerance);
       *reply.mutable_map_corner() = toProto(map.corner);
       reply.set_map_width(map.width);
       reply.set_map_height(map.height);

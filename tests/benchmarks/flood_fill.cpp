@@ -118,7 +118,7 @@ std::optional<Vec3> FloodFill::stepTo(scene::Walker& walker, const Vec3& from, d
     if (!standing) continue;
     const double climb = std::abs(standing->y() - from.y());
     if (climb > stepHeight_ + 1e-3) continue;
-    // As a place of its own: not one that only a fall beside something leads to.
+    // It must be a place of its own, not only the end of a fall next to an obstacle.
     if (!scene::standAt(walker, *standing + Vec3(0, kLift, 0), stepHeight_)) continue;
     if (climb < kEvenFloor) return standing;
     walker.returnTo(from);

@@ -32,7 +32,7 @@ class FloodFill {
   std::optional<Component> findComponent(const scene::Vec3& place) const;
 
   /// Length of the shortest way on the grid, pulled straight where all places below the straight
-  /// line are filled, metres. nullopt: there is none.
+  /// line are filled, metres. nullopt: no way.
   std::optional<double> measureShortest(const scene::Vec3& from, const scene::Vec3& to) const;
 
  private:

@@ -8,7 +8,9 @@
 //
 // SCENE is a file, or district:N for a generated district of N objects. Default: the district of
 // 1e5 objects, and the small house and the estate if the shared folder exists.
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
@@ -34,6 +36,22 @@ constexpr std::size_t kCompared = 15;  // stops of a walk
 
 struct Size {
   int width, height;
+};
+
+/// Pixels in which frames differ, and by how much in depth.
+struct Difference {
+  std::size_t ids = 0, depths = 0, colours = 0;
+  double farthest = 0;  ///< metres
+
+  void add(const render::Frame& a, const render::Frame& b) {
+    for (std::size_t i = 0; i < a.ids.size(); ++i) ids += a.ids[i] != b.ids[i] ? 1 : 0;
+    for (std::size_t i = 0; i < a.rgb.size(); ++i) colours += a.rgb[i] != b.rgb[i] ? 1 : 0;
+    for (std::size_t i = 0; i < a.depth.size(); ++i) {
+      if (std::memcmp(&a.depth[i], &b.depth[i], sizeof(float)) == 0) continue;
+      ++depths;
+      farthest = std::max(farthest, static_cast<double>(std::abs(a.depth[i] - b.depth[i])));
+    }
+  }
 };
 
 scene::Model modelOf(const std::string& name) {
@@ -140,8 +158,8 @@ void measureTogether(const std::shared_ptr<const scene::Scene>& scene, const std
     views.back().camera.height = size.height;
   }
   double together = 0, alone = 0;
-  std::size_t different = 0;
-  for (int round = -2; round < kRounds; ++round) {  // the first two fill the caches
+  Difference different;
+  for (int round = -6; round < kRounds; ++round) {  // the first ones fill the caches
     const auto begin = Clock::now();
     const std::vector<render::Frame> frames = renderer.render(views);
     const auto middle = Clock::now();
@@ -149,17 +167,20 @@ void measureTogether(const std::shared_ptr<const scene::Scene>& scene, const std
     for (const render::View& view : views)
       each.push_back(renderer.render(snapshot, view.camera, view.options));
     const auto end = Clock::now();
-    for (std::size_t i = 0; i < views.size(); ++i) different += same(frames[i], each[i]) ? 0 : 1;
+    for (std::size_t i = 0; i < views.size(); ++i) different.add(frames[i], each[i]);
     if (round < 0) continue;
     together += std::chrono::duration<double>(middle - begin).count();
     alone += std::chrono::duration<double>(end - middle).count();
   }
   const double frames = kRounds * static_cast<double>(views.size());
-  std::printf("%-28.28s %-12.12s %-6s %4dx%-4d %2zu views: %8.3f ms alone %8.3f ratio %5.2f  %s\n",
-              std::filesystem::path(name).filename().c_str(), renderer.deviceName().c_str(),
-              coloured ? "colour" : "depth", size.width, size.height, views.size(),
-              1e3 * together / frames, 1e3 * alone / frames, alone / together,
-              different == 0 ? "same bytes" : "DIFFERENT BYTES");
+  std::printf(
+      "%-28.28s %-12.12s %-6s %4dx%-4d %2zu views: %8.3f ms alone %8.3f ratio %5.2f  different: "
+      "%zu ids, "
+      "%zu depths (%.2g m), %zu colours\n",
+      std::filesystem::path(name).filename().c_str(), renderer.deviceName().c_str(),
+      coloured ? "colour" : "depth", size.width, size.height, views.size(), 1e3 * together / frames,
+      1e3 * alone / frames, alone / together, different.ids, different.depths, different.farthest,
+      different.colours);
   std::fflush(stdout);
 }
 

@@ -9,7 +9,7 @@ import unittest.mock
 import numpy as np
 
 import enfilade
-from room import RoomCase
+from room import RoomCase, obj
 
 _STARTS = [(0, 0.01, 0), (-3, 0.01, 2)]
 
@@ -286,6 +286,21 @@ class Environments(RoomCase):
         self.assertGreater(missed, 20)  # by a look at the last tick of each step
         self.assertGreater(free, 20)
         self.assertGreater(left, 0)  # stopped in the first ticks only, after a step that ended there
+
+    def test_a_ramp_after_a_collision_is_none(self):
+        scene = self.folder / "ramp.obj"
+        scene.write_text(obj() + "o ramp\n" + "".join(
+            f"v {x} {y} {z}\n" for x, y in ((4.4, 0), (0, 0), (0, 1)) for z in (-3, 3)) +
+            "".join("f " + " ".join(str(25 + i) for i in face) + "\n" for face in
+                    ((0, 2, 4), (1, 5, 3), (0, 4, 5, 1), (2, 3, 5, 4), (0, 1, 3, 2))))
+        env = enfilade.WalkEnv(scene, starts=[(4.65, 0.05, 0, 0)], channels=(), ticks_per_step=30,
+                               turn_speed=2 * math.pi)
+        self.addCleanup(env.close)
+        env.reset()
+        self.assertTrue(env.step((1, 0))[-1]["stopped_by"].startswith("wall"))
+        infos = [env.step((1, 1))[-1], env.step((1, 0))[-1]]  # away from the wall, up the ramp
+        self.assertGreater(env._feet[1], 0.2)
+        self.assertEqual([info["collided"] for info in infos], [False, False])
 
     def test_stairs_are_no_collision(self):
         with enfilade.serve(os.environ["ENFILADE_BUILDING"]) as server:

@@ -168,8 +168,16 @@ class CompatTest(RoomCase):
         self.assertEqual(self.finder.get_topdown_view(0.1, 0).dtype, bool)
         np.testing.assert_array_equal(self.finder.get_topdown_view(0.1, 0, 0.5),
                                       self.finder.get_topdown_view(0.1, 0))
-        with self.assertRaisesRegex(ValueError, "eps"):
-            self.finder.get_topdown_view(0.1, 0, 0.1)
+
+    def test_a_map_has_the_floors_within_eps(self):
+        floor, air, above = (self.finder.get_topdown_view(0.1, height, eps)
+                             for height, eps in ((0, 0.1), (1, 0.9), (1, 1.1)))
+        self.assertGreater(floor.sum(), 30000)
+        self.assertFalse(air.any())
+        np.testing.assert_array_equal(floor, above)
+        with self.assertRaises(enfilade.ServerError) as raised:
+            self.finder.get_topdown_view(0.1, 0, -1)
+        self.assertEqual(raised.exception.field, "navigation.map.tolerance")
 
     def test_obstacles_are_searched_from_the_surface_and_capped(self):
         for place, most, expected in (((3, 0, 0), 2.0, 1.9), ((3.05, 0, 0), 2.0, 1.85), ((0, 0, 0), 2.0, 2.0),

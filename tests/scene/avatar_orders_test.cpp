@@ -169,6 +169,25 @@ TEST(MoveResult, ReportsTheDisplacementAndTheObstacleOfADrive) {
   EXPECT_NEAR(move.separation.normal.x(), 1, 1e-9);
 }
 
+TEST(MoveResult, TheLastTickWithAnObstacleIsKeptAndTheFloorIsNone) {
+  WorldFixture run(
+      {floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}, {"step", {-4, 0, -3}, {-2, 0.2, 3}}});
+  run.order("ann", Spawn{{0, 0, 0}});
+  run.untilIdle();
+  run.order("ann", Drive{{1.5, 0, 0}});
+  std::uint64_t last = 0;
+  for (int i = 0; i < 100; ++i) {
+    run.step();
+    if (run.view("ann").move.blockedBy != 0) last = run.world.snapshot()->tick;
+    ASSERT_EQ(run.view("ann").lastStoppedTick, last);
+  }
+  EXPECT_EQ(last, run.world.snapshot()->tick);
+  run.order("ann", Drive{{-1.5, 0, 0}});
+  run.ticks(160);
+  EXPECT_GT(run.feet("ann").y(), 0.19);  // it climbed the step
+  EXPECT_EQ(run.view("ann").lastStoppedTick, last);
+}
+
 TEST(MoveResult, BlockedIsReportedOnceEachTimeItBegins) {
   WorldFixture run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});

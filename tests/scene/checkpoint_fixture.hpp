@@ -49,7 +49,8 @@ inline bool same(const AvatarSnapshot& a, const AvatarSnapshot& b) {
          a.grounded == b.grounded && a.flying == b.flying && a.groundEntity == b.groundEntity &&
          a.height == b.height && same(a.move.requestedDisplacement, b.move.requestedDisplacement) &&
          same(a.move.actualDisplacement, b.move.actualDisplacement) &&
-         a.move.blockedBy == b.move.blockedBy && same(a.move.separation, b.move.separation);
+         a.move.blockedBy == b.move.blockedBy && same(a.move.separation, b.move.separation) &&
+         a.lastStoppedTick == b.lastStoppedTick;
 }
 inline bool same(const BodySnapshot& a, const BodySnapshot& b) {
   return a.id == b.id && a.index == b.index && same(a.pose.translation, b.pose.translation) &&

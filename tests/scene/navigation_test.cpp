@@ -234,6 +234,51 @@ TEST(Navigation, AMapShowsTheRoomsAndTheWallBetween) {
   EXPECT_THROW(navigation.drawMap(0.001, 0), std::invalid_argument);
 }
 
+TEST(Navigation, AMapIsASliceOfStairs) {
+  std::vector<NamedBox> boxes{{"floor", {0, -0.2, -3}, {12, 0, 3}}};
+  for (int step = 0; step < 8; ++step)
+    boxes.push_back(
+        {"stair/" + std::to_string(step), {4 + 0.28 * step, 0, -1}, {9, 0.18 * (step + 1), 1}});
+  Navigation navigation(boxScene(boxes), {}, {});
+  const auto heights = [&](double height, double tolerance) {
+    const NavigationMap map = navigation.drawMap(0.05, height, tolerance);
+    Aabb found;  // of places on the middle of the stairs
+    for (std::uint32_t column = 0; column < map.width; ++column) {
+      const auto row = static_cast<std::size_t>(-map.corner.z() / map.cell);
+      if (map.cells[row * map.width + column] == 0) continue;
+      const double x = map.corner.x() + (column + 0.5) * map.cell;
+      if (x > 9) break;
+      const double riser = std::floor((x - 4) / 0.28) + 1;
+      found.include({x, 0.18 * std::clamp(riser, 0.0, 8.0), 0});
+    }
+    return found;
+  };
+  // An avatar stands on the tread that its edge reaches, which is up to 2 after that at its middle.
+  EXPECT_NEAR(heights(0.72, 0.3).min.y(), 0.36, 0.19);
+  EXPECT_NEAR(heights(0.72, 0.3).max.y(), 0.81, 0.19);
+  EXPECT_EQ(heights(0, 0.1).min.y(), 0);
+  EXPECT_LT(heights(0, 0.1).max.x(), 4.6);
+  EXPECT_EQ(heights(1.44, 0).max.y(), 1.44);
+  EXPECT_GT(heights(1.44, 0).min.x(), 5.6);
+  EXPECT_LT(heights(1.44, 1.5).min.x(), 1);
+}
+
+TEST(Navigation, APlaceOnATableWithoutMeshHasNoIsland) {
+  Navigation navigation(
+      boxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}}, {"table", {3.8, 0, -0.2}, {4.2, 0.7, 0.2}}}),
+      {}, {});
+  const auto floor = navigation.islandOf({2, 0, 0});
+  ASSERT_TRUE(floor);
+  const auto rim = navigation.snap({4.15, 0.75, 0.15}, 0.2);
+  ASSERT_TRUE(rim);
+  ASSERT_NEAR(rim->y(), 0.7, 0.01);
+  EXPECT_FALSE(navigation.islandOf(*rim));
+  const auto below = navigation.snapTo(*rim, {Vec3(2, 4, 2), floor});
+  ASSERT_TRUE(below);
+  EXPECT_LT(below->y(), 0.1);
+  EXPECT_EQ(navigation.islandOf(*below), floor);
+}
+
 TEST(Navigation, AClosedDoorIsNamedAndAnOpenOneIsPassed) {
   auto boxes = twoRooms(1);
   boxes.push_back({"leaf", {3.98, 0.01, -0.49}, {4.02, 2, 0.49}});

@@ -109,6 +109,7 @@ TEST_F(AvatarOrders, ADriveIntoAWallReportsDisplacementAndObstacle) {
   EXPECT_EQ(move.asked().x(), 5);
   EXPECT_LT(std::abs(move.made().x()), 0.01);
   EXPECT_EQ(move.stopped_by_name(), "room_wall");
+  EXPECT_EQ(outcome.avatars.at(0).last_stopped_tick(), world.snapshot()->tick);
   EXPECT_EQ(move.verdict(), v1::VERDICT_SEPARATED);
   EXPECT_LT(move.distance(), 0.001);
 }

@@ -122,6 +122,8 @@ TEST(NavigationService, MapsAreBytesBitsOrAPicture) {
   EXPECT_EQ(png[23], height);
   query.mutable_map()->set_format(static_cast<v1::NavigationQuery::Map::Format>(9));
   EXPECT_EQ(ask(scene, query).error.field(), "navigation.map.format");
+  query.mutable_map()->set_tolerance(-1);
+  EXPECT_EQ(ask(scene, query).error.field(), "navigation.map.tolerance");
 }
 
 /// Starts of the program that share a cache folder.

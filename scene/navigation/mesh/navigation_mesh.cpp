@@ -335,9 +335,10 @@ std::vector<Vec3> NavigationMesh::corners(std::uint32_t index) const {
   return corners;
 }
 
-void NavigationMesh::rasterize(std::uint32_t index, double x, double z, double cell,
-                               std::uint32_t width, std::uint32_t height,
-                               std::vector<std::uint8_t>& cells) const {
+void NavigationMesh::rasterize(
+    std::uint32_t index, const CellGrid& grid, double lowest, double highest,
+    const std::function<double(const Vec3& onMesh, double top)>& measureFloor,
+    std::vector<std::uint8_t>& cells) const {
   const dtPoly* polygon = nullptr;
   const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
   std::array<float, 3 * DT_VERTS_PER_POLYGON> corners{};
@@ -346,16 +347,21 @@ void NavigationMesh::rasterize(std::uint32_t index, double x, double z, double c
     std::copy_n(&tile.verts[polygon->verts[i] * 3], 3, &corners[static_cast<std::size_t>(3 * i)]);
     box.include(toVec3(&corners[static_cast<std::size_t>(3 * i)]));
   }
+  if (box.max.y() < lowest || box.min.y() > highest) return;
+  const bool isInside = box.min.y() >= lowest && box.max.y() <= highest;
   const auto first = [&](double least, double origin) {
-    return static_cast<std::uint32_t>(std::max(0.0, std::floor((least - origin) / cell)));
+    return static_cast<std::uint32_t>(std::max(0.0, std::floor((least - origin) / grid.cell)));
   };
-  for (std::uint32_t row = first(box.min.z(), z); row < height && z + row * cell <= box.max.z();
-       ++row) {
-    for (std::uint32_t column = first(box.min.x(), x);
-         column < width && x + column * cell <= box.max.x(); ++column) {
-      const Float3 middle = toFloats({x + (column + 0.5) * cell, 0, z + (row + 0.5) * cell});
-      if (dtPointInPolygon(middle.data(), corners.data(), polygon->vertCount))
-        cells[std::size_t{row} * width + column] = 1;
+  for (std::uint32_t row = first(box.min.z(), grid.z);
+       row < grid.height && grid.z + row * grid.cell <= box.max.z(); ++row) {
+    for (std::uint32_t column = first(box.min.x(), grid.x);
+         column < grid.width && grid.x + column * grid.cell <= box.max.x(); ++column) {
+      const Vec3 middle(grid.x + (column + 0.5) * grid.cell, box.min.y(),
+                        grid.z + (row + 0.5) * grid.cell);
+      if (!dtPointInPolygon(toFloats(middle).data(), corners.data(), polygon->vertCount)) continue;
+      const double height =
+          isInside ? lowest : measureFloor(closestPoint(index, middle), box.max.y());
+      if (height >= lowest && height <= highest) cells[std::size_t{row} * grid.width + column] = 1;
     }
   }
 }

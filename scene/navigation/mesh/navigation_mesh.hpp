@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <span>
@@ -41,6 +42,12 @@ struct BoundaryEdge {
   std::uint32_t polygon = 0;
   Vec3 from = Vec3::Zero(), to = Vec3::Zero();  ///< scene frame, metres
   Vec3 outward = Vec3::Zero();                  ///< horizontal, unit
+};
+
+/// Square cells seen from above, in metres. Cell 0 has its corner at (x, z); rows run along x.
+struct CellGrid {
+  double x = 0, z = 0, cell = 0;
+  std::uint32_t width = 0, height = 0;
 };
 
 /// Copies share nothing. Const functions may be called from several threads.
@@ -85,10 +92,12 @@ class NavigationMesh {
   void forgetFailures(std::uint32_t from, std::uint32_t to);
   /// A point of a polygon for two numbers of 0..1, uniform in area.
   Vec3 pointInPolygon(std::uint32_t polygon, double s, double t) const;
-  /// Sets the cells to 1 whose middle lies over a polygon. Cell 0 has its corner at (x, z); rows
-  /// run along x.
-  void rasterize(std::uint32_t polygon, double x, double z, double cell, std::uint32_t width,
-                 std::uint32_t height, std::vector<std::uint8_t>& cells) const;
+  /// Sets the cells to 1 whose middle lies over a polygon from `lowest` to `highest`. If only a
+  /// part of it may, `measureFloor` returns the height below or above a point of it; `top` is its
+  /// highest.
+  void rasterize(std::uint32_t polygon, const CellGrid& grid, double lowest, double highest,
+                 const std::function<double(const Vec3& onMesh, double top)>& measureFloor,
+                 std::vector<std::uint8_t>& cells) const;
   /// For each polygon the number of its island: polygons joined by open portals. The largest island
   /// has number 0.
   std::vector<std::uint32_t> findIslands() const;

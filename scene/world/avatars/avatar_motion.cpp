@@ -276,6 +276,7 @@ void moveAvatar(const WorldData& world, Avatar& avatar, QueryCount& count) {
   avatar.dirty = false;
   if (avatar.turn.left != 0) turnAvatar(world.settings, avatar, count);
   if (avatar.chain.speed > 0) moveJoints(world, avatar, count);
+  if (avatar.blockedBy != 0) avatar.lastStoppedTick = world.tick;
 }
 
 }  // namespace enfilade::scene

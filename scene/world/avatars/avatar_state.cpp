@@ -88,6 +88,7 @@ AvatarSnapshot makeAvatarSnapshot(const Avatar& avatar) {
   snapshot.facing = avatar.facing;
   snapshot.turnRadius = computeTurnRadius(avatar);
   snapshot.teleports = avatar.teleports;
+  snapshot.lastStoppedTick = avatar.lastStoppedTick;
   return snapshot;
 }
 

@@ -141,9 +141,9 @@ void archiveMembers(A& a, MaybeConst<A, Avatar>& avatar) {
   auto& [name, id, shape, spawnOrder, footPosition, viewDirection, eyeHeight, fallSpeed, grounded,
          groundEntity, flying, jumping, spawnHeight, height, radius, baseParts, chain, facing, turn,
          viewHeld, teleports, driveVelocity, desiredVelocity, walk, waitTimeLeft, stalledInAirTime,
-         lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, pairsChanged, blockingHit,
-         blockedReported, proxy, motionBounds, cachedBounds, obstacles, work, hasBodyObstacles,
-         contacts] = avatar;
+         lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, lastStoppedTick,
+         pairsChanged, blockingHit, blockedReported, proxy, motionBounds, cachedBounds, obstacles,
+         work, hasBodyObstacles, contacts] = avatar;
   a(name, spawnOrder, spawnHeight, height, radius, facing);
   if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // `shape`, `baseParts`
   a(chain);
@@ -151,8 +151,9 @@ void archiveMembers(A& a, MaybeConst<A, Avatar>& avatar) {
     if (!chain.links.empty()) shape = makeChainShape(baseParts, chain);
   a(id, footPosition, viewDirection, eyeHeight, fallSpeed, grounded, groundEntity, flying, jumping,
     turn, viewHeld, teleports, driveVelocity, walk, waitTimeLeft, stalledInAirTime,
-    lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, pairsChanged, blockingHit,
-    blockedReported, proxy, motionBounds, cachedBounds, obstacles, hasBodyObstacles, contacts);
+    lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, lastStoppedTick, pairsChanged,
+    blockingHit, blockedReported, proxy, motionBounds, cachedBounds, obstacles, hasBodyObstacles,
+    contacts);
 }
 
 // ---- bodies ------------------------------------------------------------------------------------

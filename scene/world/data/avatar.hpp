@@ -72,6 +72,7 @@ struct Avatar {
   bool idle = false;   ///< grounded, at rest, no moving neighbours: skipped in this tick
   bool dirty = false;  ///< shape or position changed since: not idle in this tick
   EntityId blockedBy = 0;
+  std::uint64_t lastStoppedTick = 0;  ///< the last one with `blockedBy`; 0: none. Not hashed
   bool pairsChanged = true;  ///< its broad-phase pairs changed since `obstacles` were collected
   collision::SeparationResult blockingHit;  ///< to `blockedBy`, where the move ended
   bool blockedReported = false;             ///< driven against an obstacle; reported at the start

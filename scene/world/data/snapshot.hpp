@@ -49,6 +49,7 @@ struct AvatarSnapshot {
   double facing = 0;                  ///< degrees, of its parts and links; 0 for a mere prism
   double turnRadius = 0;              ///< as computeTurnRadius()
   std::uint32_t teleports = 0;        ///< since it spawned
+  std::uint64_t lastStoppedTick = 0;  ///< the last one with `move.blockedBy`; 0: none
 };
 
 struct BodySnapshot {

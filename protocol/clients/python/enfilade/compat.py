@@ -307,10 +307,8 @@ class PathFinder:
         return float(np.linalg.norm(places - places.mean(axis=0), axis=1).max()) if len(places) else 0.0
 
     def get_topdown_view(self, meters_per_pixel: float, height: float, eps: float = 0.5) -> np.ndarray:
-        """Floors within 0.5 m of the height, habitat's default; another `eps` raises ValueError."""
-        if eps != 0.5:
-            raise ValueError(f"eps: the server's maps have the floors within 0.5 m, not {eps}")
-        return self.navigation.top_down(height, meters_per_pixel).cells
+        """The floors within `eps` metres of the height, as is_navigable() with that `max_y_delta`."""
+        return self.navigation.top_down(height, meters_per_pixel, eps).cells
 
 
 def _island(index: int) -> Optional[int]:

@@ -164,7 +164,7 @@ class WalkEnv(spaces.EnvBase):
         self._tag = 0  # of the last reset()'s spawn
         self._feet: Optional[np.ndarray] = None  # metres; None: no episode has begun
         self._stopped_by = ""  # in the last tick
-        self._velocity = (0.0, 0.0)  # of the last step, metres per second along x and z
+        self._last_stopped = 0  # the last tick in which an obstacle stopped it; 0: none
         self._rgb: Optional[np.ndarray] = None
         self._seen: Observation = {}  # of the last step
         self.server: Optional[Server] = None
@@ -396,6 +396,7 @@ class WalkEnv(spaces.EnvBase):
                 feet = one.feet
                 self._feet = np.array((feet.x, feet.y, feet.z))
                 self._stopped_by = one.move.stopped_by_name
+                self._last_stopped = one.last_stopped_tick
                 return True
         return False
 
@@ -415,8 +416,7 @@ class WalkEnv(spaces.EnvBase):
         ahead, turn = meaning
         self._face(math.remainder(self._heading + turn * self.turn_speed * self._seconds, math.tau))
         cosine, sine = self._direction
-        self._velocity = ahead * self.speed * cosine, ahead * self.speed * -sine
-        return self._velocity
+        return ahead * self.speed * cosine, ahead * self.speed * -sine
 
     def _kept_step(self, member: Member) -> KeptRequest:
         """The requests of a step in this episode. The doubles are _step_numbers()."""
@@ -449,7 +449,6 @@ class WalkEnv(spaces.EnvBase):
         assert before is not None
         made = replies[1][0].step
         self._steps += 1
-        was_stopped = bool(self._stopped_by)
         if not self._take_avatar(made):
             if not left:
                 raise OrderFailed("the avatar is no longer in the world: another client commands it")
@@ -458,35 +457,22 @@ class WalkEnv(spaces.EnvBase):
         for reply, _ in replies[2:]:
             raise_refusal(reply)
         path = replies.pop()[0].navigation.paths[0] if self.is_geodesic else None
-        info = self._info(made.tick, made.state_hash, contacts,
-                          self._has_collided(before, was_stopped, contacts))
+        info = self._info(made.tick, made.state_hash, contacts, self._has_collided(made.tick, contacts))
         return (self._observation(replies[2:]), *self._judged(before, info, path))
 
-    def _take_packed(self, step: Tuple[int, int, np.ndarray, str]) -> Dict[str, Any]:
+    def _take_packed(self, step: Tuple[int, int, np.ndarray, str, int]) -> Dict[str, Any]:
         """Keeps the avatar's state of a packed step. Returns its info."""
-        before, was_stopped = self._feet, bool(self._stopped_by)
-        assert before is not None
-        tick, state_hash, self._feet, self._stopped_by = step
+        tick, state_hash, self._feet, self._stopped_by, self._last_stopped = step
         self._steps += 1
         client = self.client
         client._notices.clear()
         contacts = client._kept_contacts() if client._contacts else []
-        return self._info(tick, state_hash, contacts, self._has_collided(before, was_stopped, contacts))
+        return self._info(tick, state_hash, contacts, self._has_collided(tick, contacts))
 
-    def _has_collided(self, before: np.ndarray, was_stopped: bool,
-                      contacts: List[results.Contact]) -> bool:
-        """Whether an obstacle stopped the avatar in any tick of the step, or came into contact with it.
-        `was_stopped`: in the last tick of the step before."""
-        if self._stopped_by or any(map(self._is_collision, contacts)):
-            return True
-        if not was_stopped:
-            return False
-        # "blocked" is not sent again for the first ticks after a step that ended at the obstacle. They
-        # show as a displacement that is shorter than the drive.
-        assert self._feet is not None
-        x, z = self._velocity
-        made = (self._feet[0] - before[0]) * x + (self._feet[2] - before[2]) * z
-        return made < (1 - 1e-6) * (x * x + z * z) * self._seconds
+    def _has_collided(self, tick: int, contacts: List[results.Contact]) -> bool:
+        """Whether an obstacle stopped the avatar in any tick of the step that ended at `tick`, or came into
+        contact with it."""
+        return self._last_stopped > tick - self.ticks_per_step or any(map(self._is_collision, contacts))
 
     def _is_collision(self, contact: results.Contact) -> bool:
         """Whether a contact event is one of the avatar with something that it cannot stand on."""

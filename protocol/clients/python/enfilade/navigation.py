@@ -261,17 +261,17 @@ class Navigation:
                        one.to, one.roof, one.drawn)
                 for one in self._ask(islands=query)[0].islands]
 
-    def top_down(self, height: float, cell: float = 0.05) -> Map:
-        """Returns a map of the floors within 0.5 m of a height."""
-        query = messages.NavigationQuery.Map(cell=cell, height=height, format="FORMAT_BITS")
+    def top_down(self, height: float, cell: float = 0.05, tolerance: float = 0.5) -> Map:
+        """Returns a map of the floors within `tolerance` metres of a height; floors up to 5 cm higher may show."""
+        query = messages.NavigationQuery.Map(cell=cell, height=height, tolerance=tolerance, format="FORMAT_BITS")
         reply, attachment = self._ask(map=query)
         rows = np.frombuffer(attachment, np.uint8).reshape(reply.map_height, -1)
         cells = np.unpackbits(rows, axis=1, count=reply.map_width)
         return Map(cells.astype(bool), _xyz(reply.map_corner), cell)
 
-    def top_down_png(self, height: float, cell: float = 0.05) -> bytes:
+    def top_down_png(self, height: float, cell: float = 0.05, tolerance: float = 0.5) -> bytes:
         """Returns the map as a PNG: white cells are walkable."""
-        query = messages.NavigationQuery.Map(cell=cell, height=height, format="FORMAT_PNG")
+        query = messages.NavigationQuery.Map(cell=cell, height=height, tolerance=tolerance, format="FORMAT_PNG")
         return bytes(self._ask(map=query)[1])
 
     def triangles(self, island: Optional[int] = None) -> np.ndarray:

@@ -111,6 +111,7 @@ class AvatarState:
     stopped_by_name: str
     joints: Tuple[float, ...] = ()
     facing: float = 0.0  # DEGREES, of parts and links
+    last_stopped_tick: int = 0  # the last tick with `stopped_by`; 0: none since it spawned
 
     @property
     def eyes(self) -> Vector:
@@ -124,7 +125,7 @@ def avatar_state(message: Any) -> AvatarState:
         eye_height=message.eye_height, grounded=message.grounded, flying=message.flying,
         asked=vector(move.asked), made=vector(move.made), stopped_by=move.stopped_by,
         stopped_by_name=move.stopped_by_name, joints=tuple(j.value for j in message.joints),
-        facing=message.facing)
+        facing=message.facing, last_stopped_tick=message.last_stopped_tick)
 
 
 @dataclass(frozen=True)

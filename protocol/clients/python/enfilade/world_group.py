@@ -131,7 +131,7 @@ class _Steps:
 
     def __init__(self, packed: Any) -> None:
         self.ticks, self.hashes = packed.tick[:], packed.state_hash[:]
-        self.stopped_by = packed.stopped_by_name[:]
+        self.stopped_by, self.last_stopped = packed.stopped_by_name[:], packed.last_stopped_tick[:]
         self.feet = np.array(packed.feet[:]).reshape(-1, 3)  # rows of NaN: no such avatar
         self.has_avatar = (~np.isnan(self.feet[:, 0])).tolist()
 
@@ -162,15 +162,15 @@ class WorldReply:
             start = max(start, end)
         return found
 
-    def packed(self, others: int) -> Optional[Tuple[int, int, np.ndarray, str]]:
-        """Returns tick, hash, feet and stopped_by_name of the packed step; None if it was refused, the
-        avatar is not in the world, or more came with it than `others` replies."""
+    def packed(self, others: int) -> Optional[Tuple[int, int, np.ndarray, str, int]]:
+        """Returns tick, hash, feet, stopped_by_name and last_stopped_tick of the packed step; None if it was
+        refused, the avatar is not in the world, or more came with it than `others` replies."""
         steps, i = self._steps, self._index
         if steps is None or not steps.has_avatar[i] or len(self.messages) != others:
             return None
         if others and any(one.HasField("error") for one in self.messages):
             return None
-        return steps.ticks[i], steps.hashes[i], steps.feet[i], steps.stopped_by[i]
+        return steps.ticks[i], steps.hashes[i], steps.feet[i], steps.stopped_by[i], steps.last_stopped[i]
 
     def unpacked(self, avatar: str) -> List[Any]:
         """Returns the replies to Drive and Step, the first two requests, that are in none of the
@@ -186,6 +186,7 @@ class WorldReply:
             if steps.has_avatar[i]:
                 x, y, z = steps.feet[i].tolist()
                 made.avatars.add(name=avatar, feet=messages.Vec3(x=x, y=y, z=z),
+                                 last_stopped_tick=steps.last_stopped[i],
                                  move=messages.MoveResult(stopped_by_name=steps.stopped_by[i]))
             found.append(messages.ServerMessage(reply_to=2, step=made))
         return found
