@@ -39,13 +39,13 @@ struct District {
   std::vector<Prototype> houses;
   Prototype gallery, tree, lamp, street;
 
-  std::size_t left() const { return wanted - model.objects.size(); }
+  std::size_t countLeft() const { return wanted - model.objects.size(); }
 };
 
 /// Places a whole prototype; places nothing if it would exceed the number of objects.
 bool place(District& d, const Prototype& prototype, const std::string& path,
            const Eigen::Affine3d& worldFromLocal) {
-  if (prototype.objects.size() > d.left()) return false;
+  if (prototype.objects.size() > d.countLeft()) return false;
   for (const scene::Object& object : prototype.objects) {
     d.model.objects.push_back(object);
     scene::Object& placed = d.model.objects.back();
@@ -60,45 +60,46 @@ void addLampPost(Sketch& sketch) {
   addTurned(s, Vec3::Zero(), {{0.12, 0}, {0.12, 0.1}, {0.05, 0.2}, {0.04, 4.0}}, 12,
             Paint::darkIron);
   addBall(s, {0, 4.15, 0}, {0.2, 0.2, 0.2}, 12, Paint::lampGlow);
-  sketch.place("lamp_post", s, moved(Vec3::Zero()));
+  sketch.place("lamp_post", s, makeTranslation(Vec3::Zero()));
 }
 
 /// Adds the flat surfaces of a block: pavement, the streets west and north of it, their stripes.
 void addStreet(Sketch& sketch) {
   const double x = kBlockX / 2, z = kBlockZ / 2, half = kStreet / 2;
-  sketch.box("pavement", {-x + half, -0.3, -z + half}, {x - half, -0.0, z - half}, Paint::paving);
-  sketch.box("road_west", {-x - half, -0.3, -z + half}, {-x + half, -0.12, z - half},
-             Paint::asphalt);
-  sketch.box("road_north", {-x - half, -0.3, -z - half}, {x - half, -0.12, -z + half},
-             Paint::asphalt);
+  sketch.placeBox("pavement", {-x + half, -0.3, -z + half}, {x - half, -0.0, z - half},
+                  Paint::paving);
+  sketch.placeBox("road_west", {-x - half, -0.3, -z + half}, {-x + half, -0.12, z - half},
+                  Paint::asphalt);
+  sketch.placeBox("road_north", {-x - half, -0.3, -z - half}, {x - half, -0.12, -z + half},
+                  Paint::asphalt);
   for (int i = 0; i < 10; ++i) {
     const double at = -x + 9 + 8.4 * i;
-    sketch.box(numbered("stripe", i + 1), {at, -0.13, -z - 0.08}, {at + 3, -0.116, -z + 0.08},
-               Paint::roadPaint);
+    sketch.placeBox(appendNumber("stripe", i + 1), {at, -0.13, -z - 0.08},
+                    {at + 3, -0.116, -z + 0.08}, Paint::roadPaint);
   }
 }
 
 template <typename Add>
-Prototype prototypeOf(scene::Model& model, Add add) {
+Prototype makePrototype(scene::Model& model, Add add) {
   Sketch sketch;
   add(sketch);
   return adopt(model, std::move(sketch.model()), "");
 }
 
-District prepared(std::size_t objects, std::uint64_t seed) {
+District prepareDistrict(std::size_t objects, std::uint64_t seed) {
   District d;
   d.wanted = objects;
   d.model.source =
       "district of " + std::to_string(objects) + " objects, seed " + std::to_string(seed);
-  d.model.materials = paletteMaterials();
+  d.model.materials = makePaletteMaterials();
   d.model.objects.reserve(objects);
   Random random(seed);
   d.gallery = adopt(d.model, makeBuilding({random.next(), 0}), "grounds/lawn");
   for (int i = 0; i < kHouses; ++i)
-    d.houses.push_back(prototypeOf(d.model, [&](Sketch& s) { addHouse(s, random); }));
-  d.tree = prototypeOf(d.model, [&](Sketch& s) { addTree(s, "tree", Vec3::Zero(), random); });
-  d.lamp = prototypeOf(d.model, addLampPost);
-  d.street = prototypeOf(d.model, addStreet);
+    d.houses.push_back(makePrototype(d.model, [&](Sketch& s) { addHouse(s, random); }));
+  d.tree = makePrototype(d.model, [&](Sketch& s) { addTree(s, "tree", Vec3::Zero(), random); });
+  d.lamp = makePrototype(d.model, addLampPost);
+  d.street = makePrototype(d.model, addStreet);
   return d;
 }
 
@@ -111,7 +112,8 @@ bool fillWithHouses(District& d, const std::string& block, const Vec3& middle, R
     const double x = (kBlockX - kStreet) * ((i % kRow + 0.5) / kRow - 0.5);
     const Vec3 at = middle + Vec3{x, 0, north ? -12.0 : 12.0};
     const auto kind = static_cast<std::size_t>(random.below(kHouses));
-    if (!place(d, d.houses[kind], numbered(block + "/house", i + 1), turned(north ? 2 : 0, at)))
+    if (!place(d, d.houses[kind], appendNumber(block + "/house", i + 1),
+               makeQuarterTurn(north ? 2 : 0, at)))
       return false;
   }
   return true;
@@ -123,19 +125,19 @@ void plantStreet(District& d, const std::string& block, const Vec3& middle) {
   for (int i = 0; i < 8; ++i) {
     const double x = (kBlockX - kStreet) * ((i + 0.25) / 8 - 0.5);
     const Prototype& what = i % 2 ? d.lamp : d.tree;
-    place(d, what, numbered(block + "/south", i + 1), moved(middle + Vec3{x, 0, z}));
-    place(d, what, numbered(block + "/north", i + 1), moved(middle + Vec3{x, 0, -z}));
+    place(d, what, appendNumber(block + "/south", i + 1), makeTranslation(middle + Vec3{x, 0, z}));
+    place(d, what, appendNumber(block + "/north", i + 1), makeTranslation(middle + Vec3{x, 0, -z}));
   }
 }
 
 /// Places bollards along the edge of the last block, until the number of objects is exact.
 void fillUp(District& d, const Vec3& middle) {
-  for (int i = 0; d.left() > 0; ++i) {
+  for (int i = 0; d.countLeft() > 0; ++i) {
     const int row = i / 160;
     const Vec3 at{-38 + 0.48 * (i % 160), 0, -20 + 2.0 * row};
     scene::Object bollard = d.lamp.objects.front();
     bollard.path = "district/bollards/bollard" + std::to_string(i + 1);
-    bollard.worldFromMesh = moved(middle + at) * Eigen::Scaling(0.6, 0.22, 0.6);
+    bollard.worldFromMesh = makeTranslation(middle + at) * Eigen::Scaling(0.6, 0.22, 0.6);
     d.model.objects.push_back(std::move(bollard));
   }
 }
@@ -147,21 +149,21 @@ scene::Model makeDistrict(std::size_t objects, std::uint64_t seed) {
     throw std::invalid_argument("a district has at least " + std::to_string(kMinDistrictObjects) +
                                 " objects, not " + std::to_string(objects) +
                                 "; omit the number for the gallery alone");
-  District d = prepared(objects, seed);
+  District d = prepareDistrict(objects, seed);
   Random random(seed + 1);
   const double blocks = static_cast<double>(objects) / 4000.0 + 1;
   const int columns = static_cast<int>(std::sqrt(blocks * kBlockZ / kBlockX)) + 1;
   Vec3 middle = Vec3::Zero();
   bool room = true;
   int number = 0;
-  for (; room && d.left() > 0; ++number) {
+  for (; room && d.countLeft() > 0; ++number) {
     const std::string block = "district/block" + std::to_string(number + 1);
     middle = {kBlockX * (number % columns), 0, kBlockZ * (number / columns)};
-    room = place(d, d.street, block, moved(middle));
+    room = place(d, d.street, block, makeTranslation(middle));
     if (!room) break;
     if (number % kGalleryEvery == 0)
       room = place(d, d.gallery, block + "/gallery",
-                   moved(middle + Vec3{-26, -plan::kGround + 0.005, 0}));
+                   makeTranslation(middle + Vec3{-26, -plan::kGround + 0.005, 0}));
     else
       room = fillWithHouses(d, block, middle, random);
     if (room) plantStreet(d, block, middle);

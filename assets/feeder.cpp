@@ -25,31 +25,31 @@ constexpr double kPeriod = 16.0 / 240;        // seconds
 constexpr double kUp = 2e-3, kSide = 0.5e-3;  // metres: 1.8 times gravity at 15 Hz
 
 /// Half the tray's inner width, for about two layers.
-double innerOf(std::size_t parts) {
+double computeInnerHalfWidth(std::size_t parts) {
   const double across = std::ceil(std::sqrt(static_cast<double>(parts) / 4));
   return 0.5 * kSpacing * across;
 }
 
-PaintedMesh turnedPart(double radius, double halfHeight, double top, int sides, Paint paint) {
+PaintedMesh makeTurnedPart(double radius, double halfHeight, double top, int sides, Paint paint) {
   PaintedMesh shape;
   addTurned(shape, Vec3::Zero(), {{radius, -halfHeight}, {top * radius, halfHeight}}, sides, paint);
   return shape;
 }
 
-std::array<PaintedMesh, 5> kindsOfParts() {
+std::array<PaintedMesh, 5> makePartKinds() {
   std::array<PaintedMesh, 5> kinds;
   addBox(kinds[0], Vec3(-0.010, -0.005, -0.007), Vec3(0.010, 0.005, 0.007), Paint::steel);
-  kinds[1] = turnedPart(0.009, 0.004, 1, 6, Paint::brass);
+  kinds[1] = makeTurnedPart(0.009, 0.004, 1, 6, Paint::brass);
   addPrism(kinds[2], {{-0.009, -0.005}, {0.009, -0.005}, {0, 0.010}},
            {Vec3(0, 0, -0.006), Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ()}, 0.012, Paint::chrome);
-  kinds[3] = turnedPart(0.006, 0.010, 0.7, 8, Paint::darkIron);
-  kinds[4] = turnedPart(0.010, 0.003, 0.5, 4, Paint::blackMetal);
+  kinds[3] = makeTurnedPart(0.006, 0.010, 0.7, 8, Paint::darkIron);
+  kinds[4] = makeTurnedPart(0.010, 0.003, 0.5, 4, Paint::blackMetal);
   return kinds;
 }
 
 /// Uniform over all rotations, without a sine: a random point in the unit ball of quaternions,
 /// normalised.
-Eigen::Quaterniond anyRotation(Random& random) {
+Eigen::Quaterniond makeRandomRotation(Random& random) {
   while (true) {  // ends: three of ten points are accepted
     Eigen::Vector4d q;
     for (int i = 0; i < 4; ++i) q[i] = random.between(-1, 1);
@@ -63,31 +63,32 @@ Eigen::Quaterniond anyRotation(Random& random) {
 void placeTray(Sketch& sketch, double in) {
   const double out = in + kPlate, top = kTrayFloor + kWall;
   const Paint paint = Paint::paintedWood;
-  sketch.box("feeder/tray/floor", {-out, kTrayFloor - kPlate, -out}, {out, kTrayFloor, out}, paint);
-  sketch.box("feeder/tray/west", {-out, kTrayFloor, -out}, {-in, top, out}, paint);
-  sketch.box("feeder/tray/east", {in, kTrayFloor, -out}, {out, top, out}, paint);
-  sketch.box("feeder/tray/north", {-in, kTrayFloor, -out}, {in, top, -in}, paint);
-  sketch.box("feeder/tray/south", {-in, kTrayFloor, in}, {in, top, out}, paint);
+  sketch.placeBox("feeder/tray/floor", {-out, kTrayFloor - kPlate, -out}, {out, kTrayFloor, out},
+                  paint);
+  sketch.placeBox("feeder/tray/west", {-out, kTrayFloor, -out}, {-in, top, out}, paint);
+  sketch.placeBox("feeder/tray/east", {in, kTrayFloor, -out}, {out, top, out}, paint);
+  sketch.placeBox("feeder/tray/north", {-in, kTrayFloor, -out}, {in, top, -in}, paint);
+  sketch.placeBox("feeder/tray/south", {-in, kTrayFloor, in}, {in, top, out}, paint);
 }
 
 void placeParts(Sketch& sketch, const FeederOptions& options, double in) {
   Random random(options.seed);
-  const std::array<PaintedMesh, 5> kinds = kindsOfParts();
+  const std::array<PaintedMesh, 5> kinds = makePartKinds();
   const auto across = static_cast<std::size_t>(std::lround(2 * in / kSpacing));
   for (std::size_t i = 0; i < options.parts; ++i) {
     const std::size_t row = i % across, column = i / across % across, layer = i / across / across;
     const Vec3 cell(static_cast<double>(row) + 0.5, static_cast<double>(layer) + 0.7,
                     static_cast<double>(column) + 0.5);
     Eigen::Affine3d worldFromPart = Eigen::Affine3d::Identity();
-    worldFromPart.linear() = anyRotation(random).toRotationMatrix();
+    worldFromPart.linear() = makeRandomRotation(random).toRotationMatrix();
     worldFromPart.translation() = kSpacing * cell + Vec3(-in, kTrayFloor, -in);
-    sketch.place(numbered("feeder/part", static_cast<int>(i + 1)), kinds[i % kinds.size()],
+    sketch.place(appendNumber("feeder/part", static_cast<int>(i + 1)), kinds[i % kinds.size()],
                  worldFromPart);
   }
 }
 
-Json keysOfDrive() {
-  const std::vector<Vec2> circle = unitCircle(kKeys);
+Json makeDriveKeys() {
+  const std::vector<Vec2> circle = makeUnitCircle(kKeys);
   Json keys = Json::array();
   for (int i = 0; i <= kKeys; ++i) {
     const double sine = i % (kKeys / 2) == 0 ? 0 : circle[static_cast<std::size_t>(i % kKeys)].y();
@@ -101,21 +102,22 @@ Json keysOfDrive() {
 scene::Model makeFeeder(const FeederOptions& options) {
   if (options.parts < 1 || options.parts > kMaxParts)
     throw std::invalid_argument("a feeder has 1 to " + std::to_string(kMaxParts) + " parts");
-  const double in = innerOf(options.parts), out = in + kPlate;
+  const double in = computeInnerHalfWidth(options.parts), out = in + kPlate;
   Sketch sketch;
-  sketch.box("room/floor", {-out - 3, -0.2, -out - 3}, {out + 3, 0, out + 3}, Paint::concrete);
-  sketch.box("room/stand", {-out, 0, -out}, {out, kTrayFloor - kPlate - kGap, out}, Paint::oakDark);
+  sketch.placeBox("room/floor", {-out - 3, -0.2, -out - 3}, {out + 3, 0, out + 3}, Paint::concrete);
+  sketch.placeBox("room/stand", {-out, 0, -out}, {out, kTrayFloor - kPlate - kGap, out},
+                  Paint::oakDark);
   placeTray(sketch, in);
   placeParts(sketch, options, in);
   return sketch.model();
 }
 
-std::string feederSidecar() {
+std::string makeFeederSidecar() {
   const Json tray{{"name", "tray"},
                   {"kind", "path"},
                   {"objects", {"feeder/tray/*"}},
                   {"loops", true},
-                  {"keys", keysOfDrive()}};
+                  {"keys", makeDriveKeys()}};
   const Json parts{{"name", "part"}, {"kind", "rigid"}, {"objects", {"feeder/part*"}},
                    {"each", true},   {"density", 2700}, {"friction", 0.4}};
   return Json{{"walk", 1}, {"bodies", {tray, parts}}}.dump(1) + "\n";

@@ -18,6 +18,6 @@ scene::Model makeFeeder(const FeederOptions& options = {});
 
 /// Sidecar with the tray as a path of 15 Hz, 2 mm up and 0.5 mm sideways, and the parts as dynamic
 /// bodies.
-std::string feederSidecar();
+std::string makeFeederSidecar();
 
 }  // namespace enfilade::assets

@@ -11,7 +11,7 @@ void addLegs(PaintedMesh& s, double halfX, double halfZ, double height, double t
 
 }  // namespace
 
-PaintedMesh chairShape(Paint wood, Paint seat) {
+PaintedMesh makeChairShape(Paint wood, Paint seat) {
   PaintedMesh s;
   addLegs(s, 0.19, 0.19, 0.43, 0.018, wood);
   addBox(s, {-0.215, 0.425, -0.215}, {0.215, 0.45, 0.215}, wood);
@@ -23,7 +23,7 @@ PaintedMesh chairShape(Paint wood, Paint seat) {
   return s;
 }
 
-PaintedMesh stoolShape() {
+PaintedMesh makeStoolShape() {
   PaintedMesh s;
   addCylinder(s, {0, 0, 0}, 0.2, 0.02, 16, Paint::blackMetal);
   addCylinder(s, {0, 0.018, 0}, 0.025, 0.69, 8, Paint::chrome);
@@ -33,11 +33,11 @@ PaintedMesh stoolShape() {
   return s;
 }
 
-PaintedMesh armchairShape(Paint cloth) {
-  return sofaShape(cloth, 0.85);
+PaintedMesh makeArmchairShape(Paint cloth) {
+  return makeSofaShape(cloth, 0.85);
 }
 
-PaintedMesh sofaShape(Paint cloth, double width) {
+PaintedMesh makeSofaShape(Paint cloth, double width) {
   PaintedMesh s;
   const double h = width / 2;
   addLegs(s, 0.34, h - 0.08, 0.11, 0.025, Paint::mahogany);
@@ -57,7 +57,7 @@ PaintedMesh sofaShape(Paint cloth, double width) {
   return s;
 }
 
-PaintedMesh tableShape(double depth, double width, Paint wood) {
+PaintedMesh makeTableShape(double depth, double width, Paint wood) {
   PaintedMesh s;
   addBox(s, {-depth / 2, 0.71, -width / 2}, {depth / 2, 0.75, width / 2}, wood);
   addBox(s, {-depth / 2 + 0.06, 0.62, -width / 2 + 0.06},
@@ -66,7 +66,7 @@ PaintedMesh tableShape(double depth, double width, Paint wood) {
   return s;
 }
 
-PaintedMesh roundTableShape(double radius, Paint wood) {
+PaintedMesh makeRoundTableShape(double radius, Paint wood) {
   PaintedMesh s;
   addTurned(s, {0, 0.71, 0}, {{radius - 0.02, 0}, {radius, 0.015}, {radius, 0.035}}, 24, wood);
   addTurned(s, {0, 0, 0},
@@ -75,7 +75,7 @@ PaintedMesh roundTableShape(double radius, Paint wood) {
   return s;
 }
 
-PaintedMesh vaseShape(int kind, Paint glaze) {
+PaintedMesh makeVaseShape(int kind, Paint glaze) {
   static const std::vector<std::vector<Ring>> kOutlines{
       {{0.09, 0}, {0.15, 0.08}, {0.19, 0.2}, {0.16, 0.34}, {0.08, 0.42}, {0.07, 0.48}, {0.1, 0.52}},
       {{0.12, 0}, {0.16, 0.12}, {0.13, 0.3}, {0.06, 0.42}, {0.05, 0.58}, {0.08, 0.64}},
@@ -98,7 +98,7 @@ void addTwistedColumn(PaintedMesh& s, Paint stone) {
     const double half = 0.17 - 0.005 * i, y = 0.07 * i;
     addBox(slab, {-half, y - 0.002, -half * 0.6}, {half, y + 0.07, half * 0.6}, stone);
     append(s, slab, turn);
-    turn = turnedByHalfTangent(0.1) * turn;
+    turn = makeHalfTangentTurn(0.1) * turn;
   }
 }
 
@@ -147,14 +147,14 @@ void addRings(PaintedMesh& s, Paint stone) {
   upright.translation() = Vec3{0, 0.36, 0};
   addCylinder(s, Vec3::Zero(), 0.05, 0.12, 12, stone);
   append(s, ring, upright);
-  append(s, ring, turnedByHalfTangent(0.57735) * upright);
-  append(s, ring, turnedByHalfTangent(-0.57735) * upright);
+  append(s, ring, makeHalfTangentTurn(0.57735) * upright);
+  append(s, ring, makeHalfTangentTurn(-0.57735) * upright);
   addBall(s, {0, 0.36, 0}, {0.09, 0.09, 0.09}, 12, stone);
 }
 
 }  // namespace
 
-PaintedMesh sculptureShape(int kind, Paint stone) {
+PaintedMesh makeSculptureShape(int kind, Paint stone) {
   PaintedMesh s;
   switch (kind % 5) {
     case 0:
@@ -177,12 +177,12 @@ PaintedMesh sculptureShape(int kind, Paint stone) {
   return s;
 }
 
-PaintedMesh pottedPlantShape(Random& random) {
+PaintedMesh makePottedPlantShape(Random& random) {
   PaintedMesh s;
   addTurned(s, Vec3::Zero(), {{0.15, 0}, {0.2, 0.34}, {0.22, 0.35}, {0.22, 0.4}}, 16, Paint::clay);
   addCylinder(s, {0, 0.4, 0}, 0.19, 0.006, 16, Paint::soil);
   constexpr Paint kLeaves[] = {Paint::leaf, Paint::leafDark, Paint::leafLight};
-  const std::vector<Vec2> circle = unitCircle(12);
+  const std::vector<Vec2> circle = makeUnitCircle(12);
   for (int i = 0; i < 16; ++i) {
     const Vec2 out = circle[static_cast<std::size_t>(i * 5 % 12)];
     const double reach = random.between(0.22, 0.5), top = random.between(0.8, 1.5);
@@ -208,7 +208,7 @@ PaintedMesh pottedPlantShape(Random& random) {
   return s;
 }
 
-PaintedMesh globeShape() {
+PaintedMesh makeGlobeShape() {
   PaintedMesh s;
   addTurned(s, Vec3::Zero(), {{0.22, 0}, {0.22, 0.03}, {0.05, 0.06}, {0.035, 0.5}, {0.07, 0.55}},
             16, Paint::mahogany);
@@ -218,7 +218,7 @@ PaintedMesh globeShape() {
   return s;
 }
 
-PaintedMesh floorLampShape() {
+PaintedMesh makeFloorLampShape() {
   PaintedMesh s;
   addCylinder(s, Vec3::Zero(), 0.15, 0.025, 16, Paint::brass);
   addCylinder(s, {0, 0.02, 0}, 0.012, 1.4, 8, Paint::brass);
@@ -226,7 +226,7 @@ PaintedMesh floorLampShape() {
   return s;
 }
 
-PaintedMesh tableLampShape() {
+PaintedMesh makeTableLampShape() {
   PaintedMesh s;
   addTurned(s, Vec3::Zero(), {{0.08, 0}, {0.08, 0.015}, {0.02, 0.04}, {0.015, 0.26}}, 12,
             Paint::brass);
@@ -235,7 +235,7 @@ PaintedMesh tableLampShape() {
   return s;
 }
 
-PaintedMesh pendantShape(double cord, Paint shade) {
+PaintedMesh makePendantShape(double cord, Paint shade) {
   PaintedMesh s;
   addCylinder(s, {0, -0.03, 0}, 0.06, 0.03, 12, Paint::brass);
   addCylinder(s, {0, -cord, 0}, 0.006, cord, 8, Paint::blackMetal);
@@ -245,7 +245,7 @@ PaintedMesh pendantShape(double cord, Paint shade) {
   return s;
 }
 
-PaintedMesh spotShape() {
+PaintedMesh makeSpotShape() {
   PaintedMesh s;
   addCylinder(s, {0, -0.09, 0}, 0.012, 0.09, 8, Paint::blackMetal);
   PaintedMesh head;
@@ -258,7 +258,7 @@ PaintedMesh spotShape() {
   return s;
 }
 
-PaintedMesh radiatorShape(double width) {
+PaintedMesh makeRadiatorShape(double width) {
   PaintedMesh s;
   const int ribs = static_cast<int>(width / 0.09);
   for (int i = 0; i < ribs; ++i) {
@@ -270,7 +270,7 @@ PaintedMesh radiatorShape(double width) {
   return s;
 }
 
-PaintedMesh stanchionShape() {
+PaintedMesh makeStanchionShape() {
   PaintedMesh s;
   addTurned(s, Vec3::Zero(),
             {{0.15, 0},
@@ -285,7 +285,7 @@ PaintedMesh stanchionShape() {
   return s;
 }
 
-PaintedMesh rugShape(double sizeX, double sizeZ, Paint ground, Paint border) {
+PaintedMesh makeRugShape(double sizeX, double sizeZ, Paint ground, Paint border) {
   const double x = sizeX / 2, z = sizeZ / 2;
   PaintedMesh s;
   addBox(s, {-x, -0.002, -z}, {x, 0.006, z}, border);

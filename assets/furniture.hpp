@@ -15,24 +15,24 @@ struct Spot {
   int quarters = 0;
 };
 
-PaintedMesh chairShape(Paint wood, Paint seat);
-PaintedMesh stoolShape();
-PaintedMesh armchairShape(Paint cloth);
-PaintedMesh sofaShape(Paint cloth, double width);
-PaintedMesh tableShape(double depth, double width, Paint wood);
-PaintedMesh roundTableShape(double radius, Paint wood);
-PaintedMesh vaseShape(int kind, Paint glaze);
-PaintedMesh sculptureShape(int kind, Paint stone);
-PaintedMesh pottedPlantShape(Random& random);
-PaintedMesh globeShape();
-PaintedMesh floorLampShape();
-PaintedMesh tableLampShape();
-PaintedMesh pendantShape(double cord, Paint shade);
-PaintedMesh spotShape();
-PaintedMesh radiatorShape(double width);
-PaintedMesh stanchionShape();
+PaintedMesh makeChairShape(Paint wood, Paint seat);
+PaintedMesh makeStoolShape();
+PaintedMesh makeArmchairShape(Paint cloth);
+PaintedMesh makeSofaShape(Paint cloth, double width);
+PaintedMesh makeTableShape(double depth, double width, Paint wood);
+PaintedMesh makeRoundTableShape(double radius, Paint wood);
+PaintedMesh makeVaseShape(int kind, Paint glaze);
+PaintedMesh makeSculptureShape(int kind, Paint stone);
+PaintedMesh makePottedPlantShape(Random& random);
+PaintedMesh makeGlobeShape();
+PaintedMesh makeFloorLampShape();
+PaintedMesh makeTableLampShape();
+PaintedMesh makePendantShape(double cord, Paint shade);
+PaintedMesh makeSpotShape();
+PaintedMesh makeRadiatorShape(double width);
+PaintedMesh makeStanchionShape();
 /// A rug flat on the floor; `low`, `high` are its corners in x and z.
-PaintedMesh rugShape(double sizeX, double sizeZ, Paint ground, Paint border);
+PaintedMesh makeRugShape(double sizeX, double sizeZ, Paint ground, Paint border);
 
 /// An upholstered bench whose legs are separate objects.
 void placeBench(Sketch& sketch, const std::string& path, const Spot& spot, double width,

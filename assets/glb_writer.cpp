@@ -20,7 +20,7 @@ constexpr int kArrayBuffer = 34962, kElementArrayBuffer = 34963;
 constexpr std::uint32_t kMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinChunk = 0x004E4942;
 
 /// A float as the shortest decimal that reads back as the same float.
-Json shortest(float value) {
+Json makeShortestNumber(float value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.6g", static_cast<double>(value));
   if (std::strtof(text, nullptr) != value)
@@ -28,19 +28,19 @@ Json shortest(float value) {
   return std::strtod(text, nullptr);
 }
 
-Json materialJson(const scene::Material& m) {
+Json makeMaterialJson(const scene::Material& m) {
   Json json{{"name", m.name}};
   Json pbr;
-  for (int i = 0; i < 4; ++i) pbr["baseColorFactor"].push_back(shortest(m.baseColour[i]));
-  pbr["metallicFactor"] = shortest(m.metallic);
-  pbr["roughnessFactor"] = shortest(m.roughness);
+  for (int i = 0; i < 4; ++i) pbr["baseColorFactor"].push_back(makeShortestNumber(m.baseColour[i]));
+  pbr["metallicFactor"] = makeShortestNumber(m.metallic);
+  pbr["roughnessFactor"] = makeShortestNumber(m.roughness);
   json["pbrMetallicRoughness"] = pbr;
   if (m.emissive != Eigen::Vector3f::Zero())
-    for (int i = 0; i < 3; ++i) json["emissiveFactor"].push_back(shortest(m.emissive[i]));
+    for (int i = 0; i < 3; ++i) json["emissiveFactor"].push_back(makeShortestNumber(m.emissive[i]));
   if (m.alpha == scene::Material::Alpha::blend) json["alphaMode"] = "BLEND";
   if (m.alpha == scene::Material::Alpha::mask) {
     json["alphaMode"] = "MASK";
-    json["alphaCutoff"] = shortest(m.alphaCutoff);
+    json["alphaCutoff"] = makeShortestNumber(m.alphaCutoff);
   }
   if (m.doubleSided) json["doubleSided"] = true;
   return json;
@@ -73,8 +73,8 @@ std::size_t addVectors(Buffer& buffer, const std::vector<Eigen::Vector3f>& vecto
       high = high.cwiseMax(v);
     }
     for (int i = 0; i < 3; ++i) {
-      accessor["min"].push_back(shortest(low[i]));
-      accessor["max"].push_back(shortest(high[i]));
+      accessor["min"].push_back(makeShortestNumber(low[i]));
+      accessor["max"].push_back(makeShortestNumber(high[i]));
     }
   }
   return buffer.add(vectors.data(), vectors.size() * 12, kArrayBuffer, std::move(accessor));
@@ -91,7 +91,7 @@ std::size_t addIndices(Buffer& buffer, const scene::Mesh& mesh) {
   return buffer.add(shorts.data(), shorts.size() * 2, kElementArrayBuffer, accessor);
 }
 
-std::vector<Json> primitivesOf(const scene::Model& model, Buffer& buffer) {
+std::vector<Json> makePrimitives(const scene::Model& model, Buffer& buffer) {
   std::vector<Json> primitives;
   for (const scene::Mesh& mesh : model.meshes) {
     if (mesh.positions.empty() || mesh.indices.empty())
@@ -111,7 +111,7 @@ struct MeshTable {
   std::map<std::vector<std::uint32_t>, std::size_t> index;
 };
 
-MeshTable meshTable(const scene::Model& model, const std::vector<Json>& primitives) {
+MeshTable makeMeshTable(const scene::Model& model, const std::vector<Json>& primitives) {
   MeshTable table;
   for (const scene::Object& object : model.objects) {
     if (object.meshes.empty())
@@ -136,10 +136,10 @@ struct PathTree {
   std::vector<std::uint32_t> roots;
 };
 
-PathTree pathTree(const scene::Model& model) {
+PathTree makePathTree(const scene::Model& model) {
   PathTree tree;
   std::map<std::string, std::uint32_t, std::less<>> byPath;
-  const auto nodeAt = [&](auto& self, const std::string& path) -> std::uint32_t {
+  const auto findOrAddNode = [&](auto& self, const std::string& path) -> std::uint32_t {
     if (const auto found = byPath.find(path); found != byPath.end()) return found->second;
     const std::size_t slash = path.rfind('/');
     const bool isRoot = slash == std::string::npos;
@@ -151,7 +151,7 @@ PathTree pathTree(const scene::Model& model) {
     return index;
   };
   for (std::size_t i = 0; i < model.objects.size(); ++i) {
-    Node& node = tree.nodes[nodeAt(nodeAt, model.objects[i].path)];
+    Node& node = tree.nodes[findOrAddNode(findOrAddNode, model.objects[i].path)];
     if (node.object >= 0)
       throw std::invalid_argument("two objects with the path '" + model.objects[i].path + "'");
     node.object = static_cast<std::int64_t>(i);
@@ -160,7 +160,7 @@ PathTree pathTree(const scene::Model& model) {
 }
 
 /// The frame of each node is that of its nearest ancestor object, or the scene's.
-std::vector<std::int64_t> ancestorObjects(const PathTree& tree) {
+std::vector<std::int64_t> findAncestorObjects(const PathTree& tree) {
   std::vector<std::int64_t> ancestors(tree.nodes.size(), -1);
   for (std::size_t i = 0; i < tree.nodes.size(); ++i)  // parents come before their children
     for (std::uint32_t child : tree.nodes[i].children)
@@ -180,7 +180,7 @@ void addTransform(Json& json, const Eigen::Affine3d& t) {
   }
 }
 
-Json motionJson(const MovingPart& part) {
+Json makeMotionJson(const MovingPart& part) {
   const bool turns = part.kind == MovingPart::Kind::hinge;
   if (part.isLift())  // as in the sidecar, which has its doors, too
     return {{"walk_kind", "lift"},
@@ -194,11 +194,11 @@ Json motionJson(const MovingPart& part) {
 }
 
 /// Writes the nodes as text one by one: a district's would not fit in memory as JSON values.
-std::string nodesText(const scene::Model& model, const std::vector<MovingPart>& movingParts,
-                      const PathTree& tree, const MeshTable& meshes) {
+std::string formatNodes(const scene::Model& model, const std::vector<MovingPart>& movingParts,
+                        const PathTree& tree, const MeshTable& meshes) {
   std::map<std::int64_t, Json> extras;
-  for (const MovingPart& part : movingParts) extras[part.object] = motionJson(part);
-  const std::vector<std::int64_t> ancestors = ancestorObjects(tree);
+  for (const MovingPart& part : movingParts) extras[part.object] = makeMotionJson(part);
+  const std::vector<std::int64_t> ancestors = findAncestorObjects(tree);
   std::string text;
   for (std::size_t i = 0; i < tree.nodes.size(); ++i) {
     const Node& node = tree.nodes[i];
@@ -220,21 +220,21 @@ std::string nodesText(const scene::Model& model, const std::vector<MovingPart>& 
   return text;
 }
 
-std::string jsonText(const scene::Model& model, const std::vector<MovingPart>& movingParts,
-                     Buffer& buffer) {
-  const PathTree tree = pathTree(model);
-  const MeshTable meshes = meshTable(model, primitivesOf(model, buffer));
+std::string formatJson(const scene::Model& model, const std::vector<MovingPart>& movingParts,
+                       Buffer& buffer) {
+  const PathTree tree = makePathTree(model);
+  const MeshTable meshes = makeMeshTable(model, makePrimitives(model, buffer));
   Json json{{"asset", {{"version", "2.0"}, {"generator", "enfilade make_building"}}},
             {"scene", 0},
             {"scenes", {{{"name", model.source}, {"nodes", tree.roots}}}}};
-  for (const scene::Material& m : model.materials) json["materials"].push_back(materialJson(m));
+  for (const scene::Material& m : model.materials) json["materials"].push_back(makeMaterialJson(m));
   json["meshes"] = meshes.meshes;
   json["accessors"] = buffer.accessors;
   json["bufferViews"] = buffer.views;
   json["buffers"] = {{{"byteLength", buffer.bytes.size()}}};
   std::string text = json.dump();
   text.pop_back();
-  return text + ",\"nodes\":[" + nodesText(model, movingParts, tree, meshes) + "]}";
+  return text + ",\"nodes\":[" + formatNodes(model, movingParts, tree, meshes) + "]}";
 }
 
 void appendWord(std::string& bytes, std::size_t value) {
@@ -246,10 +246,10 @@ void appendWord(std::string& bytes, std::size_t value) {
 
 }  // namespace
 
-std::string glbBytes(const scene::Model& model, const std::vector<MovingPart>& movingParts) {
+std::string encodeGlb(const scene::Model& model, const std::vector<MovingPart>& movingParts) {
   if (model.objects.empty()) throw std::invalid_argument("a GLB needs at least one object");
   Buffer buffer;
-  std::string json = jsonText(model, movingParts, buffer);
+  std::string json = formatJson(model, movingParts, buffer);
   while (json.size() % 4) json.push_back(' ');
   while (buffer.bytes.size() % 4) buffer.bytes.push_back('\0');
   const std::size_t total = 12 + 8 + json.size() + 8 + buffer.bytes.size();
@@ -272,7 +272,7 @@ std::string glbBytes(const scene::Model& model, const std::vector<MovingPart>& m
 
 void writeGlb(const std::filesystem::path& file, const scene::Model& model,
               const std::vector<MovingPart>& movingParts) {
-  const std::string bytes = glbBytes(model, movingParts);
+  const std::string bytes = encodeGlb(model, movingParts);
   // Written to a temporary name and renamed, so that a file with the final name is complete.
   const std::filesystem::path part = file.string() + ".part";
   std::ofstream out(part, std::ios::binary);

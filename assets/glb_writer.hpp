@@ -15,7 +15,7 @@ namespace enfilade::assets {
 /// relative to its pose. A sidecar next to the file has further data. Textures and texture
 /// coordinates are not written. Throws std::length_error beyond GLB's 4 GiB, and
 /// std::invalid_argument naming an object that cannot be written.
-std::string glbBytes(const scene::Model& model, const std::vector<MovingPart>& movingParts = {});
+std::string encodeGlb(const scene::Model& model, const std::vector<MovingPart>& movingParts = {});
 
 /// Throws std::runtime_error naming the file.
 void writeGlb(const std::filesystem::path& file, const scene::Model& model,

@@ -18,11 +18,11 @@ struct Plan {
   Paint facade, roof, inside;
 };
 
-std::string floorPath(int storey) {
+std::string makeFloorPath(int storey) {
   return "floor" + std::to_string(storey);
 }
 
-std::vector<Opening> windowRow(double half, double floor, int count) {
+std::vector<Opening> makeWindowRow(double half, double floor, int count) {
   std::vector<Opening> windows;
   for (int i = 0; i < count; ++i) {
     const double at = -half + 2 * half * (i + 0.5) / count;
@@ -33,7 +33,7 @@ std::vector<Opening> windowRow(double half, double floor, int count) {
 
 void addFacades(Sketch& sketch, const Plan& p, int storey) {
   const double y = kStorey * storey, t = kWallThick;
-  const std::string path = floorPath(storey);
+  const std::string path = makeFloorPath(storey);
   for (const bool front : {true, false}) {
     const Wall wall{Along::x,
                     -p.halfX - t,
@@ -44,14 +44,14 @@ void addFacades(Sketch& sketch, const Plan& p, int storey) {
                     y + kStorey,
                     front ? p.inside : p.facade,
                     front ? p.facade : p.inside};
-    std::vector<Opening> holes = windowRow(p.halfX, y, 3);
+    std::vector<Opening> holes = makeWindowRow(p.halfX, y, 3);
     const bool hasDoor = front && storey == 0;
     if (hasDoor) holes[1] = {-0.55, 0.55, y + 0.01, y + 2.2};
     const std::string name = path + (front ? "/front" : "/back");
     addWall(sketch, name, wall, holes);
     for (std::size_t i = 0; i < holes.size(); ++i)
       if (!hasDoor || i != 1)
-        addWindow(sketch, numbered(name + "/window", static_cast<int>(i + 1)), wall, holes[i],
+        addWindow(sketch, appendNumber(name + "/window", static_cast<int>(i + 1)), wall, holes[i],
                   {2, 2, Paint::glass, front ? -1.0 : 1.0});
     if (!hasDoor) continue;
     addDoorFrame(sketch, name + "/door", wall, holes[1], Paint::paintedWood);
@@ -67,59 +67,61 @@ void addFacades(Sketch& sketch, const Plan& p, int storey) {
   }
 }
 
-double stairEast(const Plan& p) {
+double computeStairEast(const Plan& p) {
   return -p.halfX + 0.4 + kTread * kHouseRisers;
 }
 
 /// Adds the slab of a storey; upper slabs are open over the stair along the back.
 void addSlab(Sketch& sketch, const Plan& p, int storey) {
   const double y1 = kStorey * storey + (storey == 0 ? 0.01 : 0.0), y0 = y1 - kFloorThick;
-  const std::string path = floorPath(storey) + "/slab";
+  const std::string path = makeFloorPath(storey) + "/slab";
   if (storey == 0 || storey == p.storeys) {
-    sketch.box(path, {-p.halfX, y0, -p.halfZ}, {p.halfX, y1, p.halfZ}, Paint::oak);
+    sketch.placeBox(path, {-p.halfX, y0, -p.halfZ}, {p.halfX, y1, p.halfZ}, Paint::oak);
     return;
   }
   const double z = -p.halfZ + kStairWidth + 0.1;
   const BoxPaints paints{Paint::oak, Paint::oak, Paint::ceiling,
                          Paint::oak, Paint::oak, Paint::oak};
-  sketch.box(path + "_front", {-p.halfX, y0, z}, {p.halfX, y1, p.halfZ}, paints);
-  sketch.box(path + "_back", {stairEast(p), y0, -p.halfZ}, {p.halfX, y1, z}, paints);
+  sketch.placeBox(path + "_front", {-p.halfX, y0, z}, {p.halfX, y1, p.halfZ}, paints);
+  sketch.placeBox(path + "_back", {computeStairEast(p), y0, -p.halfZ}, {p.halfX, y1, z}, paints);
 }
 
 void addStairs(Sketch& sketch, const Plan& p, int storey) {
   const double riser = kStorey / kHouseRisers;
   for (int k = 1; k < kHouseRisers; ++k) {
-    const double x = stairEast(p) - kTread * (kHouseRisers - k), y = kStorey * storey + riser * k;
-    sketch.box(numbered(floorPath(storey) + "/stair/step", k),
-               {x, y - riser - 0.03, -p.halfZ + 0.01},
-               {x + kTread + 0.01, y, -p.halfZ + kStairWidth}, Paint::oakDark);
+    const double x = computeStairEast(p) - kTread * (kHouseRisers - k),
+                 y = kStorey * storey + riser * k;
+    sketch.placeBox(appendNumber(makeFloorPath(storey) + "/stair/step", k),
+                    {x, y - riser - 0.03, -p.halfZ + 0.01},
+                    {x + kTread + 0.01, y, -p.halfZ + kStairWidth}, Paint::oakDark);
   }
 }
 
 void furnish(Sketch& sketch, const Plan& p, int storey, Random& random) {
   const double y = kStorey * storey + (storey == 0 ? 0.01 : 0.0);
-  const std::string path = floorPath(storey) + "/";
+  const std::string path = makeFloorPath(storey) + "/";
   const double east = p.halfX, west = -p.halfX, front = p.halfZ;
   constexpr Paint kCloths[] = {Paint::fabricRed, Paint::fabricBlue, Paint::fabricGrey,
                                Paint::leather};
-  sketch.place(path + "sofa", sofaShape(kCloths[random.below(4)], 1.8),
-               turned(2, {east - 0.5, y, 0.5}));
-  sketch.place(path + "rug", rugShape(2.2, 1.6, Paint::rugBlue, Paint::rugGold),
-               moved({east - 2.0, y, 0.5}));
-  sketch.place(path + "table", tableShape(0.9, 1.5, Paint::oakDark),
-               turned(1, {west + 1.8, y, 0.8}));
+  sketch.place(path + "sofa", makeSofaShape(kCloths[random.below(4)], 1.8),
+               makeQuarterTurn(2, {east - 0.5, y, 0.5}));
+  sketch.place(path + "rug", makeRugShape(2.2, 1.6, Paint::rugBlue, Paint::rugGold),
+               makeTranslation({east - 2.0, y, 0.5}));
+  sketch.place(path + "table", makeTableShape(0.9, 1.5, Paint::oakDark),
+               makeQuarterTurn(1, {west + 1.8, y, 0.8}));
   int chair = 0;
   for (const double dx : {-0.4, 0.4})
     for (const int side : {1, 3})
       sketch.place(path + "chair" + std::to_string(++chair),
-                   chairShape(Paint::birch, Paint::fabricCream),
-                   turned(side, {west + 1.8 + dx, y, 0.8 + (side == 1 ? 0.75 : -0.75)}));
+                   makeChairShape(Paint::birch, Paint::fabricCream),
+                   makeQuarterTurn(side, {west + 1.8 + dx, y, 0.8 + (side == 1 ? 0.75 : -0.75)}));
   placeBookcase(sketch, path + "bookcase", {{west, y, front - 1.2}, 0}, 1.0, 2.0, random);
   placePicture(sketch, path + "picture1", {{east, y + 1.6, -1.2}, 2}, 1.0, 0.8, random);
   placePicture(sketch, path + "picture2", {{west, y + 1.6, -0.4}, 0}, 0.8, 1.0, random);
-  sketch.place(path + "lamp", pendantShape(0.7, Paint::lampShade),
-               moved({west + 1.8, y + kStorey - kFloorThick, 0.8}));
-  sketch.place(path + "plant", pottedPlantShape(random), moved({east - 0.5, y, front - 0.6}));
+  sketch.place(path + "lamp", makePendantShape(0.7, Paint::lampShade),
+               makeTranslation({west + 1.8, y + kStorey - kFloorThick, 0.8}));
+  sketch.place(path + "plant", makePottedPlantShape(random),
+               makeTranslation({east - 0.5, y, front - 0.6}));
 }
 
 void addRoof(Sketch& sketch, const Plan& p) {
@@ -127,9 +129,9 @@ void addRoof(Sketch& sketch, const Plan& p) {
   PaintedMesh roof;
   addPrism(roof, {{-z, -0.01}, {z, -0.01}, {0, z * 0.6}},
            {{-x, y, 0}, {0, 0, -1}, {0, 1, 0}, {1, 0, 0}}, 2 * x, p.roof);
-  sketch.place("roof", roof, moved(Vec3::Zero()));
-  sketch.box("chimney", {p.halfX - 1.2, y + 0.5, -1.4}, {p.halfX - 0.6, y + z * 0.6 + 0.7, -0.8},
-             Paint::brickDark);
+  sketch.place("roof", roof, makeTranslation(Vec3::Zero()));
+  sketch.placeBox("chimney", {p.halfX - 1.2, y + 0.5, -1.4},
+                  {p.halfX - 0.6, y + z * 0.6 + 0.7, -0.8}, Paint::brickDark);
 }
 
 }  // namespace
@@ -154,8 +156,8 @@ void addHouse(Sketch& sketch, Random& random) {
   }
   addSlab(sketch, p, p.storeys);
   addRoof(sketch, p);
-  sketch.box("doorstep", {-0.9, -0.1, p.halfZ + kWallThick - 0.003},
-             {0.9, 0.008, p.halfZ + kWallThick + 0.9}, Paint::plinthStone);
+  sketch.placeBox("doorstep", {-0.9, -0.1, p.halfZ + kWallThick - 0.003},
+                  {0.9, 0.008, p.halfZ + kWallThick + 0.9}, Paint::plinthStone);
 }
 
 }  // namespace enfilade::assets

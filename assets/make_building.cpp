@@ -21,7 +21,7 @@ int main(int argc, char** argv) {
         const scene::Model model = assets::makeBuilding(options, &movingParts);
         assets::writeGlb(arguments.file, model, movingParts);
         if (options.objects == 0)
-          assets::writeSidecarOf(arguments.file, assets::sidecarText(model, movingParts));
+          assets::writeSidecar(arguments.file, assets::makeSidecarText(model, movingParts));
         std::printf("%s: %zu objects, %zu meshes, %zu materials, %.1f MB\n", arguments.file.c_str(),
                     model.objects.size(), model.meshes.size(), model.materials.size(),
                     static_cast<double>(std::filesystem::file_size(arguments.file)) / 1e6);

@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
         options.parts = arguments.number.value_or(options.parts);
         options.seed = arguments.seed.value_or(options.seed);
         assets::writeGlb(arguments.file, assets::makeFeeder(options));
-        assets::writeSidecarOf(arguments.file, assets::feederSidecar());
+        assets::writeSidecar(arguments.file, assets::makeFeederSidecar());
         std::printf("%s: a tray and %zu parts\n", arguments.file.c_str(), options.parts);
       });
 }

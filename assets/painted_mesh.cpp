@@ -7,7 +7,7 @@
 namespace enfilade::assets {
 namespace {
 
-PaintedMesh::Part& partOf(PaintedMesh& shape, Paint paint) {
+PaintedMesh::Part& findOrAddPart(PaintedMesh& shape, Paint paint) {
   for (PaintedMesh::Part& part : shape.parts)
     if (part.paint == paint) return part;
   shape.parts.push_back({paint, {}, {}, {}});
@@ -20,12 +20,12 @@ std::uint32_t addVertex(PaintedMesh::Part& part, const Vec3& position, const Vec
   return static_cast<std::uint32_t>(part.positions.size() - 1);
 }
 
-double cross(const Vec2& a, const Vec2& b, const Vec2& c) {
+double computeCross(const Vec2& a, const Vec2& b, const Vec2& c) {
   return (b.x() - a.x()) * (c.y() - a.y()) - (b.y() - a.y()) * (c.x() - a.x());
 }
 
-bool insideOrOn(const Vec2& p, const Vec2& a, const Vec2& b, const Vec2& c) {
-  return cross(a, b, p) >= 0 && cross(b, c, p) >= 0 && cross(c, a, p) >= 0;
+bool isInsideOrOn(const Vec2& p, const Vec2& a, const Vec2& b, const Vec2& c) {
+  return computeCross(a, b, p) >= 0 && computeCross(b, c, p) >= 0 && computeCross(c, a, p) >= 0;
 }
 
 /// Whether the corner at `i` is an ear of the polygon of the remaining indices.
@@ -33,15 +33,15 @@ bool isEar(const std::vector<Vec2>& polygon, const std::vector<std::uint32_t>& l
            std::size_t i) {
   const std::size_t n = left.size();
   const std::uint32_t ia = left[(i + n - 1) % n], ib = left[i], ic = left[(i + 1) % n];
-  if (cross(polygon[ia], polygon[ib], polygon[ic]) <= 0) return false;
+  if (computeCross(polygon[ia], polygon[ib], polygon[ic]) <= 0) return false;
   return std::none_of(left.begin(), left.end(), [&](std::uint32_t k) {
     return k != ia && k != ib && k != ic &&
-           insideOrOn(polygon[k], polygon[ia], polygon[ib], polygon[ic]);
+           isInsideOrOn(polygon[k], polygon[ia], polygon[ib], polygon[ic]);
   });
 }
 
 /// Triangulates by ear clipping; three indices a triangle.
-std::vector<std::uint32_t> triangulated(const std::vector<Vec2>& polygon) {
+std::vector<std::uint32_t> triangulatePolygon(const std::vector<Vec2>& polygon) {
   std::vector<std::uint32_t> left(polygon.size()), triangles;
   for (std::uint32_t i = 0; i < left.size(); ++i) left[i] = i;
   while (left.size() >= 3) {
@@ -55,18 +55,18 @@ std::vector<std::uint32_t> triangulated(const std::vector<Vec2>& polygon) {
   return triangles;
 }
 
-Vec3 at(const SweepFrame& f, const Vec2& p, double along) {
+Vec3 computePoint(const SweepFrame& f, const Vec2& p, double along) {
   return f.origin + p.x() * f.u + p.y() * f.v + along * f.w;
 }
 
 /// The outward normal of an outline's segment, in (radius, y).
-Vec2 segmentNormal(const Ring& a, const Ring& b) {
+Vec2 computeSegmentNormal(const Ring& a, const Ring& b) {
   const Vec2 n{b.y - a.y, a.radius - b.radius};
   return n / std::sqrt(n.x() * n.x() + n.y() * n.y());
 }
 
 /// Smooths over bends of less than about 45 degrees.
-Vec2 jointNormal(const Vec2& own, const Vec2& neighbour) {
+Vec2 computeJointNormal(const Vec2& own, const Vec2& neighbour) {
   if (own.dot(neighbour) < 0.7) return own;
   const Vec2 sum = own + neighbour;
   return sum / std::sqrt(sum.x() * sum.x() + sum.y() * sum.y());
@@ -93,7 +93,7 @@ void addBand(PaintedMesh::Part& part, const Vec3& base, const std::vector<Vec2>&
 void addDisc(PaintedMesh& shape, const Vec3& base, const std::vector<Vec2>& circle,
              const Ring& ring, bool facesUp, Paint paint) {
   if (ring.radius <= 0) return;
-  PaintedMesh::Part& part = partOf(shape, paint);
+  PaintedMesh::Part& part = findOrAddPart(shape, paint);
   const auto first = static_cast<std::uint32_t>(part.positions.size());
   const Vec3 normal{0, facesUp ? 1.0 : -1.0, 0};
   for (const Vec2& c : circle)
@@ -106,11 +106,11 @@ void addDisc(PaintedMesh& shape, const Vec3& base, const std::vector<Vec2>& circ
 
 }  // namespace
 
-Eigen::Affine3d moved(const Vec3& by) {
-  return turned(0, by);
+Eigen::Affine3d makeTranslation(const Vec3& by) {
+  return makeQuarterTurn(0, by);
 }
 
-Eigen::Affine3d turned(int quarters, const Vec3& by) {
+Eigen::Affine3d makeQuarterTurn(int quarters, const Vec3& by) {
   constexpr double kCosine[] = {1, 0, -1, 0}, kSine[] = {0, 1, 0, -1};
   const double c = kCosine[quarters & 3], s = kSine[quarters & 3];
   Eigen::Affine3d result = Eigen::Affine3d::Identity();
@@ -119,7 +119,7 @@ Eigen::Affine3d turned(int quarters, const Vec3& by) {
   return result;
 }
 
-Eigen::Affine3d turnedByHalfTangent(double t, const Vec3& by) {
+Eigen::Affine3d makeHalfTangentTurn(double t, const Vec3& by) {
   const double c = (1 - t * t) / (1 + t * t), s = 2 * t / (1 + t * t);
   Eigen::Affine3d result = Eigen::Affine3d::Identity();
   result.linear() << c, 0, s, 0, 1, 0, -s, 0, c;
@@ -127,7 +127,7 @@ Eigen::Affine3d turnedByHalfTangent(double t, const Vec3& by) {
   return result;
 }
 
-std::vector<Vec2> unitCircle(int sides) {
+std::vector<Vec2> makeUnitCircle(int sides) {
   std::vector<Vec2> corners;
   const double h = std::sqrt(3.0) / 2;
   if (sides % 6 == 0)
@@ -147,7 +147,7 @@ std::vector<Vec2> unitCircle(int sides) {
 }
 
 void addTriangle(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, Paint paint) {
-  PaintedMesh::Part& part = partOf(shape, paint);
+  PaintedMesh::Part& part = findOrAddPart(shape, paint);
   Vec3 n = (b - a).cross(c - a);
   n /= std::sqrt(n.x() * n.x() + n.y() * n.y() + n.z() * n.z());
   const std::uint32_t ia = addVertex(part, a, n);
@@ -158,7 +158,7 @@ void addTriangle(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c
 
 void addQuad(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d,
              Paint paint) {
-  PaintedMesh::Part& part = partOf(shape, paint);
+  PaintedMesh::Part& part = findOrAddPart(shape, paint);
   Vec3 n = (c - a).cross(d - b);
   n /= std::sqrt(n.x() * n.x() + n.y() * n.y() + n.z() * n.z());
   const std::uint32_t first = addVertex(part, a, n);
@@ -170,30 +170,34 @@ void addQuad(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, co
 }
 
 void addBox(PaintedMesh& shape, const Vec3& l, const Vec3& h, const BoxPaints& p) {
-  const auto corner = [&](int i) {
+  const auto getCorner = [&](int i) {
     return Vec3{i & 1 ? h.x() : l.x(), i & 2 ? h.y() : l.y(), i & 4 ? h.z() : l.z()};
   };
-  addQuad(shape, corner(0), corner(4), corner(6), corner(2), p.minusX);
-  addQuad(shape, corner(1), corner(3), corner(7), corner(5), p.plusX);
-  addQuad(shape, corner(0), corner(1), corner(5), corner(4), p.minusY);
-  addQuad(shape, corner(2), corner(6), corner(7), corner(3), p.plusY);
-  addQuad(shape, corner(0), corner(2), corner(3), corner(1), p.minusZ);
-  addQuad(shape, corner(4), corner(5), corner(7), corner(6), p.plusZ);
+  addQuad(shape, getCorner(0), getCorner(4), getCorner(6), getCorner(2), p.minusX);
+  addQuad(shape, getCorner(1), getCorner(3), getCorner(7), getCorner(5), p.plusX);
+  addQuad(shape, getCorner(0), getCorner(1), getCorner(5), getCorner(4), p.minusY);
+  addQuad(shape, getCorner(2), getCorner(6), getCorner(7), getCorner(3), p.plusY);
+  addQuad(shape, getCorner(0), getCorner(2), getCorner(3), getCorner(1), p.minusZ);
+  addQuad(shape, getCorner(4), getCorner(5), getCorner(7), getCorner(6), p.plusZ);
 }
 
 void addBox(PaintedMesh& shape, const Vec3& low, const Vec3& high, Paint paint) {
-  addBox(shape, low, high, allFaces(paint));
+  addBox(shape, low, high, paintAllFaces(paint));
 }
 
 void addTiledSlab(PaintedMesh& shape, const Vec3& l, const Vec3& h, int cellsX, int cellsZ,
                   Paint side, const std::vector<Paint>& cellTones) {
-  const auto x = [&](int i) { return i == cellsX ? h.x() : l.x() + (h.x() - l.x()) * i / cellsX; };
-  const auto z = [&](int k) { return k == cellsZ ? h.z() : l.z() + (h.z() - l.z()) * k / cellsZ; };
+  const auto computeX = [&](int i) {
+    return i == cellsX ? h.x() : l.x() + (h.x() - l.x()) * i / cellsX;
+  };
+  const auto computeZ = [&](int k) {
+    return k == cellsZ ? h.z() : l.z() + (h.z() - l.z()) * k / cellsZ;
+  };
   const double y0 = l.y(), y1 = h.y();
   for (int i = 0; i < cellsX; ++i) {
-    const double a = x(i), b = x(i + 1);
+    const double a = computeX(i), b = computeX(i + 1);
     for (int k = 0; k < cellsZ; ++k) {
-      const double c = z(k), d = z(k + 1);
+      const double c = computeZ(k), d = computeZ(k + 1);
       const Paint tone = cellTones[static_cast<std::size_t>(i * cellsZ + k) % cellTones.size()];
       addQuad(shape, {a, y1, c}, {a, y1, d}, {b, y1, d}, {b, y1, c}, tone);
       addQuad(shape, {a, y0, c}, {b, y0, c}, {b, y0, d}, {a, y0, d}, side);
@@ -202,7 +206,7 @@ void addTiledSlab(PaintedMesh& shape, const Vec3& l, const Vec3& h, int cellsX, 
     addQuad(shape, {a, y0, l.z()}, {a, y1, l.z()}, {b, y1, l.z()}, {b, y0, l.z()}, side);
   }
   for (int k = 0; k < cellsZ; ++k) {
-    const double c = z(k), d = z(k + 1);
+    const double c = computeZ(k), d = computeZ(k + 1);
     addQuad(shape, {l.x(), y0, c}, {l.x(), y0, d}, {l.x(), y1, d}, {l.x(), y1, c}, side);
     addQuad(shape, {h.x(), y0, c}, {h.x(), y1, c}, {h.x(), y1, d}, {h.x(), y0, d}, side);
   }
@@ -210,10 +214,10 @@ void addTiledSlab(PaintedMesh& shape, const Vec3& l, const Vec3& h, int cellsX, 
 
 void addPolygon(PaintedMesh& shape, const std::vector<Vec2>& profile, const SweepFrame& frame,
                 Paint paint) {
-  PaintedMesh::Part& part = partOf(shape, paint);
+  PaintedMesh::Part& part = findOrAddPart(shape, paint);
   const auto first = static_cast<std::uint32_t>(part.positions.size());
-  for (const Vec2& p : profile) addVertex(part, at(frame, p, 0), frame.w);
-  for (std::uint32_t i : triangulated(profile)) part.indices.push_back(first + i);
+  for (const Vec2& p : profile) addVertex(part, computePoint(frame, p, 0), frame.w);
+  for (std::uint32_t i : triangulatePolygon(profile)) part.indices.push_back(first + i);
 }
 
 void addPrism(PaintedMesh& shape, const std::vector<Vec2>& profile, const SweepFrame& f,
@@ -221,14 +225,15 @@ void addPrism(PaintedMesh& shape, const std::vector<Vec2>& profile, const SweepF
   const std::size_t n = profile.size();
   for (std::size_t i = 0; i < n; ++i) {
     const Vec2 &a = profile[i], &b = profile[(i + 1) % n];
-    addQuad(shape, at(f, a, 0), at(f, b, 0), at(f, b, length), at(f, a, length), paint);
+    addQuad(shape, computePoint(f, a, 0), computePoint(f, b, 0), computePoint(f, b, length),
+            computePoint(f, a, length), paint);
   }
-  PaintedMesh::Part& part = partOf(shape, paint);
-  const std::vector<std::uint32_t> triangles = triangulated(profile);
+  PaintedMesh::Part& part = findOrAddPart(shape, paint);
+  const std::vector<std::uint32_t> triangles = triangulatePolygon(profile);
   for (const bool top : {false, true}) {
     const auto first = static_cast<std::uint32_t>(part.positions.size());
     for (const Vec2& p : profile)
-      addVertex(part, at(f, p, top ? length : 0), top ? f.w : Vec3{-f.w});
+      addVertex(part, computePoint(f, p, top ? length : 0), top ? f.w : Vec3{-f.w});
     for (std::size_t i = 0; i < triangles.size(); i += 3)
       part.indices.insert(part.indices.end(),
                           {first + triangles[i], first + triangles[top ? i + 1 : i + 2],
@@ -238,14 +243,15 @@ void addPrism(PaintedMesh& shape, const std::vector<Vec2>& profile, const SweepF
 
 void addTurned(PaintedMesh& shape, const Vec3& base, const std::vector<Ring>& outline, int sides,
                Paint paint) {
-  const std::vector<Vec2> circle = unitCircle(sides);
+  const std::vector<Vec2> circle = makeUnitCircle(sides);
   std::vector<Vec2> normals;
   for (std::size_t i = 0; i + 1 < outline.size(); ++i)
-    normals.push_back(segmentNormal(outline[i], outline[i + 1]));
+    normals.push_back(computeSegmentNormal(outline[i], outline[i + 1]));
   for (std::size_t i = 0; i < normals.size(); ++i) {
-    const Vec2 low = i > 0 ? jointNormal(normals[i], normals[i - 1]) : normals[i];
-    const Vec2 high = i + 1 < normals.size() ? jointNormal(normals[i], normals[i + 1]) : normals[i];
-    addBand(partOf(shape, paint), base, circle, outline[i], outline[i + 1], low, high);
+    const Vec2 low = i > 0 ? computeJointNormal(normals[i], normals[i - 1]) : normals[i];
+    const Vec2 high =
+        i + 1 < normals.size() ? computeJointNormal(normals[i], normals[i + 1]) : normals[i];
+    addBand(findOrAddPart(shape, paint), base, circle, outline[i], outline[i + 1], low, high);
   }
   addDisc(shape, base, circle, outline.front(), false, paint);
   addDisc(shape, base, circle, outline.back(), true, paint);
@@ -273,7 +279,7 @@ void addRod(PaintedMesh& shape, const Vec3& a, const Vec3& b, double radius, int
 }
 
 void addBall(PaintedMesh& shape, const Vec3& centre, const Vec3& radii, int sides, Paint paint) {
-  const std::vector<Vec2> circle = unitCircle(2 * (sides / 2));
+  const std::vector<Vec2> circle = makeUnitCircle(2 * (sides / 2));
   std::vector<Ring> outline;  // the right half of the circle, from the lowest point up
   const int half = sides / 2, quarter = sides / 4;
   for (int i = 0; i <= half; ++i) {
@@ -290,10 +296,10 @@ void addBall(PaintedMesh& shape, const Vec3& centre, const Vec3& radii, int side
 
 void addTorus(PaintedMesh& shape, const Vec3& centre, double ringRadius, double tubeRadius,
               int sides, int tubeSides, Paint paint) {
-  const std::vector<Vec2> tube = unitCircle(tubeSides), circle = unitCircle(sides);
+  const std::vector<Vec2> tube = makeUnitCircle(tubeSides), circle = makeUnitCircle(sides);
   for (std::size_t i = 0; i < tube.size(); ++i) {
     const Vec2 &a = tube[i], &b = tube[(i + 1) % tube.size()];
-    addBand(partOf(shape, paint), centre, circle,
+    addBand(findOrAddPart(shape, paint), centre, circle,
             {ringRadius + tubeRadius * a.x(), tubeRadius * a.y()},
             {ringRadius + tubeRadius * b.x(), tubeRadius * b.y()}, a, b);
   }
@@ -314,7 +320,7 @@ void addSlopedBar(PaintedMesh& shape, const Vec3& a, const Vec3& b, double width
 void append(PaintedMesh& shape, const PaintedMesh& other, const Eigen::Affine3d& shapeFromOther) {
   const Eigen::Matrix3d normalMatrix = shapeFromOther.linear().inverse().transpose();
   for (const PaintedMesh::Part& from : other.parts) {
-    PaintedMesh::Part& to = partOf(shape, from.paint);
+    PaintedMesh::Part& to = findOrAddPart(shape, from.paint);
     const auto first = static_cast<std::uint32_t>(to.positions.size());
     for (std::size_t i = 0; i < from.positions.size(); ++i) {
       const Vec3 n = normalMatrix * from.normals[i];

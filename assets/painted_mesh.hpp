@@ -29,7 +29,7 @@ struct PaintedMesh {
 struct BoxPaints {
   Paint minusX, plusX, minusY, plusY, minusZ, plusZ;
 };
-inline BoxPaints allFaces(Paint paint) {
+inline BoxPaints paintAllFaces(Paint paint) {
   return {paint, paint, paint, paint, paint, paint};
 }
 
@@ -43,15 +43,15 @@ struct Ring {
   double radius, y;
 };
 
-Eigen::Affine3d moved(const Vec3& by);
+Eigen::Affine3d makeTranslation(const Vec3& by);
 /// A rotation about +Y by quarter turns (1 takes +X to -Z), then a translation.
-Eigen::Affine3d turned(int quarters, const Vec3& by = Vec3::Zero());
+Eigen::Affine3d makeQuarterTurn(int quarters, const Vec3& by = Vec3::Zero());
 /// A rotation about +Y by the angle whose half has this tangent, then a translation.
-Eigen::Affine3d turnedByHalfTangent(double tangent, const Vec3& by = Vec3::Zero());
+Eigen::Affine3d makeHalfTangentTurn(double tangent, const Vec3& by = Vec3::Zero());
 
 /// Vertices of the regular polygon in the unit circle, counter-clockwise from (1, 0). `sides` is 4
 /// or 6 times a power of two.
-std::vector<Vec2> unitCircle(int sides);
+std::vector<Vec2> makeUnitCircle(int sides);
 
 void addTriangle(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, Paint paint);
 void addQuad(PaintedMesh& shape, const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d,

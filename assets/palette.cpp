@@ -130,15 +130,16 @@ constexpr std::array<Entry, static_cast<std::size_t>(Paint::count)> kEntries{{
 }};
 
 /// sRGB to linear by a cubic (within 1 %): pow() would differ between libraries.
-float linear(std::uint32_t byte) {
+float toLinear(std::uint32_t byte) {
   const double c = static_cast<double>(byte & 0xffu) / 255.0;
   return static_cast<float>(c * (c * (c * 0.305306011 + 0.682171111) + 0.012522878));
 }
 
-scene::Material materialOf(const Entry& entry) {
+scene::Material makeMaterial(const Entry& entry) {
   scene::Material m;
   m.name = entry.name;
-  const Eigen::Vector3f rgb{linear(entry.srgb >> 16), linear(entry.srgb >> 8), linear(entry.srgb)};
+  const Eigen::Vector3f rgb{toLinear(entry.srgb >> 16), toLinear(entry.srgb >> 8),
+                            toLinear(entry.srgb)};
   m.baseColour = {rgb.x(), rgb.y(), rgb.z(), entry.alpha};
   m.emissive = entry.glow * rgb;
   m.metallic = entry.metallic;
@@ -149,10 +150,10 @@ scene::Material materialOf(const Entry& entry) {
 
 }  // namespace
 
-std::vector<scene::Material> paletteMaterials() {
+std::vector<scene::Material> makePaletteMaterials() {
   static_assert(kEntries.back().name != nullptr, "a Paint without an entry");
   std::vector<scene::Material> materials;
-  for (const Entry& entry : kEntries) materials.push_back(materialOf(entry));
+  for (const Entry& entry : kEntries) materials.push_back(makeMaterial(entry));
   return materials;
 }
 

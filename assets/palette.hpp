@@ -135,6 +135,6 @@ enum class Paint : std::uint32_t {
 };
 
 /// The materials in the order of Paint. Colours are linear.
-std::vector<scene::Material> paletteMaterials();
+std::vector<scene::Material> makePaletteMaterials();
 
 }  // namespace enfilade::assets

@@ -21,7 +21,7 @@ struct Easel {
     lay({{x0, y0}, {x1, y0}, {x1, y1}, {x0, y1}}, paint);
   }
   void layOval(double x, double y, double rx, double ry, Paint paint) {
-    std::vector<Vec2> outline = unitCircle(24);
+    std::vector<Vec2> outline = makeUnitCircle(24);
     for (Vec2& p : outline) p = {x + rx * p.x(), y + ry * p.y()};
     lay(outline, paint);
   }
@@ -167,7 +167,7 @@ void paintSomething(Easel& e, Random& random) {
   }
 }
 
-PaintedMesh frameShape(double w, double h, Paint paint) {
+PaintedMesh makeFrameShape(double w, double h, Paint paint) {
   const double bar = 0.075, out = 0.055;
   PaintedMesh s;
   addBox(s, {-0.003, -h, -w}, {out, -h + bar, w}, paint);
@@ -183,10 +183,11 @@ PaintedMesh frameShape(double w, double h, Paint paint) {
 
 void placePicture(Sketch& sketch, const std::string& path, const Spot& spot, double width,
                   double height, Random& random) {
-  const Eigen::Affine3d place = turned(spot.quarters, spot.at);
+  const Eigen::Affine3d place = makeQuarterTurn(spot.quarters, spot.at);
   constexpr Paint kFrames[] = {Paint::gilt, Paint::gilt, Paint::mahogany, Paint::blackMetal};
   const double w = width / 2, h = height / 2;
-  sketch.place(path + "/frame", frameShape(w + 0.07, h + 0.07, kFrames[random.below(4)]), place);
+  sketch.place(path + "/frame", makeFrameShape(w + 0.07, h + 0.07, kFrames[random.below(4)]),
+               place);
   PaintedMesh canvas;
   addBox(canvas, {-0.002, -h - 0.004, -w - 0.004}, {0.02, h + 0.004, w + 0.004}, Paint::canvas);
   Easel easel{canvas, w, h};

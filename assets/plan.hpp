@@ -29,18 +29,18 @@ inline constexpr double kVestibule = 4.5;  ///< its east face
 inline constexpr double kRoom = 6.0;       ///< width of a room of the enfilade along X
 inline constexpr int kRooms = 6;
 /// West face of room i = 0..5; room 6 is the hall.
-constexpr double roomWest(int i) {
+constexpr double computeRoomWest(int i) {
   return kVestibule + kPartition + (kRoom + kPartition) * i;
 }
-constexpr double roomEast(int i) {
-  return roomWest(i) + kRoom;
+constexpr double computeRoomEast(int i) {
+  return computeRoomWest(i) + kRoom;
 }
 
 // The doors of the enfilade, all on z = 0.
 inline constexpr double kDoorHalf = 0.65, kDoorHeight = 2.45;
 
 // Hall.
-inline constexpr double kHallWest = roomEast(kRooms - 1) + kOuter;  // 42.7
+inline constexpr double kHallWest = computeRoomEast(kRooms - 1) + kOuter;  // 42.7
 inline constexpr double kHallEast = kHallWest + 18;
 inline constexpr double kHallHalf = 8.2;  ///< it reaches from z = -kHallHalf to +kHallHalf
 inline constexpr double kWalkway = 2.2;   ///< width of the gallery round it

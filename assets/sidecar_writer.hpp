@@ -12,9 +12,9 @@ namespace enfilade::assets {
 
 /// Bodies are named as their objects, without "building/". Doors are open in the model; avatars
 /// push rotating doors open by walking into them.
-std::string sidecarText(const scene::Model& model, const std::vector<MovingPart>& movingParts);
+std::string makeSidecarText(const scene::Model& model, const std::vector<MovingPart>& movingParts);
 
 /// Writes the sidecar next to the GLB file. Throws std::runtime_error with the sidecar's name.
-void writeSidecarOf(std::filesystem::path glb, const std::string& text);
+void writeSidecar(std::filesystem::path glb, const std::string& text);
 
 }  // namespace enfilade::assets

@@ -19,10 +19,10 @@ double roundToMicrometre(double metres) {
 }  // namespace
 
 Sketch::Sketch() {
-  model_.materials = paletteMaterials();
+  model_.materials = makePaletteMaterials();
 }
 
-std::uint32_t Sketch::meshIndex(const PaintedMesh::Part& part, const std::string& name) {
+std::uint32_t Sketch::findOrAddMesh(const PaintedMesh::Part& part, const std::string& name) {
   scene::Mesh mesh;
   for (const Vec3& p : part.positions) mesh.positions.push_back(p.cast<float>());
   for (const Vec3& n : part.normals) mesh.normals.push_back(n.cast<float>());
@@ -47,28 +47,29 @@ void Sketch::place(const std::string& path, const PaintedMesh& shape,
   scene::Object object;
   object.path = path;
   object.worldFromMesh = worldFromShape;
-  for (const PaintedMesh::Part& part : shape.parts) object.meshes.push_back(meshIndex(part, path));
+  for (const PaintedMesh::Part& part : shape.parts)
+    object.meshes.push_back(findOrAddMesh(part, path));
   model_.objects.push_back(std::move(object));
 }
 
-void Sketch::box(const std::string& path, const Vec3& low, const Vec3& high,
-                 const BoxPaints& paints) {
+void Sketch::placeBox(const std::string& path, const Vec3& low, const Vec3& high,
+                      const BoxPaints& paints) {
   const Vec3 half = (0.5 * (high - low)).unaryExpr([](double v) { return roundToMicrometre(v); });
   PaintedMesh shape;
   addBox(shape, -half, half, paints);
-  place(path, shape, moved(0.5 * (low + high)));
+  place(path, shape, makeTranslation(0.5 * (low + high)));
 }
 
-void Sketch::box(const std::string& path, const Vec3& low, const Vec3& high, Paint paint) {
-  box(path, low, high, allFaces(paint));
+void Sketch::placeBox(const std::string& path, const Vec3& low, const Vec3& high, Paint paint) {
+  placeBox(path, low, high, paintAllFaces(paint));
 }
 
-void Sketch::moves(MovingPart::Kind kind, const Vec3& axis, double low, double high) {
+void Sketch::setJoint(MovingPart::Kind kind, const Vec3& axis, double low, double high) {
   movingParts_.push_back(
       {static_cast<std::uint32_t>(model_.objects.size() - 1), kind, axis, low, high});
 }
 
-std::string numbered(const std::string& name, int number) {
+std::string appendNumber(const std::string& name, int number) {
   return name + (number < 10 ? "0" : "") + std::to_string(number);
 }
 

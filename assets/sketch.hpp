@@ -18,17 +18,18 @@ class Sketch {
   void place(const std::string& path, const PaintedMesh& shape,
              const Eigen::Affine3d& worldFromShape);
   /// The mesh is centred, so that equal boxes share it.
-  void box(const std::string& path, const Vec3& low, const Vec3& high, const BoxPaints& paints);
-  void box(const std::string& path, const Vec3& low, const Vec3& high, Paint paint);
+  void placeBox(const std::string& path, const Vec3& low, const Vec3& high,
+                const BoxPaints& paints);
+  void placeBox(const std::string& path, const Vec3& low, const Vec3& high, Paint paint);
   /// Sets the joint of the object placed last.
-  void moves(MovingPart::Kind kind, const Vec3& axis, double low, double high);
+  void setJoint(MovingPart::Kind kind, const Vec3& axis, double low, double high);
 
   std::size_t size() const { return model_.objects.size(); }
   scene::Model& model() { return model_; }
   std::vector<MovingPart>& movingParts() { return movingParts_; }
 
  private:
-  std::uint32_t meshIndex(const PaintedMesh::Part& part, const std::string& name);
+  std::uint32_t findOrAddMesh(const PaintedMesh::Part& part, const std::string& name);
 
   scene::Model model_;
   std::vector<MovingPart> movingParts_;
@@ -37,6 +38,6 @@ class Sketch {
 };
 
 /// "name07": two digits, so that names sort by number.
-std::string numbered(const std::string& name, int number);
+std::string appendNumber(const std::string& name, int number);
 
 }  // namespace enfilade::assets

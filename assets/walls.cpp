@@ -7,7 +7,7 @@ namespace {
 
 constexpr double kQuarterTurn = 1.5707963267948966;
 
-std::vector<double> cutsOf(const Wall& wall, const std::vector<Opening>& openings) {
+std::vector<double> findCuts(const Wall& wall, const std::vector<Opening>& openings) {
   std::vector<double> cuts{wall.from, wall.to};
   for (const Opening& o : openings) cuts.insert(cuts.end(), {o.from, o.to});
   std::sort(cuts.begin(), cuts.end());
@@ -16,7 +16,7 @@ std::vector<double> cutsOf(const Wall& wall, const std::vector<Opening>& opening
 }
 
 /// The openings that overlap a strip between two cuts, from bottom to top.
-std::vector<Opening> holesIn(const std::vector<Opening>& openings, double from, double to) {
+std::vector<Opening> findHoles(const std::vector<Opening>& openings, double from, double to) {
   std::vector<Opening> holes;
   for (const Opening& o : openings)
     if (o.from < to && from < o.to) holes.push_back(o);
@@ -25,7 +25,7 @@ std::vector<Opening> holesIn(const std::vector<Opening>& openings, double from, 
   return holes;
 }
 
-BoxPaints paintsOf(const Wall& w) {
+BoxPaints makeBoxPaints(const Wall& w) {
   if (w.along == Wall::Along::x) return {w.ends, w.ends, w.ends, w.ends, w.lowFace, w.highFace};
   return {w.lowFace, w.highFace, w.ends, w.ends, w.ends, w.ends};
 }
@@ -35,16 +35,16 @@ void addMoulding(Sketch& sketch, const std::string& path, const Face& f, std::ve
                  double y, Paint paint) {
   constexpr double kInto = 0.004;
   const double length = f.to - f.from + 2 * kInto;
-  const Vec3 out = wallPoint(f.along, 0, 0, f.inward), up{0, 1, 0};
+  const Vec3 out = makeWallPoint(f.along, 0, 0, f.inward), up{0, 1, 0};
   const Vec3 w = out.cross(up);
-  const double start = w.dot(wallPoint(f.along, 1, 0, 0)) > 0 ? f.from - kInto : f.to + kInto;
+  const double start = w.dot(makeWallPoint(f.along, 1, 0, 0)) > 0 ? f.from - kInto : f.to + kInto;
   PaintedMesh shape;
   addPrism(shape, profile, {Vec3::Zero(), out, up, w}, length, paint);
-  sketch.place(path, shape, moved(wallPoint(f.along, start, y, f.face)));
+  sketch.place(path, shape, makeTranslation(makeWallPoint(f.along, start, y, f.face)));
 }
 
 /// Wavy cloth on a rod, `width` wide along +X, a closed solid.
-PaintedMesh curtainShape(double width, double height, Paint paint) {
+PaintedMesh makeCurtainShape(double width, double height, Paint paint) {
   constexpr int kFolds = 7;
   std::vector<Vec2> outline;
   for (int i = 0; i <= 2 * kFolds; ++i)
@@ -61,43 +61,46 @@ void addCurtains(Sketch& sketch, const std::string& path, const Wall& wall, cons
   const double face = style.inward > 0 ? wall.high : wall.low;
   const double across = face + style.inward * 0.10;
   const double top = hole.top + 0.12, bottom = hole.bottom - 0.35, width = 0.34;
-  const Vec3 reach = wallPoint(wall.along, 0.28, 0, 0);
+  const Vec3 reach = makeWallPoint(wall.along, 0.28, 0, 0);
   PaintedMesh rod;
-  addRod(rod, wallPoint(wall.along, hole.from, top, across) - reach,
-         wallPoint(wall.along, hole.to, top, across) + reach, 0.014, 8, Paint::brass);
+  addRod(rod, makeWallPoint(wall.along, hole.from, top, across) - reach,
+         makeWallPoint(wall.along, hole.to, top, across) + reach, 0.014, 8, Paint::brass);
   sketch.place(path + "/curtain_rod", rod, Eigen::Affine3d::Identity());
-  const PaintedMesh cloth = curtainShape(width, top - bottom, style.curtain);
+  const PaintedMesh cloth = makeCurtainShape(width, top - bottom, style.curtain);
   const int quarters = wall.along == Wall::Along::x ? 0 : 3;
-  sketch.place(path + "/curtain_left", cloth,
-               turned(quarters, wallPoint(wall.along, hole.from - 0.26, bottom, across)));
-  sketch.place(path + "/curtain_right", cloth,
-               turned(quarters, wallPoint(wall.along, hole.to - 0.08, bottom, across)));
+  sketch.place(
+      path + "/curtain_left", cloth,
+      makeQuarterTurn(quarters, makeWallPoint(wall.along, hole.from - 0.26, bottom, across)));
+  sketch.place(
+      path + "/curtain_right", cloth,
+      makeQuarterTurn(quarters, makeWallPoint(wall.along, hole.to - 0.08, bottom, across)));
 }
 
 }  // namespace
 
-Vec3 wallPoint(Wall::Along along, double a, double y, double across) {
+Vec3 makeWallPoint(Wall::Along along, double a, double y, double across) {
   return along == Wall::Along::x ? Vec3{a, y, across} : Vec3{across, y, a};
 }
 
-void wallBox(Sketch& sketch, const std::string& path, Wall::Along along, const Vec3& low,
-             const Vec3& high, Paint paint) {
-  sketch.box(path, wallPoint(along, low.x(), low.y(), low.z()),
-             wallPoint(along, high.x(), high.y(), high.z()), paint);
+void placeWallBox(Sketch& sketch, const std::string& path, Wall::Along along, const Vec3& low,
+                  const Vec3& high, Paint paint) {
+  sketch.placeBox(path, makeWallPoint(along, low.x(), low.y(), low.z()),
+                  makeWallPoint(along, high.x(), high.y(), high.z()), paint);
 }
 
 void addWall(Sketch& sketch, const std::string& path, const Wall& w,
              const std::vector<Opening>& openings) {
-  const std::vector<double> cuts = cutsOf(w, openings);
+  const std::vector<double> cuts = findCuts(w, openings);
   int piece = 0;
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
     double y = w.bottom;
     const auto fill = [&](double top) {
       if (top - y > 1e-6)
-        sketch.box(numbered(path + "/piece", ++piece), wallPoint(w.along, cuts[i], y, w.low),
-                   wallPoint(w.along, cuts[i + 1], top, w.high), paintsOf(w));
+        sketch.placeBox(appendNumber(path + "/piece", ++piece),
+                        makeWallPoint(w.along, cuts[i], y, w.low),
+                        makeWallPoint(w.along, cuts[i + 1], top, w.high), makeBoxPaints(w));
     };
-    for (const Opening& o : holesIn(openings, cuts[i], cuts[i + 1])) {
+    for (const Opening& o : findHoles(openings, cuts[i], cuts[i + 1])) {
       fill(o.bottom);
       y = o.top;
     }
@@ -133,7 +136,7 @@ void addSkirting(Sketch& sketch, const std::string& path, const Face& face, doub
     Face part = face;
     part.from = from;
     part.to = to;
-    addMoulding(sketch, numbered(path, ++piece), part,
+    addMoulding(sketch, appendNumber(path, ++piece), part,
                 {{-0.003, -0.003}, {0.018, -0.003}, {0.018, 0.10}, {0.008, 0.13}, {-0.003, 0.13}},
                 floor, Paint::paintedWood);
   };
@@ -164,12 +167,12 @@ void addCasing(Sketch& sketch, const std::string& path, const Wall& w, const Ope
   const std::string side = path + (high ? "/casing_b" : "/casing_a");
   const double inner = high ? w.high - 0.003 : w.low - kProud;
   const double outer = high ? w.high + kProud : w.low + 0.003;
-  wallBox(sketch, side + "_left", w.along, {o.from - kWidth, o.bottom, inner},
-          {o.from - kLap, o.top, outer}, paint);
-  wallBox(sketch, side + "_right", w.along, {o.to + kLap, o.bottom, inner},
-          {o.to + kWidth, o.top, outer}, paint);
-  wallBox(sketch, side + "_head", w.along, {o.from - kWidth - 0.01, o.top, inner},
-          {o.to + kWidth + 0.01, o.top + 0.14, outer}, paint);
+  placeWallBox(sketch, side + "_left", w.along, {o.from - kWidth, o.bottom, inner},
+               {o.from - kLap, o.top, outer}, paint);
+  placeWallBox(sketch, side + "_right", w.along, {o.to + kLap, o.bottom, inner},
+               {o.to + kWidth, o.top, outer}, paint);
+  placeWallBox(sketch, side + "_head", w.along, {o.from - kWidth - 0.01, o.top, inner},
+               {o.to + kWidth + 0.01, o.top + 0.14, outer}, paint);
   Face face{w.along, o.from - 0.2, o.to + 0.2, high ? w.high : w.low, high ? 1.0 : -1.0};
   addRail(sketch, path + (high ? "/architrave_b" : "/architrave_a"), face, o.top + 0.141, 0.07,
           0.08, paint);
@@ -182,8 +185,8 @@ void addDoorFrame(Sketch& sketch, const std::string& path, const Wall& w, const 
 
 void addThreshold(Sketch& sketch, const std::string& path, const Wall& w, const Opening& o,
                   Paint paint) {
-  wallBox(sketch, path, w.along, {o.from, o.bottom - 0.02, w.low - 0.005},
-          {o.to, o.bottom + 0.002, w.high + 0.005}, paint);
+  placeWallBox(sketch, path, w.along, {o.from, o.bottom - 0.02, w.low - 0.005},
+               {o.to, o.bottom + 0.002, w.high + 0.005}, paint);
 }
 
 void addLeaf(Sketch& sketch, const std::string& path, const Leaf& leaf) {
@@ -212,9 +215,9 @@ void addLeaf(Sketch& sketch, const std::string& path, const Leaf& leaf) {
     addRod(s, {w - 0.05, 1.02, side * (kHalf - 0.005)}, {w - 0.05, 1.02, z}, 0.01, 8, Paint::brass);
     addRod(s, {w - 0.04, 1.02, z}, {w - 0.15, 1.02, z}, 0.01, 8, Paint::brass);
   }
-  sketch.place(path, s, turned(leaf.quarters, leaf.hinge));
+  sketch.place(path, s, makeQuarterTurn(leaf.quarters, leaf.hinge));
   const double a = leaf.closes * kQuarterTurn;
-  sketch.moves(MovingPart::Kind::hinge, Vec3{0, 1, 0}, std::min(0.0, a), std::max(0.0, a));
+  sketch.setJoint(MovingPart::Kind::hinge, Vec3{0, 1, 0}, std::min(0.0, a), std::max(0.0, a));
 }
 
 void addWindow(Sketch& sketch, const std::string& path, const Wall& w, const Opening& o,
@@ -222,31 +225,32 @@ void addWindow(Sketch& sketch, const std::string& path, const Wall& w, const Ope
   const double middle = 0.5 * (w.low + w.high), d = 0.035, bar = 0.05;
   const auto put = [&](const std::string& name, double a0, double a1, double y0, double y1,
                        double half, Paint paint) {
-    wallBox(sketch, path + name, w.along, {a0, y0, middle - half}, {a1, y1, middle + half}, paint);
+    placeWallBox(sketch, path + name, w.along, {a0, y0, middle - half}, {a1, y1, middle + half},
+                 paint);
   };
   put("/frame_left", o.from, o.from + bar, o.bottom, o.top, d, Paint::paintedWood);
   put("/frame_right", o.to - bar, o.to, o.bottom, o.top, d, Paint::paintedWood);
   put("/frame_bottom", o.from + bar, o.to - bar, o.bottom, o.bottom + bar, d, Paint::paintedWood);
   put("/frame_top", o.from + bar, o.to - bar, o.top - bar, o.top, d, Paint::paintedWood);
   const double a0 = o.from + bar, a1 = o.to - bar, y0 = o.bottom + bar, y1 = o.top - bar;
-  const auto column = [&](int i) { return a0 + (a1 - a0) * i / style.columns; };
+  const auto computeColumn = [&](int i) { return a0 + (a1 - a0) * i / style.columns; };
   for (int i = 1; i < style.columns; ++i)
-    put(numbered("/mullion", i), column(i) - 0.02, column(i) + 0.02, y0, y1, d - 0.005,
-        Paint::paintedWood);
+    put(appendNumber("/mullion", i), computeColumn(i) - 0.02, computeColumn(i) + 0.02, y0, y1,
+        d - 0.005, Paint::paintedWood);
   for (int i = 1; i < style.rows; ++i) {
     const double y = y0 + (y1 - y0) * i / style.rows;
-    put(numbered("/transom", i), a0, a1, y - 0.015, y + 0.015, d - 0.012, Paint::paintedWood);
+    put(appendNumber("/transom", i), a0, a1, y - 0.015, y + 0.015, d - 0.012, Paint::paintedWood);
   }
   for (int i = 0; i < style.columns; ++i)
-    put(numbered("/pane", i + 1), column(i) + (i ? 0.015 : -0.005),
-        column(i + 1) - (i + 1 < style.columns ? 0.015 : -0.005), y0 - 0.005, y1 + 0.005, 0.004,
-        Paint::glass);
+    put(appendNumber("/pane", i + 1), computeColumn(i) + (i ? 0.015 : -0.005),
+        computeColumn(i + 1) - (i + 1 < style.columns ? 0.015 : -0.005), y0 - 0.005, y1 + 0.005,
+        0.004, Paint::glass);
   if (style.sill) {
     const double inner = style.inward > 0 ? w.high + 0.09 : w.low - 0.09;
     const double outer = style.inward > 0 ? middle : middle;
-    wallBox(sketch, path + "/sill", w.along,
-            {o.from - 0.08, o.bottom - 0.012, std::min(inner, outer)},
-            {o.to + 0.08, o.bottom + 0.03, std::max(inner, outer)}, Paint::marbleWhite);
+    placeWallBox(sketch, path + "/sill", w.along,
+                 {o.from - 0.08, o.bottom - 0.012, std::min(inner, outer)},
+                 {o.to + 0.08, o.bottom + 0.03, std::max(inner, outer)}, Paint::marbleWhite);
   }
   if (style.curtain != Paint::glass) addCurtains(sketch, path, w, o, style);
 }

@@ -26,10 +26,10 @@ struct Opening {
 };
 
 /// A point given along the wall, up, and across its thickness.
-Vec3 wallPoint(Wall::Along along, double a, double y, double across);
+Vec3 makeWallPoint(Wall::Along along, double a, double y, double across);
 /// The box between two such points.
-void wallBox(Sketch& sketch, const std::string& path, Wall::Along along, const Vec3& low,
-             const Vec3& high, Paint paint);
+void placeWallBox(Sketch& sketch, const std::string& path, Wall::Along along, const Vec3& low,
+                  const Vec3& high, Paint paint);
 
 /// Builds the wall of vertical strips between the openings, with pieces above and below them.
 void addWall(Sketch& sketch, const std::string& path, const Wall& wall,

@@ -64,7 +64,7 @@ double larger(Double2 lanes) {
 void appendFans(const Hull& hull, SupportTable& table) {
   for (std::uint32_t v = 0; v < hull.vertices.size(); ++v) {
     table.fanOffsets.push_back(static_cast<std::uint32_t>(table.fans.size() / kBlock));
-    const auto neighbours = hull.neighboursOf(v);
+    const auto neighbours = hull.getNeighbours(v);
     for (std::size_t k = 0; k < neighbours.size(); k += 2) {
       const std::uint32_t first = neighbours[k],
                           second = neighbours[std::min(k + 1, neighbours.size() - 1)];
@@ -90,13 +90,15 @@ struct Climber {
   Vec3 direction;
   std::uint64_t& looked;
 
-  double heightOf(std::uint32_t vertex) const { return project(direction, hull.vertices[vertex]); }
+  double computeHeight(std::uint32_t vertex) const {
+    return project(direction, hull.vertices[vertex]);
+  }
 
   Top findHighestVertex() {
     looked += hull.vertices.size();
-    Top top{0, heightOf(0)};
+    Top top{0, computeHeight(0)};
     for (std::uint32_t v = 1; v < hull.vertices.size(); ++v)
-      if (const double height = heightOf(v); height > top.height) top = {v, height};
+      if (const double height = computeHeight(v); height > top.height) top = {v, height};
     return top;
   }
 
@@ -108,10 +110,10 @@ struct Climber {
     std::size_t size = 0;
     plateau[size++] = top.vertex;
     for (std::size_t k = 0; k < size; ++k) {
-      const auto neighbours = hull.neighboursOf(plateau[k]);
+      const auto neighbours = hull.getNeighbours(plateau[k]);
       looked += neighbours.size();
       for (const std::uint32_t next : neighbours) {
-        const double height = heightOf(next);
+        const double height = computeHeight(next);
         if (height < top.height - slack) continue;
         if (height > top.height) return {next, height};
         if (std::find(plateau.begin(), plateau.begin() + size, next) != plateau.begin() + size)
@@ -147,7 +149,7 @@ struct Climber {
   double climb(std::uint32_t& start) {
     const double slack = kPlateau * hull.radius + kUnderflow;
     Top top{start < hull.vertices.size() ? start : 0, 0};
-    top.height = heightOf(top.vertex);
+    top.height = computeHeight(top.vertex);
     for (;;) {  // heights rise strictly: at most one visit per vertex
       const Top next = findHighestNeighbour(top.vertex);
       if (next.height > top.height) {

@@ -48,11 +48,11 @@ bool isPrime(std::int64_t n) {
   return true;
 }
 
-std::array<double, 3> extentOf(const SignedBounds& box) {
+std::array<double, 3> computeExtents(const SignedBounds& box) {
   return {box[0] + box[3], box[1] + box[4], box[2] + box[5]};
 }
 
-std::size_t exponentOf(const std::array<double, 3>& extent) {
+std::size_t computeExponent(const std::array<double, 3>& extent) {
   const double largest = std::max({extent[0], extent[1], extent[2]});
   return std::bit_cast<std::uint64_t>(largest) >> 52 & 0x7ff;
 }
@@ -120,7 +120,7 @@ class BoxTable::PairWriter {
     // Room for as many pairs again as this object has appended, and not as the vector holds: a
     // vector may get few pairs from each of many objects.
     if (pairs_.size() < count_ + candidates) pairs_.resize(2 * count_ - begin_ + candidates);
-    const SignedBounds minEndpoints = minEndpointsOf(box);
+    const SignedBounds minEndpoints = computeMinEndpoints(box);
     IdPair* to = pairs_.data() + count_;
     const AppendOverlaps append = table.useAvx ? appendOverlapsAvx : appendOverlaps;
     for (const Run& run : runs)
@@ -192,8 +192,8 @@ void BoxTable::classify(std::span<const SignedBounds> maxEndpoints, std::span<co
   exponentOfBox_.resize(ids.size());
   for (std::size_t k = 0; k < ids.size(); ++k) {
     const SignedBounds& box = maxEndpoints[ids[k]];
-    const std::array<double, 3> extent = extentOf(box);
-    const std::size_t exponent = exponentOf(extent);
+    const std::array<double, 3> extent = computeExtents(box);
+    const std::size_t exponent = computeExponent(extent);
     exponentOfBox_[k] = static_cast<std::uint16_t>(exponent);
     if (classes_[exponent].count == 0)
       usedExponents_.push_back(static_cast<std::uint16_t>(exponent));
@@ -273,7 +273,7 @@ void BoxTable::findOverlaps(const SignedBounds& maxEndpoints, Id id,
   }
 }
 
-BoxTable::Run BoxTable::boxesOf(const Level& level) const {
+BoxTable::Run BoxTable::getBoxes(const Level& level) const {
   return cellsAt(level.firstCell, level.firstCell + static_cast<std::size_t>(level.cellCount()));
 }
 
@@ -336,7 +336,7 @@ void BoxTable::visitNear(const Level& level, const SignedBounds& box, const Visi
         isAll ? 0
               : static_cast<std::size_t>(wrap(low, level.cells[axis], level.inverseCells[axis]));
   }
-  if (count[0] * count[1] >= level.content.count) return visit(boxesOf(level));  // few boxes
+  if (count[0] * count[1] >= level.content.count) return visit(getBoxes(level));  // few boxes
   const std::size_t endZ = std::min(first[2] + count[2], cells[2]),
                     wrappedZ = first[2] + count[2] - endZ;
   for (std::size_t i = 0, x = first[0]; i < count[0]; ++i, x = x + 1 == cells[0] ? 0 : x + 1) {
@@ -358,7 +358,7 @@ void BoxTable::findPairsBetween(const Level& fine, const Level& coarse, PairWrit
   }
   const bool fromFine =
       fine.content.count * kRowsOfFineBox < coarse.content.count * rowsOfCoarseBox;
-  const Run sources = boxesOf(fromFine ? fine : coarse);
+  const Run sources = getBoxes(fromFine ? fine : coarse);
   for (std::uint32_t k = sources.begin; k < sources.end; ++k) {
     visitNear(fromFine ? coarse : fine, boxes_[k], [&](const Run& run) {
       writer.compare(*this, boxes_[k], ids_[k], std::span(&run, 1));

@@ -74,7 +74,7 @@ class BoxTable {
   void findPairsInLevel(const Level& level, PairWriter& writer) const;
   void findPairsInRow(const Level& level, std::size_t x, std::size_t y, PairWriter& writer) const;
   void findPairsBetween(const Level& fine, const Level& coarse, PairWriter& writer) const;
-  Run boxesOf(const Level& level) const;
+  Run getBoxes(const Level& level) const;
 
   std::vector<SizeClass> classes_;              ///< by exponent of the largest extent
   std::vector<std::uint16_t> usedExponents_;    ///< ascending

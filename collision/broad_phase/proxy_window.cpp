@@ -70,7 +70,7 @@ void ProxyWindow::build(const StaticGrid& staticGrid, std::span<const StaticGrid
     const SignedBounds& minEndpoints = staticGrid.minEndpoints(rows[r]);
     const unsigned separated = greaterMask(minEndpoints, maxEndpoints),
                    listed = greaterMask(minEndpoints, minBounds);
-    const std::uint32_t id = staticGrid.idOf(rows[r]);
+    const std::uint32_t id = staticGrid.getId(rows[r]);
     statics[r] = {id, static_cast<std::uint8_t>(separated), static_cast<std::uint8_t>(listed)};
     overlapping[overlapCount] = id;
     overlapCount += separated == 0 ? 1 : 0;

@@ -37,7 +37,7 @@ inline bool noneGreater(const SignedBounds& a, const SignedBounds& b) {
 }
 
 /// The minimum endpoints of a box that is given by its maximum endpoints.
-inline SignedBounds minEndpointsOf(const SignedBounds& maxEndpoints) {
+inline SignedBounds computeMinEndpoints(const SignedBounds& maxEndpoints) {
   return {-maxEndpoints[3], -maxEndpoints[4], -maxEndpoints[5],
           -maxEndpoints[0], -maxEndpoints[1], -maxEndpoints[2]};
 }

@@ -292,13 +292,13 @@ std::span<const ProxyPair> SortAndSweep::removedPairs() const {
   return state_->removedPairs;
 }
 
-std::span<const SortAndSweep::Overlap> SortAndSweep::overlapsOf(ProxyId proxy) const {
+std::span<const SortAndSweep::Overlap> SortAndSweep::getOverlaps(ProxyId proxy) const {
   if (proxy >= state_->proxies.size()) return {};
   return state_->proxies[proxy].overlaps;
 }
 
-std::span<const SortAndSweep::Overlap> SortAndSweep::dynamicOverlapsOf(ProxyId proxy) const {
-  const std::span<const Overlap> all = overlapsOf(proxy);
+std::span<const SortAndSweep::Overlap> SortAndSweep::getDynamicOverlaps(ProxyId proxy) const {
+  const std::span<const Overlap> all = getOverlaps(proxy);
   std::size_t first = all.size();
   while (first > 0 && all[first - 1].isDynamic) --first;
   return all.subspan(first);
@@ -312,7 +312,7 @@ std::vector<StaticId> SortAndSweep::overlapStatic(const Aabb& box) const {
   staticGrid.gather(maxEndpoints, rows);
   std::vector<StaticId> ids;
   for (const StaticGrid::Row row : rows.all()) {
-    if (overlaps(staticGrid.minEndpoints(row), maxEndpoints)) ids.push_back(staticGrid.idOf(row));
+    if (overlaps(staticGrid.minEndpoints(row), maxEndpoints)) ids.push_back(staticGrid.getId(row));
   }
   std::sort(ids.begin(), ids.end());
   return ids;

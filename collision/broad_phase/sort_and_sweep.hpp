@@ -95,9 +95,9 @@ class SortAndSweep {
   };
   /// All current overlaps of a dynamic proxy, sorted: static boxes first. Empty for an unknown id.
   /// Valid until the next update().
-  std::span<const Overlap> overlapsOf(ProxyId proxy) const;
-  /// Those of overlapsOf() with dynamic proxies. Costs no look at the static ones.
-  std::span<const Overlap> dynamicOverlapsOf(ProxyId proxy) const;
+  std::span<const Overlap> getOverlaps(ProxyId proxy) const;
+  /// Those of getOverlaps() with dynamic proxies. Costs no look at the static ones.
+  std::span<const Overlap> getDynamicOverlaps(ProxyId proxy) const;
   /// Static boxes that overlap an arbitrary box, ascending, as of the last update(). For single
   /// queries, such as a free-space test. The cost is linear in the boxes of the cells it covers.
   /// Throws std::invalid_argument for a box that is empty or not finite.

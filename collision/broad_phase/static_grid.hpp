@@ -25,7 +25,7 @@ class StaticGrid {
   StaticGrid(std::span<const Aabb> boxes, std::span<const std::uint32_t> ids);
 
   const SignedBounds& minEndpoints(Row row) const { return minEndpoints_[row]; }
-  std::uint32_t idOf(Row row) const { return ids_[row]; }
+  std::uint32_t getId(Row row) const { return ids_[row]; }
   const CellGrid& grid() const { return grid_; }
 
   /// The first `count` rows of a vector that never shrinks, which avoids its initialisation.

@@ -43,7 +43,7 @@ ConvexFeatures computeFeatures(const BoundedConvex& convex) {
   for (std::uint32_t i = 0; i < convex.vertexCount(); ++i)
     features.points.push_back(convex.rotated<LongReal>(i));
   for (std::uint32_t i = 0; i < convex.vertexCount(); ++i) {
-    for (const std::uint32_t j : features.hull->neighboursOf(i)) {
+    for (const std::uint32_t j : features.hull->getNeighbours(i)) {
       const LongVec3 direction = features.points[j] - features.points[i];
       if (i < j) features.edges.push_back({{i, j}, direction, direction.cast<double>()});
     }

@@ -268,7 +268,7 @@ inline void hillClimb(const BoundedConvex& convex, std::uint32_t start, double e
     const double goal = best + enough;
     while (true) {  // terminates: the projection grows and there are finitely many vertices
       second = -std::numeric_limits<double>::infinity();
-      for (const std::uint32_t neighbour : hull->neighboursOf(vertex)) {
+      for (const std::uint32_t neighbour : hull->getNeighbours(vertex)) {
         const double projection = dot(d, vertices[neighbour]);
         start = projection > second ? neighbour : start;  // branchless: avoids mispredictions
         second = std::max(second, projection);
@@ -325,7 +325,7 @@ void forEachSupportCandidate(const BoundedConvex& convex, const SupportVertex& s
   std::size_t count = 1;
   for (std::size_t k = 0; k < count; ++k) {
     std::size_t end = count;  // appends the vertices above the threshold, branchless
-    for (const std::uint32_t neighbour : hull->neighboursOf(reached[k])) {
+    for (const std::uint32_t neighbour : hull->getNeighbours(reached[k])) {
       if (end == reached.size()) return visitAllAbove();
       reached[end] = neighbour;
       end += dot(direction, vertices[neighbour]) < threshold ? 0 : 1;

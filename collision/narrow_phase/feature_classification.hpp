@@ -23,7 +23,7 @@ inline Feature findSpannedFeature(const PlacedConvex& convex, const FeatureCache
   }
   if (second == first) return Feature::vertex;
   if (!convex.hull) return Feature::edge;
-  for (const std::uint32_t neighbour : convex.hull->neighboursOf(first))
+  for (const std::uint32_t neighbour : convex.hull->getNeighbours(first))
     if (neighbour == second) return Feature::edge;
   return Feature::face;  // the two vertices are a diagonal of a face
 }

@@ -17,7 +17,7 @@ struct Hull {
   std::vector<std::uint32_t> neighbours;          ///< vertices joined by an edge, ascending
   double radius = 0;                              ///< maximum distance of a vertex from the origin
 
-  std::span<const std::uint32_t> neighboursOf(std::uint32_t vertex) const {
+  std::span<const std::uint32_t> getNeighbours(std::uint32_t vertex) const {
     return {neighbours.data() + neighbourOffsets[vertex],
             neighbours.data() + neighbourOffsets[vertex + 1]};
   }

@@ -28,15 +28,15 @@ std::vector<std::uint32_t> groupThings(const Model& model) {
   return first;
 }
 
-/// The ids, each replaced by `labelOf(id)`. Adjacent pixels mostly show the same entity.
-template <class LabelOf>
+/// The ids, each replaced by `getLabel(id)`. Adjacent pixels mostly show the same entity.
+template <class GetLabel>
 std::vector<std::uint32_t> labelPixels(const std::vector<std::uint32_t>& ids,
-                                       const LabelOf& labelOf) {
+                                       const GetLabel& getLabel) {
   std::vector<std::uint32_t> labels;
   labels.reserve(ids.size());
   std::uint32_t id = 0, label = 0;
   for (const std::uint32_t next : ids) {
-    if (next != id) id = next, label = labelOf(id);
+    if (next != id) id = next, label = getLabel(id);
     labels.push_back(label);
   }
   return labels;
@@ -44,22 +44,22 @@ std::vector<std::uint32_t> labelPixels(const std::vector<std::uint32_t>& ids,
 
 }  // namespace
 
-std::uint32_t ObjectClasses::classOf(std::uint32_t entity) const {
+std::uint32_t ObjectClasses::getClass(std::uint32_t entity) const {
   if (entity == 0) return 0;
   return entity <= classIds.size() ? classIds[entity - 1]
                                    : static_cast<std::uint32_t>(names.size() - 1);
 }
 
-std::uint32_t ObjectClasses::thingOf(std::uint32_t entity) const {
+std::uint32_t ObjectClasses::getThing(std::uint32_t entity) const {
   return entity == 0 || entity > things.size() ? entity : things[entity - 1];
 }
 
-std::vector<std::uint32_t> ObjectClasses::classesOf(const std::vector<std::uint32_t>& ids) const {
-  return labelPixels(ids, [this](std::uint32_t id) { return classOf(id); });
+std::vector<std::uint32_t> ObjectClasses::getClasses(const std::vector<std::uint32_t>& ids) const {
+  return labelPixels(ids, [this](std::uint32_t id) { return getClass(id); });
 }
 
-std::vector<std::uint32_t> ObjectClasses::thingsOf(const std::vector<std::uint32_t>& ids) const {
-  return labelPixels(ids, [this](std::uint32_t id) { return thingOf(id); });
+std::vector<std::uint32_t> ObjectClasses::getThings(const std::vector<std::uint32_t>& ids) const {
+  return labelPixels(ids, [this](std::uint32_t id) { return getThing(id); });
 }
 
 ObjectClasses computeObjectClasses(const Model& model) {

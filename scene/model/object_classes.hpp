@@ -15,12 +15,12 @@ struct ObjectClasses {
   std::vector<std::uint32_t> things;  ///< by object: the entity id of the first object of its thing
 
   /// Of an entity id; avatars, which follow the objects, have the last class. 0 for id 0.
-  std::uint32_t classOf(std::uint32_t entity) const;
+  std::uint32_t getClass(std::uint32_t entity) const;
   /// Of an entity id; an avatar is a thing of its own. 0 for id 0.
-  std::uint32_t thingOf(std::uint32_t entity) const;
+  std::uint32_t getThing(std::uint32_t entity) const;
   // Of the entity ids of an image.
-  std::vector<std::uint32_t> classesOf(const std::vector<std::uint32_t>& ids) const;
-  std::vector<std::uint32_t> thingsOf(const std::vector<std::uint32_t>& ids) const;
+  std::vector<std::uint32_t> getClasses(const std::vector<std::uint32_t>& ids) const;
+  std::vector<std::uint32_t> getThings(const std::vector<std::uint32_t>& ids) const;
 };
 
 /// The class is the IFC class, else Object::className; a part without one has that of its whole. A

@@ -36,7 +36,7 @@ struct Grid {
   double spacing = 0;
 
   Vec3 centre(int x, int z) const { return origin + Vec3(x * spacing, 0, z * spacing); }
-  Cell cellOf(const Vec3& feet, int x, int z) const {
+  Cell computeCell(const Vec3& feet, int x, int z) const {
     return {x, z, static_cast<int>(std::lround((feet.y() - origin.y()) / kLayerHeight))};
   }
 };
@@ -70,7 +70,7 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
   std::map<Cell, Place> places;
   using Entry = std::pair<double, Cell>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
-  const Cell start = grid.cellOf(from, 0, 0);
+  const Cell start = grid.computeCell(from, 0, 0);
   places[start] = {from, 0, start, false};
   open.push({0, start});
   while (!open.empty()) {
@@ -100,7 +100,7 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
       walker.returnTo(feet);
       if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
       const Vec3 reached = walker.footPosition();
-      const Cell to2 = grid.cellOf(reached, x, z);
+      const Cell to2 = grid.computeCell(reached, x, z);
       const auto [at, isNew] = places.try_emplace(to2, Place{reached, next, cell, false});
       if (!isNew) {
         if (at->second.done || at->second.cost <= next) continue;

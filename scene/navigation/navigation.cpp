@@ -199,14 +199,14 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
       const Aabb around{gap.from.cwiseMin(gap.to), gap.from.cwiseMax(gap.to)};
       return overlaps(inflated(around, kMaxGapDetour + agent_.radius), box);
     });
-    const auto tileOf = [&](double at, double origin, int count) {
+    const auto computeTile = [&](double at, double origin, int count) {
       const double tile = std::floor((at - origin) / grid_.tileSize());
       return static_cast<int>(std::clamp(tile, 0.0, count - 1.0));
     };
-    for (int z = tileOf(box.min.z() - margin, grid_.origin.z(), grid_.tilesZ);
-         z <= tileOf(box.max.z() + margin, grid_.origin.z(), grid_.tilesZ); ++z)
-      for (int x = tileOf(box.min.x() - margin, grid_.origin.x(), grid_.tilesX);
-           x <= tileOf(box.max.x() + margin, grid_.origin.x(), grid_.tilesX); ++x)
+    for (int z = computeTile(box.min.z() - margin, grid_.origin.z(), grid_.tilesZ);
+         z <= computeTile(box.max.z() + margin, grid_.origin.z(), grid_.tilesZ); ++z)
+      for (int x = computeTile(box.min.x() - margin, grid_.origin.x(), grid_.tilesX);
+           x <= computeTile(box.max.x() + margin, grid_.origin.x(), grid_.tilesX); ++x)
         isChanged[static_cast<std::size_t>(z * grid_.tilesX + x)] = true;
   };
   for (const BodySnapshot& body : *snapshot.bodies) {
@@ -434,7 +434,7 @@ std::optional<std::uint32_t> Navigation::islandAt(const Vec3& place) const {
   return number == kNoIsland ? std::nullopt : std::optional(number);
 }
 
-std::optional<std::uint32_t> Navigation::islandOf(const Vec3& place) {
+std::optional<std::uint32_t> Navigation::findIsland(const Vec3& place) {
   const std::lock_guard lock(mutex_);
   return islandAt(place);
 }

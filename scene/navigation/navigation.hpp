@@ -48,7 +48,7 @@ struct RandomPlace {
   double maxDistance = 0;
   std::optional<Vec3> awayFrom = {};  ///< at least `minDistance` metres in space
   double minDistance = 0;
-  std::optional<std::uint32_t> island = {};  ///< number as by islandOf()
+  std::optional<std::uint32_t> island = {};  ///< number as by findIsland()
 };
 
 /// Thread-safe; queries run one after another. The state of bodies is that of the construction or
@@ -113,7 +113,7 @@ class Navigation {
   std::vector<Vec3> collectTriangles(const std::optional<std::uint32_t>& island);
   /// Number of the island of a place where an agent stands, 0 for the largest; nullopt: no polygon
   /// of its floor is near.
-  std::optional<std::uint32_t> islandOf(const Vec3& place);
+  std::optional<std::uint32_t> findIsland(const Vec3& place);
   /// By number.
   std::vector<Island> islands();
   /// Islands next to an island, the closest first, with places to stand near the gap between both.

@@ -44,7 +44,7 @@ void includeObject(const Model& model, const Object& object, Aabb& box) {
       box.include(computeWorldPosition(object, model.meshes[mesh], i));
 }
 
-std::uint32_t findBodyOf(const Model& model, std::uint32_t object) {
+std::uint32_t findBodyOfObject(const Model& model, std::uint32_t object) {
   for (std::uint32_t body = 0; body < model.bodies.size(); ++body)
     if (std::ranges::count(model.bodies[body].objects, object) > 0) return body;
   return kNoBody;
@@ -64,7 +64,7 @@ std::optional<NamedPlace> findObject(const Model& model, std::string_view name, 
     if (object.path != name && (object.globalId != name || name.empty())) continue;
     Aabb box;
     includeObject(model, object, box);
-    return placeAround(box, findBodyOf(model, i), reach);
+    return placeAround(box, findBodyOfObject(model, i), reach);
   }
   return std::nullopt;
 }

@@ -247,14 +247,14 @@ void setMotor(const PhysicsBody& a, const PhysicsBody& b, ContactConstraint& con
 collision::ContactManifold computeManifold(const BodyPair& pair, const ContactAxis& axis,
                                            double limit, const PhysicsBody& a,
                                            const PhysicsBody& b) {
-  const auto faceNormalsOf = [](const PhysicsBody& body, std::uint32_t part) {
+  const auto getFaceNormals = [](const PhysicsBody& body, std::uint32_t part) {
     return part < body.parts.size() ? std::span<const Vec3>(body.parts[part].faceNormals)
                                     : std::span<const Vec3>();
   };
   return collision::computeContactManifold(
       placePart(a, pair.key.partA), placePart(b, pair.key.partB),
       {axis.normal, axis.pointA, axis.pointB, limit, ContactConstraint::kMaxPoints,
-       faceNormalsOf(a, pair.key.partA), faceNormalsOf(b, pair.key.partB)});
+       getFaceNormals(a, pair.key.partA), getFaceNormals(b, pair.key.partB)});
 }
 
 void buildConstraint(BodyPair& pair, const collision::ContactManifold& manifold,

@@ -204,7 +204,7 @@ bool updateRelativeBounds(StepScratch& scratch, Pass& pass) {
 
 void findNearPairs(const PhysicsWorld& world, StepScratch& scratch, Pass& pass) {
   pass.isNear.resize(scratch.activePairs.size());
-  const auto lowerBoundOf = [&](std::size_t k) {
+  const auto computePairBound = [&](std::size_t k) {
     const auto [a, b] = scratch.pairBodies[k];
     return computeLowerBound(world.pairs[scratch.activePairs[k]],
                              pass.teleportedDistances[a] + pass.teleportedDistances[b]);
@@ -214,14 +214,14 @@ void findNearPairs(const PhysicsWorld& world, StepScratch& scratch, Pass& pass) 
         for (std::size_t k = from; k < to; ++k) {
           const auto [a, b] = scratch.pairBodies[k];
           pass.isNear[k] = !((pass.relativeBounds[a] + pass.relativeBounds[b]) * kRoundUpFactor <
-                             lowerBoundOf(k));
+                             computePairBound(k));
         }
       });
   pass.nearPairs.clear(), pass.lowerBounds.clear();
   for (std::uint32_t k = 0; k < scratch.activePairs.size(); ++k) {
     if (pass.isNear[k] == 0) continue;
     pass.nearPairs.push_back(k);
-    pass.lowerBounds.push_back(lowerBoundOf(k));
+    pass.lowerBounds.push_back(computePairBound(k));
   }
 }
 

@@ -238,7 +238,7 @@ void findKinematicPenetrations(const PhysicsWorld& world, StepScratch& scratch) 
 
 /// Metres by which the points of a constraint approach on the swept poses; < 0: they separate.
 double computeApproach(const ContactConstraint& constraint, const StepScratch& scratch) {
-  const auto displacementOf = [&](std::uint32_t body, const Vec3& arm) -> Vec3 {
+  const auto computeDisplacement = [&](std::uint32_t body, const Vec3& arm) -> Vec3 {
     const collision::InterpolatedMotion& sweep = scratch.sweptMotions[body];
     const Vec3 inFrame = sweep.fromFrame.rotation.transpose() * arm;
     return sweep.to.centre - sweep.from.centre +
@@ -246,8 +246,8 @@ double computeApproach(const ContactConstraint& constraint, const StepScratch& s
   };
   double maxApproach = -std::numeric_limits<double>::infinity();
   for (const ContactConstraintPoint& point : constraint.activePoints()) {
-    const Vec3 approach =
-        displacementOf(constraint.a, point.armA) - displacementOf(constraint.b, point.armB);
+    const Vec3 approach = computeDisplacement(constraint.a, point.armA) -
+                          computeDisplacement(constraint.b, point.armB);
     maxApproach = std::max(maxApproach, constraint.normal.dot(approach));
   }
   return maxApproach;
@@ -482,7 +482,7 @@ StepReport stepPhysics(PhysicsWorld& world, const StepSettings& settings) {
   return scratch.report;
 }
 
-void erasePairsOf(PhysicsWorld& world, std::uint32_t body) {
+void erasePairs(PhysicsWorld& world, std::uint32_t body) {
   std::erase_if(world.pairs,
                 [&](const BodyPair& pair) { return pair.key.a == body || pair.key.b == body; });
 }

@@ -64,6 +64,6 @@ void setPairs(PhysicsWorld& world, std::span<const PartPairKey> candidates,
 StepReport stepPhysics(PhysicsWorld& world, const StepSettings& settings);
 
 /// Discards all pair state of a body. Call it after its shape changed.
-void erasePairsOf(PhysicsWorld& world, std::uint32_t body);
+void erasePairs(PhysicsWorld& world, std::uint32_t body);
 
 }  // namespace enfilade::scene

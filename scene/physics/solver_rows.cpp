@@ -177,11 +177,11 @@ void buildBatches(std::span<const ContactConstraint> constraints, SolverContext&
   std::uint32_t from = 0, size = 0;
   context.colorEnds.clear();
   // Constraints of the last color may share bodies: one per block.
-  const auto lanesPerBlockOf = [&](std::size_t color) {
+  const auto getLanesPerBlock = [&](std::size_t color) {
     return color + 1 == coloring.ends.size() ? std::size_t{1} : kLanes;
   };
   for (std::size_t i = 0; i < coloring.ends.size(); ++i) {
-    const std::size_t lanesPerBlock = lanesPerBlockOf(i);
+    const std::size_t lanesPerBlock = getLanesPerBlock(i);
     size +=
         static_cast<std::uint32_t>((coloring.ends[i] - from + lanesPerBlock - 1) / lanesPerBlock);
     context.colorEnds.push_back(size);
@@ -191,9 +191,9 @@ void buildBatches(std::span<const ContactConstraint> constraints, SolverContext&
   std::uint32_t block = 0;
   from = 0;
   for (std::size_t i = 0; i < coloring.ends.size(); ++i) {
-    batchColor(constraints, batchKeys,
-               std::span(coloring.order).subspan(from, coloring.ends[i] - from), lanesPerBlockOf(i),
-               context.constraints.subspan(block, context.colorEnds[i] - block));
+    batchColor(
+        constraints, batchKeys, std::span(coloring.order).subspan(from, coloring.ends[i] - from),
+        getLanesPerBlock(i), context.constraints.subspan(block, context.colorEnds[i] - block));
     block = context.colorEnds[i];
     from = coloring.ends[i];
   }

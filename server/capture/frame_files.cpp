@@ -94,8 +94,8 @@ Bytes encodeChannel(const std::string& channel, const render::Frame& frame,
   if (channel == "rgb") return encodeRgb(frame, options);
   if (channel == "depth") return encodeDepth(frame, frame.depth, options, faults);
   if (channel == "ids") return encodeIds(frame, frame.ids, options);
-  if (channel == "class") return encodeIds(frame, classes.classesOf(frame.ids), options);
-  if (channel == "thing") return encodeIds(frame, classes.thingsOf(frame.ids), options);
+  if (channel == "class") return encodeIds(frame, classes.getClasses(frame.ids), options);
+  if (channel == "thing") return encodeIds(frame, classes.getThings(frame.ids), options);
   if (channel == "normals") return render::encodeNpy(makeRaster(frame, 3, frame.normals));
   return encodeDepth(frame, render::computeRange(frame), options, faults);
 }

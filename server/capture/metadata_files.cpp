@@ -126,11 +126,11 @@ std::string makeInstancesJson(const scene::Model& model, const std::vector<Avata
     Json one{{"path", object.path}};
     if (!object.globalId.empty()) one["global_id"] = object.globalId;
     const auto id = static_cast<std::uint32_t>(i + 1);
-    if (classes.classOf(id) != 0) {
-      one["class"] = classes.names[classes.classOf(id)];
-      one["class_id"] = classes.classOf(id);
+    if (classes.getClass(id) != 0) {
+      one["class"] = classes.names[classes.getClass(id)];
+      one["class_id"] = classes.getClass(id);
     }
-    one["thing"] = classes.thingOf(id);
+    one["thing"] = classes.getThing(id);
     for (const scene::ObjectAttribute& attribute : object.attributes)
       one["attributes"][attribute.name] = attribute.values;
     if (object.storey) one["storey"] = model.storeys[*object.storey].name;
@@ -141,7 +141,7 @@ std::string makeInstancesJson(const scene::Model& model, const std::vector<Avata
   for (const AvatarName& avatar : avatars)
     all[std::to_string(avatar.id)] = Json{{"path", avatar.name},
                                           {"class", "avatar"},
-                                          {"class_id", classes.classOf(avatar.id)},
+                                          {"class_id", classes.getClass(avatar.id)},
                                           {"thing", avatar.id}};
   return all.dump(1) + "\n";
 }

@@ -167,7 +167,7 @@ void drawTrail(Canvas& canvas, const render::Frame& frame, const AvatarTrail& tr
 /// One label for each thing that people see.
 void drawNames(Canvas& canvas, const render::Frame& frame, const scene::Model& model,
                const scene::ObjectClasses& classes, const CapturePlan& plan) {
-  const std::vector<std::uint32_t> things = classes.thingsOf(frame.ids);
+  const std::vector<std::uint32_t> things = classes.getThings(frame.ids);
   const std::vector<ObjectRect> rects = findRects(frame, things, model.objects.size());
   std::vector<Label> labels;
   for (std::size_t i = 0; i < std::min(rects.size(), kMaxNames); ++i) {

@@ -48,9 +48,9 @@ void appendChannel(std::vector<std::uint8_t>& bytes, const render::Frame& frame,
   if (channel == v1::CHANNEL_IDS) {
     appendBytes(bytes, frame.ids);
   } else if (channel == v1::CHANNEL_CLASS) {
-    appendBytes(bytes, source.scene.objectClasses().classesOf(frame.ids));
+    appendBytes(bytes, source.scene.objectClasses().getClasses(frame.ids));
   } else if (channel == v1::CHANNEL_THING) {
-    appendBytes(bytes, source.scene.objectClasses().thingsOf(frame.ids));
+    appendBytes(bytes, source.scene.objectClasses().getThings(frame.ids));
   } else if (channel == v1::CHANNEL_FLOW) {
     ENFILADE_ASSERT(source.earlier);
     appendBytes(bytes,

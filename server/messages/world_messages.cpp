@@ -200,9 +200,9 @@ void describeObject(const scene::Model& model, scene::EntityId entity, v1::Entit
 void describeDetails(const scene::Scene& scene, scene::EntityId entity, v1::Entity& into) {
   const scene::Model& model = scene.model();
   const scene::ObjectClasses& classes = scene.objectClasses();
-  into.set_class_id(classes.classOf(entity));
-  into.set_class_name(classes.names[classes.classOf(entity)]);
-  into.set_thing(classes.thingOf(entity));
+  into.set_class_id(classes.getClass(entity));
+  into.set_class_name(classes.names[classes.getClass(entity)]);
+  into.set_thing(classes.getThing(entity));
   if (entity > model.objects.size()) return;
   const scene::Object& object = model.objects[entity - 1];
   if (const scene::Aabb box = scene.objectBoxes()[entity - 1]; !box.empty()) {

@@ -63,7 +63,7 @@ struct Answer {
     spot.set_found(place.has_value());
     if (!place) return;
     *spot.mutable_at() = toProto(*place);
-    if (const auto island = navigation.islandOf(*place)) spot.set_island(*island);
+    if (const auto island = navigation.findIsland(*place)) spot.set_island(*island);
   }
 
   PathAnswer paths() const {

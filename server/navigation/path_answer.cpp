@@ -54,7 +54,7 @@ struct PathWriter {
   void addWalk(const scene::NavigationPath& path, const scene::PathLeg& walk, std::size_t end,
                const std::vector<scene::DoorOnPath>& doors, v1::NavigationPath& message) const {
     const double speed = answer.navigation.agent().speed;
-    const auto lengthOf = [&](std::size_t from, std::size_t to) {
+    const auto computeLength = [&](std::size_t from, std::size_t to) {
       double length = 0;
       for (std::size_t i = from; i < to; ++i)
         length += (path.points[i + 1] - path.points[i]).norm();
@@ -63,7 +63,7 @@ struct PathWriter {
     std::size_t at = walk.first;
     const auto walkTo = [&](std::size_t point) {
       if (point == at) return;
-      const double length = lengthOf(at, point);
+      const double length = computeLength(at, point);
       addLeg(v1::NavigationLeg::KIND_WALK, at, length, length / speed, std::nullopt, message);
       at = point;
     };
@@ -73,7 +73,7 @@ struct PathWriter {
       walkTo(door.point);
       // Doors on the same line, as the leaves of one, are legs without a length but for the last.
       const bool isLast = scene::isLastOnLine(doors, i);
-      const double length = isLast ? lengthOf(door.point, door.point + 1) : 0;
+      const double length = isLast ? computeLength(door.point, door.point + 1) : 0;
       addLeg(v1::NavigationLeg::KIND_DOOR, door.point, length,
              length / speed + (isLast ? door.secondsToOpen : 0), door.body, message);
       if (isLast) at = door.point + 1;

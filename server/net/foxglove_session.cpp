@@ -226,7 +226,7 @@ void FoxgloveSession::applyViewSubscription(const std::string& avatar, View& vie
 }
 
 void FoxgloveSession::requestSceneModel() {
-  context_.worlds.sceneFileOf(*world_).request(
+  context_.worlds.getSceneFile(*world_).request(
       SceneFileKind::viewerScene,
       [weak = weak_from_this(), executor = stream_.get_executor()](const SceneFile& file) {
         asio::post(executor, [weak, file] {

@@ -215,7 +215,7 @@ void HttpSession::requestSceneFile(const Target& target) {
   awaitsFile_ = true;
   timer_.expires_at(Clock::time_point::max());
   const bool compressed = acceptsGzip(acceptEncoding_);
-  context_.worlds.sceneFileOf(*world).request(
+  context_.worlds.getSceneFile(*world).request(
       compressed ? SceneFileKind::gzip : SceneFileKind::glb,
       [weak = weak_from_this(), executor = socket_.get_executor(),
        compressed](const SceneFile& file) {

@@ -36,7 +36,7 @@ class Chains {
   explicit Chains(const std::vector<Segment>& segments)
       : segments_(segments), used_(segments.size()) {
     for (std::size_t i = 0; i < segments.size(); ++i)
-      for (const Vec3& end : segments[i]) byEnd_.emplace(keyOf(end), i);
+      for (const Vec3& end : segments[i]) byEnd_.emplace(makeKey(end), i);
   }
 
   void collect(ObjectSection& section) {
@@ -45,7 +45,7 @@ class Chains {
       used_[i] = true;
       std::vector<Vec3> chain{segments_[i][0], segments_[i][1]};
       extend(chain);
-      if (keyOf(chain.front()) == keyOf(chain.back())) {
+      if (makeKey(chain.front()) == makeKey(chain.back())) {
         chain.pop_back();
         section.loops.push_back(std::move(chain));
         continue;
@@ -58,23 +58,23 @@ class Chains {
 
  private:
   using Key = std::pair<double, double>;
-  static Key keyOf(const Vec3& point) { return {point.x(), point.z()}; }
+  static Key makeKey(const Vec3& point) { return {point.x(), point.z()}; }
 
   /// Appends segments until the chain ends or returns to its beginning.
   void extend(std::vector<Vec3>& chain) {
-    while (keyOf(chain.front()) != keyOf(chain.back())) {
+    while (makeKey(chain.front()) != makeKey(chain.back())) {
       const std::optional<Vec3> next = takeNext(chain.back());
       if (!next) return;
       chain.push_back(*next);
     }
   }
   std::optional<Vec3> takeNext(const Vec3& end) {
-    const auto [first, last] = byEnd_.equal_range(keyOf(end));
+    const auto [first, last] = byEnd_.equal_range(makeKey(end));
     for (auto at = first; at != last; ++at) {
       if (used_[at->second]) continue;
       used_[at->second] = true;
       const Segment& segment = segments_[at->second];
-      return keyOf(segment[0]) == keyOf(end) ? segment[1] : segment[0];
+      return makeKey(segment[0]) == makeKey(end) ? segment[1] : segment[0];
     }
     return std::nullopt;
   }

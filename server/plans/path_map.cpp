@@ -128,10 +128,10 @@ void drawLegend(Canvas& canvas, const std::vector<LegendEntry>& entries, Point a
 
 /// The storey of the file at this floor; null: none is near.
 const StoreyFloor* findStoreyAt(const std::vector<StoreyFloor>& storeys, double floor) {
-  const auto distanceOf = [&](const StoreyFloor& s) { return std::abs(s.height - floor); };
-  const auto nearest = std::ranges::min_element(storeys, {}, distanceOf);
-  return nearest != storeys.end() && distanceOf(*nearest) < kMaxStoreyDistance ? &*nearest
-                                                                               : nullptr;
+  const auto computeDistance = [&](const StoreyFloor& s) { return std::abs(s.height - floor); };
+  const auto nearest = std::ranges::min_element(storeys, {}, computeDistance);
+  return nearest != storeys.end() && computeDistance(*nearest) < kMaxStoreyDistance ? &*nearest
+                                                                                    : nullptr;
 }
 
 /// The storey's name, if it has any, and its floor; in lines of at most `width` pixels.
@@ -151,14 +151,14 @@ void drawLines(Canvas& canvas, const std::vector<std::string>& lines, Point at,
   }
 }
 
-double heightOf(const std::vector<std::string>& lines) {
+double computeHeight(const std::vector<std::string>& lines) {
   return static_cast<double>(lines.size()) * kLineHeight;
 }
 
 /// Gives the storeys their places, one below the other, and returns the height of all.
 double placeStoreys(std::vector<StoreyPlan>& storeys, double top) {
   for (StoreyPlan& storey : storeys) {
-    top += heightOf(storey.heading);
+    top += computeHeight(storey.heading);
     storey.view = makePlanView(storey.camera, storey.floor, {kBorder, top},
                                storey.camera.height / storey.camera.heightY, 1);
     top += storey.camera.height + kBorder;
@@ -192,7 +192,7 @@ void layOutMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
           .wrap(trace.title, makeStyle(kTitleSize, true), layout.inner(), kMaxTitleLines);
   for (StoreyPlan& storey : storeys) storey.heading = makeHeading(storey, layout.inner());
   layout.legendTop =
-      placeStoreys(storeys, kBorder + heightOf(layout.title) + kLineHeight) + 2 * kLineHeight;
+      placeStoreys(storeys, kBorder + computeHeight(layout.title) + kLineHeight) + 2 * kLineHeight;
   for (const StoreyPlan& storey : storeys) {
     std::optional<PlanStorey> rooms;
     if (storey.named != nullptr && storey.named->storey)
@@ -216,7 +216,7 @@ Image composeMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
   drawLines(canvas, layout.title, {kBorder, kBorder}, makeStyle(kTitleSize, true));
   for (std::size_t i = 0; i < storeys.size(); ++i) {
     const PlanView& view = storeys[i].view;
-    const double above = heightOf(storeys[i].heading) - 4;
+    const double above = computeHeight(storeys[i].heading) - 4;
     drawLines(canvas, storeys[i].heading, {kBorder, view.topLeft.y - above},
               makeStyle(kHeadingSize));
     drawPlanPicture(canvas, view, storeys[i].picture);

@@ -202,7 +202,7 @@ void drawCut(Canvas& canvas, const PlanView& view, const scene::Scene& scene) {
 void drawGrid(Canvas& canvas, const PlanView& view) {
   const double step = chooseGridStep(view), text = kTextSize * view.unit;
   const double right = view.topLeft.x + view.width(), bottom = view.topLeft.y + view.height();
-  const auto styleOf = [&](double metres) {
+  const auto makeLabelStyle = [&](double metres) {
     TextStyle style;
     style.size = text;
     style.colour = metres == 0 ? kAxis : kPlanInk;
@@ -211,14 +211,14 @@ void drawGrid(Canvas& canvas, const PlanView& view) {
   forEachGridLine(view.area.min.x(), view.area.max.x(), step, [&](double metres) {
     const double x = view.at({metres, 0, 0}).x;
     canvas.line({x, view.topLeft.y}, {x, bottom}, 0.7 * view.unit, metres == 0 ? kAxis : kGrid);
-    canvas.text({x, bottom + 0.4 * text}, formatNumber(metres), styleOf(metres),
+    canvas.text({x, bottom + 0.4 * text}, formatNumber(metres), makeLabelStyle(metres),
                 render::Align::centre);
   });
   forEachGridLine(view.area.min.z(), view.area.max.z(), step, [&](double metres) {
     const double y = view.at({0, 0, metres}).y;
     canvas.line({view.topLeft.x, y}, {right, y}, 0.7 * view.unit, metres == 0 ? kAxis : kGrid);
     canvas.text({view.topLeft.x - 0.5 * text, y - 0.6 * text}, formatNumber(metres),
-                styleOf(metres), render::Align::right);
+                makeLabelStyle(metres), render::Align::right);
   });
   canvas.rectangle(view.topLeft, view.width(), view.height(), 1.5 * view.unit, kPlanInk);
 }

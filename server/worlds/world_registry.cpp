@@ -87,7 +87,7 @@ std::vector<std::shared_ptr<TickLoop>> WorldRegistry::allWorlds() const {
   return worlds;
 }
 
-SceneFileService& WorldRegistry::sceneFileOf(const TickLoop& world) const {
+SceneFileService& WorldRegistry::getSceneFile(const TickLoop& world) const {
   HostedScene* const scene = findScene(world.identity().scene);
   ENFILADE_ASSERT(scene != nullptr);  // scenes outlive their worlds
   return scene->file;

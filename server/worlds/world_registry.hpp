@@ -49,7 +49,7 @@ class WorldRegistry : public WorldDirectory {
   std::shared_ptr<TickLoop> find(const std::string& name) const;
   TickLoop& mainWorld() const { return *mainWorld_; }
   /// The file of the world's scene. Lives as long as the registry.
-  SceneFileService& sceneFileOf(const TickLoop& world) const;
+  SceneFileService& getSceneFile(const TickLoop& world) const;
   /// The main world first, then by name.
   std::vector<std::shared_ptr<TickLoop>> allWorlds() const;
   v1::WorldList makeWorldList() const override;

@@ -9,7 +9,7 @@ namespace {
 
 using namespace collision;
 
-PlacedConvex bodyOf(const Triangle& triangle) {
+PlacedConvex makeBody(const Triangle& triangle) {
   return {triangle};
 }
 
@@ -17,7 +17,7 @@ std::vector<SeparationResult> decideAll(const PlacedConvex& body, std::span<cons
   std::vector<SeparationResult> separations;
   for (const Triangle& triangle : mesh) {
     FeatureCache cache;
-    separations.push_back(computeSeparation(body, bodyOf(triangle), cache));
+    separations.push_back(computeSeparation(body, makeBody(triangle), cache));
   }
   return separations;
 }
@@ -62,7 +62,7 @@ void takeNearestRefined(const PlacedConvex& body, std::span<const Triangle> mesh
   for (std::uint32_t i = 0; i < separations.size(); ++i) {
     if (separations[i].distance - separations[i].errorBound > reach) continue;
     FeatureCache cache;
-    const RefinedSeparation refined = refineSeparation(body, bodyOf(mesh[i]), cache);
+    const RefinedSeparation refined = refineSeparation(body, makeBody(mesh[i]), cache);
     if (refined.distance >= contact.distance) continue;
     contact.nearest = i;
     contact.distance = refined.distance;

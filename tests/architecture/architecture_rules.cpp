@@ -134,13 +134,13 @@ struct Include {
   std::string path;
 };
 
-std::string folderOf(const std::string& path) {
+std::string getFolder(const std::string& path) {
   const auto slash = path.find('/');
   return slash == std::string::npos ? std::string() : path.substr(0, slash);
 }
 
 /// "scene/import/ifc" of "scene/import/ifc/units.hpp".
-std::string roomOf(const std::string& path) {
+std::string getRoom(const std::string& path) {
   const auto slash = path.rfind('/');
   return slash == std::string::npos ? std::string() : path.substr(0, slash);
 }
@@ -171,7 +171,7 @@ void forEachLine(const std::string& text, const See& see) {
   for (int number = 1; std::getline(lines, line); ++number) see(number, line);
 }
 
-std::vector<Include> includesOf(const std::string& text) {
+std::vector<Include> findIncludes(const std::string& text) {
   static const std::regex include(R"(^\s*#\s*include\s*([<"])([^>"]+)[>"])");
   std::vector<Include> found;
   forEachLine(text, [&](int number, const std::string& line) {
@@ -190,14 +190,14 @@ Names publicHeaders(const Sources& sources) {
     if (sources.count(path) != 0 && reached.insert(path).second) open.push_back(path);
   };
   for (const auto& [path, text] : sources) {
-    if (!isCode(path) || kMayInclude.count(folderOf(path)) == 0) continue;
-    for (const Include& include : includesOf(text))
-      if (include.quoted && folderOf(include.path) != folderOf(path)) reach(include.path);
+    if (!isCode(path) || kMayInclude.count(getFolder(path)) == 0) continue;
+    for (const Include& include : findIncludes(text))
+      if (include.quoted && getFolder(include.path) != getFolder(path)) reach(include.path);
   }
   while (!open.empty()) {
     const std::string path = open.back();
     open.pop_back();
-    for (const Include& include : includesOf(sources.at(path)))
+    for (const Include& include : findIncludes(sources.at(path)))
       if (include.quoted) reach(include.path);
   }
   return reached;
@@ -210,8 +210,8 @@ bool allowedInPublicHeader(const std::string& path) {
 
 std::optional<std::string> faultOfInclude(const Sources& sources, const std::string& from,
                                           const Include& include) {
-  const std::string folder = folderOf(from);
-  const std::string target = folderOf(include.path);
+  const std::string folder = getFolder(from);
+  const std::string target = getFolder(include.path);
   if (target.empty()) return "\"" + include.path + "\" is not a path from the root";
   if (sources.count(include.path) == 0 && !isGeneratedMessage(include.path))
     return "\"" + include.path + "\" is not in the repository";
@@ -225,8 +225,8 @@ std::optional<std::string> faultOfInclude(const Sources& sources, const std::str
 }
 
 std::optional<std::string> faultBetweenRooms(const std::string& from, const Include& include) {
-  const std::string room = roomOf(from), wanted = roomOf(include.path);
-  if (room == wanted || kWithoutRooms.count(folderOf(from)) != 0 ||
+  const std::string room = getRoom(from), wanted = getRoom(include.path);
+  if (room == wanted || kWithoutRooms.count(getFolder(from)) != 0 ||
       isGeneratedMessage(include.path))
     return std::nullopt;
   const auto here = std::find(kRooms.begin(), kRooms.end(), room);
@@ -283,7 +283,7 @@ Faults includeDirections(const Sources& sources) {
   Faults faults;
   for (const auto& [path, text] : sources) {
     if (!isCode(path)) continue;
-    for (const Include& include : includesOf(text)) {
+    for (const Include& include : findIncludes(text)) {
       if (!include.quoted) continue;
       auto fault = faultOfInclude(sources, path, include);
       if (!fault) fault = faultBetweenRooms(path, include);
@@ -297,7 +297,7 @@ Faults thirdPartiesInPublicHeaders(const Sources& sources) {
   Faults faults;
   for (const std::string& path : publicHeaders(sources)) {
     if (!isHeader(path)) continue;
-    for (const Include& include : includesOf(sources.at(path)))
+    for (const Include& include : findIncludes(sources.at(path)))
       if (!include.quoted && !allowedInPublicHeader(include.path))
         faults.push_back(at(path, include.line) + ": <" + include.path +
                          "> in a header that other folders reach; move it into a .cpp file");
@@ -308,13 +308,13 @@ Faults thirdPartiesInPublicHeaders(const Sources& sources) {
 Faults thirdPartiesOutOfPlace(const Sources& sources) {
   Faults faults;
   for (const auto& [path, text] : sources) {
-    if (!isCode(path) || kMayInclude.count(folderOf(path)) == 0) continue;
-    for (const Include& include : includesOf(text)) {
+    if (!isCode(path) || kMayInclude.count(getFolder(path)) == 0) continue;
+    for (const Include& include : findIncludes(text)) {
       for (const ThirdParty& party : kThirdParties) {
-        if (include.quoted || party.folders.count(folderOf(path)) != 0) continue;
+        if (include.quoted || party.folders.count(getFolder(path)) != 0) continue;
         if (std::regex_match(include.path, std::regex(party.pattern)))
           faults.push_back(at(path, include.line) + ": " + party.name + " has no place in " +
-                           folderOf(path) + "/");
+                           getFolder(path) + "/");
       }
     }
   }
@@ -354,7 +354,7 @@ Faults headersWithoutPragmaOnce(const Sources& sources) {
 Faults headersWithoutComment(const Sources& sources) {
   Faults faults;
   for (const auto& [path, text] : sources)
-    if (endsWith(path, ".hpp") && kMayInclude.count(folderOf(path)) != 0 &&
+    if (endsWith(path, ".hpp") && kMayInclude.count(getFolder(path)) != 0 &&
         text.rfind("//", 0) != 0)
       faults.push_back(path + ": does not begin with a comment that says what it is");
   return faults;
@@ -386,9 +386,10 @@ Faults sourcesWithoutHeader(const Sources& sources) {
   static const std::regex alone(R"(main\.cpp|make_\w+\.cpp|\w+_module\.cpp|\w+_sanitizer\.cpp)");
   Faults faults;
   for (const auto& [path, text] : sources) {
-    if (!endsWith(path, ".cpp") || kMayInclude.count(folderOf(path)) == 0) continue;
+    if (!endsWith(path, ".cpp") || kMayInclude.count(getFolder(path)) == 0) continue;
     const auto slash = path.rfind('/');
-    if (kWithoutRooms.count(folderOf(path)) != 0 || std::regex_match(path.substr(slash + 1), alone))
+    if (kWithoutRooms.count(getFolder(path)) != 0 ||
+        std::regex_match(path.substr(slash + 1), alone))
       continue;
     if (sources.count(path.substr(0, path.size() - 4) + ".hpp") == 0)
       faults.push_back(path + ": no header of the same name");
@@ -400,8 +401,8 @@ Faults crowdedFolders(const Sources& sources, int maxFiles) {
   std::map<std::string, int> counts;
   for (const auto& [path, text] : sources)
     if (endsWith(path, ".ts") || endsWith(path, ".py") ||
-        (isCode(path) && kMayInclude.count(folderOf(path)) != 0 && folderOf(path) != "assets"))
-      ++counts[roomOf(path)];
+        (isCode(path) && kMayInclude.count(getFolder(path)) != 0 && getFolder(path) != "assets"))
+      ++counts[getRoom(path)];
   Faults faults;
   for (const auto& [room, count] : counts)
     if (count > maxFiles) faults.push_back(room + "/: " + std::to_string(count) + " sources");
@@ -425,6 +426,20 @@ Faults oddWords(const Sources& sources) {
       if (std::regex_search(line, match, subjects))
         faults.push_back(at(name, number) + ": a comment about \"" + match[1].str() +
                          "\"; name the thing");
+    });
+  }
+  return faults;
+}
+
+Faults nounFunctions(const Sources& sources) {
+  static const std::regex noun(R"(\b([a-z]\w*Of)(?:<[^<>()]*>)?\()");
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (!isCode(path) || kMayInclude.count(path.substr(0, path.find('/'))) == 0) continue;
+    forEachLine(text, [&, &name = path](int number, const std::string& line) {
+      for (std::sregex_iterator it(line.begin(), line.end(), noun), end; it != end; ++it)
+        faults.push_back(at(name, number) + ": " + (*it)[1].str() +
+                         "(); name it by a verb, as get.., find.., compute.. or make..");
     });
   }
   return faults;

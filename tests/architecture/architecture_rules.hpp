@@ -52,6 +52,10 @@ Faults crowdedFolders(const Sources& sources, int maxFiles);
 /// named kMax.. and kMin.., not kMost.. and kLeast...
 Faults oddWords(const Sources& sources);
 
+/// Functions of the product that are named by a noun, as `areaOf()`. The convention is verb + noun:
+/// `getArea()`, `findArea()`, `computeArea()`. Comments count.
+Faults nounFunctions(const Sources& sources);
+
 /// Each kind of diagnostic that scene/ reports is in scene/model/diagnostic_catalog.cpp.
 Faults diagnosticsWithoutMeaning(const Sources& sources);
 

@@ -79,6 +79,11 @@ TEST(Architecture, NoOddWordsAreUsed) {
   EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
+TEST(Architecture, FunctionsAreNamedByVerbs) {
+  const Faults faults = nounFunctions(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
 TEST(Architecture, NothingIsLeftUnfinished) {
   const Faults faults = unfinishedWork(repository());
   EXPECT_EQ(faults, Faults{}) << listed(faults);
@@ -191,6 +196,19 @@ TEST(ArchitectureRules, ACommentWithoutASubjectIsAFault) {
   EXPECT_EQ(oddWords(sources),
             (Faults{"scene/model/a.hpp:1: a comment about \"Who\"; name the thing",
                     "scene/model/a.hpp:3: a comment about \"What\"; name the thing"}));
+}
+
+TEST(ArchitectureRules, AFunctionNamedByANounIsAFault) {
+  const Sources sources{
+      {"scene/model/a.cpp",
+       "double areaOf(const Box& box);\n/// As bodyOf().\nauto all = box.cornersOf<3>(sizeof(x));\n"
+       "int at = entry.partOf, out_of(3), byIndexOfBody(2), TypeOf(1);\n"},
+      {"scene/model/a.py", "areaOf(box)\n"},
+      {"tests/scene/a_test.cpp", "areaOf(box);\n"}};
+  const std::string remedy = "(); name it by a verb, as get.., find.., compute.. or make..";
+  EXPECT_EQ(nounFunctions(sources),
+            (Faults{"scene/model/a.cpp:1: areaOf" + remedy, "scene/model/a.cpp:2: bodyOf" + remedy,
+                    "scene/model/a.cpp:3: cornersOf" + remedy}));
 }
 
 TEST(ArchitectureRules, ATestsFileUnderASharedNameIsAFault) {

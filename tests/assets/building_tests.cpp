@@ -21,7 +21,7 @@ const Model& building() {
   return model;
 }
 
-Aabb boxOf(const Model& model, const Object& object) {
+Aabb computeBox(const Model& model, const Object& object) {
   Aabb box;
   for (std::uint32_t mesh : object.meshes)
     for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
@@ -29,9 +29,9 @@ Aabb boxOf(const Model& model, const Object& object) {
   return box;
 }
 
-Aabb boxOf(const std::string& path) {
+Aabb computeBox(const std::string& path) {
   for (const Object& object : building().objects)
-    if (object.path == path) return boxOf(building(), object);
+    if (object.path == path) return computeBox(building(), object);
   ADD_FAILURE() << "no object " << path;
   return {};
 }
@@ -69,7 +69,7 @@ std::size_t unmatchedEdges(const Model& model, const Object& object) {
   return open;
 }
 
-double volumeOf(const Model& model, const Object& object) {
+double computeVolume(const Model& model, const Object& object) {
   double volume = 0;
   const Vec3 origin = object.worldFromMesh.translation();
   eachTriangle(model, object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
@@ -97,7 +97,7 @@ TEST(Building, MakesClosedSolidsThatFaceOutwards) {
     if (object.path.ends_with("/canvas")) continue;  // paint is a set of flat patches
     ++solids;
     EXPECT_EQ(unmatchedEdges(building(), object), 0u) << object.path;
-    EXPECT_GT(volumeOf(building(), object), 0) << object.path;
+    EXPECT_GT(computeVolume(building(), object), 0) << object.path;
   }
   EXPECT_GT(solids, 2000u);
 }
@@ -124,7 +124,7 @@ TEST(Building, LeavesTheAxisOfTheEnfiladeFree) {
   const Aabb corridor{{-0.3, 0.02, -0.35}, {49, 2.0, 0.35}};
   std::size_t seen = 0;
   for (const Object& object : building().objects) {
-    if (!overlaps(boxOf(building(), object), corridor)) continue;
+    if (!overlaps(computeBox(building(), object), corridor)) continue;
     eachTriangle(building(), object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
       Aabb box;
       for (const Vec3& p : {a, b, c}) box.include(p);
@@ -140,7 +140,7 @@ TEST(Building, LeavesTheAxisOfTheEnfiladeFree) {
 double floorBelow(double x, double z, double y) {
   double floor = -1e9;
   for (const Object& object : building().objects) {
-    const Aabb box = boxOf(building(), object);
+    const Aabb box = computeBox(building(), object);
     if (box.min.x() > x || box.max.x() < x || box.min.z() > z || box.max.z() < z) continue;
     eachTriangle(building(), object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
       const double area = (b.x() - a.x()) * (c.z() - a.z()) - (c.x() - a.x()) * (b.z() - a.z());
@@ -171,7 +171,7 @@ TEST(Building, HasAStairThatCanBeWalked) {
   std::vector<Aabb> steps;
   for (int k = 1; k <= 24; ++k) {
     const std::string number = (k < 10 ? "0" : "") + std::to_string(k);
-    steps.push_back(boxOf("building/hall/stair/" + (k == 12 ? "landing" : "tread" + number)));
+    steps.push_back(computeBox("building/hall/stair/" + (k == 12 ? "landing" : "tread" + number)));
   }
   double below = 0, east = steps[0].min.x();
   for (std::size_t i = 0; i < steps.size(); ++i) {
@@ -192,7 +192,7 @@ TEST(Building, HasAStairThatCanBeWalked) {
     heads.max += Vec3{-0.05, 2.1, -0.3};
     for (const Object& object : building().objects) {
       if (object.path.find("/stair/") != std::string::npos) continue;
-      EXPECT_FALSE(overlaps(boxOf(building(), object), heads)) << object.path;
+      EXPECT_FALSE(overlaps(computeBox(building(), object), heads)) << object.path;
     }
   }
 }
@@ -208,7 +208,7 @@ TEST(Building, HangsItsDoorsOnTheirHinges) {
     if (part.kind == MovingPart::Kind::slide) continue;
     EXPECT_NE(object.path.find("leaf"), std::string::npos);
     const Vec3 hinge = object.worldFromMesh.translation();
-    const Aabb box = boxOf(model, object);
+    const Aabb box = computeBox(model, object);
     // The hinge is at one end of the leaf, in the middle of its thickness.
     const double toEdge = std::min({hinge.x() - box.min.x(), box.max.x() - hinge.x(),
                                     hinge.z() - box.min.z(), box.max.z() - hinge.z()});

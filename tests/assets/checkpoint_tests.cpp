@@ -30,7 +30,7 @@ TEST(CheckpointOfAssets, ARestoredWalkThroughTheBuildingIsBitEqual) {
 
 TEST(CheckpointOfAssets, ARestoredPartsFeederIsBitEqual) {
   scene::Model model = makeFeeder({40, 1});
-  applySidecar(model, feederSidecar(), "feeder.walk.json");
+  applySidecar(model, makeFeederSidecar(), "feeder.walk.json");
   const auto feeder = std::make_shared<const scene::Scene>(std::move(model));
   compareCopies(feeder, {}, {}, 150, {5, 60}, 90);
 }

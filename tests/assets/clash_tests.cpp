@@ -12,7 +12,7 @@ using namespace scene::testing;
 TEST(BuildingClashes, DoorsAndLiftTouchNothingOnTheirWays) {
   std::vector<MovingPart> parts;
   scene::Model model = makeBuilding({}, &parts);
-  const std::string sidecar = sidecarText(model, parts);
+  const std::string sidecar = makeSidecarText(model, parts);
   applySidecar(model, sidecar, "building.walk.json");
   BodyFixture run(std::move(model));
   std::size_t driven = 0;

@@ -22,12 +22,12 @@ TEST(FeederAsset, HasATrayAStandAndTheParts) {
 }
 
 TEST(FeederAsset, IsTheSameFromRunToRunAndDiffersWithTheSeed) {
-  EXPECT_EQ(glbBytes(makeFeeder({50, 1})), glbBytes(makeFeeder({50, 1})));
-  EXPECT_NE(glbBytes(makeFeeder({50, 1})), glbBytes(makeFeeder({50, 2})));
+  EXPECT_EQ(encodeGlb(makeFeeder({50, 1})), encodeGlb(makeFeeder({50, 1})));
+  EXPECT_NE(encodeGlb(makeFeeder({50, 1})), encodeGlb(makeFeeder({50, 2})));
 }
 
 TEST(FeederAsset, TheDriveIsAKeyASubstepEndsWhereItBeginsAndIsSlowEnough) {
-  const auto sidecar = nlohmann::json::parse(feederSidecar());
+  const auto sidecar = nlohmann::json::parse(makeFeederSidecar());
   const auto& keys = sidecar["bodies"][0]["keys"];
   ASSERT_GE(keys.size(), 9u) << "at most an eighth of the substeps' rate";
   EXPECT_EQ(keys.front()["offset"], keys.back()["offset"]);

@@ -16,7 +16,7 @@ const std::string& buildingBytes() {
   static const std::string bytes = [] {
     std::vector<MovingPart> parts;
     const scene::Model model = makeBuilding({}, &parts);
-    return glbBytes(model, parts);
+    return encodeGlb(model, parts);
   }();
   return bytes;
 }
@@ -61,13 +61,13 @@ TEST(Maker, ParsesFileNumberAndSeed) {
 TEST(Glb, IsTheSameFromRunToRunAndFromCompilerToCompiler) {
   std::vector<MovingPart> parts;
   const scene::Model again = makeBuilding({}, &parts);
-  EXPECT_EQ(glbBytes(again, parts), buildingBytes());
+  EXPECT_EQ(encodeGlb(again, parts), buildingBytes());
   // Pinned hash: a deliberate change of the building changes it.
   EXPECT_EQ(fnv1a(buildingBytes()), 0xfafad81e048108c7u) << std::hex << fnv1a(buildingBytes());
 }
 
 TEST(Glb, DiffersWithTheSeed) {
-  EXPECT_NE(glbBytes(makeBuilding({2, 0})), glbBytes(makeBuilding({3, 0})));
+  EXPECT_NE(encodeGlb(makeBuilding({2, 0})), encodeGlb(makeBuilding({3, 0})));
 }
 
 TEST(Glb, HasAWellFormedHeaderAndStaysSmall) {
@@ -91,12 +91,12 @@ struct Count {
   bool operator==(const Count&) const = default;
 };
 
-Count countOf(const aiScene& scene, const aiNode& node) {
+Count countObjects(const aiScene& scene, const aiNode& node) {
   Count count{node.mNumMeshes > 0, 0};
   for (unsigned i = 0; i < node.mNumMeshes; ++i)
     count.triangles += scene.mMeshes[node.mMeshes[i]]->mNumFaces;
   for (unsigned i = 0; i < node.mNumChildren; ++i) {
-    const Count child = countOf(scene, *node.mChildren[i]);
+    const Count child = countObjects(scene, *node.mChildren[i]);
     count.objects += child.objects;
     count.triangles += child.triangles;
   }
@@ -113,8 +113,8 @@ TEST(Glb, IsReadBackByAssimpWithAllItsObjectsAndTriangles) {
   for (const scene::Object& object : model.objects)
     for (std::uint32_t mesh : object.meshes)
       expected.triangles += model.meshes[mesh].indices.size() / 3;
-  EXPECT_EQ(countOf(*scene, *scene->mRootNode).objects, expected.objects);
-  EXPECT_EQ(countOf(*scene, *scene->mRootNode).triangles, expected.triangles);
+  EXPECT_EQ(countObjects(*scene, *scene->mRootNode).objects, expected.objects);
+  EXPECT_EQ(countObjects(*scene, *scene->mRootNode).triangles, expected.triangles);
 }
 
 TEST(Glb, KeepsAnObjectThatLiesUnderAnotherInPlace) {
@@ -132,7 +132,7 @@ TEST(Glb, KeepsAnObjectThatLiesUnderAnotherInPlace) {
   child.worldFromMesh.translation() = collision::Vec3{3, 1, 0};
   model.objects = {parent, child};
   Assimp::Importer importer;
-  const std::string glb = glbBytes(model);
+  const std::string glb = encodeGlb(model);
   const aiScene* scene = importer.ReadFileFromMemory(glb.data(), glb.size(), 0, "glb");
   ASSERT_NE(scene, nullptr) << importer.GetErrorString();
   const aiNode* handle = scene->mRootNode->FindNode("handle");
@@ -142,7 +142,7 @@ TEST(Glb, KeepsAnObjectThatLiesUnderAnotherInPlace) {
 }
 
 TEST(Glb, RefusesModelsBeyondTheFormatsLimits) {
-  EXPECT_THROW(glbBytes({}), std::invalid_argument);
+  EXPECT_THROW(encodeGlb({}), std::invalid_argument);
   scene::Model duplicates;
   duplicates.meshes.resize(1);
   duplicates.meshes[0].positions.resize(3);
@@ -152,7 +152,7 @@ TEST(Glb, RefusesModelsBeyondTheFormatsLimits) {
     object.path = "same";
     object.meshes = {0};
   }
-  EXPECT_THROW(glbBytes(duplicates), std::invalid_argument);
+  EXPECT_THROW(encodeGlb(duplicates), std::invalid_argument);
   EXPECT_THROW(writeGlb("/nowhere/at/all.glb", makeBuilding()), std::runtime_error);
 }
 

@@ -53,7 +53,7 @@ class RecomputeUpdate : public BoxUpdate {
 std::vector<BoxMethod> boxMethods() {
   std::vector<BoxMethod> all;
   for (const auto method : {AabbMethod::sphereCube, AabbMethod::vertexScan, AabbMethod::hillClimb})
-    all.push_back({nameOf(method), [method](const Hull& hull, std::size_t bodies) {
+    all.push_back({getName(method), [method](const Hull& hull, std::size_t bodies) {
                      return std::make_unique<OurBoxUpdate>(hull, method, bodies);
                    }});
   all.push_back({"recompute", [](const Hull& hull, std::size_t) {

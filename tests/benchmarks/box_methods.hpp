@@ -7,7 +7,7 @@
 
 namespace enfilade::benchmarks {
 
-inline const char* nameOf(collision::AabbMethod method) {
+inline const char* getName(collision::AabbMethod method) {
   switch (method) {
     case collision::AabbMethod::sphereCube:
       return "sphere cube";

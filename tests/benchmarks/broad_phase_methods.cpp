@@ -18,7 +18,7 @@ class OurSortAndSweep : public BroadPhase {
     inserted_ = true;
     sweep_.update();
     for (std::uint32_t id = 0; id < movers.size(); ++id) {
-      for (const auto& partner : sweep_.overlapsOf(id)) {
+      for (const auto& partner : sweep_.getOverlaps(id)) {
         if (!partner.isDynamic) tally.addStill(id, partner.id);
         if (partner.isDynamic && id < partner.id) tally.addMovers(id, partner.id);
       }

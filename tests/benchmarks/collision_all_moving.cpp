@@ -45,7 +45,7 @@ std::vector<Aabb> distantBoxes() {
           {Vec3(-1e3, 1000, -1e3), Vec3(1e3, 1001, 1e3)}};
 }
 
-std::vector<double> timedOf(const BroadPhaseRun& run) {
+std::vector<double> selectTimed(const BroadPhaseRun& run) {
   std::vector<double> timed = run.microseconds;
   std::erase(timed, 0.0);
   return timed;
@@ -63,17 +63,17 @@ std::size_t measure(CubeMotion motion, const Size& size, const Arguments& argume
   }
   std::size_t wrong = 0;
   for (const BroadPhaseRun& run : runMethods(chosen, distant, recorded, size.secondsAMethod)) {
-    const std::vector<double> timed = timedOf(run);
+    const std::vector<double> timed = selectTimed(run);
     const double median = quantile(timed, 0.5) / 1e3, p99 = quantile(timed, 0.99) / 1e3;
     const double pairs = static_cast<double>(recorded.pairs.back().count);
     std::printf("%-22s %-9s %6zu cubes | %9.3f ms (99 %% %9.3f, first %9.2f) | %zu of %zu wrong\n",
-                run.method->name.c_str(), nameOf(motion), size.cubes, median, p99,
+                run.method->name.c_str(), getName(motion), size.cubes, median, p99,
                 1e3 * run.firstTick, run.wrong, run.tick);
     std::fflush(stdout);
     results.add({{"bench", "moving"},
                  {"method", run.method->name},
                  {"kind", kindName(run.method->kind)},
-                 {"motion", nameOf(motion)},
+                 {"motion", getName(motion)},
                  {"cubes", size.cubes},
                  {"median_ms", median},
                  {"p99_ms", p99},
@@ -96,14 +96,14 @@ std::size_t measureHeapBesideWalkers(const Size& size, const BroadPhaseMethod& o
   const std::vector<Aabb> distant = distantBoxes();
   const BroadPhaseMethod* const methods[] = {&ours};
   std::size_t wrong = 0;
-  const auto medianOf = [&](const RecordedBoxes& recorded) {
+  const auto measureMedian = [&](const RecordedBoxes& recorded) {
     const auto runs = runMethods(methods, distant, recorded, size.secondsAMethod);
     wrong += runs[0].wrong;
-    return quantile(timedOf(runs[0]), 0.5) / 1e3;
+    return quantile(selectTimed(runs[0]), 0.5) / 1e3;
   };
-  const double ofHeap = medianOf(record(size.ticks, heap));
-  const double ofWalkers = medianOf(record(size.ticks, walkers));
-  const double ofBoth = medianOf(record(size.ticks, heap, walkers));
+  const double ofHeap = measureMedian(record(size.ticks, heap));
+  const double ofWalkers = measureMedian(record(size.ticks, walkers));
+  const double ofBoth = measureMedian(record(size.ticks, heap, walkers));
   std::printf("%zu turbulent cubes %.3f ms, %zu walkers %.3f ms, in one sweep %.3f ms\n",
               size.cubes, ofHeap, kWalkers, ofWalkers, ofBoth);
   results.add({{"bench", "regions"},

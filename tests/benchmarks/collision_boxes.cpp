@@ -111,8 +111,8 @@ void checkBoxes(Contestant& one, const Hull& hull, const std::vector<TurnedPose>
 
 bool isOurs(const std::string& name) {
   using collision::AabbMethod;
-  return name == nameOf(AabbMethod::sphereCube) || name == nameOf(AabbMethod::vertexScan) ||
-         name == nameOf(AabbMethod::hillClimb);
+  return name == getName(AabbMethod::sphereCube) || name == getName(AabbMethod::vertexScan) ||
+         name == getName(AabbMethod::hillClimb);
 }
 
 /// Returns the number of our boxes that do not contain their body.
@@ -138,7 +138,7 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
       if (tick % 20 == 19) checkBoxes(one, hull, poses, 1 + vertices / 8);
     }
   }
-  const std::string chosen = nameOf(collision::chooseAabbMethod(hull));
+  const std::string chosen = getName(collision::chooseAabbMethod(hull));
   std::size_t wrong = 0;
   for (const Contestant& one : all) {
     const double boxes = static_cast<double>(ticks * kBodies);

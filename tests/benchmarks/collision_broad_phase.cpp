@@ -102,7 +102,7 @@ RecordedBoxes record(const Building& building, std::size_t movers, int ticks) {
   return motion;
 }
 
-nlohmann::json headOf(const BroadPhaseMethod& method, std::size_t objects, std::size_t movers) {
+nlohmann::json makeHead(const BroadPhaseMethod& method, std::size_t objects, std::size_t movers) {
   return {{"bench", "broad"},
           {"method", method.name},
           {"kind", kindName(method.kind)},
@@ -122,7 +122,7 @@ void print(const BroadPhaseRun& run, std::size_t objects, std::size_t movers, do
       run.method->name.c_str(), objects, movers, median, p99, median / static_cast<double>(movers),
       run.buildSeconds, run.bytesAnObject, run.wrong, run.tick);
   std::fflush(stdout);
-  auto line = headOf(*run.method, objects, movers);
+  auto line = makeHead(*run.method, objects, movers);
   line.update({{"median_us", median},
                {"p99_us", p99},
                {"build_s", run.buildSeconds},
@@ -137,7 +137,7 @@ void leaveOut(const BroadPhaseMethod& method, std::size_t objects, std::size_t m
               Results& results) {
   std::printf("%-22s %8zu %6zu | left out: %s\n", method.name.c_str(), objects, movers,
               method.reason.c_str());
-  auto line = headOf(method, objects, movers);
+  auto line = makeHead(method, objects, movers);
   line.update({{"left_out", method.reason}});
   results.add(line);
 }
@@ -172,7 +172,7 @@ std::size_t measure(const Building& building, std::size_t objects, std::size_t m
   for (collision::ProxyId id = 0; id < boxes.size(); ++id) sweep.move(id, boxes[id]);
   sweep.update();
   std::size_t ends = 0;
-  for (collision::ProxyId id = 0; id < boxes.size(); ++id) ends += sweep.overlapsOf(id).size();
+  for (collision::ProxyId id = 0; id < boxes.size(); ++id) ends += sweep.getOverlaps(id).size();
   return ends;
 }
 

@@ -35,7 +35,7 @@ struct Setting {
 
 // ---- the world ---------------------------------------------------------------------------------
 
-double volumeOf(const Hull& hull) {
+double computeVolume(const Hull& hull) {
   double six = 0;
   for (const auto& face : hull.faces) {
     for (std::size_t k = 2; k < face.size(); ++k) {
@@ -62,7 +62,7 @@ struct Flyer {
 class Swarm {
  public:
   explicit Swarm(const Setting& setting) : hull(polytope(random_, setting.faces)) {
-    const double volume = volumeOf(hull) * static_cast<double>(setting.number);
+    const double volume = computeVolume(hull) * static_cast<double>(setting.number);
     edge_ = std::cbrt(volume / setting.density);
     for (std::size_t k = 0; k < setting.number; ++k) flyers.push_back(fresh(setting));
   }
@@ -106,7 +106,7 @@ class Swarm {
   double edge_ = 0;
 };
 
-Contacts truthOf(const Swarm& swarm) {
+Contacts findTruth(const Swarm& swarm) {
   std::vector<Aabb> boxes;
   for (const Flyer& f : swarm.flyers)
     boxes.push_back(computeTightAabb(swarm.hull, f.rotation, f.pose.translation));
@@ -197,14 +197,14 @@ class OurDetector : public Detector {
     inserted_ = true;
     sweep_.update();
     for (const ProxyPair& pair : sweep_.removedPairs())
-      features_.erase(keyOf(pair.proxy, pair.other));
+      features_.erase(makeKey(pair.proxy, pair.other));
     frame.broad = watch.lap();
     for (std::uint32_t a = 0; a < boxes.size(); ++a) {
-      for (const auto& partner : sweep_.overlapsOf(a)) {
+      for (const auto& partner : sweep_.getOverlaps(a)) {
         if (partner.id <= a) continue;
         ++frame.pairs;
         const auto reported = collision::computeSeparation(swarm.body(a), swarm.body(partner.id),
-                                                           features_[keyOf(a, partner.id)]);
+                                                           features_[makeKey(a, partner.id)]);
         if (reported.verdict != collision::Verdict::separated) contacts.emplace_back(a, partner.id);
       }
     }
@@ -213,7 +213,7 @@ class OurDetector : public Detector {
   }
 
  private:
-  static std::uint64_t keyOf(std::uint32_t a, std::uint32_t b) {
+  static std::uint64_t makeKey(std::uint32_t a, std::uint32_t b) {
     return (std::uint64_t{a} << 32) + b;
   }
   BoxMaker boxes_;
@@ -243,7 +243,7 @@ class PeerDetector : public Detector {
     for (const ProxyPair& pair : pairs_) {
       pair_->forget();  // one pair object is used for all pairs
       const Answer reported =
-          pair_->ask(placementOf(swarm, pair.proxy), placementOf(swarm, pair.other));
+          pair_->ask(getPlacement(swarm, pair.proxy), getPlacement(swarm, pair.other));
       if (reported.verdict == Answer::Verdict::collides)
         contacts.emplace_back(pair.proxy, pair.other);
     }
@@ -253,7 +253,7 @@ class PeerDetector : public Detector {
   }
 
  private:
-  static RigidTransform placementOf(const Swarm& swarm, std::uint32_t k) {
+  static RigidTransform getPlacement(const Swarm& swarm, std::uint32_t k) {
     return {swarm.flyers[k].rotation, swarm.flyers[k].pose.translation};
   }
   BoxMaker boxes_;
@@ -315,7 +315,7 @@ void measure(const char* sweep, double value, const Setting& setting, std::size_
   std::size_t trueContacts = 0;
   for (std::size_t frame = 0; frame < frames; ++frame) {
     swarm.step();
-    const Contacts truth = truthOf(swarm);
+    const Contacts truth = findTruth(swarm);
     for (Contestant& one : all) {
       Contacts reported;
       const Frame cost = one.detector->frame(swarm, reported);

@@ -82,7 +82,7 @@ struct Truth {
   std::vector<std::uint32_t> contacts;
 };
 
-Truth truthOf(const collision::Hull& hull, const RigidTransform& at, const Triangles& mesh) {
+Truth findTruth(const collision::Hull& hull, const RigidTransform& at, const Triangles& mesh) {
   const collision::PlacedConvex body{hull.vertices, at.translation, &at.rotation, &hull};
   const Vec3 reach = Vec3::Constant(3 * kRadius);
   const collision::Aabb near{at.translation - reach, at.translation + reach};
@@ -107,7 +107,7 @@ struct Row {
 };
 
 template <typename Ask>
-double microsecondsOf(const Ask& ask) {
+double measureMicroseconds(const Ask& ask) {
   const auto start = Clock::now();
   ask();
   return 1e6 * secondsSince(start);
@@ -120,7 +120,7 @@ void fly(Row& row, std::span<const RigidTransform> places, std::span<const Truth
   row.query->forget();
   for (std::size_t k = 0; k < places.size(); ++k) {
     double reported = 0;
-    const double time = microsecondsOf([&] { reported = row.query->distance(places[k]); });
+    const double time = measureMicroseconds([&] { reported = row.query->distance(places[k]); });
     if (k > 0) row.distance.push_back(time);
     if (k % every == 0) {
       const double error = std::abs(reported - truths[k / every].distance);
@@ -130,7 +130,7 @@ void fly(Row& row, std::span<const RigidTransform> places, std::span<const Truth
   row.query->forget();
   for (std::size_t k = 0; k < places.size(); ++k) {
     std::vector<std::uint32_t> reported;
-    const double time = microsecondsOf([&] { row.query->contacts(places[k], reported); });
+    const double time = measureMicroseconds([&] { row.query->contacts(places[k], reported); });
     if (k > 0) row.contacts.push_back(time);
     if (k % every != 0) continue;
     std::sort(reported.begin(), reported.end());
@@ -149,10 +149,11 @@ void fly(Row& row, std::span<const RigidTransform> places, std::span<const Truth
 void askCold(Row& row, std::span<const RigidTransform> places, std::size_t every) {
   for (std::size_t k = 0; k < places.size(); k += every) {
     row.query->forget();
-    row.coldDistance.push_back(microsecondsOf([&] { row.query->distance(places[k]); }));
+    row.coldDistance.push_back(measureMicroseconds([&] { row.query->distance(places[k]); }));
     row.query->forget();
     std::vector<std::uint32_t> reported;
-    row.coldContacts.push_back(microsecondsOf([&] { row.query->contacts(places[k], reported); }));
+    row.coldContacts.push_back(
+        measureMicroseconds([&] { row.query->contacts(places[k], reported); }));
   }
 }
 
@@ -195,7 +196,8 @@ int main(int argc, char** argv) {
   for (const bool dipping : {false, true}) {
     const auto places = flight(dipping, steps);
     std::vector<Truth> truths;
-    for (std::size_t k = 0; k < steps; k += every) truths.push_back(truthOf(hull, places[k], mesh));
+    for (std::size_t k = 0; k < steps; k += every)
+      truths.push_back(findTruth(hull, places[k], mesh));
     std::vector<Row> rows;
     for (const MeshMethod& method : methods) {
       if (!arguments.wants(method.name)) continue;

@@ -32,7 +32,7 @@ struct Effort {
   int repeats;            ///< of a cold case
 };
 
-nlohmann::json headOf(const NarrowPhaseMethod& method, const char* bench) {
+nlohmann::json makeHead(const NarrowPhaseMethod& method, const char* bench) {
   return {
       {"bench", bench}, {"method", method.name}, {"ours", method.ours}, {"level", method.level}};
 }
@@ -47,7 +47,8 @@ struct Turn {
   std::array<double, kMaxPairs> cold{}, warm{};
 };
 
-double nanosecondsOf(PairOfBodies& pair, const ConvexMotion& motion, std::size_t steps, bool warm) {
+double measureNanoseconds(PairOfBodies& pair, const ConvexMotion& motion, std::size_t steps,
+                          bool warm) {
   pair.forget();
   const auto start = Clock::now();
   for (std::size_t k = 0; k < steps; ++k) {
@@ -65,7 +66,7 @@ Turn measureTurn(const NarrowPhaseMethod& method, const std::vector<ConvexMotion
   for (std::size_t k = 0; k < motions.size() && (k == 0 || secondsSince(start) < seconds); ++k) {
     const auto pair = method.make(motions[k].a, motions[k].b);
     // Warms the machine's caches, and measures how many steps the time allows.
-    const double one = 1e-9 * nanosecondsOf(*pair, motions[k], 1, true);
+    const double one = 1e-9 * measureNanoseconds(*pair, motions[k], 1, true);
     if (one > secondsAPair) {  // one step already used the available time
       turn.cold[k] = turn.warm[k] = 1e9 * one;
       continue;
@@ -73,8 +74,8 @@ Turn measureTurn(const NarrowPhaseMethod& method, const std::vector<ConvexMotion
     const auto steps = static_cast<std::size_t>(
         std::clamp(secondsAPair / (2 * one), static_cast<double>(kMinSteps),
                    static_cast<double>(motions[k].placesA.size())));
-    turn.cold[k] = nanosecondsOf(*pair, motions[k], steps, false);
-    turn.warm[k] = method.warm ? nanosecondsOf(*pair, motions[k], steps, true) : turn.cold[k];
+    turn.cold[k] = measureNanoseconds(*pair, motions[k], steps, false);
+    turn.warm[k] = method.warm ? measureNanoseconds(*pair, motions[k], steps, true) : turn.cold[k];
   }
   return turn;
 }
@@ -85,8 +86,9 @@ struct GuardedAnswer {
 };
 
 /// One answer for each step of each motion, warm.
-std::vector<GuardedAnswer> answersOf(const NarrowPhaseMethod& method,
-                                     const std::vector<ConvexMotion>& motions, double seconds) {
+std::vector<GuardedAnswer> collectAnswers(const NarrowPhaseMethod& method,
+                                          const std::vector<ConvexMotion>& motions,
+                                          double seconds) {
   const std::size_t steps = motions.front().placesA.size();
   const double secondsAPair = seconds / static_cast<double>(motions.size());
   std::unique_ptr<PairOfBodies> pair;
@@ -104,13 +106,13 @@ std::vector<GuardedAnswer> answersOf(const NarrowPhaseMethod& method,
 
 /// Our two levels are the reference: the exact verdict of decide and the numbers of refine. Without
 /// time for refine the depth is unknown.
-std::vector<std::optional<TrueAnswer>> truthOf(const Methods& methods,
-                                               const std::vector<ConvexMotion>& motions,
-                                               double seconds) {
+std::vector<std::optional<TrueAnswer>> findTruth(const Methods& methods,
+                                                 const std::vector<ConvexMotion>& motions,
+                                                 double seconds) {
   std::vector<std::optional<TrueAnswer>> truth(motions.size() * motions.front().placesA.size());
   for (const NarrowPhaseMethod& method : methods) {
     if (!method.ours) continue;
-    const auto answers = answersOf(method, motions, seconds);
+    const auto answers = collectAnswers(method, motions, seconds);
     for (std::size_t k = 0; k < answers.size(); ++k) {
       const Answer& answer = answers[k].answer;
       if (!answers[k].asked || answer.verdict == Answer::Verdict::none) continue;
@@ -130,13 +132,13 @@ void report(const NarrowPhaseMethod& method, std::size_t vertices, Gap gap, cons
   std::printf(
       "%-26s %4zu %-11s | cold %10.0f  warm %10.0f ns | wrong %4zu none %4zu of %5zu |"
       " error of distance %8.1e of depth %8.1e\n",
-      method.name.c_str(), vertices, nameOf(gap), coldMedian, warmMedian, errors.wrong, errors.none,
-      errors.count, quantile(errors.distance, 1), quantile(errors.depth, 1));
+      method.name.c_str(), vertices, getName(gap), coldMedian, warmMedian, errors.wrong,
+      errors.none, errors.count, quantile(errors.distance, 1), quantile(errors.depth, 1));
   std::fflush(stdout);
-  auto line = headOf(method, "narrow");
+  auto line = makeHead(method, "narrow");
   line.update(errors.json());
   line.update({{"vertices", vertices},
-               {"gap", nameOf(gap)},
+               {"gap", getName(gap)},
                {"warms", method.warm},
                {"cold_ns", number(coldMedian)},
                {"warm_ns", number(warmMedian)}});
@@ -146,13 +148,13 @@ void report(const NarrowPhaseMethod& method, std::size_t vertices, Gap gap, cons
 void measureMotion(const Methods& methods, std::size_t vertices, Gap gap, const Effort& effort,
                    Results& results) {
   const auto motions = convexMotions(vertices, gap, effort.pairs, effort.steps);
-  const auto truth = truthOf(methods, motions, effort.secondsAnswers);
+  const auto truth = findTruth(methods, motions, effort.secondsAnswers);
   const auto turns = guarded<Turn>(effort.turns * methods.size(), kMaxSeconds, [&](std::size_t k) {
     return measureTurn(methods[k % methods.size()], motions, effort.secondsATurn);
   });
   for (std::size_t m = 0; m < methods.size(); ++m) {
     Errors errors;
-    const auto answers = answersOf(methods[m], motions, effort.secondsAnswers);
+    const auto answers = collectAnswers(methods[m], motions, effort.secondsAnswers);
     for (std::size_t k = 0; k < answers.size(); ++k) {
       if (answers[k].asked && truth[k]) errors.add(answers[k].answer, *truth[k]);
     }
@@ -174,7 +176,7 @@ struct TimedAnswer {
   double nanoseconds = 0;
 };
 
-RigidTransform placementOf(const accuracy::Placed& body) {
+RigidTransform getPlacement(const accuracy::Placed& body) {
   return {body.rotation, body.translation};
 }
 
@@ -184,7 +186,7 @@ double diagonal(const Points& points) {
   return box.size().norm();
 }
 
-TrueAnswer truthOf(const accuracy::Case& asked) {
+TrueAnswer findTruth(const accuracy::Case& asked) {
   const auto parsed = [](const std::string& s) {
     return s.empty() ? 0.0L : std::strtold(s.c_str(), nullptr);
   };
@@ -214,8 +216,8 @@ class CaseAnswerer {
 
  private:
   TimedAnswer ask(const accuracy::Case& asked) {
-    const RigidTransform a = placementOf(asked.a);
-    const RigidTransform b = placementOf(asked.b);
+    const RigidTransform a = getPlacement(asked.a);
+    const RigidTransform b = getPlacement(asked.b);
     const auto start = Clock::now();
     const Answer answer = pair_->ask(a, b);
     return {answer, 1e9 * secondsSince(start)};
@@ -264,12 +266,12 @@ void measureCases(const NarrowPhaseMethod& method, const std::vector<accuracy::C
   std::map<std::string, std::vector<double>> times;
   for (std::size_t k = 0; k < cases.size(); ++k) {
     for (const std::string& family : {cases[k].family, std::string("all")}) {
-      errors[family].add(answers[k].answer, truthOf(cases[k]));
+      errors[family].add(answers[k].answer, findTruth(cases[k]));
       if (answers[k].nanoseconds > 0) times[family].push_back(answers[k].nanoseconds);
     }
   }
   for (const auto& [family, e] : errors) {
-    auto line = headOf(method, "family");
+    auto line = makeHead(method, "family");
     line.update(e.json());
     line.update({{"family", family},
                  {"ns", number(quantile(times[family], 0.5))},

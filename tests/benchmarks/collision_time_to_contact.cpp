@@ -74,7 +74,7 @@ MovingPair flight(Random& random, bool turning) {
   return e;
 }
 
-MotionBounds boundsOf(const MovingBody& moving) {
+MotionBounds computeMotionBounds(const MovingBody& moving) {
   const Motion& m = moving.motion;
   return {m.velocity, m.acceleration.norm(), m.angularVelocity, 0,
           computeRadius(moving.body, false)};
@@ -82,8 +82,8 @@ MotionBounds boundsOf(const MovingBody& moving) {
 
 /// Gap, normal and closest points are the input of both bounds.
 double ourTime(const MovingPair& e, const SeparationResult& gap) {
-  const ClosingBounds closing =
-      computeClosingBounds(boundsOf(e.a()), boundsOf(e.b()), gap.normal, kHorizon);
+  const ClosingBounds closing = computeClosingBounds(
+      computeMotionBounds(e.a()), computeMotionBounds(e.b()), gap.normal, kHorizon);
   return computeTimeToContact(gap.distance - gap.errorBound, closing);
 }
 
@@ -92,13 +92,13 @@ double seedTime(const MovingPair& e, const SeparationResult& gap) {
     return Vec3(moving.motion.velocity +
                 moving.motion.angularVelocity.cross(point - moving.body.translation));
   };
-  const auto accelerationOf = [](const MovingBody& moving) {
+  const auto computeAcceleration = [](const MovingBody& moving) {
     const Motion& m = moving.motion;
     return m.acceleration.norm() +
            m.angularVelocity.squaredNorm() * computeRadius(moving.body, false);
   };
   const double v = (velocityAt(e.a(), gap.pointA) - velocityAt(e.b(), gap.pointB)).dot(gap.normal);
-  const double a = accelerationOf(e.a()) + accelerationOf(e.b());
+  const double a = computeAcceleration(e.a()) + computeAcceleration(e.b());
   if (a == 0) return v > 0 ? gap.distance / v : kHorizon;
   return (std::sqrt(v * v + 2 * a * gap.distance) - v) / a;
 }

@@ -30,7 +30,7 @@ struct Turning {
   }
 };
 
-double gapOf(Gap gap) {
+double getGapLength(Gap gap) {
   if (gap == Gap::separated) return 1;
   return gap == Gap::near ? 1e-3 : -0.1;
 }
@@ -48,7 +48,7 @@ ConvexMotion makeMotion(Random& random, std::size_t vertices, Gap gap, std::size
     const auto separation =
         collision::computeSeparation({hullA.vertices, a.translation, &a.rotation, &hullA},
                                      {hullB.vertices, b.translation, &b.rotation, &hullB}, none);
-    b.translation -= (separation.distance - gapOf(gap)) * separation.normal;
+    b.translation -= (separation.distance - getGapLength(gap)) * separation.normal;
     motion.placesA.push_back(a);
     motion.placesB.push_back(b);
   }
@@ -57,7 +57,7 @@ ConvexMotion makeMotion(Random& random, std::size_t vertices, Gap gap, std::size
 
 }  // namespace
 
-const char* nameOf(Gap gap) {
+const char* getName(Gap gap) {
   if (gap == Gap::separated) return "separated";
   return gap == Gap::near ? "near" : "penetrating";
 }

@@ -13,7 +13,7 @@ enum class Gap {
   penetrating  ///< at most 10 cm deep
 };
 inline constexpr Gap kGaps[] = {Gap::separated, Gap::near, Gap::penetrating};
-const char* nameOf(Gap gap);
+const char* getName(Gap gap);
 
 struct ConvexMotion {
   Points a, b;

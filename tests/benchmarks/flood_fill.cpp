@@ -40,9 +40,9 @@ FloodFill::FloodFill(const scene::WorldData& world, const scene::NavigationAgent
   std::int32_t component = 0;
   for (const Vec3& start : starts) {
     if (places_.size() >= maxPlaces) return;
-    const std::int32_t column = columnOf(start.x(), start.z());
+    const std::int32_t column = computeColumn(start.x(), start.z());
     if (column < 0 || findNearest(start) >= 0) continue;
-    const Vec3 centre = positionOf(add(column, start.y(), component));
+    const Vec3 centre = computePosition(add(column, start.y(), component));
     const auto standing = stepTo(walker, centre, centre.x(), centre.z());
     if (!standing) {
       first_[static_cast<std::size_t>(column)] = places_.back().next;
@@ -56,14 +56,14 @@ FloodFill::FloodFill(const scene::WorldData& world, const scene::NavigationAgent
   }
 }
 
-std::int32_t FloodFill::columnOf(double x, double z) const {
+std::int32_t FloodFill::computeColumn(double x, double z) const {
   const double column = std::floor((x - corner_.x()) / kSpacing);
   const double row = std::floor((z - corner_.z()) / kSpacing);
   if (!(column >= 1 && row >= 1 && column < width_ - 1 && row < depth_ - 1)) return -1;
   return static_cast<std::int32_t>(row) * width_ + static_cast<std::int32_t>(column);
 }
 
-Vec3 FloodFill::positionOf(std::int32_t place) const {
+Vec3 FloodFill::computePosition(std::int32_t place) const {
   const Place& at = places_[static_cast<std::size_t>(place)];
   return {corner_.x() + (at.column % width_ + 0.5) * kSpacing, at.height,
           corner_.z() + (at.column / width_ + 0.5) * kSpacing};
@@ -84,7 +84,7 @@ std::int32_t FloodFill::findPlace(std::int32_t column, double height) const {
 }
 
 std::int32_t FloodFill::findNearest(const Vec3& point) const {
-  const std::int32_t column = columnOf(point.x(), point.z());
+  const std::int32_t column = computeColumn(point.x(), point.z());
   if (column < 0) return -1;
   if (const std::int32_t here = findPlace(column, point.y()); here >= 0) return here;
   std::int32_t best = -1;
@@ -92,7 +92,7 @@ std::int32_t FloodFill::findNearest(const Vec3& point) const {
   for (const auto& [dx, dz] : kNeighbours) {
     const std::int32_t place = findPlace(column + dx + dz * width_, point.y());
     if (place < 0) continue;
-    const Vec3 away = positionOf(place) - point;
+    const Vec3 away = computePosition(place) - point;
     const double distance = std::hypot(away.x(), away.z());
     if (distance >= least) continue;
     least = distance;
@@ -134,13 +134,13 @@ void FloodFill::fill(scene::Walker& walker, std::int32_t start, std::size_t maxP
   open.push(start);
   const std::int32_t component = places_[static_cast<std::size_t>(start)].component;
   while (!open.empty() && places_.size() < maxPlaces) {
-    const Vec3 from = positionOf(open.front());
+    const Vec3 from = computePosition(open.front());
     const std::int32_t column = places_[static_cast<std::size_t>(open.front())].column;
     open.pop();
     for (std::size_t k = 0; k < kStraightNeighbours; ++k) {
       const auto [dx, dz] = kNeighbours[k];
       const double x = from.x() + dx * kSpacing, z = from.z() + dz * kSpacing;
-      if (columnOf(x, z) < 0) continue;
+      if (computeColumn(x, z) < 0) continue;
       const std::int32_t next = column + dx + dz * width_;
       if (findPlace(next, from.y()) >= 0) continue;
       if (const auto standing = stepTo(walker, from, x, z))
@@ -162,22 +162,22 @@ std::vector<std::int32_t> FloodFill::findWay(std::int32_t from, std::int32_t to)
     double length;
     std::int32_t before;
   };
-  const Vec3 goal = positionOf(to);
+  const Vec3 goal = computePosition(to);
   std::unordered_map<std::int32_t, Known> known{{from, {0, -1}}};
   using Entry = std::pair<double, std::int32_t>;  // length through the place, place
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
-  open.emplace((goal - positionOf(from)).norm(), from);
+  open.emplace((goal - computePosition(from)).norm(), from);
   while (!open.empty() && open.top().second != to) {
     const auto [through, at] = open.top();
     open.pop();
-    const Vec3 here = positionOf(at);
+    const Vec3 here = computePosition(at);
     const double length = known[at].length;
     if (through > length + (goal - here).norm() + 1e-9) continue;  // a longer way to it
     for (const auto& [dx, dz] : kNeighbours) {
       const std::int32_t next =
           findPlace(places_[static_cast<std::size_t>(at)].column + dx + dz * width_, here.y());
       if (next < 0) continue;
-      const Vec3 there = positionOf(next);
+      const Vec3 there = computePosition(next);
       const double longer = length + (there - here).norm();
       const auto [entry, isNew] = known.try_emplace(next, Known{longer, at});
       if (!isNew && entry->second.length <= longer) continue;
@@ -197,7 +197,7 @@ bool FloodFill::isStraight(const Vec3& from, const Vec3& to) const {
   double height = from.y();
   for (int i = 0; i <= count; ++i) {
     const Vec3 at = from + (to - from) * (static_cast<double>(i) / count);
-    const std::int32_t column = columnOf(at.x(), at.z());
+    const std::int32_t column = computeColumn(at.x(), at.z());
     const std::int32_t place = column < 0 ? -1 : findPlace(column, height);
     if (place < 0) return false;
     height = places_[static_cast<std::size_t>(place)].height;
@@ -213,7 +213,7 @@ std::optional<double> FloodFill::measureShortest(const Vec3& from, const Vec3& t
   std::vector<Vec3> points{from};
   const std::size_t stride = std::max<std::size_t>(1, way.size() / 200);
   for (std::size_t i = stride; i + 1 < way.size(); i += stride)
-    points.push_back(positionOf(way[i]));
+    points.push_back(computePosition(way[i]));
   points.push_back(to);
   // The shortest chain of points of which neighbours see each other.
   std::vector<double> best(points.size(), std::numeric_limits<double>::infinity());

@@ -22,7 +22,9 @@ class FloodFill {
             const std::vector<scene::Vec3>& starts, std::size_t maxPlaces);
 
   std::size_t size() const { return places_.size(); }
-  scene::Vec3 at(std::size_t place) const { return positionOf(static_cast<std::int32_t>(place)); }
+  scene::Vec3 at(std::size_t place) const {
+    return computePosition(static_cast<std::int32_t>(place));
+  }
 
   struct Component {
     std::int32_t number = 0;
@@ -43,8 +45,8 @@ class FloodFill {
     std::int32_t next;  ///< another place of the column, or -1
   };
 
-  std::int32_t columnOf(double x, double z) const;
-  scene::Vec3 positionOf(std::int32_t place) const;
+  std::int32_t computeColumn(double x, double z) const;
+  scene::Vec3 computePosition(std::int32_t place) const;
   std::int32_t findPlace(std::int32_t column, double height) const;
   std::int32_t findNearest(const scene::Vec3& point) const;
   std::int32_t add(std::int32_t column, double height, std::int32_t component);

@@ -22,7 +22,7 @@ Vec3 uniform3(Random& random, const Vec3& low, const Vec3& high) {
 
 }  // namespace
 
-const char* nameOf(CubeMotion motion) {
+const char* getName(CubeMotion motion) {
   switch (motion) {
     case CubeMotion::brownian:
       return "Brownian";

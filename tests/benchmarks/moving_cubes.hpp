@@ -20,7 +20,7 @@ using collision::Aabb;
 enum class CubeMotion { brownian, falling, turbulent };
 constexpr CubeMotion kCubeMotions[] = {CubeMotion::brownian, CubeMotion::falling,
                                        CubeMotion::turbulent};
-const char* nameOf(CubeMotion motion);
+const char* getName(CubeMotion motion);
 
 class MovingCubes {
  public:

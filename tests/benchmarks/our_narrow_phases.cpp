@@ -19,7 +19,7 @@ class OurPair : public PairOfBodies {
   void forget() override { features_ = {}; }
 
  protected:
-  static PlacedConvex bodyOf(const Hull& hull, const RigidTransform& at) {
+  static PlacedConvex makeBody(const Hull& hull, const RigidTransform& at) {
     return {hull.vertices, at.translation, &at.rotation, &hull};
   }
   Hull hullA_, hullB_;
@@ -31,7 +31,7 @@ class Decides : public OurPair {
   using OurPair::OurPair;
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     const auto result =
-        collision::computeSeparation(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
+        collision::computeSeparation(makeBody(hullA_, a), makeBody(hullB_, b), features_);
     Answer answer = result.verdict == Verdict::separated ? apart(result.distance) : collides();
     answer.decidedBy = static_cast<std::int8_t>(result.certificate);
     return answer;
@@ -42,8 +42,8 @@ class DecidesWithDepth : public OurPair {
  public:
   using OurPair::OurPair;
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
-    const PlacedConvex bodyA = bodyOf(hullA_, a);
-    const PlacedConvex bodyB = bodyOf(hullB_, b);
+    const PlacedConvex bodyA = makeBody(hullA_, a);
+    const PlacedConvex bodyB = makeBody(hullB_, b);
     const auto result = collision::computeSeparation(bodyA, bodyB, features_);
     Answer answer = result.verdict == Verdict::separated ? apart(result.distance) : collides(0);
     answer.decidedBy = static_cast<std::int8_t>(result.certificate);
@@ -68,7 +68,7 @@ class Refines : public OurPair {
   using OurPair::OurPair;
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     const auto result =
-        collision::refineSeparation(bodyOf(hullA_, a), bodyOf(hullB_, b), features_);
+        collision::refineSeparation(makeBody(hullA_, a), makeBody(hullB_, b), features_);
     Answer answer = result.verdict == Verdict::separated ? apart(result.distance)
                                                          : collides(result.penetration);
     answer.decidedBy = static_cast<std::int8_t>(result.certificate);

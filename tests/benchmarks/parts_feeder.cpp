@@ -131,7 +131,7 @@ bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks
 /// Whether no part left the tray and none penetrated by more than the contact offset.
 bool checkScene(const FeederPlan& plan, int ticks) {
   scene::Model model = assets::makeFeeder({plan.parts.size(), 1});
-  scene::applySidecar(model, assets::feederSidecar(), "feeder.walk.json");
+  scene::applySidecar(model, assets::makeFeederSidecar(), "feeder.walk.json");
   scene::World world(std::make_shared<const scene::Scene>(std::move(model)));
   scene::setThreadCount(world, kThreads);
   const auto isInside = [&](const scene::BodySnapshot& body) {

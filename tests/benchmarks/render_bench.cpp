@@ -54,7 +54,7 @@ struct Difference {
   }
 };
 
-scene::Model modelOf(const std::string& name) {
+scene::Model loadNamedModel(const std::string& name) {
   const std::string district = "district:";
   if (name.starts_with(district))
     return assets::makeDistrict(std::stoul(name.substr(district.size())), 1);
@@ -185,7 +185,7 @@ void measureTogether(const std::shared_ptr<const scene::Scene>& scene, const std
 }
 
 void benchmarkTogether(const std::string& name) {
-  const auto scene = std::make_shared<const scene::Scene>(modelOf(name));
+  const auto scene = std::make_shared<const scene::Scene>(loadNamedModel(name));
   render::GlRenderer gl(scene);
   render::RayRenderer rays(scene);
   for (render::Renderer* renderer :
@@ -196,7 +196,7 @@ void benchmarkTogether(const std::string& name) {
 }
 
 void benchmark(const std::string& name, int frames) {
-  scene::Model model = modelOf(name);
+  scene::Model model = loadNamedModel(name);
   const bool textures = !model.textures.empty();
   const auto textured = std::make_shared<const scene::Scene>(model);
   for (scene::Material& material : model.materials) material.baseColourTexture = -1;

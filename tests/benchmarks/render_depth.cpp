@@ -139,8 +139,8 @@ void take(Method& method, const Camera& camera, const render::ReferenceFrame& tr
   }
 }
 
-nlohmann::json lineOf(const std::string& scene, const scene::Model& model, std::size_t triangles,
-                      const Camera& size, const Method& method) {
+nlohmann::json makeLine(const std::string& scene, const scene::Model& model, std::size_t triangles,
+                        const Camera& size, const Method& method) {
   nlohmann::json line = nlohmann::json::parse(render::formatReportJson(method.report));
   line["bench"] = "depth";
   line["scene"] = scene;
@@ -153,7 +153,7 @@ nlohmann::json lineOf(const std::string& scene, const scene::Model& model, std::
   return line;
 }
 
-std::size_t trianglesOf(const scene::Model& model) {
+std::size_t countTriangles(const scene::Model& model) {
   std::size_t triangles = 0;
   for (const scene::Object& object : model.objects)
     for (const std::uint32_t mesh : object.meshes)
@@ -167,7 +167,7 @@ void measure(const NamedScene& named, const Arguments& arguments, Results& resul
   std::printf("%s: %zu objects, %zu cameras\n", named.name.c_str(), scene->model().objects.size(),
               cameras.size());
   render::ReferenceTracer rays(scene);
-  const std::size_t triangles = trianglesOf(scene->model());
+  const std::size_t triangles = countTriangles(scene->model());
   for (const auto& [width, height] : {std::pair(256, 256), std::pair(640, 480)}) {
     if (arguments.quick && width > 256) break;
     std::vector<Method> methods = methodsFor(scene);
@@ -180,7 +180,7 @@ void measure(const NamedScene& named, const Arguments& arguments, Results& resul
       for (Method& method : methods) take(method, camera, truth, arguments.quick ? 2 : 3);
     }
     for (const Method& method : methods) {
-      results.add(lineOf(named.name, scene->model(), triangles, size, method));
+      results.add(makeLine(named.name, scene->model(), triangles, size, method));
       const render::DepthErrors& away = method.report.awayFromEdges;
       std::printf("  %4dx%-4d %-24s %8.2f ms %8.2f ms CPU   mean %.5f mm  max %.4f mm\n", width,
                   height, method.name.c_str(), quantile(method.milliseconds, 0.5),

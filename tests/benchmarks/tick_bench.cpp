@@ -50,7 +50,7 @@ double peakMegabytes() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
-scene::Model modelOf(const std::filesystem::path& file) {
+scene::Model loadNamedModel(const std::filesystem::path& file) {
   const std::string name = file.string();
   const std::size_t colon = name.find(':');
   if (colon == std::string::npos)
@@ -65,7 +65,7 @@ scene::Model modelOf(const std::filesystem::path& file) {
 
 std::shared_ptr<const scene::Scene> load(const std::filesystem::path& file) {
   const auto start = std::chrono::steady_clock::now();
-  auto still = std::make_shared<const scene::Scene>(modelOf(file));
+  auto still = std::make_shared<const scene::Scene>(loadNamedModel(file));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   std::printf("%s: %zu objects loaded in %.2f s, %.0f MB at most\n", file.c_str(),
               still->model().objects.size(), took.count(), peakMegabytes());

@@ -115,7 +115,7 @@ inline void CheckedSweep::checkOverlaps(const Pairs& expected) {
   }
   for (auto& [id, list] : expectedOverlaps) std::sort(list.begin(), list.end());
   for (const auto& [id, box] : dynamicBoxes_) {
-    const auto reported = sweep_.overlapsOf(id);
+    const auto reported = sweep_.getOverlaps(id);
     ASSERT_TRUE(std::equal(reported.begin(), reported.end(), expectedOverlaps[id].begin(),
                            expectedOverlaps[id].end()))
         << "proxy " << id;

@@ -70,7 +70,7 @@ TEST(Hull, OfABoxHasSixQuadsWhateverElseLiesOnIt) {
   EXPECT_EQ(hull.vertices.size(), 8u);
   ASSERT_EQ(hull.faces.size(), 6u);
   for (const auto& face : hull.faces) EXPECT_EQ(face.size(), 4u);
-  for (std::uint32_t v = 0; v < 8; ++v) EXPECT_EQ(hull.neighboursOf(v).size(), 3u);
+  for (std::uint32_t v = 0; v < 8; ++v) EXPECT_EQ(hull.getNeighbours(v).size(), 3u);
   expectInside(hull, points);
 }
 
@@ -98,12 +98,12 @@ TEST(Hull, OfOnePointOrASegmentOrAPolygonIsFlat) {
   validateHull(point);
   EXPECT_EQ(point.vertices.size(), 1u);
   EXPECT_TRUE(point.faces.empty());
-  EXPECT_TRUE(point.neighboursOf(0).empty());
+  EXPECT_TRUE(point.getNeighbours(0).empty());
 
   const Hull segment = buildHull(Points{{1, 1, 1}, {0, 0, 0}, {3, 3, 3}, {2, 2, 2}});
   validateHull(segment);
   EXPECT_EQ(segment.vertices, (Points{{0, 0, 0}, {3, 3, 3}}));
-  EXPECT_EQ(segment.neighboursOf(0).size(), 1u);
+  EXPECT_EQ(segment.getNeighbours(0).size(), 1u);
 
   for (int flat = 0; flat < 3; ++flat) {
     Points points;

@@ -13,7 +13,7 @@ using namespace testing;
 const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
                                   {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
 
-Aabb boxOf(const PlacedConvex& body) {
+Aabb computeBox(const PlacedConvex& body) {
   Aabb box;
   for (const Vec3& vertex : body.vertices) box.include(vertex + body.translation);
   return box;
@@ -21,7 +21,7 @@ Aabb boxOf(const PlacedConvex& body) {
 
 /// As a caller does: by the planes, or by the axis of the last query.
 bool haveMissed(SeparatingPlanes& planes, const PlacedConvex& body, const Vec3& axis) {
-  return planes.haveMissed(body, boxOf(body)) || planes.tryAxis(body, boxOf(body), axis);
+  return planes.haveMissed(body, computeBox(body)) || planes.tryAxis(body, computeBox(body), axis);
 }
 bool haveMissed(SeparatingPlanes& planes, const std::vector<Vec3>& vertices, const Vec3& axis) {
   return haveMissed(planes, PlacedConvex{vertices}, axis);

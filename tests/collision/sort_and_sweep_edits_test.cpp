@@ -189,11 +189,11 @@ TEST(BroadPhaseAudit, AcceptsACorrectSweepAndFindsEachInjectedFault) {
   EXPECT_EQ(compareWithBruteForce(sweep, staticBoxes, movers).pairs, sweep.pairCount());
 
   // The audit receives boxes that the sweep did not: the state of the sweep is then wrong.
-  ASSERT_FALSE(sweep.overlapsOf(movers[3].first).empty());
+  ASSERT_FALSE(sweep.getOverlaps(movers[3].first).empty());
   const Aabb before = movers[3].second;
   movers[3].second = boxAt(Vec3::Constant(1e6), Vec3::Ones());
   const BroadPhaseAudit gone = compareWithBruteForce(sweep, staticBoxes, movers);
-  EXPECT_EQ(gone.extra.size(), sweep.overlapsOf(movers[3].first).size());
+  EXPECT_EQ(gone.extra.size(), sweep.getOverlaps(movers[3].first).size());
   EXPECT_TRUE(gone.missed.empty());
   movers[3].second = before;
   staticBoxes.push_back(before);
@@ -206,7 +206,7 @@ TEST(BroadPhaseAudit, AcceptsACorrectSweepAndFindsEachInjectedFault) {
   const std::vector<ProxyId> one{movers[7].first};
   const BroadPhaseAudit some = compareWithBruteForce(sweep, staticBoxes, movers, one);
   EXPECT_TRUE(some.missed.empty() && some.extra.empty());
-  EXPECT_EQ(some.pairs, sweep.overlapsOf(one[0]).size());
+  EXPECT_EQ(some.pairs, sweep.getOverlaps(one[0]).size());
 }
 
 }  // namespace

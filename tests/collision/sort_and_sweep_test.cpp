@@ -288,7 +288,7 @@ TEST(SortAndSweep, ReportsThePairsOfARemovedProxyAsRemoved) {
   scene.updateAndCheck();
   const Pairs ended(scene.sweep().removedPairs().begin(), scene.sweep().removedPairs().end());
   EXPECT_EQ(ended, (Pairs{{a, 0, false}, {a, b, true}}));
-  EXPECT_TRUE(scene.sweep().overlapsOf(a).empty());
+  EXPECT_TRUE(scene.sweep().getOverlaps(a).empty());
   EXPECT_EQ(scene.insert(boxAt(Vec3::Zero(), Vec3::Ones())), a);
 }
 
@@ -362,12 +362,12 @@ TEST(SortAndSweep, RemovesAllPairsWhenAllProxiesJump) {
   const Aabb slab = boxAt({-5000, -1, -5000}, {10000, 1, 10000});
   SortAndSweep sweep(std::span(&slab, 1));
   constexpr int kMovers = 100;
-  const auto boxOf = [](int k, double x) { return boxAt({x + 3 * k, 0.5, 0}, {1, 1, 1}); };
-  for (int k = 0; k < kMovers; ++k) sweep.insert(boxOf(k, 0));
+  const auto makeBox = [](int k, double x) { return boxAt({x + 3 * k, 0.5, 0}, {1, 1, 1}); };
+  for (int k = 0; k < kMovers; ++k) sweep.insert(makeBox(k, 0));
   sweep.update();
   for (int tick = 1; tick < 5; ++tick) {
     for (ProxyId k = 0; k < kMovers; ++k)
-      sweep.move(k, boxOf(static_cast<int>(k), 100 + 0.001 * tick));
+      sweep.move(k, makeBox(static_cast<int>(k), 100 + 0.001 * tick));
     sweep.update();
   }
   EXPECT_LE(sweep.counters().aabbTests, 4U * kMovers);  // those of neighbours, not all of them
@@ -486,7 +486,7 @@ TEST(SortAndSweep, ResultsDoNotDependOnTheOrderOfTheStaticBoxes) {
   reversed.update();
   ASSERT_EQ(sweep.pairCount(), reversed.pairCount());
   ASSERT_GT(sweep.pairCount(), 5u);
-  const auto a = sweep.overlapsOf(id), b = reversed.overlapsOf(id);
+  const auto a = sweep.getOverlaps(id), b = reversed.getOverlaps(id);
   for (std::size_t k = 0; k < a.size(); ++k) EXPECT_EQ(a[k].id, last - b[a.size() - 1 - k].id);
 }
 

@@ -18,7 +18,7 @@ std::vector<std::filesystem::path> filesIn(const char* folder) {
   return files;
 }
 
-std::vector<std::uint8_t> bytesOf(const std::filesystem::path& file) {
+std::vector<std::uint8_t> readBytes(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::vector<std::uint8_t> bytes;
   std::transform(std::istreambuf_iterator<char>(stream), {}, std::back_inserter(bytes),
@@ -34,7 +34,7 @@ int main(int count, char** arguments) {
     for (const auto& file : filesIn(arguments[i])) {
       // Printed before the call, so that the last line names a crashing file.
       std::fprintf(stderr, "%s\n", file.c_str());
-      enfilade::fuzz::tryBytes(bytesOf(file));
+      enfilade::fuzz::tryBytes(readBytes(file));
       ++tried;
     }
   }

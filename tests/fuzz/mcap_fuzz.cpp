@@ -19,7 +19,7 @@ struct Read {
   bool whole = false;
 };
 
-std::string textOf(const Message& message) {
+std::string formatMessage(const Message& message) {
   return message.channel->topic + '\n' + std::to_string(message.time) + '\n' +
          std::string(message.data);
 }
@@ -28,7 +28,7 @@ Read frontToBack(const std::filesystem::path& file) {
   Read read;
   try {
     Reader reader(file);
-    while (const auto message = reader.next()) read.messages.push_back(textOf(*message));
+    while (const auto message = reader.next()) read.messages.push_back(formatMessage(*message));
     read.whole = reader.closed();
   } catch (const RecordingError& error) {
     require(error.what()[0] != '\0', "an error has a message");
@@ -43,7 +43,7 @@ Read byIndex(const std::filesystem::path& file) {
     for (std::size_t chunk = 0; chunk < reader.chunks().size(); ++chunk) {
       reader.open(chunk);
       Message message;
-      while (reader.next(message)) read.messages.push_back(textOf(message));
+      while (reader.next(message)) read.messages.push_back(formatMessage(message));
     }
     read.whole = reader.closed();
   } catch (const RecordingError& error) {

@@ -37,7 +37,7 @@ v1::ServerMessage metricsReply(const v1::ClientMessage& request, std::uint64_t t
 TEST(AsyncClient, GreetsWithoutBlockingAndReportsTheWelcomeFirst) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
-    connection.send(eventsOf(1));
+    connection.send(makeEvents(1));
     connection.untilClosed();
   });
   std::vector<std::string> calls;
@@ -56,7 +56,7 @@ TEST(AsyncClient, RepliesReachTheirRequestersInOrder) {
     connection.greet();
     for (std::uint64_t i = 0; i < kRequests; ++i) {
       connection.send(metricsReply(*connection.receive(), i));
-      connection.send(eventsOf(i + 1));
+      connection.send(makeEvents(i + 1));
     }
     connection.untilClosed();
   });
@@ -145,7 +145,7 @@ TEST(AsyncClient, MayBeDestroyedInAnyOfItsFunctions) {
     const TestServer server([](TestConnection& connection) {
       connection.greet();
       connection.send(metricsReply(*connection.receive(), 1));
-      connection.send(eventsOf(1));
+      connection.send(makeEvents(1));
       connection.receive();
     });
     std::optional<AsyncClient> client;

@@ -19,7 +19,7 @@ Client connectTo(const TestServer& server,
 
 /// The exception's message; fails the test if nothing was thrown.
 template <typename Exception, typename Action>
-std::string whatOf(Action action) {
+std::string catchMessage(Action action) {
   try {
     action();
   } catch (const Exception& thrown) {
@@ -31,7 +31,7 @@ std::string whatOf(Action action) {
 
 template <typename Action>
 void expectConnectionError(const TestServer& server, const std::string& part, Action action) {
-  const std::string what = whatOf<ConnectionError>(action);
+  const std::string what = catchMessage<ConnectionError>(action);
   EXPECT_NE(what.find(part), std::string::npos) << what;
   EXPECT_NE(what.find("127.0.0.1:" + std::to_string(server.port())), std::string::npos) << what;
 }
@@ -104,7 +104,8 @@ TEST(Client, ReportsWhyAServerRefusedTheGreeting) {
     connection.send(reply);
     connection.untilClosed();
   });
-  EXPECT_NE(whatOf<ProtocolError>([&] { connectTo(server); }).find("too old"), std::string::npos);
+  EXPECT_NE(catchMessage<ProtocolError>([&] { connectTo(server); }).find("too old"),
+            std::string::npos);
 }
 
 TEST(Client, RefusesAWelcomeWithoutATick) {
@@ -124,7 +125,7 @@ TEST(Client, NamesHostAndPortIfNoServerListens) {
     const TestServer server([](TestConnection&) {});
     port = server.port();
   }
-  const std::string what = whatOf<ConnectionError>([&] { Client("127.0.0.1", port); });
+  const std::string what = catchMessage<ConnectionError>([&] { Client("127.0.0.1", port); });
   EXPECT_NE(what.find("cannot connect to 127.0.0.1:" + std::to_string(port)), std::string::npos);
 }
 
@@ -159,7 +160,7 @@ TEST(Client, EventsWithoutAnEndDoNotReplaceAReply) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     const auto request = connection.receive();
-    for (std::uint64_t i = 1; i <= 10; ++i) connection.send(eventsOf(i));
+    for (std::uint64_t i = 1; i <= 10; ++i) connection.send(makeEvents(i));
     connection.untilClosed();
   });
   Client client = connectTo(server, kShort);
@@ -194,7 +195,7 @@ TEST(Client, RepeatsTheServersFinalMessage) {
     v1::ServerMessage bye;
     bye.mutable_bye()->set_code(v1::ERROR_SHUTTING_DOWN);
     bye.mutable_bye()->set_reason("the lights go out");
-    connection.send(eventsOf(1));
+    connection.send(makeEvents(1));
     connection.send(bye);
   });
   Client client = connectTo(server);
@@ -251,12 +252,12 @@ TEST(Client, EventsThatComeBeforeAReplyAreKeptInOrder) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
     const auto request = connection.receive();
-    connection.send(eventsOf(1));
-    connection.send(eventsOf(2));
+    connection.send(makeEvents(1));
+    connection.send(makeEvents(2));
     v1::ServerMessage reply = replyTo(*request);
     reply.mutable_step()->set_tick(request->step().ticks());
     connection.send(reply);
-    connection.send(eventsOf(3));
+    connection.send(makeEvents(3));
     connection.untilClosed();
   });
   Client client = connectTo(server);
@@ -270,7 +271,7 @@ TEST(Client, EventsThatComeBeforeAReplyAreKeptInOrder) {
 TEST(Client, ATimeoutKeepsAnIncompleteMessage) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
-    const auto bytes = encode(eventsOf(7));
+    const auto bytes = encode(makeEvents(7));
     const std::span<const std::uint8_t> whole(bytes);
     connection.sendRaw(whole.first(5));
     const auto request = connection.receive();  // sent after the wait timed out

@@ -17,7 +17,7 @@ std::optional<v1::Error> FakeWorld::submit(const v1::Command& command) {
   return std::nullopt;
 }
 
-std::uint64_t FakeWorld::ticksOf(const std::string& name, const v1::Command& command) const {
+std::uint64_t FakeWorld::computeTicks(const std::string& name, const v1::Command& command) const {
   if (command.has_walk() && name.starts_with("stuck")) return kStuckTicks;
   if (command.has_walk())
     return kWalkTicks * static_cast<std::uint64_t>(command.walk().along_size());
@@ -67,7 +67,7 @@ void FakeWorld::advance(const std::string& name, Avatar& avatar, StepOutcome& ou
   if (avatar.queue.empty()) return;
   if (!avatar.begun) {
     avatar.begun = true;
-    avatar.ticksLeft = ticksOf(name, avatar.queue.front());
+    avatar.ticksLeft = computeTicks(name, avatar.queue.front());
   }
   if (avatar.ticksLeft > 0) --avatar.ticksLeft;
   if (avatar.ticksLeft == 0) end(name, avatar, outcome);

@@ -39,7 +39,7 @@ class FakeWorld : public ScriptDriver {
 
   void advance(const std::string& name, Avatar& avatar, StepOutcome& outcome);
   void end(const std::string& name, Avatar& avatar, StepOutcome& outcome);
-  std::uint64_t ticksOf(const std::string& name, const v1::Command& command) const;
+  std::uint64_t computeTicks(const std::string& name, const v1::Command& command) const;
 
   std::uint64_t tick_ = 0;
   std::map<std::string, Avatar> avatars_;

@@ -20,7 +20,7 @@ std::filesystem::path fileFor(const std::string& name) {
   return tests::ownFile(name + ".mcap");
 }
 
-std::vector<Item> itemsOf(std::size_t count) {
+std::vector<Item> makeItems(std::size_t count) {
   std::vector<Item> items;
   std::mt19937 random(7);
   for (std::size_t i = 0; i < count; ++i) {
@@ -43,7 +43,7 @@ void writeAll(Writer& writer, const std::vector<Item>& items) {
     writer.write(i % 2 != 0 ? odd : even, items[i].first, items[i].second);
 }
 
-std::string bytesOf(const std::filesystem::path& file) {
+std::string readBytes(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
@@ -58,7 +58,7 @@ std::string closedFile(const std::vector<Item>& items) {
   Writer writer(file, smallChunks());
   writeAll(writer, items);
   writer.close();
-  return bytesOf(file);
+  return readBytes(file);
 }
 
 struct Read {
@@ -87,7 +87,7 @@ bool isPrefix(const std::vector<Item>& part, const std::vector<Item>& whole) {
 }
 
 TEST(Mcap, ReadsMessagesInTheirWrittenOrder) {
-  const auto items = itemsOf(500);
+  const auto items = makeItems(500);
   const auto file = fileFor("back");
   put(file, closedFile(items));
   const Read read = readAll(file);
@@ -99,7 +99,7 @@ TEST(Mcap, ReadsMessagesInTheirWrittenOrder) {
 
 TEST(Mcap, ReportsChannelsSequencesAndTheWriter) {
   const auto file = fileFor("channels");
-  put(file, closedFile(itemsOf(4)));
+  put(file, closedFile(makeItems(4)));
   Reader reader(file);
   EXPECT_EQ(reader.library(), "mcap_test");
   std::vector<std::string> texts;
@@ -120,7 +120,7 @@ TEST(Mcap, AFileWithoutMessagesIsValid) {
 }
 
 TEST(Mcap, ATruncatedFileIsReadUpToTheLastCompleteChunk) {
-  const auto items = itemsOf(200);
+  const auto items = makeItems(200);
   const std::string bytes = closedFile(items);
   const auto file = fileFor("cut");
   std::mt19937 random(11);
@@ -139,7 +139,7 @@ TEST(Mcap, ATruncatedFileIsReadUpToTheLastCompleteChunk) {
 }
 
 TEST(Mcap, AFlippedBitIsReported) {
-  const auto items = itemsOf(60);
+  const auto items = makeItems(60);
   const std::string bytes = closedFile(items);
   const auto file = fileFor("flip");
   std::mt19937 random(13);
@@ -156,7 +156,7 @@ TEST(Mcap, AFlippedBitIsReported) {
 }
 
 TEST(Mcap, AFlippedBitInATruncatedFileNeverChangesData) {
-  const auto items = itemsOf(60);
+  const auto items = makeItems(60);
   const std::string whole = closedFile(items);
   const std::string bytes = whole.substr(0, whole.size() / 2);
   const auto file = fileFor("flip_cut");
@@ -172,7 +172,7 @@ TEST(Mcap, AFlippedBitInATruncatedFileNeverChangesData) {
 
 TEST(Mcap, BytesAfterTheEndAreReported) {
   const auto file = fileFor("after");
-  put(file, closedFile(itemsOf(5)) + "x");
+  put(file, closedFile(makeItems(5)) + "x");
   EXPECT_NE(readAll(file).error.find("the closing magic bytes are missing"), std::string::npos);
 }
 
@@ -185,7 +185,7 @@ TEST(Mcap, OtherFilesAreNamedAndRefused) {
 }
 
 TEST(Mcap, FlushedDataIsReadableWithoutClose) {
-  const auto items = itemsOf(9);
+  const auto items = makeItems(9);
   const auto file = fileFor("flushed");
   Writer writer(file, smallChunks());
   writeAll(writer, items);
@@ -217,7 +217,7 @@ class FullDisk {
 };
 
 TEST(Mcap, AFullDiskIsReportedOnceAndLeavesAReadableFile) {
-  const auto items = itemsOf(400);
+  const auto items = makeItems(400);
   const auto file = fileFor("full");
   std::string message;
   {

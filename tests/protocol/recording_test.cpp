@@ -8,7 +8,7 @@
 namespace enfilade::protocol {
 namespace {
 
-v1::State stateOf(std::uint64_t tick) {
+v1::State makeState(std::uint64_t tick) {
   v1::State state;
   state.set_tick(tick);
   state.set_time(static_cast<double>(tick) / 60);
@@ -36,56 +36,56 @@ TEST(Recording, ReturnsItsMessagesInOrder) {
     writer.write(start);
     writer.write(commands, 0);
     writer.write(events);
-    writer.write(stateOf(1));
+    writer.write(makeState(1));
     writer.close();
   }
   RecordingReader reader(file);
-  const auto bytesOf = [](const RecordedItem& item) {
+  const auto serializeItem = [](const RecordedItem& item) {
     return std::visit([](const auto& message) { return message.SerializeAsString(); }, item);
   };
   std::vector<std::string> read;
   while (const auto item = reader.next())
-    read.push_back(std::to_string(item->index()) + bytesOf(*item));
+    read.push_back(std::to_string(item->index()) + serializeItem(*item));
   EXPECT_EQ(read, (std::vector<std::string>{
                       "0" + start.SerializeAsString(), "1" + commands.SerializeAsString(),
-                      "2" + events.SerializeAsString(), "3" + stateOf(1).SerializeAsString()}));
+                      "2" + events.SerializeAsString(), "3" + makeState(1).SerializeAsString()}));
   EXPECT_TRUE(reader.closed());
 }
 
 TEST(Recording, EqualStatesDoNotDiffer) {
-  EXPECT_FALSE(findFirstDifference(stateOf(3), stateOf(3)));
+  EXPECT_FALSE(findFirstDifference(makeState(3), makeState(3)));
 }
 
 TEST(Recording, ADifferenceNamesEntityFieldAndBothValues) {
-  v1::State other = stateOf(3);
+  v1::State other = makeState(3);
   other.mutable_avatars(0)->mutable_feet()->set_x(1.5000000000000002);
   other.mutable_bodies(0)->set_coordinate(0.5);
-  auto found = findFirstDifference(stateOf(3), other);
+  auto found = findFirstDifference(makeState(3), other);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->entity, "ann");
   EXPECT_EQ(found->field, "feet.x");
   EXPECT_EQ(found->recorded, "1.5");
   EXPECT_EQ(found->replayed, "1.5000000000000002");
   other.mutable_avatars(0)->mutable_feet()->set_x(1.5);
-  found = findFirstDifference(stateOf(3), other);
+  found = findFirstDifference(makeState(3), other);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->entity + " " + found->field + " " + found->recorded + " " + found->replayed,
             "door coordinate 0.25 0.5");
 }
 
 TEST(Recording, AMissingEntityIsNamed) {
-  v1::State other = stateOf(3);
+  v1::State other = makeState(3);
   other.clear_avatars();
-  const auto found = findFirstDifference(stateOf(3), other);
+  const auto found = findFirstDifference(makeState(3), other);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->entity, "ann");
   EXPECT_EQ(found->replayed, "absent");
 }
 
 TEST(Recording, ADifferenceOfTheHashAloneIsReported) {
-  v1::State other = stateOf(3);
+  v1::State other = makeState(3);
   other.set_hash(0x1235);
-  const auto found = findFirstDifference(stateOf(3), other);
+  const auto found = findFirstDifference(makeState(3), other);
   ASSERT_TRUE(found);
   EXPECT_EQ(found->field, "state hash");
   EXPECT_EQ(found->recorded, "0000000000001234");

@@ -46,20 +46,20 @@ TEST(RunScript, AllIsSubmittedUpToAGlobalWait) {
 }
 
 TEST(RunScript, AGlobalWaitIsRoundedUpToTicksAndNotByRounding) {
-  const auto ticksOf = [](const std::string& seconds) {
+  const auto countTicks = [](const std::string& seconds) {
     FakeWorld world;
     return runScript(script("{\"wait\":" + seconds + "}"), world).ticks;
   };
-  EXPECT_EQ(ticksOf("0"), 0u);
-  EXPECT_EQ(ticksOf("1"), 60u);
-  EXPECT_EQ(ticksOf("0.1"), 6u);
-  EXPECT_EQ(ticksOf("0.35"), 21u);
-  EXPECT_EQ(ticksOf("0.0001"), 1u);
-  EXPECT_EQ(ticksOf("0.11"), 7u);
+  EXPECT_EQ(countTicks("0"), 0u);
+  EXPECT_EQ(countTicks("1"), 60u);
+  EXPECT_EQ(countTicks("0.1"), 6u);
+  EXPECT_EQ(countTicks("0.35"), 21u);
+  EXPECT_EQ(countTicks("0.0001"), 1u);
+  EXPECT_EQ(countTicks("0.11"), 7u);
   for (int ticks = 1; ticks <= 600; ++ticks) {
     std::array<char, 32> seconds{};
     std::snprintf(seconds.data(), seconds.size(), "%.17g", ticks / 60.0);
-    EXPECT_EQ(ticksOf(seconds.data()), static_cast<std::uint64_t>(ticks));
+    EXPECT_EQ(countTicks(seconds.data()), static_cast<std::uint64_t>(ticks));
   }
 }
 

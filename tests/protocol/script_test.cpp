@@ -10,7 +10,7 @@ namespace enfilade::protocol {
 namespace {
 
 /// The error message for `text`; "" if it is valid.
-std::string errorOf(std::string_view text) {
+std::string catchError(std::string_view text) {
   try {
     parseScript(text, "tour.jsonl");
   } catch (const ScriptError& error) {
@@ -20,7 +20,7 @@ std::string errorOf(std::string_view text) {
 }
 
 void expectError(std::string_view text, const std::string& start) {
-  const std::string error = errorOf(text);
+  const std::string error = catchError(text);
   EXPECT_TRUE(error.starts_with(start))
       << text << "\n  said: " << error << "\n  and not: " << start;
 }
@@ -34,7 +34,7 @@ v1::Command onlyCommand(std::string_view text) {
 TEST(Script, DeeplyNestedBracketsAreAnError) {
   const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
   for (const std::string& line : {nest, R"({"walk":"ann","to":)" + nest + "}"})
-    EXPECT_TRUE(errorOf(line).ends_with("a too deeply nested value"));
+    EXPECT_TRUE(catchError(line).ends_with("a too deeply nested value"));
 }
 
 TEST(Script, ASpawnHasItsPositionAndOptions) {
@@ -257,7 +257,7 @@ TEST(Script, AnInvalidBodyLineIsReportedWithItsField) {
 TEST(Script, NamesAreShortAndFitForFiles) {
   expectError(R"({"leave":""})", "tour.jsonl:1: leave: is empty; give the avatar's name");
   expectError(R"({"leave":")" + std::string(65, 'a') + "\"}", "tour.jsonl:1: leave: has 65");
-  EXPECT_EQ(errorOf(R"({"leave":")" + std::string(64, 'a') + "\"}"), "");
+  EXPECT_EQ(catchError(R"({"leave":")" + std::string(64, 'a') + "\"}"), "");
   for (const char* bad : {"../x", "a b", "a/b", "\\u0000", "caf\xC3\xA9", ".hidden"}) {
     expectError(R"({"capture":"ann","as":")" + std::string(bad) + "\"}", "tour.jsonl:1: as: ");
   }
@@ -285,7 +285,7 @@ TEST(Script, BytesThatAreNotUtf8AreRefusedEvenInComments) {
 
 TEST(Script, EveryBadLineIsReportedWithItsNumber) {
   const std::string text = "{\"wait\":1}\n\nnonsense\n{\"leave\":\"\"}\n{\"leave\":\"ann\"}\n";
-  const std::string error = errorOf(text);
+  const std::string error = catchError(text);
   EXPECT_NE(error.find("tour.jsonl:3: is not JSON"), std::string::npos) << error;
   EXPECT_NE(error.find("\ntour.jsonl:4: leave: is empty"), std::string::npos) << error;
   try {
@@ -299,7 +299,7 @@ TEST(Script, EveryBadLineIsReportedWithItsNumber) {
 TEST(Script, ManyBadLinesAreCounted) {
   std::string text;
   for (int i = 0; i < 1000; ++i) text += "x\n";
-  const std::string error = errorOf(text);
+  const std::string error = catchError(text);
   EXPECT_TRUE(error.ends_with("and 980 more bad lines")) << error.substr(error.size() - 60);
 }
 

@@ -18,7 +18,7 @@ struct WrittenRecording {
   std::vector<std::uint64_t> checkpoints;  ///< ticks
 };
 
-v1::State bulkyStateOf(std::uint64_t tick) {
+v1::State makeBulkyState(std::uint64_t tick) {
   v1::State state;
   state.set_tick(tick);
   state.set_time(static_cast<double>(tick) * kTick);
@@ -36,7 +36,7 @@ void writeTick(RecordingWriter& writer, std::uint64_t tick, bool checkpoint) {
     commands.add_commands()->mutable_avatar()->set_avatar("ann");
     writer.write(commands, static_cast<double>(tick) * kTick);
   }
-  writer.write(bulkyStateOf(tick));
+  writer.write(makeBulkyState(tick));
   if (!checkpoint) return;
   v1::RecordedCheckpoint record;
   record.set_tick(tick);

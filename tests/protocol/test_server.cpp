@@ -58,7 +58,7 @@ void TestConnection::untilClosed() {
   }
 }
 
-v1::ServerMessage eventsOf(std::uint64_t sequence) {
+v1::ServerMessage makeEvents(std::uint64_t sequence) {
   v1::ServerMessage message;
   message.mutable_events()->set_sequence(sequence);
   return message;

@@ -36,7 +36,7 @@ class TestConnection {
 };
 
 v1::ServerMessage welcomeTo(const v1::ClientMessage& hello);
-v1::ServerMessage eventsOf(std::uint64_t sequence);
+v1::ServerMessage makeEvents(std::uint64_t sequence);
 
 class TestServer {
  public:

@@ -20,7 +20,7 @@ Camera camera() {
 
 /// The remaining light of each pixel for a given depth image: depth in metres at (x, y), which are
 /// in focal lengths from the centre.
-std::vector<std::uint8_t> leftOf(const std::function<double(double, double)>& depth) {
+std::vector<std::uint8_t> computeLight(const std::function<double(double, double)>& depth) {
   std::vector<float> depths;
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
@@ -44,14 +44,14 @@ double corner(double, double y) {
 TEST(AmbientOcclusion, PlanesOfAnyOrientationHaveNone) {
   for (const double x : {0.0, 0.4, -0.6}) {
     for (const double y : {0.0, 0.5, -0.6}) {
-      const auto left = leftOf([&](double u, double v) { return 3 / (1 + x * u + y * v); });
+      const auto left = computeLight([&](double u, double v) { return 3 / (1 + x * u + y * v); });
       EXPECT_EQ(left, std::vector<std::uint8_t>(left.size(), 255)) << x << ' ' << y;
     }
   }
 }
 
 TEST(AmbientOcclusion, ACornerIsDarkerThanAPointHalfAMetreAway) {
-  const auto left = leftOf(corner);
+  const auto left = computeLight(corner);
   const int row = 60 + 37;  // where floor and wall meet
   for (const int x : {20, 80, 81, 140}) {
     EXPECT_LT(at(left, x, row), 245) << x;
@@ -60,12 +60,12 @@ TEST(AmbientOcclusion, ACornerIsDarkerThanAPointHalfAMetreAway) {
 }
 
 TEST(AmbientOcclusion, ADistantForegroundLeavesNoOutlineOnTheWall) {
-  const auto left = leftOf([](double x, double) { return std::abs(x) < 0.2 ? 1.0 : 6.0; });
+  const auto left = computeLight([](double x, double) { return std::abs(x) < 0.2 ? 1.0 : 6.0; });
   EXPECT_EQ(left, std::vector<std::uint8_t>(left.size(), 255));
 }
 
 TEST(AmbientOcclusion, ANearForegroundShadesTheWallWithoutABand) {
-  const auto left = leftOf([](double x, double) { return std::abs(x) < 0.2 ? 3.8 : 4.0; });
+  const auto left = computeLight([](double x, double) { return std::abs(x) < 0.2 ? 3.8 : 4.0; });
   int before = at(left, 103, 60);
   EXPECT_LT(before, 250);
   for (int x = 104; x < 125; ++x) {  // with distance the wall only becomes lighter
@@ -80,7 +80,8 @@ TEST(AmbientOcclusion, ANearForegroundShadesTheWallWithoutABand) {
 
 TEST(AmbientOcclusion, WhereNothingIsSeenThereAreNone) {
   constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
-  const auto left = leftOf([&](double x, double y) { return x > 0 ? kNothing : corner(x, y); });
+  const auto left =
+      computeLight([&](double x, double y) { return x > 0 ? kNothing : corner(x, y); });
   for (int y = 0; y < kHeight; ++y) {
     for (int x = 80; x < kWidth; ++x) EXPECT_EQ(at(left, x, y), 255) << x << ' ' << y;
   }

@@ -100,7 +100,7 @@ TEST(DepthPyramid, HidesABoxExactlyIfEveryPixelHidesIt) {
 }
 
 void expectSameFromAnywhere(DepthSource depthSource) {
-  GlRenderer renderer(sceneOf(rooms(1)), {.device = "", .depthSource = depthSource});
+  GlRenderer renderer(makeScene(rooms(1)), {.device = "", .depthSource = depthSource});
   Random random(5);
   std::uint64_t occluded = 0;
   for (int i = 0; i < 60; ++i) {
@@ -128,7 +128,7 @@ TEST(Culling, ThePlaneDepthIsThatOfDrawingEverything) {
 }
 
 TEST(Culling, AWalkKeepsItsPicturesAndMostlyDrawsOnce) {
-  GlRenderer renderer(sceneOf(rooms(2)));
+  GlRenderer renderer(makeScene(rooms(2)));
   Camera camera;
   camera.width = camera.height = 80;
   std::uint32_t passes = 0, drawn = 0, inside = 0;
@@ -157,7 +157,7 @@ TEST(Culling, CoincidentObjectsThatAppearLaterAreDrawnAsWithoutCulling) {
     std::vector<PlacedBox> boxes{red, blue, {{0, 0, -2}, {1, 6, 0.1}, coloured(0, 1, 0)}};
     // Behind the eye: enough boxes to start the search for occluded ones in any case.
     for (int i = 0; i < 300; ++i) boxes.push_back({{0, 0, 10.0 + i}, {0.5, 0.5, 0.5}, {}});
-    GlRenderer renderer(sceneOf(boxes));
+    GlRenderer renderer(makeScene(boxes));
     Camera camera = squareCamera(64);
     for (int i = -40; i <= 40; ++i) {
       camera.eye.x() = 0.1 * i;
@@ -172,7 +172,7 @@ TEST(Culling, CoincidentObjectsThatAppearLaterAreDrawnAsWithoutCulling) {
 }
 
 TEST(Culling, AWalkThatShowsIdsAloneKeepsThem) {
-  GlRenderer renderer(sceneOf(rooms(7)));
+  GlRenderer renderer(makeScene(rooms(7)));
   Camera camera;
   camera.width = camera.height = 80;
   int once = 0, again = 0;
@@ -190,7 +190,7 @@ TEST(Culling, AWalkThatShowsIdsAloneKeepsThem) {
 }
 
 TEST(Culling, SeveralCamerasInTurnEachKeepTheirPictures) {
-  GlRenderer renderer(sceneOf(rooms(4)));
+  GlRenderer renderer(makeScene(rooms(4)));
   std::vector<Camera> cameras;
   Random random(8);
   for (int i = 0; i < 6; ++i) cameras.push_back(cameraAt(random, 0));
@@ -204,7 +204,7 @@ TEST(Culling, SeveralCamerasInTurnEachKeepTheirPictures) {
 }
 
 TEST(Culling, NothingIsLostWhereNothingHides) {
-  GlRenderer renderer(sceneOf({{{-1, 0, -5}, {0.5, 1, 1}, {}}, {{1, 0, -5}, {0.5, 1, 1}, {}}}));
+  GlRenderer renderer(makeScene({{{-1, 0, -5}, {0.5, 1, 1}, {}}, {{1, 0, -5}, {0.5, 1, 1}, {}}}));
   const Frame frame = renderer.render({}, squareCamera(64));
   EXPECT_EQ(frame.statistics.drawn, 2u);
   EXPECT_EQ(frame.statistics.occluded, 0u);
@@ -215,8 +215,8 @@ TEST(Culling, ASmallSceneDrawsPoorOccludersAtOnce) {
   std::vector<PlacedBox> boxes{{{0, 0, -4}, {3, 3, 0.1}, {}}};
   for (int i = 0; i < 3; ++i) boxes.push_back({{-1.0 + i, 0, -2}, {0.3, 0.3, 0.3}, {}});
   for (int i = 0; i < 3; ++i) boxes.push_back({{-1.0 + i, 0, -6}, {0.3, 0.3, 0.3}, {}});
-  const auto secondOf = [](const std::vector<PlacedBox>& some) {
-    GlRenderer renderer(sceneOf(some));
+  const auto renderSecond = [](const std::vector<PlacedBox>& some) {
+    GlRenderer renderer(makeScene(some));
     const Camera camera = squareCamera(64);
     const Frame first = renderer.render({}, camera);
     EXPECT_EQ(first.statistics.drawn, 4u);  // the visibility cache was empty
@@ -224,10 +224,10 @@ TEST(Culling, ASmallSceneDrawsPoorOccludersAtOnce) {
     expectSame(first, second, "with " + std::to_string(some.size()) + " boxes");
     return second.statistics;
   };
-  EXPECT_EQ(secondOf(boxes).drawn, 7u);
-  EXPECT_EQ(secondOf(boxes).passes, 1u);
+  EXPECT_EQ(renderSecond(boxes).drawn, 7u);
+  EXPECT_EQ(renderSecond(boxes).passes, 1u);
   for (int i = 0; i < 9; ++i) boxes.push_back({{-0.4 + 0.1 * i, 1, -6}, {0.1, 0.1, 0.1}, {}});
-  EXPECT_EQ(secondOf(boxes).drawn, 4u);  // more boxes are hidden than visible
+  EXPECT_EQ(renderSecond(boxes).drawn, 4u);  // more boxes are hidden than visible
 }
 
 }  // namespace

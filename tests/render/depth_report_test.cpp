@@ -26,7 +26,7 @@ Camera lookingIn(int width, int height, bool parallel = false) {
 }
 
 TEST(ReferenceTracer, AreThoseOfABruteForceSearchInDoubles) {
-  const auto scene = sceneOf(opaque(crowd(150)));
+  const auto scene = makeScene(opaque(crowd(150)));
   ReferenceTracer rays(scene);
   std::size_t hits = 0, others = 0;
   for (const bool parallel : {false, true}) {
@@ -46,7 +46,7 @@ TEST(ReferenceTracer, AreThoseOfABruteForceSearchInDoubles) {
 }
 
 TEST(ReferenceTracer, EdgesAreWhereSomethingElseBegins) {
-  ReferenceTracer rays(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}}));
+  ReferenceTracer rays(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}}));
   const ReferenceFrame truth = rays.render({}, squareCamera());  // the box covers pixels 75 to 124
   const auto edge = [&](int x, int y) { return truth.edge[static_cast<std::size_t>(200 * y + x)]; };
   EXPECT_TRUE(edge(75, 100));
@@ -58,7 +58,7 @@ TEST(ReferenceTracer, EdgesAreWhereSomethingElseBegins) {
 }
 
 TEST(DepthReport, GlIsWithinItsPromiseAndRaysWithinTheirs) {
-  const auto scene = sceneOf(opaque(crowd(300)));
+  const auto scene = makeScene(opaque(crowd(300)));
   ReferenceTracer rays(scene);
   GlRenderer gl(scene);
   RayRenderer cast(scene);
@@ -87,7 +87,7 @@ TEST(DepthReport, GlIsWithinItsPromiseAndRaysWithinTheirs) {
 
 /// Errors of a GPU, which rounds vertices to 1/256 pixel.
 DepthReport reportRoundedVertices(DepthSource depthSource, bool orthographic) {
-  const auto scene = sceneOf(opaque(crowd(300)));
+  const auto scene = makeScene(opaque(crowd(300)));
   ReferenceTracer rays(scene);
   GlRenderer gl(scene, {.device = "", .depthSource = depthSource, .roundsVertices = true});
   Camera camera = lookingIn(160, 120, orthographic);
@@ -117,7 +117,7 @@ TEST(DepthReport, ThePlaneDepthIsExactWhereVerticesAreRounded) {
 }
 
 TEST(DepthReport, ErrorsAreFoundWhereTheyWereMade) {
-  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}});
+  const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}});
   ReferenceTracer rays(scene);
   RayRenderer renderer(scene);
   const ReferenceFrame truth = rays.render({}, squareCamera());
@@ -142,7 +142,7 @@ TEST(DepthReport, ErrorsAreFoundWhereTheyWereMade) {
 
 TEST(DepthReport, ObjectsInOnePlaceAreTiesAndNoDisagreement) {
   const PlacedBox box{{0, 0, -5}, {2, 2, 2}, {}};
-  const auto scene = sceneOf({box, box});
+  const auto scene = makeScene({box, box});
   ReferenceTracer rays(scene);
   const ReferenceFrame truth = rays.render({}, squareCamera());
   Frame frame = RayRenderer(scene).render({}, squareCamera());
@@ -162,7 +162,7 @@ TEST(DepthReport, ItsPercentileIsThatOfTheSortedErrorsWithinABin) {
 }
 
 TEST(DepthReport, ItsTextIsJsonWithAllBands) {
-  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}});
   const DepthReport report =
       compareWithReference(RayRenderer(scene).render({}, squareCamera()),
                            ReferenceTracer(scene).render({}, squareCamera()));

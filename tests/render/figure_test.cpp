@@ -32,14 +32,14 @@ scene::AvatarSnapshot personAt(scene::EntityId id, const Vec3& feet, const Vec3&
   return person;
 }
 
-Vec3 viewOf(double degrees) {
+Vec3 computeDirection(double degrees) {
   const double radians = degrees * 3.14159265358979323846 / 180;
   return {std::cos(radians), 0, -std::sin(radians)};
 }
 
 using Triangles = std::vector<std::pair<scene::EntityId, collision::Triangle>>;
 
-Triangles trianglesOf(const scene::AvatarSnapshot& person) {
+Triangles makeTriangles(const scene::AvatarSnapshot& person) {
   const Figure figure = placeFigure(person);
   Triangles triangles;
   for (std::size_t i = 0; i < figure.mesh->indices.size(); i += 3) {
@@ -56,7 +56,7 @@ Triangles trianglesOf(const scene::AvatarSnapshot& person) {
 double farthestOutside(const scene::AvatarSnapshot& person) {
   const collision::Hull& hull = *person.shape->parts.front().hull;
   double farthest = -1;
-  for (const auto& [id, triangle] : trianglesOf(person)) {
+  for (const auto& [id, triangle] : makeTriangles(person)) {
     for (const Vec3& corner : triangle) {
       for (const auto& face : hull.faces) {
         const Vec3& a = hull.vertices[face[0]];
@@ -69,9 +69,9 @@ double farthestOutside(const scene::AvatarSnapshot& person) {
   return farthest;
 }
 
-double topOf(const scene::AvatarSnapshot& person) {
+double computeTop(const scene::AvatarSnapshot& person) {
   double top = -1;
-  for (const auto& [id, triangle] : trianglesOf(person))
+  for (const auto& [id, triangle] : makeTriangles(person))
     for (const Vec3& corner : triangle) top = std::max(top, corner.y() - person.footPosition.y());
   return top;
 }
@@ -83,16 +83,17 @@ TEST(Figure, LiesWithinTheCollisionShapeAndIsAsHigh) {
     const double standing = 0.5 + 1.7 * fraction(random), radius = 0.1 + 0.5 * fraction(random);
     const double height = standing * (i % 3 == 0 ? 1 : 0.3 + 0.7 * fraction(random));
     const Vec3 feet(10 * fraction(random), fraction(random), -4);
-    const auto person = personAt(9, feet, viewOf(360 * fraction(random)), height, radius, standing);
+    const auto person =
+        personAt(9, feet, computeDirection(360 * fraction(random)), height, radius, standing);
     ASSERT_TRUE(isPerson(person));
     EXPECT_LT(farthestOutside(person), 1e-6) << standing << ' ' << radius << ' ' << height;
-    EXPECT_NEAR(topOf(person), height, 1e-6);
+    EXPECT_NEAR(computeTop(person), height, 1e-6);
   }
 }
 
 TEST(Figure, MeshesAreClosedAndTheirNormalsPointOutwards) {
   for (double height = 1.75; height > 0.5; height -= 0.05) {
-    const Figure figure = placeFigure(personAt(9, Vec3(1, 2, 3), viewOf(70), height));
+    const Figure figure = placeFigure(personAt(9, Vec3(1, 2, 3), computeDirection(70), height));
     const scene::Mesh& mesh = *figure.mesh;
     ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
     const Eigen::Matrix3d worldFromNormal = figure.worldFromMesh.linear().inverse().transpose();
@@ -133,15 +134,15 @@ TEST(Figure, OnlyAMerePrismIsAPerson) {
 /// Three people ahead of squareCamera(), before a wall (object 1).
 scene::Snapshot group() {
   scene::Snapshot snapshot;
-  snapshot.avatars = {personAt(2, {-1.2, -1, -4}, viewOf(-60)),
-                      personAt(3, {0, -1, -3.4}, viewOf(200), 1.1),
-                      personAt(4, {1.1, -1, -3.7}, viewOf(90), 1.3, 0.25, 1.4)};
+  snapshot.avatars = {personAt(2, {-1.2, -1, -4}, computeDirection(-60)),
+                      personAt(3, {0, -1, -3.4}, computeDirection(200), 1.1),
+                      personAt(4, {1.1, -1, -3.7}, computeDirection(90), 1.3, 0.25, 1.4)};
   return snapshot;
 }
 
 class Figures : public testing::TestWithParam<RendererKind> {
  protected:
-  const std::shared_ptr<const scene::Scene> wall_ = sceneOf({{{0, 0, -8}, {40, 40, 1}, {}}});
+  const std::shared_ptr<const scene::Scene> wall_ = makeScene({{{0, 0, -8}, {40, 40, 1}, {}}});
   std::unique_ptr<Renderer> renderer_ = makeRenderer();
 
   std::unique_ptr<Renderer> makeRenderer() const {
@@ -154,7 +155,7 @@ TEST_P(Figures, IdsAndDepthAreThoseOfTheDrawnShape) {
   const scene::Snapshot snapshot = group();
   Triangles all;
   for (const auto& person : snapshot.avatars)
-    for (const auto& one : trianglesOf(person)) all.push_back(one);
+    for (const auto& one : makeTriangles(person)) all.push_back(one);
   const Frame frame = renderer_->render(snapshot, squareCamera(160));
   EXPECT_EQ(frame.avatars, AvatarForm::figure);
   std::size_t people = 0, others = 0;
@@ -218,7 +219,7 @@ TEST_P(Figures, TheCollisionShapeIsDrawnOnRequest) {
 TEST_P(Figures, ACrouchingPersonIsLowerAndATurnedOneFacesTheOtherWay) {
   const auto outline = [&](double height, double degrees) {
     scene::Snapshot snapshot;
-    snapshot.avatars = {personAt(2, {0, -1, -3}, viewOf(degrees), height)};
+    snapshot.avatars = {personAt(2, {0, -1, -3}, computeDirection(degrees), height)};
     return renderer_->render(snapshot, squareCamera(), {}).ids;
   };
   const auto top = [](const std::vector<std::uint32_t>& ids) {
@@ -249,8 +250,8 @@ TEST_P(Figures, AnAvatarsOwnEyesDoNotSeeItsFigure) {
 
 TEST_P(Figures, FlowFollowsTheTurningFigure) {
   scene::Snapshot then, now;
-  then.avatars = {personAt(2, {0.1, -1, -2}, viewOf(20))};
-  now.avatars = {personAt(2, {0, -1, -1.9}, viewOf(40))};
+  then.avatars = {personAt(2, {0.1, -1, -2}, computeDirection(20))};
+  now.avatars = {personAt(2, {0, -1, -1.9}, computeDirection(40))};
   now.avatars[0].shape = then.avatars[0].shape;
   const Frame before = renderer_->render(then, squareCamera(400));
   const Frame after = renderer_->render(now, squareCamera(400));
@@ -273,7 +274,7 @@ TEST_P(Figures, FlowFollowsTheTurningFigure) {
 }
 
 TEST(FiguresOfBothRenderers, AreShadedEquallyAndSmoothly) {
-  const auto wall = sceneOf({{{0, 0, -8}, {40, 40, 1}, {}}});
+  const auto wall = makeScene({{{0, 0, -8}, {40, 40, 1}, {}}});
   const FrameOptions all{.channels = {true, true, true, true}};
   const Frame gl = GlRenderer(wall).render(group(), squareCamera(), all);
   const Frame rays = RayRenderer(wall).render(group(), squareCamera(), all);

@@ -14,7 +14,7 @@ namespace {
 
 TEST(GlRenderer, DepthIsTrueToRelative1e4NearAndFarInBothProjections) {
   for (const double distance : {0.06, 0.5, 3.0, 40.0, 900.0}) {
-    GlRenderer renderer(sceneOf({{{0, 0, -distance - 5}, {4 * distance, 4 * distance, 10}, {}}}));
+    GlRenderer renderer(makeScene({{{0, 0, -distance - 5}, {4 * distance, 4 * distance, 10}, {}}}));
     Camera camera = squareCamera(50);
     const Frame perspective = renderer.render({}, camera);
     camera.projection = Camera::Projection::orthographic;
@@ -29,7 +29,7 @@ TEST(GlRenderer, DepthIsTrueToRelative1e4NearAndFarInBothProjections) {
 }
 
 TEST(GlRenderer, TheTopOfTheWorldIsAtTheTopOfThePictureAndXToTheRight) {
-  GlRenderer renderer(sceneOf({{{0, 2, -5}, {1, 1, 1}, {}}, {{2, 0, -5}, {1, 1, 1}, {}}}));
+  GlRenderer renderer(makeScene({{{0, 2, -5}, {1, 1, 1}, {}}, {{2, 0, -5}, {1, 1, 1}, {}}}));
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(frame.ids[at(frame, 100, 55)], 1u);
   EXPECT_EQ(frame.ids[at(frame, 145, 100)], 2u);
@@ -38,15 +38,15 @@ TEST(GlRenderer, TheTopOfTheWorldIsAtTheTopOfThePictureAndXToTheRight) {
 
 TEST(GlRenderer, NearerHidesFartherWhateverTheirOrder) {
   const PlacedBox near{{0, 0, -3}, {1, 1, 1}, {}}, far{{0, 0, -6}, {1, 1, 1}, {}};
-  GlRenderer one(sceneOf({near, far}));
-  GlRenderer other(sceneOf({far, near}));
+  GlRenderer one(makeScene({near, far}));
+  GlRenderer other(makeScene({far, near}));
   EXPECT_EQ(one.render({}, squareCamera()).ids[100 * 200 + 100], 1u);
   EXPECT_EQ(other.render({}, squareCamera()).ids[100 * 200 + 100], 2u);
 }
 
 TEST(GlRenderer, AMirroredObjectLooksLikeItsOriginal) {
-  GlRenderer straight(sceneOf({{{0.3, 0.2, -4}, {2, 1, 1}, {}}}));
-  GlRenderer mirrored(sceneOf({{{0.3, 0.2, -4}, {-2, 1, 1}, {}}}));
+  GlRenderer straight(makeScene({{{0.3, 0.2, -4}, {2, 1, 1}, {}}}));
+  GlRenderer mirrored(makeScene({{{0.3, 0.2, -4}, {-2, 1, 1}, {}}}));
   const Frame a = straight.render({}, squareCamera());
   const Frame b = mirrored.render({}, squareCamera());
   EXPECT_EQ(a.ids, b.ids);
@@ -61,8 +61,8 @@ TEST(GlRenderer, SolidGlassIsAFirstHitInAllChannels) {
   opaque.material = coloured(0.05f, 0.05f, 0.9f);
   const FrameOptions options{.channels = {true, true, true, true},
                              .transparency = TransparencyMode::opaque};
-  const Frame solid = GlRenderer(sceneOf({pane, wall})).render({}, squareCamera(), options);
-  const Frame expected = GlRenderer(sceneOf({opaque, wall})).render({}, squareCamera(), options);
+  const Frame solid = GlRenderer(makeScene({pane, wall})).render({}, squareCamera(), options);
+  const Frame expected = GlRenderer(makeScene({opaque, wall})).render({}, squareCamera(), options);
   EXPECT_EQ(solid.ids[at(solid, 100, 100)], 1u);
   EXPECT_NEAR(solid.depth[at(solid, 100, 100)], 2.9, 3e-4);
   EXPECT_EQ(solid.rgb, expected.rgb);
@@ -71,7 +71,7 @@ TEST(GlRenderer, SolidGlassIsAFirstHitInAllChannels) {
 }
 
 TEST(GlRenderer, NormalsAreThoseOfTheFacesAndLookAtTheEye) {
-  GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, -3, -5}, {40, 1, 4}, {}}}));
+  GlRenderer renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, -3, -5}, {40, 1, 4}, {}}}));
   Camera camera = squareCamera();
   camera.pinhole = Pinhole{100, 100, 100, 100};
   const Frame frame = renderer.render({}, camera, {.channels = {false, true, true, true}});
@@ -88,7 +88,7 @@ TEST(GlRenderer, NormalsAreThoseOfTheFacesAndLookAtTheEye) {
 }
 
 TEST(GlRenderer, EachChannelIsIndependentOfTheOtherRequestedChannels) {
-  GlRenderer renderer(sceneOf(crowd(200)));
+  GlRenderer renderer(makeScene(crowd(200)));
   const Frame all = renderer.render({}, squareCamera(), {.channels = {true, true, true, true}});
   for (int asked = 0; asked < 16; ++asked) {
     const Channels channels{(asked & 1) != 0, (asked & 2) != 0, (asked & 4) != 0, (asked & 8) != 0};
@@ -105,7 +105,7 @@ TEST(GlRenderer, EachChannelIsIndependentOfTheOtherRequestedChannels) {
 TEST(GlRenderer, AnOffCentrePinholeSeesPartOfALargerImage) {
   // The right half of an image of twice the width: same focal length, principal axis at the left
   // border.
-  GlRenderer renderer(sceneOf(crowd(200)));
+  GlRenderer renderer(makeScene(crowd(200)));
   Camera wide = squareCamera(100);
   wide.width = 200;
   wide.pinhole = Pinhole{50, 50, 100, 50};
@@ -127,7 +127,7 @@ TEST(GlRenderer, AnOffCentrePinholeSeesPartOfALargerImage) {
 }
 
 TEST(GlRenderer, RangeIsTheDistanceFromTheEye) {
-  GlRenderer renderer(sceneOf({{{0, 0, -5}, {40, 40, 2}, {}}}));
+  GlRenderer renderer(makeScene({{{0, 0, -5}, {40, 40, 2}, {}}}));
   Camera camera = squareCamera();
   const Frame frame = renderer.render({}, camera);
   const std::vector<float> range = computeRange(frame);
@@ -140,7 +140,7 @@ TEST(GlRenderer, RangeIsTheDistanceFromTheEye) {
 }
 
 TEST(GlRenderer, ADeviceThatIsNotThereIsRefusedWithAllThatWereTried) {
-  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}});
   try {
     GlRenderer renderer(scene, {.device = "no such device"});
     ADD_FAILURE() << "drawn with " << renderer.deviceName();
@@ -157,7 +157,7 @@ TEST(GlRenderer, ADeviceThatIsNotThereIsRefusedWithAllThatWereTried) {
 }
 
 TEST(GlRenderer, TheSamePictureHasTheSameBytesInEveryRenderer) {
-  const auto scene = sceneOf(crowd(300));
+  const auto scene = makeScene(crowd(300));
   scene::Snapshot snapshot;
   snapshot.avatars = {avatarAt(301, {1, -1, -4})};
   Camera camera = squareCamera(300);
@@ -181,7 +181,7 @@ TEST(GlRenderer, ProjectAgreesWithThePictureOfIds) {
     box.material.alpha = scene::Material::Alpha::opaque;
     box.size = Vec3::Constant(0.15);
   }
-  GlRenderer renderer(sceneOf(boxes));
+  GlRenderer renderer(makeScene(boxes));
   int seen = 0;
   for (const bool parallel : {false, true}) {
     Camera camera;
@@ -207,7 +207,7 @@ TEST(GlRenderer, ProjectAgreesWithThePictureOfIds) {
 }
 
 TEST(GlRenderer, SizesMayChangeFromPictureToPicture) {
-  GlRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  GlRenderer renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(333, 7), std::pair(8, 8)}) {
     Camera camera = squareCamera();
     camera.width = width;
@@ -219,7 +219,7 @@ TEST(GlRenderer, SizesMayChangeFromPictureToPicture) {
 }
 
 TEST(GlRenderer, FiftyAreCreatedAndDestroyedAndTwoCoexist) {
-  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}});
   GlRenderer lasting(scene);
   const Frame before = lasting.render({}, squareCamera(40));
   for (int i = 0; i < 50; ++i) {

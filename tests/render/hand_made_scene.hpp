@@ -21,7 +21,7 @@ struct PlacedBox {
 };
 
 /// Object i is box i, so its id is i + 1.
-inline std::shared_ptr<const scene::Scene> sceneOf(const std::vector<PlacedBox>& boxes) {
+inline std::shared_ptr<const scene::Scene> makeScene(const std::vector<PlacedBox>& boxes) {
   scene::Model model;
   model.source = "boxes made by hand";
   for (const PlacedBox& box : boxes) {

@@ -108,7 +108,7 @@ TEST(AtomicFile, AFailureNamesTheFileAndLeavesNoPart) {
 constexpr Colour kBlack{0, 0, 0}, kWhite{255, 255, 255};
 
 /// Covered pixels of a canvas that is black where nothing is drawn.
-double areaOf(const Canvas& canvas) {
+double computeArea(const Canvas& canvas) {
   const Image image = canvas.toImage();
   double area = 0;
   for (std::size_t i = 0; i < image.rgb.size(); i += 3) area += image.rgb[i] / 255.0;
@@ -128,14 +128,14 @@ TEST(Canvas, ImagesComeBackAsTheyWere) {
 TEST(Canvas, ShapesHaveTheirArea) {
   Canvas disc(60, 60, kBlack), loop(60, 60, kBlack), arc(60, 60, kBlack);
   disc.disc({30.3, 29.6}, 12, kWhite);
-  EXPECT_NEAR(areaOf(disc), 3.14159265 * 144, 5);
+  EXPECT_NEAR(computeArea(disc), 3.14159265 * 144, 5);
   // A square with a hole.
   loop.fill(std::vector<std::vector<Point>>{{{10, 10}, {50, 10}, {50, 50}, {10, 50}},
                                             {{20, 20}, {40, 20}, {40, 40}, {20, 40}}},
             kWhite);
-  EXPECT_NEAR(areaOf(loop), 1600 - 400, 5);
+  EXPECT_NEAR(computeArea(loop), 1600 - 400, 5);
   arc.arc({30, 30}, 20, 0, 1.5, 2, kWhite);
-  EXPECT_NEAR(areaOf(arc), 1.5 * 20 * 2 + 3.14, 5);  // with its round caps
+  EXPECT_NEAR(computeArea(arc), 1.5 * 20 * 2 + 3.14, 5);  // with its round caps
 }
 
 TEST(Canvas, ALineHasItsLengthTimesItsThicknessInEveryDirection) {
@@ -143,7 +143,8 @@ TEST(Canvas, ALineHasItsLengthTimesItsThicknessInEveryDirection) {
     const double angle = degrees * 3.14159265358979 / 180;
     Canvas canvas(120, 120, kBlack);
     canvas.line({60, 60}, {60 + 40 * std::cos(angle), 60 + 40 * std::sin(angle)}, 3, kWhite);
-    EXPECT_NEAR(areaOf(canvas), 40 * 3 + 3.14159265 * 2.25, 6) << degrees;  // with its round caps
+    EXPECT_NEAR(computeArea(canvas), 40 * 3 + 3.14159265 * 2.25, 6)
+        << degrees;  // with its round caps
   }
 }
 
@@ -155,7 +156,7 @@ TEST(Canvas, PointsOutsideAndNonFiniteOnesDrawNothing) {
   canvas.disc({std::nan(""), 1}, 3, kWhite);
   canvas.text({-100, -100}, "text", {});
   canvas.text({std::nan(""), 1}, "text", {});
-  EXPECT_EQ(areaOf(canvas), 0);
+  EXPECT_EQ(computeArea(canvas), 0);
 }
 
 TEST(Canvas, LettersOfAllScriptsDiffer) {
@@ -165,7 +166,7 @@ TEST(Canvas, LettersOfAllScriptsDiffer) {
   for (const char* text : {"A", "Ä", "ß", "é", "Ж", "Ω", "A\xff"}) {
     Canvas canvas(60, 30, kBlack);
     canvas.text({4, 2}, text, style);
-    EXPECT_GT(areaOf(canvas), 10) << text;
+    EXPECT_GT(computeArea(canvas), 10) << text;
     pictures.push_back(canvas.toImage().rgb);
     EXPECT_EQ(std::count(pictures.begin(), pictures.end(), pictures.back()), 1) << text;
   }
@@ -221,7 +222,7 @@ TEST(Canvas, KindsOfLinesDifferInTheirInk) {
                               LineKind::longDashes, LineKind::solid}) {
     Canvas canvas(320, 20, kBlack);
     canvas.polyline(std::array{Point{10, 10}, Point{310, 10}}, 3, kWhite, kind);
-    areas.push_back(areaOf(canvas));
+    areas.push_back(computeArea(canvas));
   }
   EXPECT_TRUE(std::ranges::is_sorted(areas));
   EXPECT_LT(areas[0], 0.7 * areas.back());
@@ -244,7 +245,7 @@ TEST(Canvas, DrawsLettersOfChineseJapaneseAndKorean) {
     Canvas canvas(60, 60, kBlack);
     canvas.text({10, 10}, letter, {.size = 30, .colour = kWhite});
     EXPECT_EQ(canvas.textWithoutFont(), "") << letter;
-    areas.push_back(areaOf(canvas));
+    areas.push_back(computeArea(canvas));
     EXPECT_GT(areas.back(), 20) << letter << " is blank";
   }
   std::ranges::sort(areas);
@@ -298,13 +299,14 @@ TEST(ContactSheet, ShowsEveryPictureOnceInAGrid) {
 }
 
 TEST(ContactSheet, LongTextsHaveMoreLines) {
-  const auto heightOf = [](const std::string& title, const std::string& caption) {
+  const auto computeHeight = [](const std::string& title, const std::string& caption) {
     return makeContactSheet({{plain(320, 240), caption}}, title, 4).height;
   };
-  const int small = heightOf("es.jsonl", "lamp");
-  EXPECT_GT(heightOf("es.jsonl in schependomlaan_establishment.ifc", "lamp"), small);
-  EXPECT_GT(heightOf("es.jsonl", "lamp  ann  tick 123456  (-1234.5, 12.3, -2345.6), from the door"),
-            small);
+  const int small = computeHeight("es.jsonl", "lamp");
+  EXPECT_GT(computeHeight("es.jsonl in schependomlaan_establishment.ifc", "lamp"), small);
+  EXPECT_GT(
+      computeHeight("es.jsonl", "lamp  ann  tick 123456  (-1234.5, 12.3, -2345.6), from the door"),
+      small);
 }
 
 }  // namespace

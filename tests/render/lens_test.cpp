@@ -100,7 +100,7 @@ TEST(Lens, AnEquirectangularPictureHasAnglesAsARangeScan) {
 }
 
 TEST(Lens, FramesShowWhatRaysInDoublesMeet) {
-  const auto scene = sceneOf(crowd(60));
+  const auto scene = makeScene(crowd(60));
   scene::RayCaster caster(scene);
   caster.update({});
   RayRenderer renderer(scene);
@@ -142,7 +142,7 @@ TEST(Lens, FramesShowWhatRaysInDoublesMeet) {
 }
 
 TEST(Lens, InTheMiddleColoursAreThoseOfAPinhole) {
-  const auto scene = sceneOf(crowd(60));
+  const auto scene = makeScene(crowd(60));
   RayRenderer renderer(scene);
   Camera pinhole = lensCamera(Camera::Lens::Kind::fisheye, 64, 64);
   pinhole.pinhole = Pinhole{600, 600, 32, 32};  // 6 degrees: almost no distortion
@@ -160,7 +160,7 @@ TEST(Lens, CornersAreDarkerThanTheMiddleOfWalls) {
   floor.centre = {2, -1.6, 0}, floor.size = {8, 0.2, 8};
   wall.centre = {3.1, 0, 0}, wall.size = {0.2, 4, 8};
   floor.material = wall.material = coloured(0.6f, 0.6f, 0.6f, 1);
-  RayRenderer renderer(sceneOf({floor, wall}));
+  RayRenderer renderer(makeScene({floor, wall}));
   for (const auto kind : {Camera::Lens::Kind::fisheye, Camera::Lens::Kind::equirectangular}) {
     Camera camera = lensCamera(kind, 400, 200);
     camera.eye = Vec3::Zero();

@@ -11,7 +11,7 @@ namespace enfilade::render {
 namespace {
 
 TEST(OpticalFlow, OfAMovedCameraIsTheProjectionOfTheSamePoints) {
-  const auto scene = sceneOf(crowd(40));
+  const auto scene = makeScene(crowd(40));
   RayRenderer renderer(scene);
   Camera now;
   now.eye = {0.3, 0.1, -0.2};
@@ -55,7 +55,7 @@ TEST(OpticalFlow, OfAMovedCameraIsTheProjectionOfTheSamePoints) {
 }
 
 TEST(OpticalFlow, WithoutMotionIsZeroAndBehindTheCameraUnknown) {
-  const auto scene = sceneOf({{{0, 0, -5}, {40, 40, 1}, {}}});
+  const auto scene = makeScene({{{0, 0, -5}, {40, 40, 1}, {}}});
   RayRenderer renderer(scene);
   Camera now;
   now.forward = {0, 0, -1};

@@ -81,7 +81,7 @@ Agreement compareWithBruteForce(const std::shared_ptr<const scene::Scene>& scene
 }
 
 TEST(RayRenderer, DepthAndIdsAreThoseOfABruteForceSearchInDoubles) {
-  const auto scene = sceneOf(opaque(crowd(150)));
+  const auto scene = makeScene(opaque(crowd(150)));
   const auto cameras = camerasAround(Vec3::Zero(), 12, 67, 41);
   const Agreement found = compareWithBruteForce(scene, cameras);
   EXPECT_GT(found.hits, 12u * 67u * 41u / 4);
@@ -94,7 +94,7 @@ TEST(RayRenderer, DepthIsAsTrueAKilometreFromTheOriginOfTheScene) {
   const Vec3 far(900, 20, -700);
   for (PlacedBox& box : boxes) box.centre += far;
   boxes.push_back({{0, 0, 0}, {1, 1, 1}, {}});  // moves the scene's centre
-  const Agreement found = compareWithBruteForce(sceneOf(boxes), camerasAround(far, 6, 67, 41));
+  const Agreement found = compareWithBruteForce(makeScene(boxes), camerasAround(far, 6, 67, 41));
   EXPECT_GT(found.hits, 6u * 67u * 41u / 4);
   EXPECT_LT(found.worst, 1e-5);
 }
@@ -103,7 +103,7 @@ TEST(RayRenderer, APaneSeenSquarelyIsTintedOnceAlongItsDiagonalToo) {
   // The image centre is the pane's centre: rays hit the shared edge of its two triangles.
   const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
   const PlacedBox pane{{0, 0, -3}, {1, 1, 0}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
-  RayRenderer renderer(sceneOf({pane, wall}));
+  RayRenderer renderer(makeScene({pane, wall}));
   Camera camera = squareCamera(201);
   const Frame frame = renderer.render({}, camera);
   const auto red = [&](int x, int y) { return int{frame.rgb[3 * at(frame, x, y)]}; };
@@ -114,7 +114,7 @@ TEST(RayRenderer, APaneSeenSquarelyIsTintedOnceAlongItsDiagonalToo) {
 }
 
 TEST(RayRenderer, AnOrthographicCameraSeesBehindItsEyeWithNegativeNear) {
-  RayRenderer renderer(sceneOf({{{0, 0, 5}, {2, 2, 2}, {}}, {{0, 0, -5}, {20, 20, 2}, {}}}));
+  RayRenderer renderer(makeScene({{{0, 0, 5}, {2, 2, 2}, {}}, {{0, 0, -5}, {20, 20, 2}, {}}}));
   Camera camera = squareCamera();
   camera.projection = Camera::Projection::orthographic;
   camera.heightY = 4;
@@ -151,7 +151,7 @@ TEST(RayRenderer, ABodyIsSeenWhereTheSnapshotHasIt) {
 }
 
 TEST(RayRenderer, PicturesDoNotDependOnTheNumberOfThreads) {
-  const auto scene = sceneOf(crowd(300));
+  const auto scene = makeScene(crowd(300));
   scene::Snapshot snapshot;
   snapshot.avatars = {avatarAt(301, {1, -1, -4})};
   RayRenderer one(scene, {1}), two(scene, {2}), five(scene, {5});
@@ -170,7 +170,7 @@ TEST(RayRenderer, PicturesDoNotDependOnTheNumberOfThreads) {
 }
 
 TEST(RayRenderer, UnrequestedChannelsAreEmptyAndTheOthersAreEqual) {
-  RayRenderer renderer(sceneOf(crowd(100)));
+  RayRenderer renderer(makeScene(crowd(100)));
   const Camera camera = camerasAround(Vec3::Zero(), 1, 80, 60).front();
   FrameOptions all;
   all.channels.normals = true;
@@ -187,7 +187,7 @@ TEST(RayRenderer, UnrequestedChannelsAreEmptyAndTheOthersAreEqual) {
 }
 
 TEST(RayRenderer, NormalsHaveUnitLengthAndFaceTheEye) {
-  RayRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  RayRenderer renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
   FrameOptions options;
   options.channels.normals = true;
   const Frame frame = renderer.render({}, squareCamera(), options);
@@ -198,7 +198,7 @@ TEST(RayRenderer, NormalsHaveUnitLengthAndFaceTheEye) {
 }
 
 TEST(RayRenderer, NearAndFarCutAsInEveryPicture) {
-  RayRenderer renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {9, 9, 1}, {}}}));
+  RayRenderer renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {9, 9, 1}, {}}}));
   Camera camera = squareCamera();
   camera.near = 4.5;
   const Frame inside = renderer.render({}, camera);
@@ -215,7 +215,7 @@ TEST(RayRenderer, NamesEmbreeInItsFrames) {
 }
 
 TEST(RayRenderer, IdsEqualThoseOfOpenGlExceptAtEdges) {
-  const auto scene = sceneOf(crowd(300));
+  const auto scene = makeScene(crowd(300));
   scene::Snapshot snapshot;
   snapshot.avatars = {avatarAt(301, {1, -1, -4})};
   RayRenderer rays(scene);
@@ -260,7 +260,7 @@ TEST(RayRenderer, EveryShadeFromBlackToWhiteIsWithinAStepOfGl) {
     material.roughness = 1;
     boxes.push_back({{-4.95 + 0.1 * i, 0, -5}, {0.1, 1, 0.1}, material});
   }
-  const auto scene = sceneOf(boxes);
+  const auto scene = makeScene(boxes);
   RayRenderer rays(scene);
   GlRenderer gl(scene);
   const Frame a = rays.render({}, squareCamera(400)), b = gl.render({}, squareCamera(400));

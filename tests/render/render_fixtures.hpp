@@ -105,9 +105,9 @@ inline std::shared_ptr<const scene::Scene> texturedRoom() {
 
 /// A wall (object 1) and in front of it a cube of one metre (object 2), which is a lift.
 inline std::shared_ptr<const scene::Scene> sceneWithLift() {
-  scene::Model model =
-      sceneOf({{{0, 0, -8}, {40, 40, 1}, {}}, {{0, 0, -5}, {1, 1, 1}, coloured(0.9f, 0.2f, 0.1f)}})
-          ->model();
+  scene::Model model = makeScene({{{0, 0, -8}, {40, 40, 1}, {}},
+                                  {{0, 0, -5}, {1, 1, 1}, coloured(0.9f, 0.2f, 0.1f)}})
+                           ->model();
   scene::BodySpec lift;
   lift.name = "lift";
   lift.kind = scene::BodyKind::lift;

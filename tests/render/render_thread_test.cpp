@@ -10,19 +10,19 @@
 namespace enfilade::render {
 namespace {
 
-std::shared_ptr<const scene::Snapshot> snapshotOf(std::uint64_t tick) {
+std::shared_ptr<const scene::Snapshot> makeSnapshot(std::uint64_t tick) {
   auto snapshot = std::make_shared<scene::Snapshot>();
   snapshot->tick = tick;
   return snapshot;
 }
 
 TEST(RenderThread, SeveralThreadsEachGetTheirOwnPictures) {
-  RenderThread renders(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}, {{5, 0, 0}, {2, 2, 2}, {}}}));
+  RenderThread renders(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{5, 0, 0}, {2, 2, 2}, {}}}));
   const auto ask = [&](std::uint64_t first, const Vec3& forward, std::uint32_t expected) {
     for (std::uint64_t tick = first; tick < first + 10; ++tick) {
       Camera camera = squareCamera(32);
       camera.forward = forward;
-      const Frame frame = renders.render(snapshotOf(tick), camera).get();
+      const Frame frame = renders.render(makeSnapshot(tick), camera).get();
       EXPECT_EQ(frame.tick, tick);
       EXPECT_EQ(frame.ids[at(frame, 16, 16)], expected);
     }
@@ -37,12 +37,12 @@ TEST(RenderThread, SeveralThreadsEachGetTheirOwnPictures) {
 }
 
 TEST(RenderThread, ARefusedCameraFailsItsFutureAndTheThreadContinues) {
-  RenderThread renders(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  RenderThread renders(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
   Camera bad = squareCamera(32);
   bad.eye.x() = std::nan("");
-  auto refused = renders.render(snapshotOf(1), bad);
+  auto refused = renders.render(makeSnapshot(1), bad);
   auto missing = renders.render(nullptr, squareCamera(32));
-  auto fine = renders.render(snapshotOf(2), squareCamera(32));
+  auto fine = renders.render(makeSnapshot(2), squareCamera(32));
   EXPECT_THROW(refused.get(), RenderError);
   EXPECT_THROW(missing.get(), RenderError);
   EXPECT_EQ(fine.get().tick, 2u);
@@ -51,9 +51,9 @@ TEST(RenderThread, ARefusedCameraFailsItsFutureAndTheThreadContinues) {
 TEST(RenderThread, QueuedImagesAreFinishedBeforeTheEnd) {
   std::vector<std::future<Frame>> frames;
   {
-    RenderThread renders(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+    RenderThread renders(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
     for (std::uint64_t tick = 0; tick < 8; ++tick) {
-      frames.push_back(renders.render(snapshotOf(tick), squareCamera(32)));
+      frames.push_back(renders.render(makeSnapshot(tick), squareCamera(32)));
     }
   }
   for (std::uint64_t tick = 0; tick < frames.size(); ++tick) {
@@ -62,12 +62,13 @@ TEST(RenderThread, QueuedImagesAreFinishedBeforeTheEnd) {
 }
 
 TEST(RenderThread, WithoutADeviceEachImageIsRefusedWithTheReason) {
-  RenderThread renders(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}), {.device = "no such device"});
-  auto first = renders.render(snapshotOf(1), squareCamera(32));  // while the device is being opened
+  RenderThread renders(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}), {.device = "no such device"});
+  auto first =
+      renders.render(makeSnapshot(1), squareCamera(32));  // while the device is being opened
   EXPECT_TRUE(renders.deviceName().empty());
   EXPECT_NE(renders.unavailableReason().find("no such device"), std::string::npos)
       << renders.unavailableReason();
-  auto second = renders.render(snapshotOf(2), squareCamera(32));
+  auto second = renders.render(makeSnapshot(2), squareCamera(32));
   EXPECT_THROW(first.get(), RendererUnavailable);
   EXPECT_THROW(second.get(), RendererUnavailable);
 }

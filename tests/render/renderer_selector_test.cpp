@@ -24,7 +24,7 @@ TEST(RendererSelector, AGpuIsAlwaysPreferred) {
 }
 
 TEST(RendererSelector, EachKindDrawsWithItsOwnAndARequestGoesBeforeIt) {
-  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}});
   RendererSelector gl(scene, RendererKind::gl), rays(scene, RendererKind::rays);
   const Camera camera = squareCamera(20);
   const std::string glName = gl.render({}, camera).renderer;
@@ -54,7 +54,7 @@ TEST(RendererSelector, OnACpuRaysDrawSmallPicturesButForColoursOfFewTriangles) {
 }
 
 TEST(RendererSelector, AutomaticFollowsItsRule) {
-  const auto scene = sceneOf(crowd(50));
+  const auto scene = makeScene(crowd(50));
   RendererSelector renderer(scene);
   for (const Channels& channels : {kColour, kMeasured}) {
     for (const int size : {20, 300}) {
@@ -70,7 +70,7 @@ TEST(RendererSelector, AutomaticFollowsItsRule) {
 }
 
 TEST(RendererSelector, ADeviceThatIsNotThereIsAnErrorWithTheKindsThatNeedOne) {
-  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}});
   const DeviceChoice none{"no device is called so", false};
   EXPECT_THROW(RendererSelector(scene, RendererKind::gl, none), RenderError);
   EXPECT_THROW(RendererSelector(scene, RendererKind::automatic, none), RenderError);
@@ -81,12 +81,12 @@ TEST(RendererSelector, ADeviceThatIsNotThereIsAnErrorWithTheKindsThatNeedOne) {
 }
 
 TEST(RendererSelector, RaysAreRefusedWhereAGpuIsRequired) {
-  const auto scene = sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}});
+  const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}});
   EXPECT_THROW(RendererSelector(scene, RendererKind::rays, {"", true}), RenderError);
 }
 
 TEST(RendererSelector, NamesTheRendererOfAFrameInAdvance) {
-  RendererSelector selector(sceneOf(crowd(60)));
+  RendererSelector selector(makeScene(crowd(60)));
   for (const int size : {8, 64, 300}) {
     for (const bool colour : {false, true}) {
       const FrameOptions options{.channels = {colour, true, true, false}};
@@ -97,7 +97,7 @@ TEST(RendererSelector, NamesTheRendererOfAFrameInAdvance) {
 }
 
 TEST(RendererSelector, AutomaticShadowsAreForLargePerspectiveColourByProcessors) {
-  RendererSelector selector(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}), RendererKind::rays);
+  RendererSelector selector(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}), RendererKind::rays);
   FrameOptions options{.automaticShadows = true};
   Camera camera = squareCamera(300);
   EXPECT_TRUE(selector.render({}, camera, options).shadows);

@@ -35,7 +35,7 @@ TYPED_TEST_SUITE(BothRenderers, Kinds, KindNames);
 TYPED_TEST(BothRenderers, SeeABoxExactlyWhereItsGeometrySays) {
   // The box's face is 2 m square, 4 m ahead; the image is 8 m wide there: the middle 50 pixels of
   // 200.
-  TypeParam renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  TypeParam renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
   const Frame frame = renderer.render({}, squareCamera());
   for (int y = 0; y < 200; ++y) {
     for (int x = 0; x < 200; ++x) {
@@ -54,7 +54,7 @@ TYPED_TEST(BothRenderers, SeeABoxExactlyWhereItsGeometrySays) {
 TYPED_TEST(BothRenderers, TintTheColourByGlassAndLetIdsAndDepthThrough) {
   const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
   const PlacedBox pane{{0, 0, -3}, {1, 1, 0.1}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
-  TypeParam renderer(sceneOf({pane, wall}));
+  TypeParam renderer(makeScene({pane, wall}));
   const Frame frame = renderer.render({}, squareCamera());
   EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
   const std::size_t through = at(frame, 100, 100), nextTo = at(frame, 20, 100);
@@ -72,8 +72,8 @@ TYPED_TEST(BothRenderers, TintTheColourByGlassAndLetIdsAndDepthThrough) {
 TYPED_TEST(BothRenderers, DoNotShowGlassBehindAWall) {
   const PlacedBox wall{{0, 0, -3}, {20, 20, 1}, {}};
   const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, coloured(0.9f, 0.0f, 0.0f, 0.5f)};
-  TypeParam with(sceneOf({wall, pane}));
-  TypeParam without(sceneOf({wall}));
+  TypeParam with(makeScene({wall, pane}));
+  TypeParam without(makeScene({wall}));
   EXPECT_EQ(with.render({}, squareCamera()).rgb, without.render({}, squareCamera()).rgb);
 }
 
@@ -86,7 +86,7 @@ TYPED_TEST(BothRenderers, CutTheHolesOfAMaskIntoIdsAndDepth) {
 }
 
 TYPED_TEST(BothRenderers, DrawAllAvatarsWhereTheyStandExceptTheHiddenOne) {
-  TypeParam renderer(sceneOf({{{0, 0, -20}, {60, 60, 1}, {}}}));
+  TypeParam renderer(makeScene({{{0, 0, -20}, {60, 60, 1}, {}}}));
   scene::Snapshot snapshot;
   snapshot.tick = 42;
   snapshot.avatars = {avatarAt(2, {-1, -1, -4}), avatarAt(3, {1, -1, -4})};
@@ -115,7 +115,7 @@ TYPED_TEST(BothRenderers, ShowSkyInAnEmptyScene) {
 }
 
 TYPED_TEST(BothRenderers, RefuseABadCameraAndDrawTheNextPicture) {
-  TypeParam renderer(sceneOf({{{0, 0, -5}, {2, 2, 2}, {}}}));
+  TypeParam renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
   Camera bad = squareCamera();
   bad.far = std::nan("");
   EXPECT_THROW(renderer.render({}, bad), RenderError);

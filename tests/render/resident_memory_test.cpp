@@ -31,7 +31,7 @@ std::vector<PlacedBox> manyBoxes() {
 template <class OneRenderer>
 void work(int reloads) {
   for (int reload = 0; reload < reloads; ++reload) {
-    OneRenderer renderer(sceneOf(manyBoxes()));
+    OneRenderer renderer(makeScene(manyBoxes()));
     for (int i = 0; i < 20; ++i) {
       Camera camera = squareCamera(96);
       camera.forward = {std::cos(0.3 * i), -0.1, std::sin(0.3 * i)};

@@ -85,7 +85,7 @@ class Samples : public testing::TestWithParam<RendererKind> {
   }
 };
 
-double linearOf(std::uint8_t byte) {
+double toLinear(std::uint8_t byte) {
   const double s = byte / 255.0;
   return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
 }
@@ -100,8 +100,8 @@ double differenceFrom(const Frame& large, const Frame& frame) {
         double mean = 0;
         for (int v = 0; v < kScale; ++v)
           for (int u = 0; u < kScale; ++u)
-            mean += linearOf(large.rgb[3 * at(large, kScale * x + u, kScale * y + v) + c]);
-        sum += std::abs(mean / (kScale * kScale) - linearOf(frame.rgb[3 * at(frame, x, y) + c]));
+            mean += toLinear(large.rgb[3 * at(large, kScale * x + u, kScale * y + v) + c]);
+        sum += std::abs(mean / (kScale * kScale) - toLinear(frame.rgb[3 * at(frame, x, y) + c]));
       }
     }
   }
@@ -115,7 +115,7 @@ std::shared_ptr<const scene::Scene> boxesApart() {
     const Vec3 place(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 2);
     boxes.push_back({3.5 * place, {1, 1.2, 0.8}, coloured(0.9f, 0.2f, 0.1f)});
   }
-  return sceneOf(boxes);
+  return makeScene(boxes);
 }
 
 TEST_P(Samples, ApproachThePictureOfEightTimesTheSize) {
@@ -141,7 +141,7 @@ TEST_P(Samples, ApproachThePictureOfEightTimesTheSize) {
 }
 
 TEST_P(Samples, ChangeOnlyTheColour) {
-  const auto renderer = makeRenderer(sceneOf(crowd(200)));
+  const auto renderer = makeRenderer(makeScene(crowd(200)));
   FrameOptions options{.channels = {true, true, true, true}};
   for (const Camera& camera : camerasOfAllProjections()) {
     options.samples = 1;
@@ -160,7 +160,7 @@ TEST_P(Samples, ChangeOnlyTheColour) {
 }
 
 TEST_P(Samples, OfOtherNumbersAreRefusedByName) {
-  const auto renderer = makeRenderer(sceneOf(crowd(3)));
+  const auto renderer = makeRenderer(makeScene(crowd(3)));
   for (const std::uint32_t samples : {0u, 2u, 3u, 8u, 64u}) {
     try {
       renderer->render({}, squareCamera(8), {.samples = samples});
@@ -172,7 +172,7 @@ TEST_P(Samples, OfOtherNumbersAreRefusedByName) {
 }
 
 TEST(SamplesOfALens, SmoothItsEdges) {
-  RayRenderer renderer(sceneOf(opaque(crowd(200))));
+  RayRenderer renderer(makeScene(opaque(crowd(200))));
   for (const auto kind : {Camera::Lens::Kind::fisheye, Camera::Lens::Kind::equirectangular}) {
     Camera camera = camerasOfAllProjections().front();
     camera.lens = Camera::Lens{.kind = kind};

@@ -21,10 +21,10 @@ constexpr scene::EntityId kWall = 1, kPane = 2, kLift = 3;
 
 /// A wall, a pane, and before them a lift of two cubes with one mesh.
 std::shared_ptr<const scene::Scene> twoCubesLift() {
-  scene::Model model = sceneOf({{{0, 0, -9}, {40, 40, 1}, {}},
-                                {{0, 0, -7}, {40, 40, 0.1}, coloured(0, 0, 1, 0.5f)},
-                                {{-1, 0, -5}, {1, 1, 1}, {}},
-                                {{1, 0, -5}, {1, 1, 1}, {}}})
+  scene::Model model = makeScene({{{0, 0, -9}, {40, 40, 1}, {}},
+                                  {{0, 0, -7}, {40, 40, 0.1}, coloured(0, 0, 1, 0.5f)},
+                                  {{-1, 0, -5}, {1, 1, 1}, {}},
+                                  {{1, 0, -5}, {1, 1, 1}, {}}})
                            ->model();
   model.objects[3].meshes = {2};
   scene::BodySpec lift;

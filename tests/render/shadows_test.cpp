@@ -71,7 +71,7 @@ class Shadows : public testing::TestWithParam<RendererKind> {};
 
 TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
   const std::vector<PlacedBox> boxes = boxesOnAFloor();
-  RendererSelector renderer(sceneOf(boxes), GetParam());
+  RendererSelector renderer(makeScene(boxes), GetParam());
   for (const bool parallel : {false, true}) {
     Camera camera = slantedCamera();
     if (parallel) camera.projection = Camera::Projection::orthographic, camera.heightY = 16;
@@ -111,7 +111,7 @@ TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
 TEST_P(Shadows, OnlySolidGlassCastsShadows) {
   const PlacedBox floor{{0, -1, 0}, {20, 1, 20}, {}};
   const PlacedBox pane{{0, 2, 0}, {6, 0.1, 6}, coloured(0.2f, 0.2f, 0.9f, 0.3f)};
-  RendererSelector renderer(sceneOf({floor, pane}), GetParam());
+  RendererSelector renderer(makeScene({floor, pane}), GetParam());
   Camera camera = squareCamera(40);  // below the pane, towards its shadow
   camera.eye = {-2, 1, -2};
   camera.forward = {0, -1, 0};
@@ -159,7 +159,7 @@ TEST_P(Shadows, HolesOfTexturesLetTheSunThrough) {
 TEST_P(Shadows, GeometryThatAPlanCutsAwayCastsNone) {
   const PlacedBox floor{{0, -0.5, 0}, {20, 1, 20}, {}}, roof{{0, 3, 0}, {20, 0.2, 20}, {}};
   const PlacedBox wall{{0, 1.25, 0}, {0.2, 2.5, 8}, {}};
-  RendererSelector renderer(sceneOf({floor, roof, wall}), GetParam());
+  RendererSelector renderer(makeScene({floor, roof, wall}), GetParam());
   Camera camera = makePlanCamera({Vec3(-4, 0, -4), Vec3(4, 0, 4)}, -0.1, 2, 80, 80);
   const Frame shaded = renderer.render({}, camera, withShadows());
   const Frame sunny = renderer.render({}, camera, withShadows(false));
@@ -174,7 +174,7 @@ TEST_P(Shadows, GeometryThatAPlanCutsAwayCastsNone) {
 }
 
 TEST_P(Shadows, APersonCastsOneButForTheirOwnEyes) {
-  RendererSelector renderer(sceneOf({{{0, -0.5, 0}, {20, 1, 20}, {}}}), GetParam());
+  RendererSelector renderer(makeScene({{{0, -0.5, 0}, {20, 1, 20}, {}}}), GetParam());
   scene::Snapshot snapshot;
   snapshot.avatars = {avatarAt(7, Vec3::Zero())};
   Camera camera = slantedCamera();
@@ -184,10 +184,10 @@ TEST_P(Shadows, APersonCastsOneButForTheirOwnEyes) {
   camera.eye = {-0.6, 3, -0.8};  // above the shadow
   camera.forward = {0, -1, 0};
   camera.up = Vec3::UnitX();
-  const auto floorOf = [&](const Frame& frame) { return frame.rgb[3 * at(frame, 75, 55)]; };
-  const int shaded = floorOf(renderer.render(snapshot, camera, options));
+  const auto getFloorRed = [&](const Frame& frame) { return frame.rgb[3 * at(frame, 75, 55)]; };
+  const int shaded = getFloorRed(renderer.render(snapshot, camera, options));
   options.hiddenEntity = 7;
-  EXPECT_GT(floorOf(renderer.render(snapshot, camera, options)), shaded + 5);
+  EXPECT_GT(getFloorRed(renderer.render(snapshot, camera, options)), shaded + 5);
 }
 
 INSTANTIATE_TEST_SUITE_P(OfBothRenderers, Shadows,
@@ -195,13 +195,13 @@ INSTANTIATE_TEST_SUITE_P(OfBothRenderers, Shadows,
                          [](const auto& kind) { return std::string(toString(kind.param)); });
 
 TEST(ShadowsOfGl, NeedAShadowMask) {
-  GlRenderer renderer(sceneOf(boxesOnAFloor()));
+  GlRenderer renderer(makeScene(boxesOnAFloor()));
   EXPECT_THROW(renderer.render({}, squareCamera(20), withShadows()), RenderError);
   EXPECT_EQ(renderer.render({}, squareCamera(20)).rgb.size(), 1200u);
 }
 
 TEST(ShadowsOfGl, AreTheSameWhateverIsLeftOutOfTheDrawing) {
-  const auto scene = sceneOf(crowd(600));
+  const auto scene = makeScene(crowd(600));
   RayRenderer rays(scene);
   GlRenderer gl(scene, {}, [&](const auto&... frame) { return rays.computeShadowMask(frame...); });
   for (int i = 0; i < 12; ++i) {

@@ -17,7 +17,7 @@ namespace {
 std::shared_ptr<const scene::Scene> heap() {
   std::vector<PlacedBox> boxes = crowd(400);
   boxes.push_back({{0, -6, 0}, {60, 1, 60}, coloured(0.4f, 0.4f, 0.4f)});
-  return sceneOf(boxes);
+  return makeScene(boxes);
 }
 
 std::shared_ptr<const scene::Snapshot> twoAvatars() {
@@ -130,7 +130,7 @@ std::shared_ptr<const scene::Scene> room() {
                      coloured(0.1f, 0.05f * static_cast<float>(i), 0.5f)});
     boxes.push_back({{i - 6.0, 0, -4}, {0.5, 1, 0.05}, coloured(0.8f, 0.2f, 0.2f, 0.5f)});
   }
-  return sceneOf(boxes);
+  return makeScene(boxes);
 }
 
 /// Views that take each of the renderer's ways, in one order and in the other.

@@ -17,7 +17,7 @@ std::vector<NamedBox> wideFloor() {
           {"column", {-0.5, 0, -0.5}, {0.5, 3, 0.5}}};
 }
 
-std::vector<std::vector<std::string>> namesOf(const World& world) {
+std::vector<std::vector<std::string>> getNames(const World& world) {
   const AvatarIslands islands(world.data());
   std::vector<std::vector<std::string>> names(islands.size());
   for (std::size_t i = 0; i < islands.size(); ++i)
@@ -38,7 +38,7 @@ TEST(AvatarIslands, UniteAllWhoseBoundsOverlapInAChainAndLeaveOutTheIdle) {
   run.step();
   using Names = std::vector<std::string>;
   const std::vector<Names> expected{{"a", "c", "e"}, {"b", "f"}};
-  EXPECT_EQ(namesOf(run.world), expected) << "d stands alone";
+  EXPECT_EQ(getNames(run.world), expected) << "d stands alone";
 }
 
 /// Walkers that meet, block one another and part again, in several islands at a time.
@@ -82,7 +82,7 @@ TEST(AvatarIslands, OneTwoAndEightThreadsGiveTheSameBitsAndEvents) {
 
 /// Doors, lifts, passengers, pushed avatars and rigid bodies among many walkers.
 TEST(AvatarIslands, ThreadsDoNotChangeARoomWithMovingBodies) {
-  const auto hashesOf = [](int threads) {
+  const auto computeHashes = [](int threads) {
     BusyRoom room(3);
     setThreadCount(room.world, threads);
     for (int i = 0; i < 60; ++i)
@@ -97,9 +97,9 @@ TEST(AvatarIslands, ThreadsDoNotChangeARoomWithMovingBodies) {
     }
     return hashes;
   };
-  const std::vector<std::uint64_t> alone = hashesOf(1);
-  EXPECT_EQ(hashesOf(2), alone);
-  EXPECT_EQ(hashesOf(8), alone);
+  const std::vector<std::uint64_t> alone = computeHashes(1);
+  EXPECT_EQ(computeHashes(2), alone);
+  EXPECT_EQ(computeHashes(8), alone);
 }
 
 }  // namespace

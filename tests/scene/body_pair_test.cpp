@@ -27,7 +27,7 @@ class BodyPairs : public ::testing::Test {
     return makeDynamicBody({&hull, 1}, 1000, {rotation(), at});
   }
   /// Part of the motion is a rotation.
-  InterpolatedMotion wayOf(const PhysicsBody& solid, double length) {
+  InterpolatedMotion makeMotion(const PhysicsBody& solid, double length) {
     InterpolatedMotion way = makeStationaryMotion(solid);
     way.isStationary = false;
     way.to.centre += vector(length);
@@ -107,7 +107,7 @@ TEST_F(BodyPairs, FrictionInsideAKinematicBodyActsOnlyAheadOfIt) {
 
 TEST_F(BodyPairs, AFractionOfAMotionEqualsRepeatedHalving) {
   constexpr int kParts = 1 << collision::kMaxHalvings;
-  const InterpolatedMotion way = wayOf(box(vector(1)), 0.5);
+  const InterpolatedMotion way = makeMotion(box(vector(1)), 0.5);
   for (int n = 1; n < kParts; ++n) {
     InterpolatedMotion rest = way, done = way;
     for (int bit = kParts / 2, left = n; left > 0; bit /= 2) {
@@ -132,15 +132,15 @@ TEST_F(BodyPairs, AMotionClearedByACachedBoundIsClear) {
   for (int i = 0; i < 1500; ++i) {
     const PhysicsBody a = box(Vec3::Zero()), b = box(vector(0.5));
     collision::FeatureCache cache;
-    const auto bodyOf = [](const PhysicsBody& solid) { return placePart(solid, 0); };
+    const auto placeFirstPart = [](const PhysicsBody& solid) { return placePart(solid, 0); };
     const collision::SeparationResult start =
-        collision::computeSeparation(bodyOf(a), bodyOf(b), cache);
+        collision::computeSeparation(placeFirstPart(a), placeFirstPart(b), cache);
     if (start.verdict != collision::Verdict::separated) continue;
     // Earlier knowledge: a distance bound below the true distance, and an outdated axis.
     const double apart = 0.5 * start.distance;
     cache.axis += 0.1 * cache.axis.norm() * vector(1);
     const collision::ConvexShape part = getPartShape(a, 0);
-    const InterpolatedMotion wayA = wayOf(a, 0.3), wayB = wayOf(b, 0.3);
+    const InterpolatedMotion wayA = makeMotion(a, 0.3), wayB = makeMotion(b, 0.3);
     const double fraction = computeClearance({part, wayA}, {part, wayB}, cache, apart).lo;
     ++(fraction == 1 ? whole : cut);
     for (double at = 0x1p-6; at <= fraction; at += 0x1p-6) {

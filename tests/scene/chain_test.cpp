@@ -277,15 +277,15 @@ TEST(Chain, PartsTurnAsTheSpawnFaces) {
 }
 
 TEST(Chain, TheSameDrivesGiveTheSameHash) {
-  const auto hashOf = [](double turn) {
+  const auto computeHash = [](double turn) {
     WorldFixture run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
     run.order("arm", armAt({0, 0, 0}));
     run.order("arm", joints({turn, 0.3, -0.4}, 3));
     run.ticks(200);
     return run.world.snapshot()->stateHash;
   };
-  EXPECT_EQ(hashOf(1.5), hashOf(1.5));
-  EXPECT_NE(hashOf(0.5), hashOf(0.5000000001));
+  EXPECT_EQ(computeHash(1.5), computeHash(1.5));
+  EXPECT_NE(computeHash(0.5), computeHash(0.5000000001));
 }
 
 }  // namespace

@@ -67,7 +67,7 @@ class Random {
   std::mt19937_64 random_;
 };
 
-Spawn spawnOf(std::size_t kind, Random& random) {
+Spawn makeSpawn(std::size_t kind, Random& random) {
   Spawn spawn;
   spawn.position = {random.uniform(-8, 8), 0.3, random.uniform(-8, 8)};
   spawn.facing = random.uniform(0, 360);
@@ -89,7 +89,7 @@ Spawn spawnOf(std::size_t kind, Random& random) {
   return spawn;
 }
 
-Order orderOf(std::size_t kind, Random& random) {
+Order makeOrder(std::size_t kind, Random& random) {
   const Vec3 there{random.uniform(-9, 9), 0, random.uniform(-9, 9)};
   switch (random.below(9)) {
     case 0:
@@ -115,16 +115,16 @@ std::map<std::uint64_t, TickCommands> roomCommands(unsigned seed, std::uint64_t 
   constexpr std::size_t kAvatars = 12;
   Random random(seed);
   std::map<std::uint64_t, TickCommands> commands;
-  const auto nameOf = [](std::size_t i) { return "a" + std::to_string(i); };
+  const auto makeName = [](std::size_t i) { return "a" + std::to_string(i); };
   std::uint64_t tag = 0;
   for (std::size_t i = 0; i < kAvatars; ++i)
-    commands[1].avatars.push_back({nameOf(i), spawnOf(i % 4, random), ++tag});
+    commands[1].avatars.push_back({makeName(i), makeSpawn(i % 4, random), ++tag});
   for (std::uint64_t t = 2; t < until; ++t) {
     const std::size_t who = random.below(kAvatars);
     if (random.below(3) == 0)
-      commands[t].avatars.push_back({nameOf(who), orderOf(who % 4, random), ++tag});
+      commands[t].avatars.push_back({makeName(who), makeOrder(who % 4, random), ++tag});
     if (random.below(60) == 0)
-      commands[t].avatars.push_back({nameOf(who), spawnOf(who % 4, random), ++tag});
+      commands[t].avatars.push_back({makeName(who), makeSpawn(who % 4, random), ++tag});
     if (random.below(40) != 0) continue;
     BodyCommand command;
     command.body = std::array{"hinged", "sliding", "lift", "tray"}[random.below(4)];

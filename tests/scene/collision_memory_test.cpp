@@ -159,7 +159,7 @@ struct Cost {
   std::size_t parts = 0;   ///< after the parts of all objects were built
   std::size_t beforeParts() const { return scene + world + shapes; }
 };
-Cost costOf(Model model, bool withParts = false) {
+Cost measureCost(Model model, bool withParts = false) {
   const auto objects = static_cast<std::uint32_t>(model.objects.size());
   std::size_t last = held;
   const auto more = [&last] {
@@ -183,7 +183,7 @@ TEST(CollisionMemory, OfTheBundledBuildingIsAtMostTwiceItsMeshesBeforeThePartsAr
   Model model = buildingWithBodies();
   EXPECT_GT(model.bodies.size(), 10u);
   const std::size_t unique = uniqueBytes(model);
-  const Cost cost = costOf(std::move(model));
+  const Cost cost = measureCost(std::move(model));
   EXPECT_GT(cost.beforeParts(), unique / 4) << "the allocation is counted";
   EXPECT_LE(cost.beforeParts(), 2 * unique);
 }
@@ -191,7 +191,7 @@ TEST(CollisionMemory, OfTheBundledBuildingIsAtMostTwiceItsMeshesBeforeThePartsAr
 TEST(CollisionMemory, OfLargeMeshesIsAtMostTwiceTheseUntilThePartsAreUsed) {
   Model model = globes(6, 60, 1);
   const std::size_t unique = uniqueBytes(model);
-  const Cost cost = costOf(std::move(model), true);
+  const Cost cost = measureCost(std::move(model), true);
   EXPECT_LE(cost.scene + cost.world, unique / 100) << "nothing is copied before its first use";
   EXPECT_LE(cost.beforeParts(), 2 * unique);
   EXPECT_GT(cost.beforeParts() + cost.parts, 2 * unique) << "excess memory is detected";
@@ -201,7 +201,7 @@ TEST(CollisionMemory, OfAMeshThatStandsFourHundredTimesIsThatOfOneAndAFewNumbers
   Model once = globes(6, 60, 1), often = globes(6, 60, 400);
   const std::size_t unique = uniqueBytes(often);
   const std::size_t more = often.objects.size() - once.objects.size();
-  const Cost one = costOf(std::move(once)), many = costOf(std::move(often));
+  const Cost one = measureCost(std::move(once)), many = measureCost(std::move(often));
   EXPECT_LE(many.beforeParts(), 2 * unique);
   EXPECT_LE(many.beforeParts() - one.beforeParts(), 256 * more);
   EXPECT_LE(many.shapes, one.shapes + 4096);

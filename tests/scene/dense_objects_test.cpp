@@ -14,16 +14,16 @@ namespace {
 
 using namespace testing;
 
-std::shared_ptr<const Scene> sceneOf(const tests::DenseScene& dense, std::size_t triangles) {
+std::shared_ptr<const Scene> makeScene(const tests::DenseScene& dense, std::size_t triangles) {
   return std::make_shared<const Scene>(dense.make(triangles));
 }
 
-std::string nameOf(int i) {
+std::string makeName(int i) {
   return "a" + std::to_string(i);
 }
 
 /// A prism, a shape of two parts, an arm, and one that flies.
-Spawn spawnOf(int i, const Vec3& position) {
+Spawn makeSpawn(int i, const Vec3& position) {
   Spawn spawn;
   spawn.position = position;
   spawn.flying = i % 4 == 3;
@@ -46,17 +46,18 @@ Vec3 somewhere(const Scene& scene, Seeded& random) {
 }
 
 /// Commands of one tick: spawns of those that have no place yet, and new directions.
-TickCommands commandsOf(const Scene& scene, int avatars, int tick, Seeded& random) {
+TickCommands makeCommands(const Scene& scene, int avatars, int tick, Seeded& random) {
   TickCommands commands;
   for (int i = 0; i < avatars; ++i) {
-    if (tick < 60) commands.avatars.push_back({nameOf(i), spawnOf(i, somewhere(scene, random)), 0});
+    if (tick < 60)
+      commands.avatars.push_back({makeName(i), makeSpawn(i, somewhere(scene, random)), 0});
     if (tick % 20 != i % 20) continue;
     const double speed = random.uniform(0.5, 4);
     commands.avatars.push_back(
-        {nameOf(i), Drive{speed * randomVelocity(random, i % 4 == 3).normalized()}, 0});
+        {makeName(i), Drive{speed * randomVelocity(random, i % 4 == 3).normalized()}, 0});
     if (i % 4 == 2)
-      commands.avatars.push_back({nameOf(i), DriveJoints{{random.uniform(-3, 3)}, 2, true}, 0});
-    if (i % 4 == 0) commands.avatars.push_back({nameOf(i), Jump{0.4, {}}, 0});
+      commands.avatars.push_back({makeName(i), DriveJoints{{random.uniform(-3, 3)}, 2, true}, 0});
+    if (i % 4 == 0) commands.avatars.push_back({makeName(i), Jump{0.4, {}}, 0});
   }
   return commands;
 }
@@ -65,12 +66,12 @@ class DenseObjects : public ::testing::TestWithParam<tests::DenseScene> {};
 
 TEST_P(DenseObjects, ContactsAreThoseOfBruteForceAndNothingPenetrates) {
   constexpr int kAvatars = 8, kTicks = tests::kSanitized ? 100 : 500;
-  const auto scene = sceneOf(GetParam(), tests::kSanitized ? 6'000 : 20'000);
+  const auto scene = makeScene(GetParam(), tests::kSanitized ? 6'000 : 20'000);
   WorldFixture run(scene);
   Seeded random(3);
   std::size_t contacts = 0;
   for (int tick = 0; tick < kTicks; ++tick) {
-    give(run.world, commandsOf(*scene, kAvatars, tick, random));
+    give(run.world, makeCommands(*scene, kAvatars, tick, random));
     run.step();
     if (tick % 5 != 0) continue;
     const ContactComparison compared = compareStaticContacts(run.world);
@@ -89,11 +90,11 @@ TEST_P(DenseObjects, ACopyFromACheckpointIsBitEqual) {
   constexpr int kAvatars = 8, kUntil = tests::kSanitized ? 250 : 500;
   WorldSettings watchful;
   watchful.nearMissDistance = 0.1;
-  const auto scene = sceneOf(GetParam(), 10'000);
+  const auto scene = makeScene(GetParam(), 10'000);
   Seeded random(4);
   std::map<std::uint64_t, TickCommands> commands;
   for (int tick = 1; tick < kUntil; ++tick)
-    commands[static_cast<std::uint64_t>(tick)] = commandsOf(*scene, kAvatars, tick, random);
+    commands[static_cast<std::uint64_t>(tick)] = makeCommands(*scene, kAvatars, tick, random);
   compareCopies(scene, watchful, commands, kUntil, {0, 61, 90, 110}, 250);
 }
 
@@ -154,11 +155,11 @@ TEST(DenseObjects, GeometryIsBuiltBeforeAnAvatarGetsThere) {
 }
 
 TEST(DenseObjects, ABlockedWalkAndItsEndReportTheDistanceOfTheNearestTriangle) {
-  const auto scene = sceneOf(*tests::findDenseScene("plant_room"), 20'000);
+  const auto scene = makeScene(*tests::findDenseScene("plant_room"), 20'000);
   WorldFixture run(scene);
   Seeded random(5);
   for (int tick = 0; tick < 400; ++tick) {
-    give(run.world, commandsOf(*scene, 4, tick, random));
+    give(run.world, makeCommands(*scene, 4, tick, random));
     for (const ContactEvent& event : run.step().contacts) {
       if (event.b == 0 || event.b > scene->model().objects.size()) continue;
       if (event.kind != ContactEvent::Kind::blocked && event.kind != ContactEvent::Kind::end)

@@ -123,10 +123,10 @@ TEST_P(EncodedGltf, DamagedAnywhereLoadsOrIsAnErrorThatNamesTheFile) {
   for (std::size_t at = 20; at < whole.size(); at += 1 + whole.size() / 12) {
     std::string damaged = whole;
     damaged[at] = static_cast<char>(~damaged[at]);
-    const std::string text = failureOf(folder.write("damaged.glb", damaged));
+    const std::string text = catchFailure(folder.write("damaged.glb", damaged));
     EXPECT_TRUE(text.empty() || text.find("damaged.glb") != std::string::npos) << text;
   }
-  EXPECT_NE(failureOf(folder.write("cut.glb", whole.substr(0, whole.size() * 2 / 3))), "");
+  EXPECT_NE(catchFailure(folder.write("cut.glb", whole.substr(0, whole.size() * 2 / 3))), "");
 }
 
 std::string nameEncoding(const ::testing::TestParamInfo<Encoding>& encoding) {
@@ -146,7 +146,7 @@ TEST(GltfUris, NamesArePercentEncodedOrRaw) {
     const Model model = importModel(folder.write("a.gltf", file.gltf(uri)));
     expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 1e-9);
   }
-  const std::string text = failureOf(folder.write("b.gltf", file.gltf("lost.bin")));
+  const std::string text = catchFailure(folder.write("b.gltf", file.gltf("lost.bin")));
   EXPECT_NE(text.find("'lost.bin' is missing"), std::string::npos) << text;
 }
 
@@ -186,7 +186,7 @@ TEST(GltfUris, ACharacterThatIsNotBase64IsAnError) {
     std::string digits = tests::base64(plain.binary);
     digits.replace(40, 1, foreign);
     const std::string text =
-        failureOf(folder.write("a.gltf", plain.gltf("data:;base64," + digits)));
+        catchFailure(folder.write("a.gltf", plain.gltf("data:;base64," + digits)));
     EXPECT_NE(text.find("buffers[0]: character 41 of its data URI is not Base64"),
               std::string::npos)
         << text;
@@ -197,17 +197,17 @@ TEST(GltfUris, AMissingOrShortBufferAndAMissingSceneAreNamed) {
   const TemporaryFolder folder;
   GltfWriter file = tests::plainTerrace();
   const auto model = folder.write("a.gltf", file.gltf("a.bin"));
-  const std::string missing = failureOf(model);
+  const std::string missing = catchFailure(model);
   EXPECT_NE(missing.find("its buffer 'a.bin' is missing; put it next to the model"),
             std::string::npos)
       << missing;
   folder.write("a.bin", file.binary.substr(0, file.binary.size() / 2));
-  const std::string cut = failureOf(model);
+  const std::string cut = catchFailure(model);
   EXPECT_NE(cut.find("extends beyond its buffer of"), std::string::npos) << cut;
   folder.write("a.bin", file.binary);
   EXPECT_EQ(importModel(model).objects.size(), 1u);
   file.json.erase("scenes");
-  const std::string bare = failureOf(folder.write("b.gltf", file.gltf("a.bin")));
+  const std::string bare = catchFailure(folder.write("b.gltf", file.gltf("a.bin")));
   EXPECT_NE(bare.find("has no scene; export it with one"), std::string::npos) << bare;
 }
 
@@ -231,7 +231,7 @@ TEST(GltfInstances, EachIsAnObjectWhetherTheExtensionIsRequiredOrNot) {
     const Model model = importModel(folder.write("instances.glb", file.glb()));
     ASSERT_EQ(model.objects.size(), 3u);
     EXPECT_EQ(model.meshes.size(), 1u);
-    EXPECT_EQ(countOf(model, "instance_attributes_ignored"), 0u);
+    EXPECT_EQ(countDiagnostics(model, "instance_attributes_ignored"), 0u);
     for (std::size_t i = 0; i < 3; ++i) {
       EXPECT_EQ(model.objects[i].path, "terrace/terrace[" + std::to_string(i) + "]");
       expectSameTriangles(listTriangles(wanted, wanted.objects[i]),
@@ -267,7 +267,7 @@ TEST(GltfInstances, AttributesThatCannotBeReadAreReportedAndTheInstancesStay) {
   attributes["_NAN"] = file.addPoints({{NAN, 0, 0}, {0, 0, 0}, {0, 0, 0}});
   const Model model = importModel(folder.write("a.glb", file.glb()));
   ASSERT_EQ(model.objects.size(), 3u);
-  EXPECT_EQ(countOf(model, "instance_attributes_ignored"), 3u);
+  EXPECT_EQ(countDiagnostics(model, "instance_attributes_ignored"), 3u);
   EXPECT_NE(diagnosticText(model, "instance_attributes_ignored").find("terrace: _ABSENT: "),
             std::string::npos);
   ASSERT_EQ(model.objects[0].attributes.size(), 1u) << "_ID";
@@ -291,12 +291,12 @@ TEST(GltfExtensions, WhatIsNotReadIsRefusedOrReported) {
   const TemporaryFolder folder;
   GltfWriter file = tests::plainTerrace();
   file.use("ACME_bent_meshes", true);
-  const std::string text = failureOf(folder.write("required.glb", file.glb()));
+  const std::string text = catchFailure(folder.write("required.glb", file.glb()));
   EXPECT_NE(text.find("requires the glTF extension ACME_bent_meshes"), std::string::npos) << text;
   file.json.erase("extensionsRequired");
   file.use("KHR_materials_sheen", false);
   const Model model = importModel(folder.write("used.glb", file.glb()));
-  EXPECT_EQ(countOf(model, "ignored_extension"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "ignored_extension"), 1u);
   EXPECT_EQ(diagnosticText(model, "ignored_extension"), "ACME_bent_meshes");
 }
 
@@ -309,7 +309,7 @@ TEST(GltfExtensions, UnlistedOnesAreReportedUnlessTheyChangeNoShape) {
   EXPECT_TRUE(importModel(folder.write("harmless.glb", file.glb())).diagnostics.empty());
   file.json["nodes"][0]["extensions"]["KHR_node_visibility"] = {{"visible", false}};
   const Model model = importModel(folder.write("hidden.glb", file.glb()));
-  EXPECT_EQ(countOf(model, "ignored_extension"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "ignored_extension"), 1u);
   EXPECT_EQ(diagnosticText(model, "ignored_extension"), "KHR_node_visibility");
 }
 
@@ -319,7 +319,7 @@ TEST(GltfExtensions, ThoseThatAreRequiredAndNotReadAreRefusedUnlessTheyChangeLoo
        {"OMI_physics_shape", "MSFT_lod", "VRM", "AGI_articulations", "EXT_structural_metadata"}) {
     GltfWriter file = tests::plainTerrace();
     file.use(name, true);
-    const std::string text = failureOf(folder.write("a.glb", file.glb()));
+    const std::string text = catchFailure(folder.write("a.glb", file.glb()));
     EXPECT_NE(text.find(std::string("requires the glTF extension ") + name), std::string::npos)
         << text;
   }
@@ -329,8 +329,8 @@ TEST(GltfExtensions, ThoseThatAreRequiredAndNotReadAreRefusedUnlessTheyChangeLoo
     GltfWriter file = tests::plainTerrace();
     file.use(name, true);
     const Model model = importModel(folder.write("a.glb", file.glb()));
-    EXPECT_EQ(countOf(model, "ignored_appearance"), count) << name;
-    EXPECT_EQ(countOf(model, "ignored_extension"), 0u) << name;
+    EXPECT_EQ(countDiagnostics(model, "ignored_appearance"), count) << name;
+    EXPECT_EQ(countDiagnostics(model, "ignored_extension"), 0u) << name;
   }
 }
 
@@ -338,18 +338,18 @@ TEST(GltfExtensions, GltfOneIsRefusedInWords) {
   const TemporaryFolder folder;
   GltfWriter file = tests::plainTerrace();
   file.json["asset"]["version"] = "1.0";
-  const std::string text = failureOf(folder.write("old.gltf", file.gltf("a.bin")));
+  const std::string text = catchFailure(folder.write("old.gltf", file.gltf("a.bin")));
   EXPECT_NE(text.find("glTF version 1.0 cannot be read; export it as glTF 2.0"), std::string::npos)
       << text;
   file.json["asset"] = {{"version", "2.1"}, {"minVersion", "2.1"}};
-  const std::string newer = failureOf(folder.write("newer.glb", file.glb()));
+  const std::string newer = catchFailure(folder.write("newer.glb", file.glb()));
   EXPECT_NE(newer.find("needs a reader of glTF 2.1"), std::string::npos) << newer;
 }
 
 TEST(GltfSizes, ACountThatTheFileCannotJustifyIsRefused) {
   const TemporaryFolder folder;
   const auto expectRefused = [&](const GltfWriter& file, const std::string& words) {
-    const std::string text = failureOf(folder.write("hostile.glb", file.glb()));
+    const std::string text = catchFailure(folder.write("hostile.glb", file.glb()));
     EXPECT_NE(text.find(words), std::string::npos) << text;
   };
   GltfWriter zeros = tests::sparseTerrace(false);
@@ -411,7 +411,7 @@ TEST(GltfTextures, WebpIsDecoded) {
   const GltfWriter damaged =
       texturedTerrace("EXT_texture_webp", makeWebp().substr(0, 24), "image/webp");
   const Model without = importModel(folder.write("b.glb", damaged.glb()));
-  EXPECT_EQ(countOf(without, "unreadable_texture"), 1u);
+  EXPECT_EQ(countDiagnostics(without, "unreadable_texture"), 1u);
 }
 
 TEST(GltfTextures, KtxIsReportedAsMissing) {
@@ -420,7 +420,7 @@ TEST(GltfTextures, KtxIsReportedAsMissing) {
       texturedTerrace("KHR_texture_basisu", "\xabKTX 20\xbb\r\n\x1a\n", "image/ktx2");
   const Model model = importModel(folder.write("a.glb", file.glb()));
   EXPECT_EQ(model.materials.at(0).baseColourTexture, -1);
-  EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "missing_texture"), 1u);
 }
 
 TEST(GltfTextures, OnesWithoutAnImageThatIsReadAreReportedAsMissing) {
@@ -428,7 +428,7 @@ TEST(GltfTextures, OnesWithoutAnImageThatIsReadAreReportedAsMissing) {
   const auto expectMissing = [&](const GltfWriter& file, const std::string& words) {
     const Model model = importModel(folder.write("a.glb", file.glb()));
     EXPECT_EQ(model.materials.at(0).baseColourTexture, -1);
-    EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+    EXPECT_EQ(countDiagnostics(model, "missing_texture"), 1u);
     EXPECT_NE(diagnosticText(model, "missing_texture").find(words), std::string::npos)
         << diagnosticText(model, "missing_texture");
   };
@@ -452,7 +452,7 @@ TEST(GltfTextures, AnEmissiveOneWithoutAnImageIsReportedAndDoesNotGlow) {
   file.json["materials"] = {{{"emissiveTexture", {{"index", 0}}}, {"emissiveFactor", {1, 1, 1}}}};
   file.json["meshes"][0]["primitives"][0]["material"] = 0;
   const Model model = importModel(folder.write("a.glb", file.glb()));
-  EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "missing_texture"), 1u);
   EXPECT_TRUE(model.materials.at(0).emissive.isZero(0));
 }
 

@@ -22,29 +22,30 @@ using tests::TemporaryFolder;
 
 /// Imports a glTF file of one-metre boxes with these nodes, all of them roots. `more`: further
 /// members of the document.
-Model modelOf(const std::string& roots, const std::string& nodes, const std::string& more = "") {
+Model importNodes(const std::string& roots, const std::string& nodes,
+                  const std::string& more = "") {
   const TemporaryFolder folder;
   std::string text = gltf(BoxMesh({1, 1, 1}), roots, nodes);
   text.insert(1, more);
   return importModel(folder.write("hall.gltf", text));
 }
 
-std::string failureOf(const std::string& extras) {
+std::string catchFailure(const std::string& extras) {
   try {
-    modelOf("0", R"({"name":"door","mesh":0,"extras":)" + extras + "}");
+    importNodes("0", R"({"name":"door","mesh":0,"extras":)" + extras + "}");
   } catch (const ImportError& error) {
     return error.what();
   }
   return "";
 }
 
-const BodySpec& bodyOf(const Model& model, const std::string& name) {
+const BodySpec& findBody(const Model& model, const std::string& name) {
   for (const BodySpec& body : model.bodies)
     if (body.name == name) return body;
   throw std::out_of_range("no body " + name);
 }
 
-std::uint32_t objectOf(const Model& model, const std::string& path) {
+std::uint32_t findObject(const Model& model, const std::string& path) {
   for (std::uint32_t i = 0; i < model.objects.size(); ++i)
     if (model.objects[i].path == path) return i;
   throw std::out_of_range("no object " + path);
@@ -54,7 +55,7 @@ std::uint32_t objectOf(const Model& model, const std::string& path) {
 
 TEST(Extras, DescribeANodeAndItsDescendants) {
   // The node's y axis lies along the scene's x.
-  const Model model = modelOf(
+  const Model model = importNodes(
       "0", R"({"name":"door","translation":[5,0,0],"rotation":[0,0,-0.7071067811865476,)"
            R"(0.7071067811865476],"children":[1,2],"extras":{"walk_kind":"hinged",)"
            R"("walk_axis":[0,1,0],"walk_limits":[-10,80],"walk_opened_by":"touch","note":"mine"}},)"
@@ -72,52 +73,52 @@ TEST(Extras, DescribeANodeAndItsDescendants) {
 }
 
 TEST(Extras, TheNearestNodeWinsAndMayBeStatic) {
-  const Model model = modelOf(
+  const Model model = importNodes(
       "0", R"({"name":"lift","children":[1,2,3],"extras":{"walk_kind":"lift","walk_stops":[0,3]}},)"
            R"({"name":"car","mesh":0},)"
            R"({"name":"box","mesh":0,"extras":{"walk_kind":"rigid","walk_mass":4}},)"
            R"({"name":"rail","mesh":0,"extras":{"walk_kind":"still"}})");
   ASSERT_EQ(model.bodies.size(), 2u);
-  EXPECT_EQ(bodyOf(model, "lift").objects, std::vector<std::uint32_t>{0});
-  EXPECT_EQ(bodyOf(model, "lift/box").mass, 4.0);
+  EXPECT_EQ(findBody(model, "lift").objects, std::vector<std::uint32_t>{0});
+  EXPECT_EQ(findBody(model, "lift/box").mass, 4.0);
 }
 
 TEST(Extras, MistakesNameTheFileTheNodeAndTheField) {
   const auto has = [](const std::string& text, const char* part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
-  has(failureOf(R"({"walk_kind":"hinged","walk_axis":[0,0,0]})"),
+  has(catchFailure(R"({"walk_kind":"hinged","walk_axis":[0,0,0]})"),
       "hall.gltf: node 'door': extras.walk_axis: has no direction");
-  has(failureOf(R"({"walk_kind":"hinged","walk_axes":[0,1,0]})"), "known here are walk_anchor");
-  has(failureOf(R"({"walk_kind":"revolving"})"), "extras.walk_kind: must be hinged");
-  has(failureOf(R"({"walk_kind":"sliding"})"), "limits is missing");
-  has(failureOf(R"({"walk_kind":"rigid","walk_mass":-1})"), "mass is -1");
+  has(catchFailure(R"({"walk_kind":"hinged","walk_axes":[0,1,0]})"), "known here are walk_anchor");
+  has(catchFailure(R"({"walk_kind":"revolving"})"), "extras.walk_kind: must be hinged");
+  has(catchFailure(R"({"walk_kind":"sliding"})"), "limits is missing");
+  has(catchFailure(R"({"walk_kind":"rigid","walk_mass":-1})"), "mass is -1");
 }
 
 TEST(Extras, AClassMakesTheObjectsBelowOneThing) {
   const Model model =
-      modelOf("0,3", R"({"name":"bed","children":[1,2],"extras":{"walk_class":"bed"}},)"
-                     R"({"name":"frame","mesh":0},{"name":"mattress","mesh":0},)"
-                     R"({"name":"lamp","mesh":0,"extras":{"class":"lamp","walk_class":7}})");
+      importNodes("0,3", R"({"name":"bed","children":[1,2],"extras":{"walk_class":"bed"}},)"
+                         R"({"name":"frame","mesh":0},{"name":"mattress","mesh":0},)"
+                         R"({"name":"lamp","mesh":0,"extras":{"class":"lamp","walk_class":7}})");
   EXPECT_TRUE(model.bodies.empty());
   for (const Diagnostic& one : model.diagnostics) EXPECT_NE(one.kind, "extras_without_kind");
-  const std::uint32_t frame = objectOf(model, "bed/frame"), lamp = objectOf(model, "lamp");
+  const std::uint32_t frame = findObject(model, "bed/frame"), lamp = findObject(model, "lamp");
   EXPECT_EQ(model.objects[frame].className, "bed");
   EXPECT_EQ(model.objects[frame].thing, frame);
-  EXPECT_EQ(model.objects[objectOf(model, "bed/mattress")].className, "bed");
-  EXPECT_EQ(model.objects[objectOf(model, "bed/mattress")].thing, frame);
+  EXPECT_EQ(model.objects[findObject(model, "bed/mattress")].className, "bed");
+  EXPECT_EQ(model.objects[findObject(model, "bed/mattress")].thing, frame);
   EXPECT_EQ(model.objects[lamp].className, "lamp") << "a class is a text";
   EXPECT_EQ(model.objects[lamp].thing, std::nullopt);
 }
 
 TEST(Extras, WithoutAKindAreReportedAndDefineNoBody) {
-  const Model model = modelOf("0", R"({"name":"a","mesh":0,"extras":{"walk_speed":3}})");
+  const Model model = importNodes("0", R"({"name":"a","mesh":0,"extras":{"walk_speed":3}})");
   EXPECT_TRUE(model.bodies.empty());
-  EXPECT_EQ(countOf(model, "extras_without_kind"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "extras_without_kind"), 1u);
 }
 
 TEST(Extras, OfOthersAreNotOurs) {
-  const Model model = modelOf("0", R"({"name":"a","mesh":0,"extras":{"kind":"walk_kind"}})");
+  const Model model = importNodes("0", R"({"name":"a","mesh":0,"extras":{"kind":"walk_kind"}})");
   EXPECT_TRUE(model.bodies.empty());
 }
 
@@ -134,13 +135,13 @@ std::string document(const std::string& members, const std::string& shapes = "")
 
 TEST(Physics, ADynamicNodeIsAFreeBodyOfItsMassVelocityAndMaterial) {
   const Model model =
-      modelOf("0",
-              R"({"name":"crate","mesh":0,"translation":[0,5,0],)" +
-                  physics(R"("motion":{"mass":7,"linearVelocity":[1,0,0]},)"
-                          R"("collider":{"geometry":{"node":0},"physicsMaterial":0})") +
-                  "}",
-              document(R"("physicsMaterials":[{"staticFriction":0.9,"dynamicFriction":0.25,)"
-                       R"("restitution":0.5}])"));
+      importNodes("0",
+                  R"({"name":"crate","mesh":0,"translation":[0,5,0],)" +
+                      physics(R"("motion":{"mass":7,"linearVelocity":[1,0,0]},)"
+                              R"("collider":{"geometry":{"node":0},"physicsMaterial":0})") +
+                      "}",
+                  document(R"("physicsMaterials":[{"staticFriction":0.9,"dynamicFriction":0.25,)"
+                           R"("restitution":0.5}])"));
   ASSERT_EQ(model.bodies.size(), 1u);
   const BodySpec& crate = model.bodies[0];
   EXPECT_EQ(crate.source, BodySource::khr);
@@ -148,7 +149,7 @@ TEST(Physics, ADynamicNodeIsAFreeBodyOfItsMassVelocityAndMaterial) {
   EXPECT_EQ(crate.mass, 7.0);
   EXPECT_EQ(crate.friction, 0.25);
   EXPECT_EQ(crate.restitution, 0.5);
-  EXPECT_EQ(countOf(model, "unsupported_physics"), 0u)
+  EXPECT_EQ(countDiagnostics(model, "unsupported_physics"), 0u)
       << diagnosticText(model, "unsupported_physics");
   testing::BodyFixture run(Model{model});
   run.ticks(6);
@@ -158,10 +159,10 @@ TEST(Physics, ADynamicNodeIsAFreeBodyOfItsMassVelocityAndMaterial) {
 
 TEST(Physics, ACollisionShapeIsSolidAndItsVisualMeshIsNot) {
   const Model model =
-      modelOf("0",
-              R"({"name":"ball","mesh":0,)" +
-                  physics(R"("motion":{},"collider":{"geometry":{"shape":0}})") + "}",
-              document("", R"({"type":"sphere","sphere":{"radius":2}})"));
+      importNodes("0",
+                  R"({"name":"ball","mesh":0,)" +
+                      physics(R"("motion":{},"collider":{"geometry":{"shape":0}})") + "}",
+                  document("", R"({"type":"sphere","sphere":{"radius":2}})"));
   ASSERT_EQ(model.objects.size(), 2u);
   EXPECT_EQ(model.objects[0].usage, Object::Usage::visualOnly);
   EXPECT_EQ(model.objects[1].usage, Object::Usage::collisionOnly);
@@ -182,7 +183,7 @@ TEST(Physics, EachImplicitShapeIsConvexAndHasItsSize) {
       R"({"name":"box","mesh":0,)" + physics(R"("collider":{"geometry":{"shape":0}})") +
       R"(},{"name":"capsule","mesh":0,)" + physics(R"("collider":{"geometry":{"shape":1}})") +
       R"(},{"name":"cylinder","mesh":0,)" + physics(R"("collider":{"geometry":{"shape":2}})") + "}";
-  const Model model = modelOf(
+  const Model model = importNodes(
       "0,1,2", nodes,
       document("",
                R"({"type":"box","box":{"size":[1,2,3]}},)"
@@ -196,7 +197,7 @@ TEST(Physics, EachImplicitShapeIsConvexAndHasItsSize) {
                                           {"cylinder/collider", {2, 2, 2}}};
   EXPECT_EQ(scene.solidObjects().size(), 3u) << "a drawn mesh is not solid";
   for (const auto& [path, size] : sizes) {
-    const std::uint32_t object = objectOf(model, path);
+    const std::uint32_t object = findObject(model, path);
     EXPECT_EQ(scene.collisionGeometry(object).hullCount(), 1u) << path;
     EXPECT_EQ(scene.collisionGeometry(object).size(), 1u) << path;
     Aabb box;
@@ -211,11 +212,12 @@ Model hinged(const std::string& limits, bool fromFrame = false) {
   const std::string joint = R"("joint":{"joint":0,"connectedNode":)";
   const std::string onDoor = fromFrame ? "" : physics(joint + "2}") + ",";
   const std::string onFrame = fromFrame ? physics(joint + "1}") + "," : "";
-  return modelOf("0,2",
-                 R"({"name":"door","mesh":0,"children":[1],)" + physics(R"("motion":{"mass":20})") +
-                     R"(},{)" + onDoor + R"("name":"hinge","translation":[0,1,0]},)" + R"({)" +
-                     onFrame + R"("name":"frame","translation":[0,1,0]})",
-                 document(R"("physicsJoints":[{"limits":[)" + limits + "]}]"));
+  return importNodes("0,2",
+                     R"({"name":"door","mesh":0,"children":[1],)" +
+                         physics(R"("motion":{"mass":20})") + R"(},{)" + onDoor +
+                         R"("name":"hinge","translation":[0,1,0]},)" + R"({)" + onFrame +
+                         R"("name":"frame","translation":[0,1,0]})",
+                     document(R"("physicsJoints":[{"limits":[)" + limits + "]}]"));
 }
 
 const std::string kAtPoint = R"({"linearAxes":[0,1,2],"max":0})";
@@ -250,15 +252,15 @@ TEST(Physics, AJointWithOneDistanceLeftIsASlider) {
 
 TEST(Physics, UnsupportedPartsAreReportedAndTheRestLoads) {
   const Model ball = hinged(kAtPoint);  // all angles free
-  EXPECT_EQ(bodyOf(ball, "door").kind, BodyKind::rigid);
+  EXPECT_EQ(findBody(ball, "door").kind, BodyKind::rigid);
   EXPECT_NE(diagnosticText(ball, "unsupported_physics").find("node 'door/hinge'"),
             std::string::npos)
       << diagnosticText(ball, "unsupported_physics");
-  const Model kinematic =
-      modelOf("0", R"({"name":"a","mesh":0,)" + physics(R"("motion":{"isKinematic":true})") + "}");
+  const Model kinematic = importNodes(
+      "0", R"({"name":"a","mesh":0,)" + physics(R"("motion":{"isKinematic":true})") + "}");
   EXPECT_TRUE(kinematic.bodies.empty());
-  EXPECT_EQ(countOf(kinematic, "unsupported_physics"), 1u);
-  const Model senseless = modelOf(
+  EXPECT_EQ(countDiagnostics(kinematic, "unsupported_physics"), 1u);
+  const Model senseless = importNodes(
       "0",
       R"({"name":"a","mesh":0,)" +
           physics(
@@ -266,15 +268,16 @@ TEST(Physics, UnsupportedPartsAreReportedAndTheRestLoads) {
               R"("physicsMaterial":"steel"},"joint":{"joint":[],"connectedNode":-1})") +
           "}");
   EXPECT_TRUE(senseless.bodies.empty()) << "a negative mass";
-  EXPECT_EQ(countOf(senseless, "unsupported_physics"), 4u);
+  EXPECT_EQ(countDiagnostics(senseless, "unsupported_physics"), 4u);
   EXPECT_NO_THROW(Scene{Model(senseless)});
 }
 
 TEST(Physics, ATriggerIsNeitherSolidNorDrawn) {
-  const Model model = modelOf("0,1",
-                              R"({"name":"floor","mesh":0},{"name":"exit","translation":[5,0,0],)" +
-                                  physics(R"("trigger":{"geometry":{"shape":0}})") + "}",
-                              document("", R"({"type":"box","box":{"size":[2,2,2]}})"));
+  const Model model =
+      importNodes("0,1",
+                  R"({"name":"floor","mesh":0},{"name":"exit","translation":[5,0,0],)" +
+                      physics(R"("trigger":{"geometry":{"shape":0}})") + "}",
+                  document("", R"({"type":"box","box":{"size":[2,2,2]}})"));
   ASSERT_EQ(model.bodies.size(), 1u);
   EXPECT_EQ(model.bodies[0].kind, BodyKind::trigger);
   const Scene scene{Model(model)};
@@ -301,19 +304,19 @@ TEST(Sources, TheHigherOneHasTheSayAndTheLowerOneAddsTheRest) {
   EXPECT_EQ(model.bodies.size(), 4u);
   collectBodies(model, file);
   ASSERT_EQ(model.bodies.size(), 3u);
-  EXPECT_EQ(bodyOf(model, "mine").source, BodySource::sidecar);
-  EXPECT_EQ(bodyOf(model, "a").mass, 2.0) << "the physics extension before extras";
-  EXPECT_EQ(bodyOf(model, "b-rigid").mass, 3.0) << "extras before names";
-  EXPECT_EQ(countOf(model, "replaced_bodies"), 3u);
+  EXPECT_EQ(findBody(model, "mine").source, BodySource::sidecar);
+  EXPECT_EQ(findBody(model, "a").mass, 2.0) << "the physics extension before extras";
+  EXPECT_EQ(findBody(model, "b-rigid").mass, 3.0) << "extras before names";
+  EXPECT_EQ(countDiagnostics(model, "replaced_bodies"), 3u);
   const auto replaced = std::ranges::find(model.diagnostics, "replaced_bodies", &Diagnostic::kind);
   EXPECT_EQ(replaced->example, "'a' of the extras by 'a' of the khr, object a");
   EXPECT_EQ(formatBodySources(model), "1 of sidecar, 1 of khr, 1 of extras");
 }
 
 TEST(Sources, BodiesOfTheFilePassThroughTheStream) {
-  const Model model =
-      modelOf("0", R"({"name":"a","mesh":0,"extras":{"walk_kind":"path","walk_keys":[{"time":0},)"
-                   R"({"time":2,"offset":[1,0,0],"turn":90}],"walk_speed":0.5}})");
+  const Model model = importNodes(
+      "0", R"({"name":"a","mesh":0,"extras":{"walk_kind":"path","walk_keys":[{"time":0},)"
+           R"({"time":2,"offset":[1,0,0],"turn":90}],"walk_speed":0.5}})");
   const std::vector<std::byte> bytes = serialiseModel(model);
   const Model back = deserialiseModel(bytes);
   EXPECT_EQ(serialiseModel(back), bytes);
@@ -325,18 +328,18 @@ TEST(Sources, BodiesOfTheFilePassThroughTheStream) {
 // ---- names --------------------------------------------------------------------------------------
 
 TEST(Names, AShapeIsTheCollisionOfWhomItNames) {
-  const Model model = modelOf(
+  const Model model = importNodes(
       "0,1,2", R"({"name":"chair","mesh":0},{"name":"UCX_chair_01","mesh":0,"scale":[2,2,2]},)"
                R"({"name":"UCX_chair_02","mesh":0,"translation":[3,0,0]})");
   const Scene scene{Model(model)};
   EXPECT_EQ(model.objects[0].usage, Object::Usage::visualOnly);
   EXPECT_EQ(scene.solidObjects(), (std::vector<std::uint32_t>{1, 2}));
   EXPECT_EQ(model.objects[2].partOf, 0u);
-  EXPECT_EQ(countOf(model, "collision_suffix"), 2u);
+  EXPECT_EQ(countDiagnostics(model, "collision_suffix"), 2u);
 }
 
 TEST(Names, GodotsHintsAreKept) {
-  const Model model = modelOf(
+  const Model model = importNodes(
       "0,1,2,3", R"({"name":"wall-col","mesh":0},{"name":"lamp","mesh":0},)"
                  R"({"name":"lamp-colonly.001","mesh":0},{"name":"barrel-rigid.003","mesh":0})");
   EXPECT_EQ(model.objects[0].usage, Object::Usage::both);
@@ -345,13 +348,13 @@ TEST(Names, GodotsHintsAreKept) {
   ASSERT_EQ(model.bodies.size(), 1u);
   EXPECT_EQ(model.bodies[0].source, BodySource::suffix);
   EXPECT_EQ(model.bodies[0].objects, std::vector<std::uint32_t>{3});
-  EXPECT_EQ(countOf(model, "collision_suffix"), 3u);
+  EXPECT_EQ(countDiagnostics(model, "collision_suffix"), 3u);
 }
 
 TEST(Names, AShapeWithoutAnObjectIsReportedAndStaysSolid) {
   const Model model =
-      modelOf("0,1", R"({"name":"UCX_gone","mesh":0},{"name":"protocol","mesh":0})");
-  EXPECT_EQ(countOf(model, "collision_shape_alone"), 1u);
+      importNodes("0,1", R"({"name":"UCX_gone","mesh":0},{"name":"protocol","mesh":0})");
+  EXPECT_EQ(countDiagnostics(model, "collision_shape_alone"), 1u);
   EXPECT_EQ(Scene{Model(model)}.solidObjects().size(), 2u);
 }
 
@@ -364,7 +367,7 @@ TEST(Names, AShapeFollowsTheBodyOfItsObject) {
                R"({"walk":1,"bodies":[{"name":"c","kind":"rigid","objects":["chair"]}]})");
   Model model = importModel(file);
   collectBodies(model, file);
-  EXPECT_EQ(bodyOf(model, "c").objects, (std::vector<std::uint32_t>{0, 1}));
+  EXPECT_EQ(findBody(model, "c").objects, (std::vector<std::uint32_t>{0, 1}));
   const Scene scene(std::move(model));
   EXPECT_TRUE(scene.solidObjects().empty());
   EXPECT_EQ(scene.bodyShape(0)->parts.size(), 1u) << "the shape's name alone";

@@ -13,13 +13,13 @@ namespace {
 using tests::BoxMesh;
 using tests::TemporaryFolder;
 
-Model modelOf(const std::string& nodes) {
+Model importNodes(const std::string& nodes) {
   const TemporaryFolder folder;
   return importModel(folder.write("a.gltf", tests::gltf(BoxMesh({1, 2, 3}), "0", nodes)));
 }
 
 Model modelWith(const std::string& transform) {
-  return modelOf(R"({"name":"box","mesh":0,)" + transform + "}");
+  return importNodes(R"({"name":"box","mesh":0,)" + transform + "}");
 }
 
 void expectSize(const Model& model, const Vec3& size) {
@@ -28,22 +28,23 @@ void expectSize(const Model& model, const Vec3& size) {
 }
 
 TEST(GltfNodes, ARotationOfThreeDigitsNeitherScalesNorHidesWhatIsBelowIt) {
-  const Model model = modelOf(R"({"name":"frame","rotation":[0,0.707,0,0.707],"children":[1]},)"
-                              R"({"name":"door","mesh":0,"translation":[0.123456789012,0,0],)"
-                              R"("extras":{"walk_kind":"hinged","walk_axis":[0,1,0],"_ID":7}})");
+  const Model model =
+      importNodes(R"({"name":"frame","rotation":[0,0.707,0,0.707],"children":[1]},)"
+                  R"({"name":"door","mesh":0,"translation":[0.123456789012,0,0],)"
+                  R"("extras":{"walk_kind":"hinged","walk_axis":[0,1,0],"_ID":7}})");
   expectSize(model, {3, 2, 1});
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].path, "frame/door");
   EXPECT_EQ(model.objects[0].attributes, (std::vector<ObjectAttribute>{{"_ID", {7}}}));
   EXPECT_NEAR(model.objects[0].worldFromMesh.translation().z(), -0.123456789012, 1e-15);
   EXPECT_EQ(model.bodies.size(), 1u);
-  EXPECT_EQ(countOf(model, "rescaled_rotation"), 0u);
+  EXPECT_EQ(countDiagnostics(model, "rescaled_rotation"), 0u);
 }
 
 TEST(GltfNodes, ARotationOfAnotherLengthIsNormalisedAndReported) {
   const Model model = modelWith(R"("rotation":[0,2,0,2])");
   expectSize(model, {3, 2, 1});
-  EXPECT_EQ(countOf(model, "rescaled_rotation"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "rescaled_rotation"), 1u);
   EXPECT_EQ(diagnosticText(model, "rescaled_rotation").find("nodes[0] 'box': of length 2.8"), 0u)
       << diagnosticText(model, "rescaled_rotation");
 }
@@ -58,18 +59,18 @@ TEST(GltfNodes, WhatGltfDoesNotAllowInATransformIsIgnoredAndReported) {
         R"("rotation":[0,1,0,0],"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1])",
         R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"scale":[2,2,2])"}) {
     const Model model = modelWith(transform);
-    EXPECT_EQ(countOf(model, "broken_transform_dropped"), 1u) << transform;
+    EXPECT_EQ(countDiagnostics(model, "broken_transform_dropped"), 1u) << transform;
     EXPECT_EQ(diagnosticText(model, "broken_transform_dropped").find("nodes[0] 'box': "), 0u);
     expectSize(model, {1, 2, 3});
   }
   const Model whole = modelWith(R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,5,6,7,1])");
-  EXPECT_EQ(countOf(whole, "broken_transform_dropped"), 0u);
+  EXPECT_EQ(countDiagnostics(whole, "broken_transform_dropped"), 0u);
 }
 
 TEST(GltfNodes, AChildThatIsNoIndexIsReportedWithItsParent) {
   const Model model =
-      modelOf(R"({"name":"box","mesh":0,"children":[1.0]},{"name":"lost","mesh":0})");
-  EXPECT_EQ(countOf(model, "unmatched_node"), 1u);
+      importNodes(R"({"name":"box","mesh":0,"children":[1.0]},{"name":"lost","mesh":0})");
+  EXPECT_EQ(countDiagnostics(model, "unmatched_node"), 1u);
   EXPECT_EQ(diagnosticText(model, "unmatched_node"), "box");
 }
 
@@ -77,12 +78,12 @@ TEST(GltfNodes, AChildThatIsNoIndexIsReportedWithItsParent) {
 
 TEST(GltfNodes, AKeyTwiceInOneObjectIsReportedWithItsPathAndTheLastCounts) {
   const Model model = modelWith(R"("translation":[1,0,0],"translation":[5,0,0])");
-  EXPECT_EQ(countOf(model, "duplicate_key"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "duplicate_key"), 1u);
   EXPECT_EQ(diagnosticText(model, "duplicate_key"), "nodes[0].translation");
   EXPECT_NEAR(model.objects.at(0).worldFromMesh.translation().x() + model.offset.x(), 5, 1e-12);
   const Model deep = modelWith(
       R"("extras":{"a":[1,[2],{"b":2},{"c":{"d":1,"e":[{"d":1},{"d":2}],"d":2,"d":3}}]})");
-  EXPECT_EQ(countOf(deep, "duplicate_key"), 2u);
+  EXPECT_EQ(countDiagnostics(deep, "duplicate_key"), 2u);
   EXPECT_EQ(diagnosticText(deep, "duplicate_key"), "nodes[0].extras.a[3].c.d");
 }
 
@@ -92,15 +93,16 @@ TEST(GltfNodes, ASectionTwiceIsReadFromTheLast) {
                             R"("accessors":[],)", R"("nodes":[{"mesh":0,"scale":[7,7,7]}],)"}) {
     std::string text = tests::gltf(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
     const Model model = importModel(folder.write("a.gltf", text.insert(1, first)));
-    EXPECT_EQ(countOf(model, "duplicate_key"), 1u) << first;
+    EXPECT_EQ(countDiagnostics(model, "duplicate_key"), 1u) << first;
     expectSize(model, {1, 2, 3});
   }
 }
 
 TEST(GltfNodes, TheSameKeyInSeveralObjectsIsNoDuplicate) {
-  const Model model = modelOf(R"({"name":"box","mesh":0,"extras":{"name":{"name":1},"mesh":[{}]},)"
-                              R"("children":[1]},{"name":"box","mesh":0})");
-  EXPECT_EQ(countOf(model, "duplicate_key"), 0u);
+  const Model model =
+      importNodes(R"({"name":"box","mesh":0,"extras":{"name":{"name":1},"mesh":[{}]},)"
+                  R"("children":[1]},{"name":"box","mesh":0})");
+  EXPECT_EQ(countDiagnostics(model, "duplicate_key"), 0u);
 }
 
 // ---- references to nothing ----------------------------------------------------------------------
@@ -112,7 +114,7 @@ TEST(GltfNodes, ANodeWithTwoParentsIsReportedAndStandsBelowEach) {
                                {"name":"b","translation":[5,0,0],"children":[2]},
                                {"name":"box","mesh":0})")));
   EXPECT_EQ(model.objects.size(), 2u);
-  EXPECT_EQ(countOf(model, "shared_node"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "shared_node"), 1u);
   EXPECT_EQ(diagnosticText(model, "shared_node"), "nodes[2] 'box' has several parents");
 }
 
@@ -133,7 +135,7 @@ TEST(GltfNodes, AReferenceToNothingCostsItselfAlone) {
         R"({"name":"a","mesh":0},{"name":"b",)" + std::string(row.members) + "}";
     const Model model =
         importModel(folder.write("a.gltf", tests::gltf(BoxMesh({1, 2, 3}), row.scene, nodes)));
-    EXPECT_EQ(countOf(model, row.kind), 1u) << row.members;
+    EXPECT_EQ(countDiagnostics(model, row.kind), 1u) << row.members;
     EXPECT_EQ(diagnosticText(model, row.kind), row.text);
     expectSize(model, {1, 2, 3});
   }

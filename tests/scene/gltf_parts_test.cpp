@@ -41,7 +41,7 @@ TEST(GltfScenes, TheDefaultIsReadAndTheOthersAreListed) {
   const Model model = importModel(folder.write("a.glb", makeThreeScenes().glb()));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].path, "second");
-  EXPECT_EQ(countOf(model, "other_scenes"), 2u);
+  EXPECT_EQ(countDiagnostics(model, "other_scenes"), 2u);
   EXPECT_EQ(model.fileScenes, (std::vector<std::string>{"day", "", "0"}));
   EXPECT_EQ(model.fileScene, 1u);
 }
@@ -64,11 +64,11 @@ TEST(GltfScenes, AnUnknownOneIsAnErrorThatListsThem) {
   const TemporaryFolder folder;
   ImportOptions options;
   options.gltfScene = "night";
-  const std::string text = failureOf(folder.write("a.glb", makeThreeScenes().glb()), options);
+  const std::string text = catchFailure(folder.write("a.glb", makeThreeScenes().glb()), options);
   EXPECT_NE(text.find("no scene 'night'; its scenes are 0 'day', 1, 2 '0'"), std::string::npos)
       << text;
   const std::string obj =
-      failureOf(folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), options);
+      catchFailure(folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), options);
   EXPECT_NE(obj.find("--gltf-scene needs a glTF file"), std::string::npos) << obj;
 }
 
@@ -96,7 +96,7 @@ TEST(GltfMeshes, OneThatCannotBeReadIsASolidBoxOfItsStatedExtent) {
   ASSERT_EQ(model.objects.size(), 2u);
   EXPECT_EQ(model.meshes.at(model.objects[0].meshes.at(0)).triangleCount(), kTriangles);
   EXPECT_EQ(model.objects[1].path, "broken");
-  EXPECT_EQ(countOf(model, "solid_mesh"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u);
   EXPECT_EQ(diagnosticText(model, "solid_mesh").find("meshes[1].primitives[0]"), 0u);
   const Scene scene{Model(model)};
   EXPECT_EQ(scene.objectBoxes()[1].min, Vec3(20, 0, 0));
@@ -108,7 +108,7 @@ TEST(GltfMeshes, OneWithoutAnExtentIsMissingAndReported) {
   const TemporaryFolder folder;
   const Model model = importModel(folder.write("a.glb", makeHalfBroken(false).glb()));
   ASSERT_EQ(model.objects.size(), 1u);
-  EXPECT_EQ(countOf(model, "missing_mesh"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "missing_mesh"), 1u);
   EXPECT_EQ(findDiagnosticKind({"missing_mesh", 1, ""}).severity, Severity::error);
 }
 
@@ -117,7 +117,7 @@ TEST(GltfMeshes, IfNoneCanBeReadTheFileIsRefused) {
   GltfWriter file = makeHalfBroken(true);
   file.json["scenes"][0]["nodes"] = {1};
   file.json["meshes"][0]["primitives"] = file.json["meshes"][1]["primitives"];
-  const std::string text = failureOf(folder.write("a.glb", file.glb()));
+  const std::string text = catchFailure(folder.write("a.glb", file.glb()));
   EXPECT_NE(text.find("a.glb"), std::string::npos) << text;
   EXPECT_NE(text.find("extends beyond its buffer view"), std::string::npos) << text;
 }
@@ -193,7 +193,7 @@ TEST(GltfMeshes, WhatGltfDoesNotAllowIsNotReadInSilence) {
   for (const auto& [fault, file] : files) {
     const Model model = importModel(folder.write("a.glb", file.glb()));
     EXPECT_EQ(model.objects.size(), 2u) << fault;
-    EXPECT_EQ(countOf(model, "solid_mesh"), 1u) << fault;
+    EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u) << fault;
     EXPECT_NE(diagnosticText(model, "solid_mesh").find(fault), std::string::npos)
         << diagnosticText(model, "solid_mesh");
   }
@@ -230,7 +230,7 @@ TEST(GltfMeshes, OneOfABufferThatIsCutOffIsNotReadBeyondIt) {
   ASSERT_NE(at, std::string::npos);
   glb.replace(at, stated.size(), "\"byteLength\":9" + std::to_string(size).substr(1) + "}");
   const Model model = importModel(folder.write("a.glb", glb));
-  EXPECT_EQ(countOf(model, "solid_mesh"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u);
 }
 
 TEST(GltfMeshes, AnIncompleteLastTriangleIsLeftOutAndReported) {
@@ -249,8 +249,8 @@ TEST(GltfMeshes, AnIncompleteLastTriangleIsLeftOutAndReported) {
     const Model model = importModel(folder.write("a.glb", file.glb()));
     ASSERT_EQ(model.objects.size(), 2u);
     EXPECT_EQ(model.meshes.at(model.objects[1].meshes.at(0)).triangleCount(), 1u);
-    EXPECT_EQ(countOf(model, "broken_triangle_dropped"), 1u);
-    EXPECT_EQ(countOf(model, "solid_mesh"), 0u);
+    EXPECT_EQ(countDiagnostics(model, "broken_triangle_dropped"), 1u);
+    EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 0u);
   }
 }
 
@@ -260,7 +260,7 @@ TEST(GltfMeshes, OneVertexThatIsNoNumberCostsItsOwnTrianglesAlone) {
   const float none = std::numeric_limits<float>::quiet_NaN();
   std::memcpy(file.binary.data() + 12 * tests::Terrace::at(3, 3), &none, sizeof none);
   const Model model = importModel(folder.write("a.glb", file.glb()));
-  EXPECT_EQ(countOf(model, "broken_triangle_dropped"), 6u);
+  EXPECT_EQ(countDiagnostics(model, "broken_triangle_dropped"), 6u);
   EXPECT_EQ(model.meshes.at(model.objects.at(0).meshes.at(0)).triangleCount(), kTriangles - 6);
 }
 

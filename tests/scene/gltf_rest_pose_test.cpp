@@ -20,7 +20,7 @@ using tests::TemporaryFolder;
 
 constexpr std::size_t kVertices = 64;  // of the terrace
 
-std::vector<Vec3> positionsOf(const Model& model, const Object& object) {
+std::vector<Vec3> computePositions(const Model& model, const Object& object) {
   std::vector<Vec3> positions;
   for (const std::uint32_t m : object.meshes)
     for (std::uint32_t v = 0; v < model.meshes[m].positions.size(); ++v)
@@ -31,7 +31,7 @@ std::vector<Vec3> positionsOf(const Model& model, const Object& object) {
 /// Expects the positions of the terrace's vertices after `move`, in any order.
 void expectMoved(const Model& model, const Object& object,
                  const std::function<Vec3(const Vec3&, std::size_t)>& move) {
-  const std::vector<Vec3> read = positionsOf(model, object);
+  const std::vector<Vec3> read = computePositions(model, object);
   const tests::Terrace terrace;
   ASSERT_EQ(terrace.positions.size(), kVertices);
   for (std::size_t v = 0; v < kVertices; ++v) {
@@ -129,27 +129,28 @@ TEST(GltfRestPose, AMeshThatOtherNodesUseUnskinnedStaysThere) {
 
 TEST(GltfRestPose, InvalidSkinsAreErrorsInWords) {
   const TemporaryFolder folder;
-  const auto textOf = [&](const std::function<void(GltfWriter&)>& damage) {
+  const auto catchDamage = [&](const std::function<void(GltfWriter&)>& damage) {
     GltfWriter file = tests::plainTerrace();
     bindToJoints(file, {Affine3d::Identity(), Affine3d::Identity()});
     damage(file);
-    return failureOf(folder.write("a.glb", file.glb()));
+    return catchFailure(folder.write("a.glb", file.glb()));
   };
   const auto expect = [](const std::string& text, const char* part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
-  expect(textOf([](GltfWriter& f) { f.json["skins"][0]["joints"] = {1}; }), "is not in its skin");
-  expect(textOf([](GltfWriter& f) {
+  expect(catchDamage([](GltfWriter& f) { f.json["skins"][0]["joints"] = {1}; }),
+         "is not in its skin");
+  expect(catchDamage([](GltfWriter& f) {
            f.json["skins"][0]["joints"] = {1, 99};
          }),
          "skins[0]: joint 1 is not a node");
-  expect(textOf([](GltfWriter& f) { f.json["skins"][0]["joints"] = Json::array(); }),
+  expect(catchDamage([](GltfWriter& f) { f.json["skins"][0]["joints"] = Json::array(); }),
          "skins[0]: has no joints");
-  expect(textOf([](GltfWriter& f) {
+  expect(catchDamage([](GltfWriter& f) {
            f.json["skins"][0]["joints"] = {1, 2, 1};
          }),
          "fewer inverse bind matrices than joints");
-  expect(textOf([](GltfWriter& f) {
+  expect(catchDamage([](GltfWriter& f) {
            f.json["meshes"][0]["primitives"][0]["attributes"].erase("WEIGHTS_0");
          }),
          "joints and weights do not fit");
@@ -226,7 +227,7 @@ TEST(GltfRestPose, AMorphTargetOfAnotherLengthIsAnError) {
   const unsigned single = file.addPoints({{1, 1, 1}});
   file.json["meshes"][0]["primitives"][0]["targets"][1]["POSITION"] = single;
   file.json["meshes"][0]["weights"] = {0, 1};
-  const std::string text = failureOf(folder.write("a.glb", file.glb()));
+  const std::string text = catchFailure(folder.write("a.glb", file.glb()));
   EXPECT_NE(text.find("morph target 1 has another number of vertices"), std::string::npos) << text;
 }
 
@@ -261,7 +262,7 @@ Aabb boxOfTerrace(const Model& model) {
   Aabb box;
   for (const Object& object : model.objects) {
     if (!object.path.ends_with("terrace")) continue;
-    for (const Vec3& position : positionsOf(model, object)) box.include(position);
+    for (const Vec3& position : computePositions(model, object)) box.include(position);
   }
   return box;
 }
@@ -276,7 +277,7 @@ TEST(GltfRestPose, TheBoxOfAMeshThatCannotBeReadIsPosedByTheJointsThatMoveIt) {
   GltfWriter file = makeBoundTerrace();
   breakAttribute(file, "POSITION");
   const Model model = importModel(folder.write("a.glb", file.glb()));
-  EXPECT_EQ(countOf(model, "solid_mesh"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u);
   EXPECT_EQ(diagnosticText(model, "solid_mesh").find("not posed"), std::string::npos);
   // The hip raises the box of 7 x 2 x 7 m by 5 m; the knee turns it, too, with a cosine of 0.28.
   expectBox(boxOfTerrace(model), Vec3(-0.96 * 2, 5, 0), Vec3(7, 5 + 0.96 * 7 + 0.28 * 2, 9));
@@ -294,7 +295,7 @@ TEST(GltfRestPose, WithoutReadableJointsTheBoxStaysAndTheReportSaysSo) {
   GltfWriter file = makeBoundTerrace();
   breakAttribute(file, "JOINTS_0");
   const Model model = importModel(folder.write("a.glb", file.glb()));
-  EXPECT_EQ(countOf(model, "solid_mesh"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u);
   EXPECT_NE(diagnosticText(model, "solid_mesh").find("not posed by its skin"), std::string::npos)
       << diagnosticText(model, "solid_mesh");
   // In the frame of its node, which doubles it and moves it by 100 m.

@@ -103,7 +103,7 @@ TEST(IfcDoors, LeftHasItsHingesAtTheLowEndAndOpensTowardsY) {
   const Vec3 tip = whenOpen(model, "house/door", {2.94, 1, 2.94});  // at its far edge, y = 0.06
   EXPECT_NEAR(tip.x(), 2.06, 1e-6);
   EXPECT_NEAR(tip.z(), 2.94 - 0.88, 1e-6) << "towards -z, IFC's y";
-  EXPECT_EQ(countOf(model, "guessed_doors"), 0u);
+  EXPECT_EQ(countDiagnostics(model, "guessed_doors"), 0u);
 }
 
 TEST(IfcDoors, RightHasItsHingesAtTheHighEndAndOpensTowardsY) {
@@ -159,7 +159,7 @@ TEST(IfcDoors, AHandleLocatesTheHingesAndTheGuessIsReported) {
   EXPECT_EQ(model.bodies[0].low, -kQuarter);
   EXPECT_EQ(model.bodies[0].high, kQuarter);
   EXPECT_EQ(collectSolidTriangles(model, 1).size(), 24u) << "the handle moves with the leaf";
-  EXPECT_EQ(countOf(model, "guessed_doors"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "guessed_doors"), 1u);
   EXPECT_NE(
       diagnosticText(model, "guessed_doors").find("house/door: NOTDEFINED; hinged at the right"),
       std::string::npos)
@@ -228,7 +228,7 @@ TEST(IfcDoors, AllStandWhereTheUserSaysSoAndIdsStayTheSame) {
 }
 
 /// The box of an object's vertices.
-Aabb boxOf(const Model& model, std::size_t object) {
+Aabb computeBox(const Model& model, std::size_t object) {
   Aabb box;
   for (const std::uint32_t mesh : model.objects[object].meshes)
     for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
@@ -243,15 +243,15 @@ TEST(IfcDoors, OpenOnesAreStaticWithTheirLeavesWhereTheBodyWouldOpenThem) {
   EXPECT_EQ(open.objects.size(), moving.objects.size());
   const std::uint32_t leaf = moving.bodies[0].objects[0];
   Aabb expected;
-  const Aabb closed = boxOf(moving, leaf);
+  const Aabb closed = computeBox(moving, leaf);
   for (int corner = 0; corner < 8; ++corner)
     expected.include(whenOpen(
         moving, moving.bodies[0].name,
         {corner & 1 ? closed.max.x() : closed.min.x(), corner & 2 ? closed.max.y() : closed.min.y(),
          corner & 4 ? closed.max.z() : closed.min.z()}));
-  EXPECT_LT((boxOf(open, leaf).min - expected.min).norm(), 1e-6);
-  EXPECT_LT((boxOf(open, leaf).max - expected.max).norm(), 1e-6);
-  EXPECT_GT((boxOf(open, leaf).max - closed.max).norm(), 0.5) << "the leaf has moved";
+  EXPECT_LT((computeBox(open, leaf).min - expected.min).norm(), 1e-6);
+  EXPECT_LT((computeBox(open, leaf).max - expected.max).norm(), 1e-6);
+  EXPECT_GT((computeBox(open, leaf).max - closed.max).norm(), 0.5) << "the leaf has moved";
 }
 
 TEST(IfcDoors, WithoutLeavesOnlyTheFramesStand) {
@@ -394,9 +394,9 @@ TEST(IfcDoors, OfRealBuildingsBecomeBodiesOrAreReported) {
         [](const Object& object) { return object.ifcClass == "IfcDoor" && !object.partOf; });
     EXPECT_EQ(static_cast<std::size_t>(doors), building.doors);
     EXPECT_EQ(model.bodies.size(), building.leaves);
-    EXPECT_EQ(countOf(model, "guessed_doors"), building.guessed)
+    EXPECT_EQ(countDiagnostics(model, "guessed_doors"), building.guessed)
         << diagnosticText(model, "guessed_doors");
-    EXPECT_EQ(countOf(model, "still_doors"), building.still)
+    EXPECT_EQ(countDiagnostics(model, "still_doors"), building.still)
         << diagnosticText(model, "still_doors");
     EXPECT_NO_THROW(Scene{Model(model)});
   }

@@ -11,29 +11,29 @@ namespace {
 
 using tests::IfcHouse;
 
-const IfcProduct& productOf(const IfcMetadata& facts, const std::string& ifcClass) {
+const IfcProduct& findProduct(const IfcMetadata& facts, const std::string& ifcClass) {
   for (const IfcProduct& product : facts.products) {
     if (product.ifcClass == ifcClass) return product;
   }
   throw std::runtime_error("no " + ifcClass);
 }
 
-IfcMetadata factsOf(const IfcHouse& house) {
+IfcMetadata readFacts(const IfcHouse& house) {
   return readIfcMetadata(StepFile(house.text()));
 }
 
 TEST(IfcMetadata, ProductsHaveClassNamePlaceAndRole) {
-  const IfcMetadata facts = factsOf({});
+  const IfcMetadata facts = readFacts({});
   EXPECT_EQ(facts.schema, "IFC4");
   EXPECT_TRUE(facts.complete);
   EXPECT_EQ(facts.metresPerUnit, 0.001);
-  const IfcProduct& wall = productOf(facts, "IfcWall");
+  const IfcProduct& wall = findProduct(facts, "IfcWall");
   EXPECT_EQ(wall.id, 120u);
   EXPECT_TRUE(wall.hasBody);
   EXPECT_EQ(wall.role, IfcProduct::Role::physical);
   EXPECT_EQ(wall.parent, 41u);
-  EXPECT_EQ(productOf(facts, "IfcOpeningElement").role, IfcProduct::Role::opening);
-  EXPECT_FALSE(productOf(facts, "IfcBuildingStorey").hasBody);
+  EXPECT_EQ(findProduct(facts, "IfcOpeningElement").role, IfcProduct::Role::opening);
+  EXPECT_FALSE(findProduct(facts, "IfcBuildingStorey").hasBody);
 }
 
 TEST(IfcMetadata, PathsLeadFromTheProjectDownAndRepeatsAreNumbered) {
@@ -42,7 +42,7 @@ TEST(IfcMetadata, PathsLeadFromTheProjectDownAndRepeatsAreNumbered) {
       "#500=IFCWALL('00000000000000000Wall2',$,'Wall',$,$,#102,#115,$,$);\n"
       "#501=IFCRELCONTAINEDINSPATIALSTRUCTURE('0000000000000000000009',$,$,$,(#500),#41);\n"
       "#502=IFCWALL('00000000000000000Wall3',$,$,$,$,#102,#115,$,$);\n";
-  const auto paths = buildIfcPaths(factsOf(house));
+  const auto paths = buildIfcPaths(readFacts(house));
   EXPECT_EQ(paths.at(120), "Test house/House/Ground%2Ffloor/Wall");
   EXPECT_EQ(paths.at(500), "Test house/House/Ground%2Ffloor/Wall#2");
   EXPECT_EQ(paths.at(502), "IfcWall") << "it has no parent and no name";
@@ -56,12 +56,12 @@ TEST(IfcMetadata, PartsThatContainEachOtherHavePaths) {
       "#502=IFCWALL('00000000000000000Wall3',$,'b',$,$,#102,#115,$,$);\n"
       "#503=IFCRELAGGREGATES('0000000000000000000010',$,$,$,#501,(#502));\n"
       "#504=IFCRELAGGREGATES('0000000000000000000011',$,$,$,#502,(#501));\n";
-  const auto paths = buildIfcPaths(factsOf(house));
+  const auto paths = buildIfcPaths(readFacts(house));
   EXPECT_NE(paths.at(501), paths.at(502));
 }
 
 TEST(IfcMetadata, DoorsSayHowTheyOpenInEitherVersion) {
-  const IfcProduct four = productOf(factsOf({}), "IfcDoor");
+  const IfcProduct four = findProduct(readFacts({}), "IfcDoor");
   EXPECT_EQ(four.operation, "SINGLE_SWING_LEFT");
   EXPECT_NEAR(four.overallWidth, 0.9, 1e-12);
   EXPECT_NEAR(four.overallHeight, 2.1, 1e-12);
@@ -71,11 +71,11 @@ TEST(IfcMetadata, DoorsSayHowTheyOpenInEitherVersion) {
 
   IfcHouse older;
   older.schema = "IFC2X3";
-  EXPECT_EQ(productOf(factsOf(older), "IfcDoor").operation, "");
+  EXPECT_EQ(findProduct(readFacts(older), "IfcDoor").operation, "");
   older.more =
       "#500=IFCDOORSTYLE('000000000000000000DSty',$,$,$,$,$,$,$,.DOUBLE_DOOR_SLIDING.,.WOOD.,.F.,"
       ".F.);\n#501=IFCRELDEFINESBYTYPE('0000000000000000000009',$,$,$,(#320),#500);\n";
-  EXPECT_EQ(productOf(factsOf(older), "IfcDoor").operation, "DOUBLE_DOOR_SLIDING");
+  EXPECT_EQ(findProduct(readFacts(older), "IfcDoor").operation, "DOUBLE_DOOR_SLIDING");
 
   IfcHouse typed;  // IFC4: the door takes the operation from its type
   const std::string operation = ".SINGLE_SWING_LEFT.";
@@ -84,7 +84,7 @@ TEST(IfcMetadata, DoorsSayHowTheyOpenInEitherVersion) {
       "#501=IFCRELDEFINESBYTYPE('0000000000000000000009',$,$,$,(#320),#500);\n";
   std::string text = typed.text();
   text.replace(text.find(operation), operation.size(), "$");
-  EXPECT_EQ(productOf(readIfcMetadata(StepFile(text)), "IfcDoor").operation, "REVOLVING");
+  EXPECT_EQ(findProduct(readIfcMetadata(StepFile(text)), "IfcDoor").operation, "REVOLVING");
 }
 
 TEST(IfcMetadata, LiftsAreTransportElements) {
@@ -92,7 +92,7 @@ TEST(IfcMetadata, LiftsAreTransportElements) {
   house.more =
       "#500=IFCTRANSPORTELEMENT('000000000000000000Lift',$,'Lift',$,$,#102,#115,$,"
       ".ELEVATOR.);\n";
-  EXPECT_EQ(productOf(factsOf(house), "IfcTransportElement").operation, "ELEVATOR");
+  EXPECT_EQ(findProduct(readFacts(house), "IfcTransportElement").operation, "ELEVATOR");
 }
 
 TEST(IfcMetadata, FeetAreAConversion) {
@@ -102,23 +102,23 @@ TEST(IfcMetadata, FeetAreAConversion) {
   house.more =
       "#601=IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#602);\n"
       "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-  const IfcMetadata facts = factsOf(house);
+  const IfcMetadata facts = readFacts(house);
   EXPECT_DOUBLE_EQ(facts.metresPerUnit, 0.3048);
   EXPECT_FALSE(facts.siUnit);
-  EXPECT_NEAR(productOf(facts, "IfcDoor").overallWidth, 0.9, 1e-5);
+  EXPECT_NEAR(findProduct(facts, "IfcDoor").overallWidth, 0.9, 1e-5);
   house.more = "#601=IFCMEASUREWITHUNIT(IFCLENGTHMEASURE(0.3048),#31);\n";  // a unit that refers to
                                                                             // itself
-  EXPECT_TRUE(factsOf(house).unitAssumption);
+  EXPECT_TRUE(readFacts(house).unitAssumption);
 }
 
 TEST(IfcMetadata, AMapPositionIsReportedInMetres) {
   IfcHouse house;  // in millimetres
-  EXPECT_FALSE(factsOf(house).mapConversion);
+  EXPECT_FALSE(readFacts(house).mapConversion);
   house.more =
       "#600=IFCMAPCONVERSION(#20,#601,456789.125,5428000.5,110.25,0.5,0.8660254037844386,0.9996);\n"
       "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
       "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-  const std::optional<IfcMapConversion> place = factsOf(house).mapConversion;
+  const std::optional<IfcMapConversion> place = readFacts(house).mapConversion;
   ASSERT_TRUE(place);
   EXPECT_EQ(place->crs, "EPSG:25832");
   EXPECT_EQ(place->east, 456789.125);
@@ -128,7 +128,7 @@ TEST(IfcMetadata, AMapPositionIsReportedInMetres) {
   EXPECT_EQ(place->scale, 0.9996);
   // A map conversion without a unit uses the project's; missing values use the defaults.
   house.more = "#600=IFCMAPCONVERSION(#20,#999,4000.,5000.,$);\n";
-  const std::optional<IfcMapConversion> bare = factsOf(house).mapConversion;
+  const std::optional<IfcMapConversion> bare = readFacts(house).mapConversion;
   ASSERT_TRUE(bare);
   EXPECT_NEAR(bare->east, 4, 1e-12);
   EXPECT_NEAR(bare->north, 5, 1e-12);
@@ -139,20 +139,21 @@ TEST(IfcMetadata, AMapPositionIsReportedInMetres) {
 
 TEST(IfcMetadata, TheScaleOfAMapIsAFactorWhetherOrNotItConvertsUnits) {
   IfcHouse house;  // in millimetres
-  const auto placeOf = [&](const std::string& scale, bool mapInMetres) {
+  const auto readMapConversion = [&](const std::string& scale, bool mapInMetres) {
     house.more = "#600=IFCMAPCONVERSION(#20,#601,456789.,5428000.,110.,1.,0.," + scale + ");\n" +
                  "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$," + (mapInMetres ? "#602" : "$") +
                  ");\n#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-    return factsOf(house).mapConversion.value();
+    return readFacts(house).mapConversion.value();
   };
   // By the standard, Scale also converts from millimetres to metres; some write the factor alone.
-  EXPECT_NEAR(placeOf("0.001", true).scale, 1, 1e-12);
-  EXPECT_NEAR(placeOf("0.0009996", true).scale, 0.9996, 1e-12);
-  EXPECT_EQ(placeOf("0.9996", true).scale, 0.9996);
-  const IfcMapConversion bare = placeOf("0.001", false);  // then the map is in metres, too
+  EXPECT_NEAR(readMapConversion("0.001", true).scale, 1, 1e-12);
+  EXPECT_NEAR(readMapConversion("0.0009996", true).scale, 0.9996, 1e-12);
+  EXPECT_EQ(readMapConversion("0.9996", true).scale, 0.9996);
+  const IfcMapConversion bare =
+      readMapConversion("0.001", false);  // then the map is in metres, too
   EXPECT_NEAR(bare.scale, 1, 1e-12);
   EXPECT_EQ(bare.east, 456789);
-  const IfcMapConversion own = placeOf("1.", false);
+  const IfcMapConversion own = readMapConversion("1.", false);
   EXPECT_EQ(own.scale, 1);
   EXPECT_NEAR(own.east, 456.789, 1e-9);
 }
@@ -163,7 +164,7 @@ TEST(IfcMetadata, DrawingsAreNoBodies) {
       "#500=IFCSHAPEREPRESENTATION(#20,'Axis','Curve2D',(#113));\n"
       "#501=IFCPRODUCTDEFINITIONSHAPE($,$,(#500));\n"
       "#502=IFCBEAM('000000000000000000Beam',$,'Axis alone',$,$,#102,#501,$,$);\n";
-  EXPECT_FALSE(productOf(factsOf(house), "IfcBeam").hasBody);
+  EXPECT_FALSE(findProduct(readFacts(house), "IfcBeam").hasBody);
 }
 
 TEST(IfcMetadata, ClassesAreWrittenAsTheStandardWritesThem) {

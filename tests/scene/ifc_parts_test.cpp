@@ -28,7 +28,7 @@ std::vector<std::uint32_t> listBodies(const StepFile& file) {
   return products;
 }
 
-std::string textOf(const StepFile& file, const IfcPart& part) {
+std::string joinRanges(const StepFile& file, const IfcPart& part) {
   std::string text;
   for (const TextRange& range : part.ranges) text += file.text().substr(range.first, range.size);
   return text;
@@ -52,8 +52,8 @@ TEST(IfcParts, AProductIsInOnePartWithAllThatItsShapeNeeds) {
   ASSERT_EQ(parts.size(), 2u);
   EXPECT_EQ(parts[0].products, (std::vector<std::uint32_t>{120}));
   EXPECT_EQ(parts[1].products, (std::vector<std::uint32_t>{320, 604})) << "the lighter part";
-  EXPECT_EQ(textOf(file, parts[1]).size(), file.text().size()) << "small gaps are read";
-  const StepFile first(textOf(file, parts[0]));
+  EXPECT_EQ(joinRanges(file, parts[1]).size(), file.text().size()) << "small gaps are read";
+  const StepFile first(joinRanges(file, parts[0]));
   EXPECT_EQ(first.damagedCount(), 0u);
   EXPECT_TRUE(first.hasEnd());
   std::set<std::uint32_t> missing;
@@ -80,7 +80,7 @@ TEST(IfcParts, WhatOthersNeedIsInAllParts) {
     const StepFile file(house.text());
     const std::vector<IfcPart> parts = divideIfc(file, listBodies(file), 2);
     for (const IfcPart& part : parts) {
-      const StepFile read(textOf(file, part));
+      const StepFile read(joinRanges(file, part));
       EXPECT_NE(read.find(600), nullptr);
       EXPECT_NE(read.find(601), nullptr);
     }

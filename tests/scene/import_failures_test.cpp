@@ -35,9 +35,9 @@ void expectNoChildren() {
 TEST(ImportFailures, MissingFileFolderAndEmptyFileAreReported) {
   const TemporaryFolder folder;
   const auto missing = folder.path() / "missing.glb";
-  EXPECT_TRUE(contains(failureOf(missing), missing.string() + ": no such file"));
-  EXPECT_TRUE(contains(failureOf(folder.path()), "is a folder"));
-  EXPECT_TRUE(contains(failureOf(folder.write("empty.obj", "")), "empty.obj: is empty"));
+  EXPECT_TRUE(contains(catchFailure(missing), missing.string() + ": no such file"));
+  EXPECT_TRUE(contains(catchFailure(folder.path()), "is a folder"));
+  EXPECT_TRUE(contains(catchFailure(folder.write("empty.obj", "")), "empty.obj: is empty"));
 }
 
 TEST(ImportFailures, AMissingReaderModuleIsReported) {
@@ -45,16 +45,16 @@ TEST(ImportFailures, AMissingReaderModuleIsReported) {
   const auto file = folder.write("box.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
   const auto missing = folder.path() / "missing.so";
   setenv("ENFILADE_ASSIMP", missing.c_str(), 1);
-  const std::string text = failureOf(file);
+  const std::string text = catchFailure(file);
   unsetenv("ENFILADE_ASSIMP");
   for (const std::string& part : {file.string(), missing.string(), std::string("install it")})
     EXPECT_TRUE(contains(text, part)) << text;
-  EXPECT_EQ(failureOf(file), "");
+  EXPECT_EQ(catchFailure(file), "");
 }
 
 TEST(ImportFailures, AnUnknownExtensionListsTheKnownOnes) {
   const TemporaryFolder folder;
-  const std::string text = failureOf(folder.write("house.skp", "x"));
+  const std::string text = catchFailure(folder.write("house.skp", "x"));
   EXPECT_TRUE(contains(text, "'.skp'"));
   for (const std::string_view known : importableExtensions()) {
     EXPECT_TRUE(contains(text, std::string(known))) << known;
@@ -64,9 +64,9 @@ TEST(ImportFailures, AnUnknownExtensionListsTheKnownOnes) {
 TEST(ImportFailures, AGlbCutOffAnywhereIsAnError) {
   const TemporaryFolder folder;
   const std::string whole = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
-  ASSERT_EQ(failureOf(folder.write("whole.glb", whole)), "");
+  ASSERT_EQ(catchFailure(folder.write("whole.glb", whole)), "");
   for (std::size_t size = 1; size < whole.size(); size += 97) {
-    const std::string text = failureOf(folder.write("cut.glb", whole.substr(0, size)));
+    const std::string text = catchFailure(folder.write("cut.glb", whole.substr(0, size)));
     EXPECT_TRUE(contains(text, "cut.glb")) << size << ": " << text;
   }
 }
@@ -78,7 +78,7 @@ TEST(ImportFailures, AGlbWithNoiseInItNeverHurtsTheCaller) {
   for (std::size_t at = 0; at < whole.size(); at += 61) {
     std::string noisy = whole;
     noisy[at] = static_cast<char>(~noisy[at]);
-    refused += static_cast<std::size_t>(!failureOf(folder.write("noise.glb", noisy)).empty());
+    refused += static_cast<std::size_t>(!catchFailure(folder.write("noise.glb", noisy)).empty());
   }
   EXPECT_GT(refused, 5u);
   expectNoChildren();
@@ -87,12 +87,12 @@ TEST(ImportFailures, AGlbWithNoiseInItNeverHurtsTheCaller) {
 TEST(ImportFailures, TruncatedAndMislabelledTextFilesAreErrors) {
   const TemporaryFolder folder;
   const std::string gltf = tests::gltf(BoxMesh({1, 1, 1}), "0", kOneNode);
-  EXPECT_TRUE(contains(failureOf(folder.write("cut.gltf", gltf.substr(0, 300))), "cut.gltf"));
-  EXPECT_TRUE(contains(failureOf(folder.write("x.dae", "<COLLADA><asset>")), "x.dae"));
-  EXPECT_TRUE(contains(failureOf(folder.write("x.ifc", "ISO-10303-21;\nDATA;\n")), "cut off"));
-  EXPECT_TRUE(contains(failureOf(folder.write("y.ifc", "hello")), "not an IFC file"));
-  EXPECT_TRUE(contains(failureOf(folder.write("x.fbx", "hello")), "x.fbx"));
-  EXPECT_TRUE(contains(failureOf(folder.write("x.obj", "v 0 0 0\n")), "x.obj"));
+  EXPECT_TRUE(contains(catchFailure(folder.write("cut.gltf", gltf.substr(0, 300))), "cut.gltf"));
+  EXPECT_TRUE(contains(catchFailure(folder.write("x.dae", "<COLLADA><asset>")), "x.dae"));
+  EXPECT_TRUE(contains(catchFailure(folder.write("x.ifc", "ISO-10303-21;\nDATA;\n")), "cut off"));
+  EXPECT_TRUE(contains(catchFailure(folder.write("y.ifc", "hello")), "not an IFC file"));
+  EXPECT_TRUE(contains(catchFailure(folder.write("x.fbx", "hello")), "x.fbx"));
+  EXPECT_TRUE(contains(catchFailure(folder.write("x.obj", "v 0 0 0\n")), "x.obj"));
 }
 
 TEST(ImportFailures, AChildThatHangsIsKilledWhenTheTimeIsOver) {
@@ -101,7 +101,7 @@ TEST(ImportFailures, AChildThatHangsIsKilledWhenTheTimeIsOver) {
   const Fault fault("hang");
   ImportOptions options;
   options.timeLimit = 0.3;
-  const std::string text = failureOf(file, options);
+  const std::string text = catchFailure(file, options);
   EXPECT_TRUE(contains(text, "box.glb: not read within 0.3 s")) << text;
   expectNoChildren();
 }
@@ -110,7 +110,7 @@ TEST(ImportFailures, ACrashNamesTheFileTheStageAndARemedy) {
   const TemporaryFolder folder;
   const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
   const Fault fault("crash");
-  const std::string text = failureOf(file);
+  const std::string text = catchFailure(file);
   EXPECT_TRUE(contains(text, "box.glb")) << text;
   EXPECT_TRUE(contains(text, "crashed")) << text;
   EXPECT_TRUE(contains(text, "'open'")) << text;
@@ -123,17 +123,17 @@ TEST(ImportFailures, AChildThatAnswersNothingOrNoiseIsAnError) {
   const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
   {
     const Fault fault("exit");
-    EXPECT_TRUE(contains(failureOf(file), "ended without an answer"));
+    EXPECT_TRUE(contains(catchFailure(file), "ended without an answer"));
   }
   {
     const Fault fault("garbage");
-    EXPECT_TRUE(contains(failureOf(file), "sent invalid data"));
+    EXPECT_TRUE(contains(catchFailure(file), "sent invalid data"));
   }
   {
     const Fault fault("memory");
-    EXPECT_TRUE(contains(failureOf(file), "MiB of memory"));
+    EXPECT_TRUE(contains(catchFailure(file), "MiB of memory"));
   }
-  EXPECT_EQ(failureOf(file), "");
+  EXPECT_EQ(catchFailure(file), "");
   expectNoChildren();
 }
 
@@ -150,10 +150,10 @@ TEST(ImportFailures, OptionsOutOfRangeAreRefused) {
   const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
   ImportOptions options;
   options.metresPerUnit = -1;
-  EXPECT_TRUE(contains(failureOf(file, options), "metres per unit"));
+  EXPECT_TRUE(contains(catchFailure(file, options), "metres per unit"));
   options.metresPerUnit.reset();
   options.up = 'q';
-  EXPECT_TRUE(contains(failureOf(file, options), "up axis"));
+  EXPECT_TRUE(contains(catchFailure(file, options), "up axis"));
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ void expectBounds(const Scene& scene, const Vec3& min, const Vec3& max, double t
   EXPECT_LT((scene.bounds().max - max).norm(), tolerance) << scene.bounds().max.transpose();
 }
 
-std::vector<std::string> pathsOf(const Model& model) {
+std::vector<std::string> getPaths(const Model& model) {
   std::vector<std::string> paths;
   for (const Object& object : model.objects) paths.push_back(object.path);
   return paths;
@@ -85,7 +85,7 @@ TEST(ImportHandMade, TranslationsThatFloatsCannotHoldAreReadWhole) {
     EXPECT_LT((apart - Vec3(2.13, 0, 1.39)).norm(), 1e-8) << apart.transpose();
     const Vec3 place = model.objects[0].worldFromMesh.translation() + model.offset;
     EXPECT_LT((place - Vec3(459123.4, 112.6, -5428310.7)).norm(), 1e-8);
-    EXPECT_EQ(countOf(model, "coarse_placement"), 0u);
+    EXPECT_EQ(countDiagnostics(model, "coarse_placement"), 0u);
   }
 }
 
@@ -115,7 +115,7 @@ TEST(ImportHandMade, AnObjectThreeHundredKilometresOffIsLeftOutAndReported) {
            R"({"mesh":0,"name":"stray","translation":[300000,0,0]})"));
   const Model model = importModel(file);
   EXPECT_EQ(model.objects.size(), 3u);
-  EXPECT_EQ(countOf(model, "far_object_dropped"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "far_object_dropped"), 1u);
   EXPECT_TRUE(model.offset.isZero(0));
   expectBounds(Scene{Model(model)}, {0, 0, 0}, {3, 1, 4});
 }
@@ -155,7 +155,7 @@ TEST(ImportHandMade, AStrayObjectFarAwayDoesNotMoveTheScene) {
   const Model model = importModel(file);
   EXPECT_TRUE(model.offset.isZero(0));
   EXPECT_EQ(model.objects.size(), 2u);
-  EXPECT_EQ(countOf(model, "far_object_dropped"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "far_object_dropped"), 1u);
 }
 
 TEST(ImportHandMade, MirroredNodesAreKeptAsTheyAreAndCounted) {
@@ -164,7 +164,7 @@ TEST(ImportHandMade, MirroredNodesAreKeptAsTheyAreAndCounted) {
       "mirror.gltf", gltf(BoxMesh({1, 2, 3}), "0,1",
                           R"({"mesh":0},{"mesh":0,"scale":[-1,1,1],"name":"mirrored"})"));
   const Model model = importModel(file);
-  EXPECT_EQ(countOf(model, "mirrored_object"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "mirrored_object"), 1u);
   EXPECT_LT(model.objects[1].worldFromMesh.linear().determinant(), 0);
   expectBounds(Scene{Model(model)}, {-1, 0, 0}, {1, 2, 3});
 }
@@ -176,7 +176,7 @@ TEST(ImportHandMade, RepeatedUnnamedAndSlashedNamesGiveUniquePaths) {
                          R"({"name":"house","children":[1,2,3,4,5,6]},{"mesh":0,"name":"door"},)"
                          R"({"mesh":0,"name":"door"},{"mesh":0,"name":"door#2"},{"mesh":0},)"
                          R"({"mesh":0,"name":"a/b"},{"mesh":0,"name":"100%"})"));
-  EXPECT_EQ(pathsOf(importModel(file)),
+  EXPECT_EQ(getPaths(importModel(file)),
             (std::vector<std::string>{"house/door", "house/door#2", "house/door#2#2", "house/node",
                                       "house/a%2Fb", "house/100%25"}));
 }
@@ -200,13 +200,13 @@ TEST(ImportHandMade, ObjIsInMetresByDefault) {
   const TemporaryFolder folder;
   const auto file = folder.write("box.OBJ", kObj);
   const Model model = importModel(file);
-  EXPECT_EQ(pathsOf(model), std::vector<std::string>{"box"});
-  EXPECT_EQ(countOf(model, "no_unit"), 1u);
+  EXPECT_EQ(getPaths(model), std::vector<std::string>{"box"});
+  EXPECT_EQ(countDiagnostics(model, "no_unit"), 1u);
   expectBounds(Scene{Model(model)}, {0, 0, 0}, {1, 2, 3});
   ImportOptions options;
   options.metresPerUnit = parseMetresPerUnit("mm");
   const Model small = importModel(file, options);
-  EXPECT_EQ(countOf(small, "no_unit"), 0u);
+  EXPECT_EQ(countDiagnostics(small, "no_unit"), 0u);
   expectBounds(Scene{Model(small)}, {0, 0, 0}, {0.001, 0.002, 0.003}, 1e-9);
 }
 
@@ -232,7 +232,7 @@ TEST(ImportHandMade, ColladaUnitAndUpAreAppliedOnceOrReplaced) {
   const Model model = importModel(file);
   EXPECT_EQ(model.metresPerUnit, 0.0254);
   EXPECT_EQ(model.upAxis, 'z');
-  EXPECT_EQ(pathsOf(model), std::vector<std::string>{"tip"});
+  EXPECT_EQ(getPaths(model), std::vector<std::string>{"tip"});
   expectBounds(Scene{Model(model)}, Vec3(10, 30, -22) * 0.0254, Vec3(11, 33, -20) * 0.0254);
   ImportOptions options;
   options.metresPerUnit = 1;
@@ -240,7 +240,7 @@ TEST(ImportHandMade, ColladaUnitAndUpAreAppliedOnceOrReplaced) {
   expectBounds(Scene(importModel(file, options)), {10, 20, 30}, {11, 22, 33}, 1e-5);
   const auto xUp = folder.write("x.dae", colladaBox("<up_axis>X_UP</up_axis>"));
   const Model turned = importModel(xUp);
-  EXPECT_EQ(countOf(turned, "no_unit"), 1u);
+  EXPECT_EQ(countDiagnostics(turned, "no_unit"), 1u);
   expectBounds(Scene{Model(turned)}, {-22, 10, 30}, {-20, 11, 33}, 1e-5);
 }
 
@@ -250,7 +250,7 @@ TEST(ImportHandMade, ATriangleWithANanVertexIsDroppedAndReported) {
   mesh.positions.push_back({std::numeric_limits<float>::quiet_NaN(), 0, 0});
   mesh.indices.insert(mesh.indices.end(), {0, 1, 8});
   const Model model = importModel(folder.write("nan.gltf", gltf(mesh, "0", kOneNode)));
-  EXPECT_EQ(countOf(model, "broken_triangle_dropped"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "broken_triangle_dropped"), 1u);
   EXPECT_EQ(model.meshes[0].indices.size(), 36u);
   expectBounds(Scene{Model(model)}, {0, 0, 0}, {1, 1, 1});
 }
@@ -261,7 +261,7 @@ TEST(ImportHandMade, DegenerateTrianglesAreKeptForTheEyeAndSkippedForTouch) {
   mesh.positions.push_back({9, 0, 0});
   mesh.indices.insert(mesh.indices.end(), {0, 1, 8});  // collinear corners
   const Model model = importModel(folder.write("flat.gltf", gltf(mesh, "0", kOneNode)));
-  EXPECT_EQ(countOf(model, "degenerate_triangle"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "degenerate_triangle"), 1u);
   const Scene scene{Model(model)};
   EXPECT_EQ(scene.shape(0).triangles.size(), 12u);
   expectBounds(scene, {0, 0, 0}, {1, 1, 1});
@@ -272,7 +272,7 @@ TEST(ImportHandMade, AMissingTextureIsAProblemAndNoError) {
   const auto file = folder.write("box.obj", "mtllib box.mtl\nusemtl wall\n" + kObj);
   folder.write("box.mtl", "newmtl wall\nKd 0.5 0.5 0.5\nmap_Kd brick.png\n");
   const Model model = importModel(file);
-  EXPECT_EQ(countOf(model, "missing_texture"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "missing_texture"), 1u);
   const Material& material = model.materials[model.meshes[0].material];
   EXPECT_EQ(material.baseColourTexture, -1);
   EXPECT_NEAR(material.baseColour.x(), 0.2140f, 1e-3f) << "sRGB 0.5 in linear light";

@@ -24,7 +24,7 @@ using tests::IfcHouse;
 using tests::readersHere;
 using tests::TemporaryFolder;
 
-const Diagnostic* problemOf(const Model& model, const std::string& kind) {
+const Diagnostic* findDiagnostic(const Model& model, const std::string& kind) {
   for (const Diagnostic& problem : model.diagnostics) {
     if (problem.kind == kind) return &problem;
   }
@@ -64,8 +64,8 @@ TEST(ImportIfc, EachReaderGivesTheSameHouse) {
     ASSERT_TRUE(door.worldFromPlacement);
     // The file's y is the scene's -z, and its z is the scene's y.
     EXPECT_LT((*door.worldFromPlacement * Vec3(0, 1, 2) - Vec3(1.5, 2, -1.1)).norm(), 1e-9);
-    EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
-    ASSERT_NE(problemOf(model, "skipped_openings"), nullptr);
+    EXPECT_EQ(findDiagnostic(model, "uncut_opening"), nullptr);
+    ASSERT_NE(findDiagnostic(model, "skipped_openings"), nullptr);
   }
 }
 
@@ -78,7 +78,7 @@ void expectUncut(const std::string& text, std::size_t count,
   for (const IfcReader reader : readersHere()) {
     const Model model = importModel(file, by(reader));
     SCOPED_TRACE(model.reader);
-    const Diagnostic* uncut = problemOf(model, "uncut_opening");
+    const Diagnostic* uncut = findDiagnostic(model, "uncut_opening");
     ASSERT_NE(uncut, nullptr);
     EXPECT_EQ(uncut->count, count) << uncut->example;
     for (const char* word : words)
@@ -141,7 +141,7 @@ TEST(ImportIfc, UnitAndUpAxisOfTheUserWin) {
   const Model model = importModel(file, options);
   expectSize(model, {8, 0.6, 6});
   EXPECT_NEAR(objectOfClass(model, "IfcDoor").overallWidth, 1.8, 1e-9);
-  EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
+  EXPECT_EQ(findDiagnostic(model, "uncut_opening"), nullptr);
 }
 
 TEST(ImportIfc, AMapPositionIsReportedAndMovesNothing) {
@@ -155,7 +155,7 @@ TEST(ImportIfc, AMapPositionIsReportedAndMovesNothing) {
   for (const IfcReader reader : readersHere()) {
     const Model model = importModel(file, by(reader));
     SCOPED_TRACE(model.reader);
-    const Diagnostic* place = problemOf(model, "map_place");
+    const Diagnostic* place = findDiagnostic(model, "map_place");
     ASSERT_NE(place, nullptr);
     EXPECT_NE(
         place->example.find("EPSG:25832: the file's origin is at E 456789.125, N 5428000.500"),
@@ -233,7 +233,7 @@ TEST(ImportIfc, StoreysThatAreAllPlacedAtOneHeightLieAtTheirElevations) {
     ASSERT_EQ(model.storeys.size(), 2u);
     EXPECT_NEAR(model.storeys[0].elevation, 0, 1e-9);
     EXPECT_NEAR(model.storeys[1].elevation, 3.2, 1e-9);
-    EXPECT_EQ(countOf(model, "storeys_by_elevation"), placed ? 0u : 2u);
+    EXPECT_EQ(countDiagnostics(model, "storeys_by_elevation"), placed ? 0u : 2u);
   }
 }
 
@@ -261,7 +261,7 @@ TEST(ImportIfc, APositionWithoutAMapIsNotReported) {
     house.more = "#600=IFCMAPCONVERSION(#20,#601," + std::string(numbers) +
                  ");\n#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,$);\n";
     const Model model = importModel(folder.write("house.ifc", house.text()), by(readersHere()[0]));
-    EXPECT_EQ(problemOf(model, "map_place"), nullptr);
+    EXPECT_EQ(findDiagnostic(model, "map_place"), nullptr);
   }
 }
 
@@ -279,7 +279,7 @@ TEST(ImportIfc, AHouseFarFromTheOriginKeepsItsMillimetres) {
     const Vec3 door =
         objectOfClass(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
     EXPECT_LT((door - Vec3(459124.9, 112.6, -5428310.8)).norm(), 1e-6);
-    EXPECT_EQ(problemOf(model, "uncut_opening"), nullptr);
+    EXPECT_EQ(findDiagnostic(model, "uncut_opening"), nullptr);
   }
 }
 
@@ -289,7 +289,7 @@ TEST(ImportIfc, ACutOffFileIsReadAsFarAsItGoesAndSaysSo) {
   const auto file = folder.write("cut.ifc", text.substr(0, text.find("ENDSEC;\nEND-ISO")));
   const Model model = importModel(file, by(IfcReader::ifcPlusPlus));
   EXPECT_EQ(model.objects.size(), 2u);
-  EXPECT_NE(problemOf(model, "cut_off_file"), nullptr);
+  EXPECT_NE(findDiagnostic(model, "cut_off_file"), nullptr);
 }
 
 TEST(ImportIfc, AReaderThatFailsIsFollowedByTheNext) {
@@ -303,15 +303,15 @@ TEST(ImportIfc, AReaderThatFailsIsFollowedByTheNext) {
     EXPECT_EQ(model.reader, "ifcplusplus") << kind;
     EXPECT_EQ(model.objects.size(), 2u);
     if (!hasWebIfc()) continue;
-    ASSERT_NE(problemOf(model, "ifc_reader_failed"), nullptr);
-    EXPECT_TRUE(problemOf(model, "ifc_reader_failed")->example.starts_with("web-ifc: "));
+    ASSERT_NE(findDiagnostic(model, "ifc_reader_failed"), nullptr);
+    EXPECT_TRUE(findDiagnostic(model, "ifc_reader_failed")->example.starts_with("web-ifc: "));
   }
   const Environment fault("ENFILADE_IMPORT_FAULT", "ifcplusplus:crash");
   const Environment noNode("ENFILADE_WEB_IFC", folder.path());
   const Model model = importModel(file);
   EXPECT_EQ(model.reader, "assimp");
-  EXPECT_NE(problemOf(model, "ifc_reader_absent"), nullptr);
-  EXPECT_NE(problemOf(model, "ifc_reader_failed"), nullptr);
+  EXPECT_NE(findDiagnostic(model, "ifc_reader_absent"), nullptr);
+  EXPECT_NE(findDiagnostic(model, "ifc_reader_failed"), nullptr);
   EXPECT_EQ(objectOfClass(model, "IfcDoor").path, "Test house/House/Ground%2Ffloor/Front door");
 }
 
@@ -320,7 +320,7 @@ TEST(ImportIfc, AMissingOrInvalidReaderModuleIsReported) {
   const auto file = folder.write("house.ifc", IfcHouse().text());
   for (const auto& module : {folder.path() / "missing.so", folder.write("none.so", "text")}) {
     const Environment named("ENFILADE_IFC_PLUS_PLUS", module);
-    const std::string failure = failureOf(file, by(IfcReader::ifcPlusPlus));
+    const std::string failure = catchFailure(file, by(IfcReader::ifcPlusPlus));
     for (const std::string& part :
          {module.filename().string(), std::string("ifcplusplus: "), std::string("install it")})
       EXPECT_NE(failure.find(part), std::string::npos) << failure;
@@ -343,9 +343,9 @@ TEST(ImportIfc, WithoutNodeTheNextReaderIsUsedAndReported) {
   const Environment nowhere("ENFILADE_WEB_IFC", folder.path());
   const Model model = importModel(file);
   EXPECT_EQ(model.reader, "ifcplusplus");
-  ASSERT_NE(problemOf(model, "ifc_reader_absent"), nullptr);
-  EXPECT_NE(problemOf(model, "ifc_reader_absent")->example.find("npm ci"), std::string::npos);
-  const std::string failure = failureOf(file, by(IfcReader::webIfc));
+  ASSERT_NE(findDiagnostic(model, "ifc_reader_absent"), nullptr);
+  EXPECT_NE(findDiagnostic(model, "ifc_reader_absent")->example.find("npm ci"), std::string::npos);
+  const std::string failure = catchFailure(file, by(IfcReader::webIfc));
   EXPECT_NE(failure.find("house.ifc: cannot be read: web-ifc: "), std::string::npos) << failure;
   EXPECT_NE(failure.find("--ifc-reader auto"), std::string::npos) << failure;
 }
@@ -358,7 +358,7 @@ TEST(ImportIfc, WhenAllReadersFailTheErrorSaysWhyOfEach) {
        at = text.find("IFCEXTRUDEDAREASOLID", at)) {
     text.replace(at, 20, "IFCNOSUCHTHINGATALL1");
   }
-  const std::string failure = failureOf(folder.write("empty.ifc", text));
+  const std::string failure = catchFailure(folder.write("empty.ifc", text));
   for (const char* part : {"empty.ifc", "web-ifc: ", "ifcplusplus: ", "assimp: ", "re-export"}) {
     EXPECT_NE(failure.find(part), std::string::npos) << failure;
   }
@@ -394,33 +394,34 @@ TEST(ImportIfc, AnArchiveIsUnpacked) {
 TEST(ImportIfc, AnArchiveWithZeroSeveralOrTooLargeModelsIsRefused) {
   const TemporaryFolder folder;
   const auto xml = folder.write("xml.ifczip", tests::storedZip({{"house.ifcXML", "<ifcXML/>"}}));
-  EXPECT_NE(failureOf(xml).find("xml.ifczip: contains house.ifcXML, and IFC in XML is not read; "
-                                "export it as .ifc"),
+  EXPECT_NE(catchFailure(xml).find("xml.ifczip: contains house.ifcXML, and IFC in XML is not read; "
+                                   "export it as .ifc"),
             std::string::npos)
-      << failureOf(xml);
+      << catchFailure(xml);
   const auto none = folder.write("none.ifczip", tests::storedZip({{"readme.txt", "x"}}));
-  EXPECT_NE(failureOf(none).find("none.ifczip: contains no .ifc file"), std::string::npos);
-  EXPECT_NE(failureOf(folder.write("empty.ifczip", tests::storedZip({})))
+  EXPECT_NE(catchFailure(none).find("none.ifczip: contains no .ifc file"), std::string::npos);
+  EXPECT_NE(catchFailure(folder.write("empty.ifczip", tests::storedZip({})))
                 .find("empty.ifczip: contains no .ifc file (0 others)"),
             std::string::npos);
   const auto two = folder.write("two.ifczip", tests::storedZip({{"a.ifc", "x"}, {"b.ifc", "x"}}));
-  EXPECT_NE(failureOf(two).find("has 2 .ifc files (a.ifc, b.ifc)"), std::string::npos);
+  EXPECT_NE(catchFailure(two).find("has 2 .ifc files (a.ifc, b.ifc)"), std::string::npos);
   const auto noise = folder.write("noise.ifczip", "PK\3\4 and then nothing");
-  EXPECT_NE(failureOf(noise).find("noise.ifczip: cannot be unzipped"), std::string::npos);
+  EXPECT_NE(catchFailure(noise).find("noise.ifczip: cannot be unzipped"), std::string::npos);
   std::string locked = tests::storedZip({{"a.ifc", "x"}});
   locked[locked.find("PK\1\2") + 8] = 1;  // sets the "encrypted" flag in the directory
   EXPECT_NE(
-      failureOf(folder.write("locked.ifczip", locked)).find("is encrypted; unzip it with its"),
+      catchFailure(folder.write("locked.ifczip", locked)).find("is encrypted; unzip it with its"),
       std::string::npos);
   std::string other = tests::storedZip({{"a.ifc", "what the checksum is of"}});
   other[other.find("what")] = 'W';
-  EXPECT_NE(failureOf(folder.write("other.ifczip", other)).find("its .ifc file is damaged"),
+  EXPECT_NE(catchFailure(folder.write("other.ifczip", other)).find("its .ifc file is damaged"),
             std::string::npos);
   const auto large =
       folder.write("large.ifczip", tests::storedZip({{"a.ifc", std::string(40 << 20, ' ')}}));
   ImportOptions options;
   options.memoryLimit = std::size_t{256} << 20;  // an eighth of the limit may be text
-  EXPECT_NE(failureOf(large, options).find("unpacks to more than the 32 MiB"), std::string::npos);
+  EXPECT_NE(catchFailure(large, options).find("unpacks to more than the 32 MiB"),
+            std::string::npos);
 }
 
 TEST(ImportIfc, DamagedFilesEndInModelsOrInErrorsThatNameThem) {
@@ -436,7 +437,7 @@ TEST(ImportIfc, DamagedFilesEndInModelsOrInErrorsThatNameThem) {
     }
     const auto file = folder.write("damaged.ifc", text);
     const std::string failure =
-        failureOf(file, by(i < 4 ? IfcReader::automatic : IfcReader::ifcPlusPlus));
+        catchFailure(file, by(i < 4 ? IfcReader::automatic : IfcReader::ifcPlusPlus));
     ++(failure.empty() ? loaded : refused);
     EXPECT_TRUE(failure.empty() || failure.find("damaged.ifc") != std::string::npos) << failure;
   }

@@ -10,7 +10,7 @@
 namespace enfilade::scene {
 
 /// 0 without a diagnostic of this kind.
-inline std::size_t countOf(const Model& model, const std::string& kind) {
+inline std::size_t countDiagnostics(const Model& model, const std::string& kind) {
   for (const Diagnostic& problem : model.diagnostics)
     if (problem.kind == kind) return problem.count;
   return 0;
@@ -31,7 +31,8 @@ inline const Object& objectOfClass(const Model& model, const std::string& ifcCla
 }
 
 /// The error message of importing `file`; "" if the import succeeds.
-inline std::string failureOf(const std::filesystem::path& file, const ImportOptions& options = {}) {
+inline std::string catchFailure(const std::filesystem::path& file,
+                                const ImportOptions& options = {}) {
   try {
     importModel(file, options);
   } catch (const ImportError& error) {

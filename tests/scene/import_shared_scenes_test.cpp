@@ -196,7 +196,7 @@ TEST_P(ImportSharedScene, GivesItsObjectsTrianglesAndTrueExtents) {
   EXPECT_LT(error.cwiseAbs().maxCoeff(), 1.5e-3) << scene.bounds().size().transpose();
 }
 
-std::string testNameOf(const ::testing::TestParamInfo<Expected>& info) {
+std::string makeTestName(const ::testing::TestParamInfo<Expected>& info) {
   static const std::map<IfcReader, std::string> kReaders{{kWeb, "_by_web_ifc"},
                                                          {kPlus, "_by_ifcplusplus"},
                                                          {kAssimp, ""},
@@ -208,7 +208,7 @@ std::string testNameOf(const ::testing::TestParamInfo<Expected>& info) {
   return name + kReaders.at(info.param.reader) + (info.param.given > 0 ? "_with_unit" : "");
 }
 
-INSTANTIATE_TEST_SUITE_P(TextTable, ImportSharedScene, ::testing::ValuesIn(kScenes), testNameOf);
+INSTANTIATE_TEST_SUITE_P(TextTable, ImportSharedScene, ::testing::ValuesIn(kScenes), makeTestName);
 
 TEST(ImportSharedScenesTogether, TheTableNamesEveryModelThatIsThere) {
   ENFILADE_NEED_SHARED(shared);
@@ -230,7 +230,7 @@ TEST(ImportSharedScenesTogether, ColladaAndFbxOfTheSameOfficeAreTheSameWorld) {
   const Scene fbx(importModel(*shared / "scenes/cpr-office/cpr_office_ascii.fbx"));
   EXPECT_LT((dae.bounds().min - fbx.bounds().min).norm(), 1e-4);
   EXPECT_LT((dae.bounds().max - fbx.bounds().max).norm(), 1e-4);
-  EXPECT_EQ(countOf(fbx.model(), "unit_assumed"), 1u);
+  EXPECT_EQ(countDiagnostics(fbx.model(), "unit_assumed"), 1u);
   // The same boxes in any order.
   ASSERT_EQ(dae.staticBoxes().size(), fbx.staticBoxes().size());
   for (const Aabb& box : dae.staticBoxes()) {
@@ -292,7 +292,7 @@ TEST(ImportSharedScenesTogether, IfcReadersAgreeOnEachProduct) {
       ids[object.globalId] = object.path + " " + object.operationType;
     }
     EXPECT_EQ(ids.size(), model.objects.size());
-    EXPECT_EQ(countOf(model, "skipped_spaces"), 21u);
+    EXPECT_EQ(countDiagnostics(model, "skipped_spaces"), 21u);
     if (known.empty()) known = ids;
     EXPECT_EQ(ids, known);
   }
@@ -316,15 +316,15 @@ TEST(ImportSharedScenesTogether, IfcDoorsSayHowTheyOpen) {
 TEST(ImportSharedScenesTogether, WebIfcCutsEveryOpeningAndIfcPlusPlusLeavesSome) {
   ENFILADE_NEED_SHARED(shared);
   const auto file = *shared / "scenes/duplex/Duplex_A_20110907.ifc";
-  const std::size_t left = countOf(importShared(file, kPlus), "uncut_opening");
+  const std::size_t left = countDiagnostics(importShared(file, kPlus), "uncut_opening");
   EXPECT_GE(left, 1u);  // this reader was measured to leave 4 of 36
   EXPECT_LE(left, 8u);
   ENFILADE_NEED_WEB_IFC();
   for (const char* name : {"duplex/Duplex_A_20110907.ifc", "fzk-haus/AC14-FZK-Haus.ifc"}) {
     const Model model = importShared(*shared / "scenes" / name, kWeb);
-    EXPECT_EQ(countOf(model, "uncut_opening"), 0u) << name;
-    EXPECT_EQ(countOf(model, "opening_unchecked"), 0u) << name;
-    EXPECT_EQ(countOf(model, "missing_product"), 0u) << name;
+    EXPECT_EQ(countDiagnostics(model, "uncut_opening"), 0u) << name;
+    EXPECT_EQ(countDiagnostics(model, "opening_unchecked"), 0u) << name;
+    EXPECT_EQ(countDiagnostics(model, "missing_product"), 0u) << name;
   }
 }
 
@@ -332,7 +332,7 @@ TEST(ImportSharedScenesTogether, TexturesThatAreThereAreReadAndOthersCounted) {
   ENFILADE_NEED_SHARED(shared);
   const Model model = importModel(*shared / "scenes/aws-small-house/small_house.gltf");
   EXPECT_EQ(model.textures.size(), 83u);
-  EXPECT_EQ(countOf(model, "missing_texture"), 2u);
+  EXPECT_EQ(countDiagnostics(model, "missing_texture"), 2u);
   for (const Texture& texture : model.textures) {
     EXPECT_EQ(texture.rgba.size(), std::size_t{4} * texture.width * texture.height);
     EXPECT_LE(std::max(texture.width, texture.height), 1024u);
@@ -342,7 +342,7 @@ TEST(ImportSharedScenesTogether, TexturesThatAreThereAreReadAndOthersCounted) {
 TEST(ImportSharedScenesTogether, MirroredBlocksAreReported) {
   ENFILADE_NEED_SHARED(shared);
   const Model model = importModel(*shared / "scenes/schependomlaan/schependomlaan_estate.glb");
-  EXPECT_EQ(countOf(model, "mirrored_object"), 6558u);
+  EXPECT_EQ(countDiagnostics(model, "mirrored_object"), 6558u);
 }
 
 TEST(ImportSharedScenesTogether, TwoImportsGiveTheSameHash) {

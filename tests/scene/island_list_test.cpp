@@ -54,7 +54,7 @@ TEST(Islands, TheInsideOfASolidDoesNotCount) {
   const NavigationReport report = navigation.report();
   ASSERT_EQ(report.islandAreas.size(), 2u) << "the floor, and the top of the block";
   EXPECT_NEAR(report.area, report.islandAreas[0] + report.islandAreas[1], 1e-9);
-  EXPECT_FALSE(navigation.islandOf({0, 0.1, -5}));
+  EXPECT_FALSE(navigation.findIsland({0, 0.1, -5}));
   std::mt19937_64 random(3);
   EXPECT_FALSE(navigation.findRandomPlace(random, {.near = Vec3(0, 0, -5), .maxDistance = 2}));
   const NavigationMap map = navigation.drawMap(0.5, 0);
@@ -85,7 +85,7 @@ TEST(Islands, AStoreyAsAGoalIsOnTheIslandOfTheStart) {
   for (const Vec3& start : {Vec3(2, 0, 1), Vec3(8, 0, -1)}) {
     const auto place = navigation.findPlaceIn(*storey, start);
     ASSERT_TRUE(place);
-    EXPECT_EQ(navigation.islandOf(*place), navigation.islandOf(start));
+    EXPECT_EQ(navigation.findIsland(*place), navigation.findIsland(start));
     EXPECT_TRUE(navigation.findPath(start, *place).found());
   }
   EXPECT_TRUE(navigation.findPlaceIn(*storey, Vec3(5, 3.2, 0))) << "elsewhere, if not there";

@@ -436,7 +436,7 @@ struct ReferenceEvents {
   using Key = std::pair<EntityId, EntityId>;
 
   explicit ReferenceEvents(const World& w) : world(w) {
-    for (const Key& key : pairs()) mounted[key] = stateOf(key).touching;
+    for (const Key& key : pairs()) mounted[key] = computeState(key).touching;
   }
 
   /// Parts of a body at fraction `part` of the tick; `turned` owns the rotations that they point
@@ -472,7 +472,7 @@ struct ReferenceEvents {
     }
     return all;
   }
-  Pair stateOf(const Key& key, double part = 1) const {
+  Pair computeState(const Key& key, double part = 1) const {
     const double contact = 2 * world.settings().contactOffset;
     Pair state;
     state.distance = std::numeric_limits<double>::infinity();
@@ -490,7 +490,7 @@ struct ReferenceEvents {
   }
   /// Upper bound on the displacement of any point of the body, metres; a fraction of the tick has
   /// that fraction of it.
-  double wayOf(EntityId id) const {
+  double computeDisplacementBound(EntityId id) const {
     const auto at = world.data().bodyIndexById.find(id);
     if (at == world.data().bodyIndexById.end()) return 0;
     const Body& body = world.data().bodies[at->second];
@@ -507,9 +507,11 @@ struct ReferenceEvents {
   /// Smallest sampled distance within the tick that ends at the distance `apart`.
   double nearestOnTheWay(const Key& key, double apart) const {
     const double contact = 2 * world.settings().contactOffset;
-    if (apart > contact + wayOf(key.first) + wayOf(key.second)) return apart;
+    if (apart >
+        contact + computeDisplacementBound(key.first) + computeDisplacementBound(key.second))
+      return apart;
     for (int i = 0; i < kSamples; ++i)
-      apart = std::min(apart, stateOf(key, static_cast<double>(i) / kSamples).distance);
+      apart = std::min(apart, computeState(key, static_cast<double>(i) / kSamples).distance);
     return apart;
   }
   /// Consumes the transient contact events. They are required if the sampled distance is small
@@ -526,7 +528,9 @@ struct ReferenceEvents {
           << findEntityName(world, key.first) << ", " << findEntityName(world, key.second);
       return false;
     }
-    EXPECT_LT(nearest, contact + (wayOf(key.first) + wayOf(key.second)) / kSamples);
+    EXPECT_LT(nearest, contact + (computeDisplacementBound(key.first) +
+                                  computeDisplacementBound(key.second)) /
+                                     kSamples);
     reported.erase(begin), reported.erase(end);
     ++onTheWay;
     return true;
@@ -547,7 +551,7 @@ struct ReferenceEvents {
       if (mounted[key]) continue;
       if (moved(key.first) || moved(key.second)) {
         Pair before = last;
-        last = stateOf(key);
+        last = computeState(key);
         if (!before.touching && !last.touching && metOnTheWay(key, last.distance, reported)) {
           if (before.near) {
             EXPECT_EQ(reported.erase({key.first, key.second, Event::nearMiss, Phase::end}), 1u);

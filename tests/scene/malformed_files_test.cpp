@@ -143,7 +143,7 @@ class DamagedFile : public ::testing::TestWithParam<Damage> {};
 TEST_P(DamagedFile, FailsWithItsNameTheStageAndARemedy) {
   const TemporaryFolder folder;
   const fs::path file = folder.write(GetParam().file, GetParam().content);
-  const std::string error = failureOf(file);
+  const std::string error = catchFailure(file);
   EXPECT_TRUE(error.starts_with(file.string())) << error;
   for (const char* word : GetParam().words)
     EXPECT_NE(error.find(word), std::string::npos) << word << " is not in: " << error;
@@ -175,7 +175,7 @@ TEST(MalformedFiles, AnObjWithCrlfNegativeIndicesPolygonsAndNoMaterialsLoads) {
     triangles += model.meshes[mesh].indices.size() / 3;
   EXPECT_EQ(triangles, 6u);
   expectSize(model, {4, 3, 5});
-  EXPECT_GT(countOf(model, "missing_material_file"), 0u);
+  EXPECT_GT(countDiagnostics(model, "missing_material_file"), 0u);
 }
 
 TEST(MalformedFiles, APathWithSpacesUmlautsAndAQuoteIsAPathAsAnyOther) {
@@ -193,7 +193,7 @@ TEST(MalformedFiles, APathWithSpacesUmlautsAndAQuoteIsAPathAsAnyOther) {
   expectSize(model, {1, 2, 3});
   const auto ifc = folder.write(inner + "/Plan.ifc", tests::IfcHouse().text());
   EXPECT_EQ(importModel(ifc).objects.size(), 2u);
-  EXPECT_NE(failureOf(folder.write(inner + "/leer.glb", "")).find(inner), std::string::npos);
+  EXPECT_NE(catchFailure(folder.write(inner + "/leer.glb", "")).find(inner), std::string::npos);
 }
 
 TEST(MalformedFiles, ASymbolicLinkIsFollowed) {
@@ -204,9 +204,9 @@ TEST(MalformedFiles, ASymbolicLinkIsFollowed) {
   fs::create_symlink("circle.glb", folder.path() / "circle.glb");
   fs::create_symlink(".", folder.path() / "folder.glb");
   expectSize(importModel(folder.path() / "link.glb"), {1, 2, 3});
-  EXPECT_NE(failureOf(folder.path() / "dangling.glb").find("no such file"), std::string::npos);
-  EXPECT_NE(failureOf(folder.path() / "circle.glb").find("circle.glb: "), std::string::npos);
-  EXPECT_NE(failureOf(folder.path() / "folder.glb").find("is a folder"), std::string::npos);
+  EXPECT_NE(catchFailure(folder.path() / "dangling.glb").find("no such file"), std::string::npos);
+  EXPECT_NE(catchFailure(folder.path() / "circle.glb").find("circle.glb: "), std::string::npos);
+  EXPECT_NE(catchFailure(folder.path() / "folder.glb").find("is a folder"), std::string::npos);
 }
 
 TEST(MalformedFiles, AnUnreadableFileIsReportedAsSuch) {
@@ -218,12 +218,12 @@ TEST(MalformedFiles, AnUnreadableFileIsReportedAsSuch) {
   fs::permissions(below.parent_path(), fs::perms::none);
   const auto pipe = folder.path() / "pipe.glb";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-  EXPECT_NE(failureOf(pipe).find("pipe.glb: is not a regular file"), std::string::npos);
+  EXPECT_NE(catchFailure(pipe).find("pipe.glb: is not a regular file"), std::string::npos);
   // Root may read all files, so this runs as another user in a child process.
   const auto asUnprivileged = [&] {
     if (geteuid() == 0 && (setgid(65534) != 0 || setuid(65534) != 0)) _exit(9);
     for (const fs::path& file : {locked, below}) {
-      const std::string error = failureOf(file);
+      const std::string error = catchFailure(file);
       std::fprintf(stderr, "%s\n", error.c_str());
       if (!error.starts_with(file.string() + ": cannot be read: Permission denied")) _exit(1);
     }
@@ -238,7 +238,7 @@ TEST(MalformedFiles, AGltfNameInAnotherEncodingThanUtf8IsMendedAndReported) {
   const std::string text = replaced(boxGltf(), R"("name":"box")", "\"name\":\"T\xFCr\"");
   const Model model = importModel(folder.write("a.gltf", text));
   EXPECT_EQ(model.objects.at(0).path, "T%FCr");
-  EXPECT_EQ(countOf(model, "mended_text"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "mended_text"), 1u);
   expectSize(model, {1, 2, 3});
 }
 
@@ -296,8 +296,9 @@ TEST(MalformedFiles, RequiredExtensionsOfLooksAloneAreNoHindrance) {
   };
   const Model unlit = importModel(requiring("KHR_materials_unlit"));
   expectSize(unlit, {1, 2, 3});
-  EXPECT_EQ(countOf(unlit, "ignored_appearance"), 1u);
-  EXPECT_NE(failureOf(requiring("ACME_bent_meshes")).find("export without it"), std::string::npos);
+  EXPECT_EQ(countDiagnostics(unlit, "ignored_appearance"), 1u);
+  EXPECT_NE(catchFailure(requiring("ACME_bent_meshes")).find("export without it"),
+            std::string::npos);
 }
 
 TEST(MalformedFiles, IfcInFeetFarFromTheOriginIsInMetresAndNearIt) {

@@ -47,7 +47,7 @@ class CachedModel : public ::testing::Test {
   std::optional<ModelCache> cache_ = ModelCache{folder_.path() / "cache"};
 };
 
-std::string contentOf(const fs::path& file) {
+std::string readContent(const fs::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
@@ -88,7 +88,7 @@ TEST_F(CachedModel, AChangeOfTheFileOrOfTheOptionsIsAnotherEntry) {
   ImportOptions up;
   up.up = 'z';
   EXPECT_FALSE(load(up).fromCache);
-  std::string text = contentOf(file_);
+  std::string text = readContent(file_);
   text.replace(text.find("\"box\""), 5, "\"cox\"");
   overwrite(file_, text);
   const LoadedModel renamed = load();
@@ -129,7 +129,7 @@ TEST_F(CachedModel, APictureThatWasMissingAndCameIsSeen) {
 TEST_F(CachedModel, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
   const std::vector<std::byte> expected = serialiseModel(load().model);
   const fs::path entry = entries().at(0);
-  const std::string whole = contentOf(entry);
+  const std::string whole = readContent(entry);
   std::mt19937 random(1);
   for (int i = 0; i < 12; ++i) {
     std::string damaged = whole;
@@ -144,7 +144,7 @@ TEST_F(CachedModel, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
     EXPECT_FALSE(again.fromCache) << place;
     EXPECT_EQ(again.notes.size(), 1u) << place;
     EXPECT_EQ(serialiseModel(again.model), expected);
-    EXPECT_EQ(contentOf(entry).size(), whole.size()) << "the entry was not rewritten";
+    EXPECT_EQ(readContent(entry).size(), whole.size()) << "the entry was not rewritten";
     EXPECT_TRUE(load().fromCache);
   }
 }
@@ -152,8 +152,8 @@ TEST_F(CachedModel, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
 TEST_F(CachedModel, AnEntryUnderAWrongNameIsNotUsed) {
   load();
   const fs::path entry = entries().at(0);
-  const std::string box = contentOf(entry);
-  overwrite(folder_.path() / "box.gltf", contentOf(file_) + " ");
+  const std::string box = readContent(entry);
+  overwrite(folder_.path() / "box.gltf", readContent(file_) + " ");
   load();
   for (const fs::path& other : entries()) overwrite(other, box);
   EXPECT_FALSE(load().fromCache);
@@ -163,7 +163,7 @@ TEST_F(CachedModel, TheLeastRecentlyReadEntryIsEvictedFirst) {
   load();
   const std::uintmax_t bytes = fs::file_size(entries().at(0));
   cache_->maxBytes = 3 * bytes + bytes / 2;
-  const std::string text = contentOf(file_);
+  const std::string text = readContent(file_);
   const auto old = fs::file_time_type::clock::now() - std::chrono::hours(48);
   fs::last_write_time(entries().at(0), old);
   for (int i = 1; i <= 2; ++i) {

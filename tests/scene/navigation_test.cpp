@@ -139,8 +139,8 @@ TEST(Navigation, RandomPlacesStandAndRepeatWithTheSeed) {
     EXPECT_LE((*place - *wanted.near).norm(), 1.5);
     EXPECT_GE((*place - *wanted.near).norm(), 0.5);
   }
-  EXPECT_NE(navigation.islandOf({1, 0, 0}), navigation.islandOf({7, 0, 0}));
-  EXPECT_FALSE(navigation.islandOf({50, 0, 0}));
+  EXPECT_NE(navigation.findIsland({1, 0, 0}), navigation.findIsland({7, 0, 0}));
+  EXPECT_FALSE(navigation.findIsland({50, 0, 0}));
 }
 
 TEST(Navigation, FindsRoomsStoreysAndObjectsByName) {
@@ -267,16 +267,16 @@ TEST(Navigation, APlaceOnATableWithoutMeshHasNoIsland) {
   Navigation navigation(
       boxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}}, {"table", {3.8, 0, -0.2}, {4.2, 0.7, 0.2}}}),
       {}, {});
-  const auto floor = navigation.islandOf({2, 0, 0});
+  const auto floor = navigation.findIsland({2, 0, 0});
   ASSERT_TRUE(floor);
   const auto rim = navigation.snap({4.15, 0.75, 0.15}, 0.2);
   ASSERT_TRUE(rim);
   ASSERT_NEAR(rim->y(), 0.7, 0.01);
-  EXPECT_FALSE(navigation.islandOf(*rim));
+  EXPECT_FALSE(navigation.findIsland(*rim));
   const auto below = navigation.snapTo(*rim, {Vec3(2, 4, 2), floor});
   ASSERT_TRUE(below);
   EXPECT_LT(below->y(), 0.1);
-  EXPECT_EQ(navigation.islandOf(*below), floor);
+  EXPECT_EQ(navigation.findIsland(*below), floor);
 }
 
 TEST(Navigation, AClosedDoorIsNamedAndAnOpenOneIsPassed) {
@@ -322,7 +322,7 @@ class FloodFill {
       reached_[static_cast<std::size_t>(cell)] = true;
       open.push(cell);
     };
-    visit(cellOf(start));
+    visit(computeCell(start));
     while (!open.empty()) {
       const int cell = open.front();
       open.pop();
@@ -333,13 +333,13 @@ class FloodFill {
     }
   }
   bool reaches(const Vec3& place) const {
-    return reached_[static_cast<std::size_t>(cellOf(place))];
+    return reached_[static_cast<std::size_t>(computeCell(place))];
   }
 
  private:
   static constexpr int kSide = 251;
   static constexpr double kStep = 0.02;  // metres
-  static int cellOf(const Vec3& place) {
+  static int computeCell(const Vec3& place) {
     return static_cast<int>(std::lround(place.x() / kStep)) +
            kSide * static_cast<int>(std::lround(place.z() / kStep));
   }
@@ -352,7 +352,7 @@ TEST(Navigation, IslandsAgreeWithThePathsThroughANarrowGap) {
     const Vec3 left(2, 0, 0), right(6, 0, 0);
     const bool found = navigation.findPath(left, right).found();
     EXPECT_EQ(found, gap > 0.6) << gap;
-    EXPECT_EQ(navigation.islandOf(left) == navigation.islandOf(right), found) << gap;
+    EXPECT_EQ(navigation.findIsland(left) == navigation.findIsland(right), found) << gap;
     EXPECT_EQ(navigation.islands().size(), found ? 1u : 2u) << gap;
     EXPECT_GT(navigation.islands()[0].area, found ? 30 : 15) << gap;
   }
@@ -370,7 +370,7 @@ TEST(Navigation, IslandsPartWhereABodyClosesTheGap) {
   const auto scene = std::make_shared<const Scene>(std::move(model));
   World world(scene);
   Navigation navigation(scene, {}, {});
-  EXPECT_EQ(navigation.islandOf({2, 0, 0}), navigation.islandOf({6, 0, 0}));
+  EXPECT_EQ(navigation.findIsland({2, 0, 0}), navigation.findIsland({6, 0, 0}));
   for (const std::uint32_t level : {0u, 1u}) {
     BodyCommand command;
     command.body = "gate";
@@ -379,21 +379,21 @@ TEST(Navigation, IslandsPartWhereABodyClosesTheGap) {
     submitBodyCommand(world, std::move(command));
     for (int i = 0; i < 400; ++i) tickWorld(world);
     navigation.update(*world.snapshot());
-    EXPECT_EQ(navigation.islandOf({2, 0, 0}) == navigation.islandOf({6, 0, 0}), level == 1);
+    EXPECT_EQ(navigation.findIsland({2, 0, 0}) == navigation.findIsland({6, 0, 0}), level == 1);
   }
 }
 
 TEST(Navigation, TheClosestPlaceOnAnIsland) {
   Navigation navigation(boxScene(twoRooms(0.5)), {}, {});
   const Vec3 left(3, 0, 0);
-  const auto own = navigation.islandOf(left), other = navigation.islandOf({5, 0, 0});
+  const auto own = navigation.findIsland(left), other = navigation.findIsland({5, 0, 0});
   ASSERT_TRUE(own && other && own != other);
   const auto here = navigation.snapTo(left, {Vec3::Constant(4), own});
   ASSERT_TRUE(here);
   EXPECT_LT((*here - left).norm(), 0.01);
   const auto beyond = navigation.snapTo(left, {Vec3::Constant(4), other});
   ASSERT_TRUE(beyond);
-  EXPECT_EQ(navigation.islandOf(*beyond), other);
+  EXPECT_EQ(navigation.findIsland(*beyond), other);
   EXPECT_LT(beyond->x(), 4.6);
   EXPECT_FALSE(navigation.snapTo(left, {Vec3::Constant(1), other}));
 }

@@ -29,9 +29,9 @@ TEST(ObjectClasses, ComeFromIfcThenFromTheSidecarAndPartsHaveThoseOfTheirWhole) 
   const ObjectClasses classes = computeObjectClasses(model);
   EXPECT_EQ(classes.names, (std::vector<std::string>{"", "IfcDoor", "IfcWall", "bed", "avatar"}));
   EXPECT_EQ(classes.classIds, (std::vector<std::uint32_t>{3, 3, 1, 1, 2, 0}));
-  EXPECT_EQ(classes.classOf(0), 0u);
-  EXPECT_EQ(classes.classOf(7), 4u) << "an avatar";
-  EXPECT_EQ(classes.classesOf({0, 1, 1, 3, 6, 9}), (std::vector<std::uint32_t>{0, 3, 3, 1, 0, 4}));
+  EXPECT_EQ(classes.getClass(0), 0u);
+  EXPECT_EQ(classes.getClass(7), 4u) << "an avatar";
+  EXPECT_EQ(classes.getClasses({0, 1, 1, 3, 6, 9}), (std::vector<std::uint32_t>{0, 3, 3, 1, 0, 4}));
 }
 
 TEST(ObjectClasses, ThingsAreBodiesProductsPartsAndTheSidecarsGroups) {
@@ -44,7 +44,7 @@ TEST(ObjectClasses, ThingsAreBodiesProductsPartsAndTheSidecarsGroups) {
   model.bodies[0].objects = {5, 0};
   const ObjectClasses classes = computeObjectClasses(model);
   EXPECT_EQ(classes.things, (std::vector<std::uint32_t>{6, 1, 3, 3, 5, 6}));
-  EXPECT_EQ(classes.thingsOf({0, 1, 6, 12}), (std::vector<std::uint32_t>{0, 6, 6, 12}));
+  EXPECT_EQ(classes.getThings({0, 1, 6, 12}), (std::vector<std::uint32_t>{0, 6, 6, 12}));
 }
 
 TEST(ObjectClasses, ASidecarsMistakesAreNamed) {

@@ -118,13 +118,13 @@ struct RigidScene {
   void pairAll() {
     std::vector<PartPairKey> keys;
     const auto& solids = dynamics.bodies;
-    const auto partsOf = [](const PhysicsBody& s) {
+    const auto countParts = [](const PhysicsBody& s) {
       return static_cast<std::uint32_t>(s.parts.size() + (s.mesh ? s.mesh->triangles().size() : 0));
     };
     for (std::uint32_t a = 0; a < solids.size(); ++a)
       for (std::uint32_t b = a + 1; b < solids.size(); ++b)
-        for (std::uint32_t p = 0; p < partsOf(solids[a]); ++p)
-          for (std::uint32_t q = 0; q < partsOf(solids[b]); ++q)
+        for (std::uint32_t p = 0; p < countParts(solids[a]); ++p)
+          for (std::uint32_t q = 0; q < countParts(solids[b]); ++q)
             if (solids[a].isDynamic() || solids[b].isDynamic()) keys.push_back({a, b, p, q});
     setPairs(dynamics, keys);
   }

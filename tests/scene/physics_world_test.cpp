@@ -61,7 +61,7 @@ TEST(PhysicsWorld, AStackOfFiveBoxesStaysAndSleeps) {
 }
 
 /// The distance that a box slides down in a second on a plane tilted by 2 atan(half) about Z.
-double slideOf(double half, double friction) {
+double measureSlide(double half, double friction) {
   RigidScene scene;
   const Quat tilt = turnBy(Vec3::UnitZ(), half);
   scene.addStill(boxHull({20, 0.5, 20}), tilt * Vec3(0, -0.5, 0), tilt);
@@ -75,7 +75,7 @@ double slideOf(double half, double friction) {
 
 TEST(PhysicsWorld, ABoxOnASlopeHoldsBelowTheAngleOfFriction) {
   // tan(angle) = 2 half / (1 - half^2) = 0.4167 for half = 0.2.
-  EXPECT_LT(std::abs(slideOf(0.2, 0.43)), 1e-4);
+  EXPECT_LT(std::abs(measureSlide(0.2, 0.43)), 1e-4);
 }
 
 TEST(PhysicsWorld, ABoxOnASlopeSlidesAboveTheAngleOfFrictionAsCoulombHasIt) {
@@ -83,7 +83,7 @@ TEST(PhysicsWorld, ABoxOnASlopeSlidesAboveTheAngleOfFrictionAsCoulombHasIt) {
   const double cosine = (1 - half * half) / (1 + half * half);
   for (const double friction : {0.0, 0.2, 0.35}) {
     const double slid = 0.5 * kGravity * (sine - friction * cosine);
-    EXPECT_NEAR(slideOf(half, friction), slid, 0.02 * slid + 2e-3) << friction;
+    EXPECT_NEAR(measureSlide(half, friction), slid, 0.02 * slid + 2e-3) << friction;
   }
 }
 

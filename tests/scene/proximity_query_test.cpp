@@ -37,7 +37,7 @@ struct Still {
   SceneAt then{index, *world.snapshot()};
 };
 
-PairProximity stateOf(const SceneAt& then, EntityId a, EntityId b, bool refined = false) {
+PairProximity computeState(const SceneAt& then, EntityId a, EntityId b, bool refined = false) {
   std::size_t work = kMaxQueryWork;
   return std::get<PairProximity>(computePairProximity(then, a, b, refined, work));
 }
@@ -67,8 +67,9 @@ TEST(PairProximity, TheDistanceOfStaticMeshesIsThatOfTheirNearestParts) {
     model.objects.push_back(strewn(model, random, Vec3::Zero(), 0.3));
     model.objects.push_back(strewn(model, random, Vec3(1.2 + 0.05 * i, 0.4, 0), 0.3));
     const Still still(std::move(model));
-    const PairProximity found = stateOf(still.then, 1, 2), back = stateOf(still.then, 2, 1),
-                        refined = stateOf(still.then, 1, 2, true);
+    const PairProximity found = computeState(still.then, 1, 2),
+                        back = computeState(still.then, 2, 1),
+                        refined = computeState(still.then, 1, 2, true);
     const Scene& scene = still.world.scene();
     const collision::SeparationResult truth =
         bruteForce(scene.collisionGeometry(0), scene.collisionGeometry(1));
@@ -155,7 +156,7 @@ TEST(PairProximity, TheDepthOfVeryRoundShapesExceedsTheWorkLimit) {
     if (corners == 20) {
       EXPECT_GT(std::get<PairProximity>(state).penetration, 0.3);
     }
-    EXPECT_EQ(stateOf(still.then, 1, 2).separation.verdict, collision::Verdict::penetrating);
+    EXPECT_EQ(computeState(still.then, 1, 2).separation.verdict, collision::Verdict::penetrating);
   }
 }
 
@@ -166,9 +167,9 @@ TEST(PairProximity, BoxesHaveTheDistancesThatWereBuilt) {
   EXPECT_EQ(findEntity(then, "wall"), 2u);
   EXPECT_EQ(findEntity(then, "window"), 0u);
   EXPECT_EQ(resolveEntity(then, 9), 0u);
-  EXPECT_EQ(stateOf(then, 1, 2).separation.verdict, collision::Verdict::touching);
-  EXPECT_EQ(stateOf(then, 2, 3).separation.verdict, collision::Verdict::penetrating);
-  const PairProximity above = stateOf(then, 1, 3, true);
+  EXPECT_EQ(computeState(then, 1, 2).separation.verdict, collision::Verdict::touching);
+  EXPECT_EQ(computeState(then, 2, 3).separation.verdict, collision::Verdict::penetrating);
+  const PairProximity above = computeState(then, 1, 3, true);
   EXPECT_EQ(above.separation.distance, 1.0);
   EXPECT_EQ(above.separation.normal, Vec3(0, 1, 0));
 }

@@ -136,11 +136,11 @@ TEST_P(ScanFiles, GiveTheBoxWithItsUpAxis) {
   const Model model = importModel(folder.write(GetParam().file, GetParam().make(makeRoom())));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.upAxis, 'z');
-  EXPECT_EQ(countOf(model, "guessed_up_axis"), 1u);
-  EXPECT_EQ(countOf(model, "no_unit"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "guessed_up_axis"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "no_unit"), 1u);
   EXPECT_EQ(model.meshes.at(0).positions.size(), 8u);
   EXPECT_EQ(model.meshes[0].triangleCount(), 12u);
-  EXPECT_EQ(countOf(model, "vertex_colours_ignored"), 0u);
+  EXPECT_EQ(countDiagnostics(model, "vertex_colours_ignored"), 0u);
   EXPECT_EQ(model.meshes[0].colours,
             std::vector<VertexColour>(GetParam().coloured ? 8 : 0, {255, 0, 0, 255}));
   const Scene scene{Model(model)};
@@ -164,11 +164,11 @@ TEST_P(ScanFiles, CutOffOrDamagedAnywhereLoadOrAreErrorsThatNameTheFile) {
     std::string damaged = whole;
     damaged[at] = static_cast<char>(~damaged[at]);
     for (const std::string& content : {damaged, whole.substr(0, at)}) {
-      const std::string text = failureOf(folder.write(name, content));
+      const std::string text = catchFailure(folder.write(name, content));
       EXPECT_TRUE(text.empty() || text.find(name) != std::string::npos) << text;
     }
   }
-  EXPECT_NE(failureOf(folder.write(name, whole.substr(0, whole.size() * 2 / 3))), "");
+  EXPECT_NE(catchFailure(folder.write(name, whole.substr(0, whole.size() * 2 / 3))), "");
 }
 
 std::string nameScan(const ::testing::TestParamInfo<ScanFile>& scan) {
@@ -209,11 +209,11 @@ TEST(ScanUpAxis, IsThatOfTheLargestLevelAreaAndCanBeSet) {
       diagnosticText(importBox({8, 3, 6}), "guessed_up_axis"),
       "y is up: the largest levels across x, y, z have 18 48 24 square units; --up sets another");
   const Model cube = importBox({5, 5, 5});
-  EXPECT_EQ(countOf(cube, "unclear_up_axis"), 1u);
-  EXPECT_EQ(countOf(cube, "guessed_up_axis"), 0u);
+  EXPECT_EQ(countDiagnostics(cube, "unclear_up_axis"), 1u);
+  EXPECT_EQ(countDiagnostics(cube, "guessed_up_axis"), 0u);
   const Model set = importBox({8, 3, 6}, 'z');
   EXPECT_EQ(set.upAxis, 'z');
-  EXPECT_EQ(countOf(set, "guessed_up_axis"), 0u);
+  EXPECT_EQ(countDiagnostics(set, "guessed_up_axis"), 0u);
 }
 
 /// A room of 6 x 5 x 2.7 m without a ceiling, with its floor across `up`.
@@ -237,14 +237,14 @@ TEST(ScanUpAxis, IsThatOfTheFloorOfARoomWithoutACeiling) {
   for (std::size_t up = 0; up < 3; ++up) {
     const Model model = importModel(folder.write("room.ply", makeOpenRoom(up)));
     EXPECT_EQ(model.upAxis, "xyz"[up]);
-    EXPECT_EQ(countOf(model, "guessed_up_axis"), 1u);
+    EXPECT_EQ(countDiagnostics(model, "guessed_up_axis"), 1u);
     EXPECT_EQ(diagnosticText(model, "missing_texture"), "room.png: textures of PLY are not read");
   }
 }
 
 TEST(ScanPly, APointCloudIsRefusedInWords) {
   const TemporaryFolder folder;
-  const std::string text = failureOf(
+  const std::string text = catchFailure(
       folder.write("cloud.ply",
                    "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
                    "property float z\nend_header\n0 0 0\n1 1 1\n"));
@@ -257,7 +257,7 @@ TEST(ScanPly, TwoVertexElementsAreRefused) {
   const std::string vertices =
       "element vertex 1\nproperty float x\nproperty float y\n"
       "property float z\n";
-  const std::string text = failureOf(folder.write(
+  const std::string text = catchFailure(folder.write(
       "two.ply", "ply\nformat ascii 1.0\n" + vertices + vertices + "end_header\n0 0 0\n1 1 1\n"));
   EXPECT_NE(text.find("two elements 'vertex'"), std::string::npos) << text;
 }
@@ -374,7 +374,7 @@ TEST(ScanColours, OfFacesSplitTheVerticesWhereTheyDiffer) {
         makeColouredBinaryPly<float>("float", 1, true)}) {
     SCOPED_TRACE(text.substr(0, 30));
     const Model model = importModel(folder.write("a.ply", text));
-    EXPECT_EQ(countOf(model, "vertex_colours_ignored"), 0u);
+    EXPECT_EQ(countDiagnostics(model, "vertex_colours_ignored"), 0u);
     EXPECT_EQ(model.materials.at(0).baseColour, Eigen::Vector4f(1, 1, 1, 1));
     const Mesh& mesh = model.meshes.at(0);
     ASSERT_EQ(mesh.triangleCount(), 5u);
@@ -411,7 +411,7 @@ TEST(ScanColours, OfVerticesArePreferredToThoseOfFaces) {
 
 TEST(ScanColours, FloatsCountTo255IfOneIsAboveOneAndMayHaveShortNames) {
   const TemporaryFolder folder;
-  const auto colourOf = [&](const std::string& first, const std::string& last) {
+  const auto readColours = [&](const std::string& first, const std::string& last) {
     const std::string text =
         "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
         "property float z\nproperty float r\nproperty float g\nproperty float b\n"
@@ -420,22 +420,24 @@ TEST(ScanColours, FloatsCountTo255IfOneIsAboveOneAndMayHaveShortNames) {
     return importModel(folder.write("a.ply", text)).meshes.at(0).colours;
   };
   const VertexColour dark{0, 1, 0, 255};
-  EXPECT_EQ(colourOf("0 1 0.2", "128 64 255"),
+  EXPECT_EQ(readColours("0 1 0.2", "128 64 255"),
             (std::vector<VertexColour>{dark, dark, {128, 64, 255, 255}}));
   const VertexColour bright{0, 255, 51, 255};
-  EXPECT_EQ(colourOf("0 1 0.2", "1.0005 0 0"),
+  EXPECT_EQ(readColours("0 1 0.2", "1.0005 0 0"),
             (std::vector<VertexColour>{bright, bright, {255, 0, 0, 255}}));
 }
 
 TEST(ScanColours, OfStlFacetsAreReported) {
   const TemporaryFolder folder;
   const std::string plain = makeBinaryStl(makeRoom());
-  EXPECT_EQ(countOf(importModel(folder.write("a.stl", plain)), "vertex_colours_ignored"), 0u);
+  EXPECT_EQ(countDiagnostics(importModel(folder.write("a.stl", plain)), "vertex_colours_ignored"),
+            0u);
   std::string magics = plain, visCam = plain;
   magics.replace(20, 6, "COLOR=");
   visCam[plain.size() - 1] = '\x80';
   for (const std::string& text : {magics, visCam})
-    EXPECT_EQ(countOf(importModel(folder.write("a.stl", text)), "vertex_colours_ignored"), 1u);
+    EXPECT_EQ(countDiagnostics(importModel(folder.write("a.stl", text)), "vertex_colours_ignored"),
+              1u);
 }
 
 TEST(ScanSizes, DataAfterWhatTheHeaderAnnouncesIsReported) {
@@ -469,13 +471,13 @@ TEST(ScanStl, ABinaryFileMayBeginWithSolidAndHaveDataBehind) {
   const Model model =
       importModel(folder.write("a.stl", makeBinaryStl(makeRoom()) + "made by a program"));
   EXPECT_EQ(model.meshes.at(0).triangleCount(), 12u);
-  EXPECT_EQ(countOf(model, "trailing_data"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "trailing_data"), 1u);
 }
 
 TEST(ScanSizes, ACountThatTheFileCannotHoldIsRefused) {
   const TemporaryFolder folder;
   for (const char* format : {"ascii", "binary_little_endian", "binary_big_endian"}) {
-    const std::string text = failureOf(folder.write(
+    const std::string text = catchFailure(folder.write(
         "a.ply", std::string("ply\nformat ") + format +
                      " 1.0\nelement vertex 4000000000\nproperty float x\nproperty float y\n"
                      "property float z\nend_header\n0 0 0\n"));
@@ -483,7 +485,7 @@ TEST(ScanSizes, ACountThatTheFileCannotHoldIsRefused) {
   }
   std::string stl =
       makeBinaryStl(makeRoom()).replace(0, 5, "other").replace(80, 4, "\xff\xff\xff\xff");
-  const std::string text = failureOf(folder.write("a.stl", stl));
+  const std::string text = catchFailure(folder.write("a.stl", stl));
   EXPECT_NE(text.find("4294967295 triangles announced"), std::string::npos) << text;
 }
 
@@ -521,15 +523,15 @@ TEST(ZippedCollada, IsTheSameAsTheDocument) {
 TEST(ZippedCollada, WithoutADocumentOrDamagedIsAnError) {
   const TemporaryFolder folder;
   const std::string other =
-      failureOf(folder.write("a.zae", tests::storedZip({{"readme.txt", "hello"}})));
+      catchFailure(folder.write("a.zae", tests::storedZip({{"readme.txt", "hello"}})));
   EXPECT_NE(other.find("contains no .dae file"), std::string::npos) << other;
-  const std::string damaged = failureOf(folder.write("b.zae", "PK\3\4 and no more"));
+  const std::string damaged = catchFailure(folder.write("b.zae", "PK\3\4 and no more"));
   EXPECT_NE(damaged.find("b.zae: cannot be unzipped"), std::string::npos) << damaged;
 }
 
 TEST(IfcInXml, IsRefusedWithTheRemedy) {
   const TemporaryFolder folder;
-  const std::string text = failureOf(folder.write("a.ifcXML", "<ifcXML/>"));
+  const std::string text = catchFailure(folder.write("a.ifcXML", "<ifcXML/>"));
   EXPECT_NE(text.find("export it as .ifc"), std::string::npos) << text;
 }
 

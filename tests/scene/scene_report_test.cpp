@@ -8,14 +8,14 @@
 namespace enfilade::scene {
 namespace {
 
-std::size_t countOf(const SceneReport& report, const std::string& kind) {
+std::size_t countDiagnostics(const SceneReport& report, const std::string& kind) {
   for (const Diagnostic& problem : report.diagnostics) {
     if (problem.kind == kind) return problem.count;
   }
   return 0;
 }
 
-std::string exampleOf(const SceneReport& report, const std::string& kind) {
+std::string findExample(const SceneReport& report, const std::string& kind) {
   for (const Diagnostic& problem : report.diagnostics) {
     if (problem.kind == kind) return problem.example;
   }
@@ -59,14 +59,14 @@ TEST(SceneReport, ReportsDiagnosticsWithTheirFirstExample) {
   model.diagnostics.push_back({"missing_texture", 2, "wall.png"});
   const SceneReport report = makeSceneReport(Scene(std::move(model)));
   EXPECT_EQ(report.diagnostics.at(0).kind, "missing_texture");
-  EXPECT_EQ(countOf(report, "duplicate_triangle"), 2u);
-  EXPECT_EQ(countOf(report, "degenerate_triangle"), 2u);
-  EXPECT_EQ(countOf(report, "inside_out_solid"), 1u);
-  EXPECT_EQ(countOf(report, "inconsistent_winding"), 1u);
-  EXPECT_EQ(countOf(report, "object_without_area"), 1u);
-  EXPECT_EQ(countOf(report, "repeated_object"), 1u);
-  EXPECT_EQ(exampleOf(report, "repeated_object"), "again");
-  EXPECT_EQ(exampleOf(report, "inside_out_solid"), "turned");
+  EXPECT_EQ(countDiagnostics(report, "duplicate_triangle"), 2u);
+  EXPECT_EQ(countDiagnostics(report, "degenerate_triangle"), 2u);
+  EXPECT_EQ(countDiagnostics(report, "inside_out_solid"), 1u);
+  EXPECT_EQ(countDiagnostics(report, "inconsistent_winding"), 1u);
+  EXPECT_EQ(countDiagnostics(report, "object_without_area"), 1u);
+  EXPECT_EQ(countDiagnostics(report, "repeated_object"), 1u);
+  EXPECT_EQ(findExample(report, "repeated_object"), "again");
+  EXPECT_EQ(findExample(report, "inside_out_solid"), "turned");
 }
 
 TEST(SceneReport, SpacesThatAreAirAreNotedAndNothingIsWrongWithThem) {

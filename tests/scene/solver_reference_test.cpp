@@ -113,11 +113,11 @@ class ReferenceSolver {
     rows_.push_back(std::move(row));
   }
 
-  Velocities velocitiesOf(const ReferenceConstraint& row) const {
+  Velocities getVelocities(const ReferenceConstraint& row) const {
     const SolverBody &a = solverBodies_[row.patch->a], &b = solverBodies_[row.patch->b];
     return {a.velocity, a.angularVelocity, b.velocity, b.angularVelocity};
   }
-  Velocities correctionsOf(const ReferenceConstraint& row) const {
+  Velocities getCorrections(const ReferenceConstraint& row) const {
     const SolverBody &a = solverBodies_[row.patch->a], &b = solverBodies_[row.patch->b];
     return {a.correctionVelocity, a.correctionAngularVelocity, b.correctionVelocity,
             b.correctionAngularVelocity};
@@ -144,7 +144,7 @@ class ReferenceSolver {
   }
 
   void warmStart(ReferenceConstraint& row) {
-    Velocities velocities = velocitiesOf(row);
+    Velocities velocities = getVelocities(row);
     applyImpulse(row, row.first, row.tangent1, velocities);
     applyImpulse(row, row.second, row.tangent2, velocities);
     applyMoment(row, row.twist, velocities);
@@ -185,7 +185,7 @@ class ReferenceSolver {
   }
 
   void iterate(ReferenceConstraint& row) {
-    Velocities velocities = velocitiesOf(row);
+    Velocities velocities = getVelocities(row);
     if (row.patch->friction > 0) solveFriction(row, velocities);
     for (ReferencePoint& point : row.points) {
       const double more = point.mass * velocityError(point, speed(point.normal, velocities));
@@ -212,8 +212,8 @@ class ReferenceSolver {
   }
 
   void correct(ReferenceConstraint& row) {
-    const Velocities velocities = velocitiesOf(row);
-    Velocities apart = correctionsOf(row);
+    const Velocities velocities = getVelocities(row);
+    Velocities apart = getCorrections(row);
     for (ReferencePoint& point : row.points) {
       const double also =
           point.separation > step_.contactOffset ? speed(point.normal, velocities) : 0;
@@ -256,7 +256,7 @@ class ReferenceSolver {
     for (ReferenceConstraint& row : rows_) {
       for (ReferencePoint& point : row.points) {
         const double both =
-            speed(point.normal, velocitiesOf(row)) + speed(point.normal, correctionsOf(row));
+            speed(point.normal, getVelocities(row)) + speed(point.normal, getCorrections(row));
         point.separation += seconds_ * both;
         point.sum += point.impulse;
       }
@@ -267,7 +267,7 @@ class ReferenceSolver {
     const double e = row.patch->restitution;
     if (e == 0) return;
     const double least = 4 * step_.gravity.norm() * step_.seconds;
-    Velocities velocities = velocitiesOf(row);
+    Velocities velocities = getVelocities(row);
     for (const ReferencePoint& point : row.points) {
       if (point.sum <= 0 || point.arrival > -least) continue;
       const double lacks = -e * point.arrival - speed(point.normal, velocities);
@@ -333,7 +333,7 @@ class HeapMaker {
   double number(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random_);
   }
-  bool oneOf(int many) { return number(0, many) < 1; }
+  bool isOneIn(int many) { return number(0, many) < 1; }
   Vec3 vector(double size) {
     const double x = number(-size, size), y = number(-size, size);
     return {x, y, number(-size, size)};
@@ -361,13 +361,13 @@ class HeapMaker {
     patch.a = atHub ? 2 : index(0, bodies - 1);
     do patch.b = index(2, bodies - 1);
     while (patch.b == patch.a);
-    if (oneOf(3)) std::swap(patch.a, patch.b);
+    if (isOneIn(3)) std::swap(patch.a, patch.b);
     patch.normal = (vector(1) + Vec3(0, 1e-3, 0)).normalized();
-    patch.friction = oneOf(3) ? 0 : number(0.05, 1.2);
-    patch.restitution = oneOf(2) ? 0 : number(0.1, 0.9);
+    patch.friction = isOneIn(3) ? 0 : number(0.05, 1.2);
+    patch.restitution = isOneIn(2) ? 0 : number(0.1, 0.9);
     patch.pointCount = index(1, ContactConstraint::kMaxPoints);
-    const bool warm = oneOf(2);
-    if (oneOf(4)) patch.maxPushForce = number(1, 200), patch.targetSpeed = number(0.1, 2);
+    const bool warm = isOneIn(2);
+    if (isOneIn(4)) patch.maxPushForce = number(1, 200), patch.targetSpeed = number(0.1, 2);
     for (std::size_t i = 0; i < patch.pointCount; ++i) {
       ContactConstraintPoint& point = patch.points[i];
       point.armA = vector(0.3), point.armB = vector(0.3);
@@ -384,7 +384,7 @@ class HeapMaker {
   std::mt19937 random_;
 };
 
-std::vector<std::uint32_t> orderOf(const Heap& heap) {
+std::vector<std::uint32_t> computeOrder(const Heap& heap) {
   std::vector<std::uint8_t> moves;
   for (const BodyMotion& body : heap.bodies) moves.push_back(body.inverseMass > 0);
   return colorConstraints(heap.patches, moves).order;
@@ -439,7 +439,7 @@ void compareWithReference(bool byAvx) {
       Heap slow = start;
       const bool few = size.patches < kSmallConstraintThreshold;
       const CaseCounts one = ReferenceSolver(slow.bodies, slow.patches, step,
-                                             few ? originalOrder(slow) : orderOf(slow))
+                                             few ? originalOrder(slow) : computeOrder(slow))
                                  .solve(slow.driven());
       all.slid += one.slid, all.held += one.held, all.pushed += one.pushed;
       all.bounced += one.bounced, all.parted += one.parted, all.free += one.free;

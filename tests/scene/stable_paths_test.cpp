@@ -17,7 +17,7 @@ using tests::gltf;
 using tests::TemporaryFolder;
 
 /// Position of each object by path.
-std::map<std::string, Vec3> placesOf(const Model& model) {
+std::map<std::string, Vec3> computePlaces(const Model& model) {
   const Scene scene{Model(model)};
   std::map<std::string, Vec3> places;
   for (std::uint32_t i = 0; i < model.objects.size(); ++i)
@@ -32,7 +32,8 @@ std::string node(const std::string& name, int x, const std::string& more = "") {
 
 std::map<std::string, Vec3> imported(const TemporaryFolder& folder, const std::string& roots,
                                      const std::string& nodes) {
-  return placesOf(importModel(folder.write("model.gltf", gltf(BoxMesh({1, 1, 1}), roots, nodes))));
+  return computePlaces(
+      importModel(folder.write("model.gltf", gltf(BoxMesh({1, 1, 1}), roots, nodes))));
 }
 
 TEST(StablePaths, AnotherOrderOfNodesAndAnotherNumberingChangeNothing) {

@@ -8,7 +8,7 @@
 
 namespace enfilade::tests {
 
-inline std::uint32_t crc32Of(const std::string& bytes) {
+inline std::uint32_t computeCrc32(const std::string& bytes) {
   std::uint32_t crc = 0xffffffff;
   for (const char c : bytes) {
     crc ^= static_cast<unsigned char>(c);
@@ -28,7 +28,7 @@ inline std::string storedZip(const std::vector<std::pair<std::string, std::strin
   for (const auto& [name, content] : members) {
     // Version, flags, method, time and date; checksum, both sizes, length of the name, no extra
     // field.
-    const std::string facts = number(10, 2) + number(0, 8) + number(crc32Of(content), 4) +
+    const std::string facts = number(10, 2) + number(0, 8) + number(computeCrc32(content), 4) +
                               number(content.size(), 4) + number(content.size(), 4) +
                               number(name.size(), 2) + number(0, 2);
     directory +=

@@ -26,7 +26,7 @@ void PrintTo(const Shut& shut, std::ostream* to) {
   *to << shut.in << ", seed " << shut.seed;
 }
 
-std::vector<Cell> cellsOf(const Shut& shut, Builder& b, Seeded& random) {
+std::vector<Cell> makeCells(const Shut& shut, Builder& b, Seeded& random) {
   const std::string in = shut.in;
   if (in == "Sheets") return gridOfCells(b, 3, shut.seed % 2 ? 1.4 : 0.7, 3, false);
   if (in == "Slivers") return gridOfCells(b, 3, shut.seed % 2 ? 1.4 : 4, 3, true);
@@ -46,7 +46,7 @@ class ThinGeometry : public ::testing::TestWithParam<Shut> {};
 TEST_P(ThinGeometry, AreNotCrossedByRandomMovesOfAnySpeed) {
   Builder b;
   Seeded random(GetParam().seed);
-  const std::vector<Cell> cells = cellsOf(GetParam(), b, random);
+  const std::vector<Cell> cells = makeCells(GetParam(), b, random);
   CellFixture run(b.model, cells);
   run.spawn();
   run.randomMoves(random, kMovesOfOne / static_cast<int>(cells.size()));

@@ -14,14 +14,14 @@ namespace {
 
 using tests::TemporaryFolder;
 
-std::string contentOf(const std::filesystem::path& file) {
+std::string readContent(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(in), {}};
 }
 
 TEST(ToolchainVersion, ALibraryIsIdentifiedByItsBuildIdAlone) {
   const TemporaryFolder folder;
-  const std::string bytes = contentOf(assimpModulePath());
+  const std::string bytes = readContent(assimpModulePath());
   const auto copy = folder.write("copy.so", bytes + "and more behind it");
   ASSERT_TRUE(computeFileVersion(copy));
   EXPECT_EQ(computeFileVersion(copy), computeFileVersion(assimpModulePath()));
@@ -32,7 +32,7 @@ TEST(ToolchainVersion, ALibraryIsIdentifiedByItsBuildIdAlone) {
 
 TEST(ToolchainVersion, OtherFilesAreIdentifiedByTheirContent) {
   const TemporaryFolder folder;
-  const std::string library = contentOf(assimpModulePath());
+  const std::string library = readContent(assimpModulePath());
   // Truncated in the header, in the program header table, before the notes; and a header followed
   // by noise.
   for (const std::string& bytes :

@@ -15,7 +15,7 @@ namespace {
 using namespace testing;
 using Kind = Notice::Kind;
 
-NamedBox floorOf(double half) {
+NamedBox makeFloor(double half) {
   return {"floor", {-half, -0.2, -half}, {half, 0, half}};
 }
 
@@ -27,7 +27,7 @@ Spawn plank(const Vec3& at, double facing = 0) {
 }
 
 TEST(Turning, AViewTurnsWithTheRateAndKeepsItsElevation) {
-  WorldFixture run({floorOf(20)});
+  WorldFixture run({makeFloor(20)});
   run.order("ann", Spawn{{0, 0, 0}});
   run.ticks(5);
   const Vec3 eyes = run.feet("ann") + Vec3(0, run.view("ann").eyeHeight, 0);
@@ -45,7 +45,7 @@ TEST(Turning, AViewTurnsWithTheRateAndKeepsItsElevation) {
 }
 
 TEST(Turning, AFacingIsReachedByTheShorterWay) {
-  WorldFixture run({floorOf(20)});
+  WorldFixture run({makeFloor(20)});
   run.order("ann", Spawn{{0, 0, 0}, 170});
   run.order("ann", Turn{-170, false, 60});
   run.ticks(5);
@@ -66,7 +66,7 @@ TEST(Turning, AFacingIsReachedByTheShorterWay) {
 }
 
 TEST(Turning, PartsTurnUpToTheFirstObstacleAndBack) {
-  WorldFixture run({floorOf(20), {"post", {-0.05, 0, -0.95}, {0.05, 2, -0.85}}});
+  WorldFixture run({makeFloor(20), {"post", {-0.05, 0, -0.95}, {0.05, 2, -0.85}}});
   run.order("bar", plank({0, 0.002, 0}));
   run.order("bar", Turn{180, true, 90});
   run.untilIdle();
@@ -88,7 +88,7 @@ TEST(Turning, PartsTurnUpToTheFirstObstacleAndBack) {
 }
 
 TEST(Turning, AnArmOnAPrismTurnsWithTheView) {
-  WorldFixture run({floorOf(20), {"wall", {-5, 0, -1.2}, {5, 2, -1}}});
+  WorldFixture run({makeFloor(20), {"wall", {-5, 0, -1.2}, {5, 2, -1}}});
   Spawn spawn{{0, 0, 0}};
   Link arm;
   arm.joint.anchor = {0.35, 1, 0};
@@ -112,7 +112,7 @@ TEST(Turning, CrowdsOfTurningPlanksNeverPenetrate) {
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution(low, high)(random);
   };
-  std::vector<NamedBox> boxes{floorOf(8)};
+  std::vector<NamedBox> boxes{makeFloor(8)};
   for (int i = 0; i < 12; ++i) {
     const Vec3 at(uniform(-6, 6), 0, uniform(-6, 6));
     boxes.push_back({"box " + std::to_string(i), at, at + Vec3(0.4, 2, 0.4)});
@@ -140,7 +140,7 @@ TEST(Turning, CrowdsOfTurningPlanksNeverPenetrate) {
 }
 
 TEST(Turning, ADriveEndsATurnAndTheViewFollowsItAgain) {
-  WorldFixture run({floorOf(20)});
+  WorldFixture run({makeFloor(20)});
   run.order("ann", Spawn{{0, 0, 0}});
   run.ticks(5);
   run.order("ann", Drive{{1, 0, 0}});
@@ -157,7 +157,7 @@ TEST(Turning, ADriveEndsATurnAndTheViewFollowsItAgain) {
 }
 
 TEST(Turning, ATurnIsInTheHashAndInCheckpoints) {
-  const auto scene = boxScene({floorOf(20), {"post", {-0.05, 0, -0.95}, {0.05, 2, -0.85}}});
+  const auto scene = boxScene({makeFloor(20), {"post", {-0.05, 0, -0.95}, {0.05, 2, -0.85}}});
   WorldFixture run(scene), other(scene);
   for (WorldFixture* one : {&run, &other}) {
     one->order("bar", plank({0, 0.002, 0}, 20));
@@ -175,7 +175,7 @@ TEST(Turning, ATurnIsInTheHashAndInCheckpoints) {
 }
 
 TEST(Teleport, PlacesAnAvatarWhereThereIsRoomAndRefusesElsewhere) {
-  WorldFixture run({floorOf(20), {"wall", {5, 0, -5}, {5.2, 3, 5}}});
+  WorldFixture run({makeFloor(20), {"wall", {5, 0, -5}, {5.2, 3, 5}}});
   run.order("ann", Spawn{{4.699, 0, 0}});
   run.order("ann", Walk{{{4.9, 0, 0}}, 1.0});
   run.untilIdle();
@@ -200,7 +200,7 @@ TEST(Teleport, PlacesAnAvatarWhereThereIsRoomAndRefusesElsewhere) {
 }
 
 TEST(Teleport, IntoTheAvatarsOwnPlaceIsNoOverlapAndIntoAnotherIs) {
-  WorldFixture run({floorOf(20)});
+  WorldFixture run({makeFloor(20)});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("bob", Spawn{{2, 0, 0}});
   run.ticks(5);
@@ -214,7 +214,7 @@ TEST(Teleport, IntoTheAvatarsOwnPlaceIsNoOverlapAndIntoAnotherIs) {
 TEST(Teleport, StartsTheContactHorizonsOfTheAvatarAgain) {
   WorldSettings settings;
   settings.maxSpeed = 2;
-  WorldFixture run({floorOf(200)}, settings);
+  WorldFixture run({makeFloor(200)}, settings);
   run.order("ann", Spawn{{-100, 0, 0}});
   run.order("bob", Spawn{{100, 0, 0}});
   run.ticks(5);

@@ -54,7 +54,7 @@ unsigned addColours(GltfWriter& file, int componentType, std::size_t channels, d
 std::vector<VertexColour> readColours(const GltfWriter& file) {
   const TemporaryFolder folder;
   const Model model = importModel(folder.write("a.glb", file.glb()));
-  EXPECT_EQ(countOf(model, "vertex_colours_ignored"), 0u);
+  EXPECT_EQ(countDiagnostics(model, "vertex_colours_ignored"), 0u);
   return model.meshes.at(0).colours;
 }
 
@@ -190,8 +190,8 @@ TEST(VertexColours, ThatCannotBeReadLeaveTheMeshAsItIs) {
   const Model model = importModel(folder.write("a.glb", file.glb()));
   EXPECT_EQ(model.meshes.at(0).triangleCount(), 1u);
   EXPECT_TRUE(model.meshes[0].colours.empty());
-  EXPECT_EQ(countOf(model, "vertex_colours_ignored"), 1u);
-  EXPECT_EQ(countOf(model, "solid_mesh"), 0u);
+  EXPECT_EQ(countDiagnostics(model, "vertex_colours_ignored"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 0u);
 }
 
 TEST(VertexColours, ThatAreAllWhiteTakeNoMemory) {

@@ -43,7 +43,7 @@ const send = (kind, body) => {
   tests::TemporaryFolder folder_;
 };
 
-std::string exampleOf(const Model& model, const std::string& kind) {
+std::string findExample(const Model& model, const std::string& kind) {
   for (const Diagnostic& problem : model.diagnostics) {
     if (problem.kind == kind) return problem.example;
   }
@@ -69,7 +69,7 @@ setTimeout(() => {}, first === 0 ? 10000 : 0);
   const Model model = importModel(node.house());
   EXPECT_EQ(model.reader, "web-ifc");
   ASSERT_EQ(model.objects.size(), 2u);
-  EXPECT_NE(exampleOf(model, "openings_unverified").find("000000000000000000Wall"),
+  EXPECT_NE(findExample(model, "openings_unverified").find("000000000000000000Wall"),
             std::string::npos)
       << "ifcplusplus reads the wall";
 
@@ -78,8 +78,8 @@ setTimeout(() => {}, first === 0 ? 10000 : 0);
   const Model left = importModel(node.house(), alone);
   ASSERT_EQ(left.objects.size(), 1u);
   EXPECT_EQ(left.objects[0].ifcClass, "IfcDoor");
-  EXPECT_NE(exampleOf(left, "missing_product").find("was killed"), std::string::npos)
-      << exampleOf(left, "missing_product");
+  EXPECT_NE(findExample(left, "missing_product").find("was killed"), std::string::npos)
+      << findExample(left, "missing_product");
 }
 
 /// A reader that gives no triangles of the wall, and a sheet for the door: x from 2.2 to 3.1, y up.
@@ -118,10 +118,10 @@ TEST(WebIfcProcess, AWallThatNoReaderCutsStaysSolidAndIsReported) {
   const Model model = importModel(node.house(makeClosedHouse(0.9, 2.1)));
   EXPECT_EQ(model.reader, "web-ifc");
   EXPECT_EQ(model.objects.size(), 2u);
-  EXPECT_NE(exampleOf(model, "solid_product").find("000000000000000000Wall"), std::string::npos);
-  EXPECT_NE(exampleOf(model, "openings_unverified").find("000000000000000000Wall"),
+  EXPECT_NE(findExample(model, "solid_product").find("000000000000000000Wall"), std::string::npos);
+  EXPECT_NE(findExample(model, "openings_unverified").find("000000000000000000Wall"),
             std::string::npos);
-  EXPECT_EQ(exampleOf(model, "cut_away_product"), "");
+  EXPECT_EQ(findExample(model, "cut_away_product"), "");
 }
 
 TEST(WebIfcProcess, AFramesWallThatIsNoLargerThanItsDoorIsLeftOutAndReported) {
@@ -130,9 +130,10 @@ TEST(WebIfcProcess, AFramesWallThatIsNoLargerThanItsDoorIsLeftOutAndReported) {
   const Model model = importModel(node.house(makeClosedHouse(4, 3)));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].ifcClass, "IfcDoor");
-  EXPECT_NE(exampleOf(model, "cut_away_product").find("000000000000000000Wall"), std::string::npos);
-  EXPECT_EQ(exampleOf(model, "solid_product"), "");
-  EXPECT_EQ(exampleOf(model, "missing_product"), "");
+  EXPECT_NE(findExample(model, "cut_away_product").find("000000000000000000Wall"),
+            std::string::npos);
+  EXPECT_EQ(findExample(model, "solid_product"), "");
+  EXPECT_EQ(findExample(model, "missing_product"), "");
 }
 
 TEST(WebIfcProcess, ARunawayIsStoppedByItsMemoryLimit) {
@@ -146,7 +147,7 @@ for (;;) all.push(Buffer.alloc(1 << 24, 1));
   options.timeLimit = 60;
   const Model model = importModel(node.house(), options);
   EXPECT_EQ(model.reader, "ifcplusplus");
-  const std::string why = exampleOf(model, "ifc_reader_failed");
+  const std::string why = findExample(model, "ifc_reader_failed");
   EXPECT_TRUE(why.starts_with("web-ifc: ")) << why;
   EXPECT_EQ(why.find("too long"), std::string::npos) << why;
 }
@@ -158,7 +159,7 @@ TEST(WebIfcProcess, NoiseAndSilenceAreFailures) {
     ENFILADE_NEED_WEB_IFC();
     const Model model = importModel(node.house());
     EXPECT_EQ(model.reader, "ifcplusplus") << script;
-    EXPECT_NE(exampleOf(model, "ifc_reader_failed"), "") << script;
+    EXPECT_NE(findExample(model, "ifc_reader_failed"), "") << script;
   }
 }
 

@@ -488,7 +488,7 @@ TEST(World, OrdersForAnAbsentAvatarAreRefusedWhenReached) {
 }
 
 TEST(World, TheSameCommandsGiveTheSameHashAndOthersDoNot) {
-  const auto hashOf = [](double speed) {
+  const auto computeHash = [](double speed) {
     WorldFixture run(stair(0.17, 0.29, 8));
     run.order("ann", Spawn{{-2, 0, 0}, 33});
     run.order("bob", Spawn{{-2, 0, 1.5}, 33});
@@ -497,8 +497,8 @@ TEST(World, TheSameCommandsGiveTheSameHashAndOthersDoNot) {
     run.ticks(400);
     return run.world.snapshot()->stateHash;
   };
-  EXPECT_EQ(hashOf(1.5), hashOf(1.5));
-  EXPECT_NE(hashOf(1.5), hashOf(1.5000000001));
+  EXPECT_EQ(computeHash(1.5), computeHash(1.5));
+  EXPECT_NE(computeHash(1.5), computeHash(1.5000000001));
 }
 
 TEST(World, ARestingAvatarCostsNoQueries) {

@@ -22,7 +22,7 @@ Access threeTokens() {
 }
 
 template <typename Action>
-v1::ErrorCode codeOf(Action action) {
+v1::ErrorCode catchCode(Action action) {
   try {
     action();
   } catch (const protocol::ProtocolError& error) {
@@ -79,8 +79,8 @@ class Roles : public ServedRoom {
 };
 
 TEST_F(Roles, AWrongOrMissingTokenIsRefused) {
-  EXPECT_EQ(codeOf([&] { client("none"); }), v1::ERROR_UNAUTHENTICATED);
-  EXPECT_EQ(codeOf([&] { client("wrong", kAdmin + "x"); }), v1::ERROR_UNAUTHENTICATED);
+  EXPECT_EQ(catchCode([&] { client("none"); }), v1::ERROR_UNAUTHENTICATED);
+  EXPECT_EQ(catchCode([&] { client("wrong", kAdmin + "x"); }), v1::ERROR_UNAUTHENTICATED);
   EXPECT_EQ(client("right", kLooker).welcome().role(), v1::ROLE_OBSERVE);
 }
 
@@ -88,15 +88,15 @@ TEST_F(Roles, EachRoleHasItsPermissions) {
   protocol::Client looker = client("looker", kLooker), driver = client("driver", kDriver);
   v1::ClientMessage restart;
   restart.mutable_restart();
-  EXPECT_EQ(codeOf([&] { looker.step(); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchCode([&] { looker.step(); }), v1::ERROR_NOT_ALLOWED);
   EXPECT_EQ(looker.command(spawn("a", 0, 0, 0))->code(), v1::ERROR_NOT_ALLOWED);
   EXPECT_EQ(looker.metrics().ticks(), 0u);
   EXPECT_EQ(driver.step().tick(), 1u);
-  EXPECT_EQ(codeOf([&] { looker.request(restart); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchCode([&] { looker.request(restart); }), v1::ERROR_NOT_ALLOWED);
   EXPECT_EQ(driver.request(restart).restart().tick(), 0u);
   protocol::Client admin = client("admin", kAdmin);
   EXPECT_FALSE(admin.command(spawn("a", 0, 0, 0)));
-  EXPECT_EQ(codeOf([&] { driver.request(restart); }), v1::ERROR_NOT_ALLOWED) << "admin's avatar";
+  EXPECT_EQ(catchCode([&] { driver.request(restart); }), v1::ERROR_NOT_ALLOWED) << "admin's avatar";
 }
 
 TEST_F(Roles, TheAdminRestartsTheWorld) {

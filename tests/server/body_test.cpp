@@ -22,16 +22,16 @@ v1::BodyCommand opening(const std::string& body) {
 }
 
 /// The event of this kind between these two; null if none was received.
-const v1::ContactEvent* eventOf(const ReceivedEvents& received, v1::ContactEvent::Kind kind,
-                                const std::string& a, const std::string& b) {
+const v1::ContactEvent* findEvent(const ReceivedEvents& received, v1::ContactEvent::Kind kind,
+                                  const std::string& a, const std::string& b) {
   for (const v1::ContactEvent& event : received.contacts)
     if (event.kind() == kind && event.a_name() == a && event.b_name() == b) return &event;
   return nullptr;
 }
 
 /// The body's state in the last State message that contains it.
-std::optional<v1::BodyState> stateOf(const std::deque<v1::ServerMessage>& messages,
-                                     const std::string& body) {
+std::optional<v1::BodyState> findState(const std::deque<v1::ServerMessage>& messages,
+                                       const std::string& body) {
   std::optional<v1::BodyState> found;
   for (const v1::ServerMessage& message : messages)
     for (const v1::BodyState& state : message.state().bodies())
@@ -80,8 +80,8 @@ TEST_F(ServedBodies, AnOpeningDoorPushesAnAvatarAndReportsIt) {
   const auto messages = guest.takeEvents();
   ReceivedEvents received;
   received.add(messages);
-  EXPECT_NE(eventOf(received, v1::ContactEvent::KIND_BEGIN, "ann", "door"), nullptr);
-  const auto door = stateOf(messages, "door");
+  EXPECT_NE(findEvent(received, v1::ContactEvent::KIND_BEGIN, "ann", "door"), nullptr);
+  const auto door = findState(messages, "door");
   ASSERT_TRUE(door);
   EXPECT_EQ(door->id(), kLeaf);
   EXPECT_EQ(door->coordinate(), 1.6);
@@ -114,8 +114,8 @@ TEST_F(ServedBodies, AnAvatarWithoutRoomBlocksTheDoorAndIsReported) {
   ReceivedEvents received;
   received.add(messages);
   const v1::ContactEvent* blocked =
-      eventOf(received, v1::ContactEvent::KIND_BLOCKED, "door", "ann");
-  const auto door = stateOf(messages, "door");
+      findEvent(received, v1::ContactEvent::KIND_BLOCKED, "door", "ann");
+  const auto door = findState(messages, "door");
   ASSERT_TRUE(door);
   ASSERT_NE(blocked, nullptr) << door->coordinate();
   EXPECT_EQ(blocked->verdict(), v1::VERDICT_SEPARATED);
@@ -135,8 +135,8 @@ TEST_F(ServedBodies, AnAvatarThroughATriggerEntersAndLeavesIt) {
   guest.metrics();
   ReceivedEvents received;
   received.add(guest.takeEvents());
-  const auto* enters = eventOf(received, v1::ContactEvent::KIND_ENTER, "ann", "zone");
-  const auto* leaves = eventOf(received, v1::ContactEvent::KIND_LEAVE, "ann", "zone");
+  const auto* enters = findEvent(received, v1::ContactEvent::KIND_ENTER, "ann", "zone");
+  const auto* leaves = findEvent(received, v1::ContactEvent::KIND_LEAVE, "ann", "zone");
   ASSERT_NE(enters, nullptr);
   ASSERT_NE(leaves, nullptr);
   EXPECT_EQ(enters->b(), kZone);
@@ -154,7 +154,7 @@ TEST_F(ServedBodies, ABodyThatFallsOutOfTheWorldIsReportedOnce) {
   ReceivedEvents received;
   received.add(ann.takeEvents());
   ASSERT_EQ(received.count(v1::ContactEvent::KIND_LEFT_WORLD), 1u);
-  const auto* left = eventOf(received, v1::ContactEvent::KIND_LEFT_WORLD, "crate", "");
+  const auto* left = findEvent(received, v1::ContactEvent::KIND_LEFT_WORLD, "crate", "");
   ASSERT_NE(left, nullptr);
   EXPECT_EQ(left->a(), kCrate);
   EXPECT_EQ(left->b(), 0u);
@@ -178,20 +178,20 @@ TEST_F(ServedBodies, APictureShowsTheDoorWhereItIs) {
     return ids;
   };
   constexpr std::size_t middle = 32 * 64 + 32;
-  const auto pixelsOf = [](const std::vector<std::uint32_t>& ids, std::uint32_t id) {
+  const auto countPixels = [](const std::vector<std::uint32_t>& ids, std::uint32_t id) {
     return std::count(ids.begin(), ids.end(), id);
   };
   ann.step(1);
   const auto shut = idsNow();
   EXPECT_EQ(shut.at(middle), kLeaf);
-  EXPECT_EQ(pixelsOf(shut, kEnd), 0) << "nothing is visible behind the door";
-  EXPECT_EQ(pixelsOf(shut, kZone), 0) << "volumes are not drawn";
+  EXPECT_EQ(countPixels(shut, kEnd), 0) << "nothing is visible behind the door";
+  EXPECT_EQ(countPixels(shut, kZone), 0) << "volumes are not drawn";
   ASSERT_FALSE(ann.bodyCommand(opening("door")));
   ann.step(90);
   const auto open = idsNow();
   EXPECT_EQ(open.at(middle), kEnd);
-  EXPECT_GT(pixelsOf(open, kEnd), 20);
-  EXPECT_LT(pixelsOf(open, kLeaf), pixelsOf(shut, kLeaf) / 2);
+  EXPECT_GT(countPixels(open, kEnd), 20);
+  EXPECT_LT(countPixels(open, kLeaf), countPixels(shut, kLeaf) / 2);
 }
 
 TEST_F(ServedBodies, ARayGoesThroughTheDoorWhenItIsOpen) {

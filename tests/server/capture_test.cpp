@@ -34,7 +34,7 @@ struct Array {
 
 template <class Value>
 Array<Value> readNpy(const fs::path& file) {
-  const std::string bytes = textOf(file);
+  const std::string bytes = readText(file);
   Array<Value> array;
   const std::size_t shape = bytes.find("'shape': (");
   if (shape == std::string::npos) return array;
@@ -46,16 +46,16 @@ Array<Value> readNpy(const fs::path& file) {
 }
 
 /// Content of every file below the folder, by name.
-std::map<std::string, std::string> treeOf(const fs::path& folder) {
+std::map<std::string, std::string> readTree(const fs::path& folder) {
   std::map<std::string, std::string> tree;
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     if (entry.is_regular_file())
-      tree[entry.path().lexically_relative(folder).generic_string()] = textOf(entry.path());
+      tree[entry.path().lexically_relative(folder).generic_string()] = readText(entry.path());
   }
   return tree;
 }
 
-std::vector<std::string> namesOf(const std::map<std::string, std::string>& tree) {
+std::vector<std::string> getNames(const std::map<std::string, std::string>& tree) {
   std::vector<std::string> names;
   for (const auto& [name, text] : tree) names.push_back(name);
   return names;
@@ -110,7 +110,7 @@ TEST_F(Capture, FilesFollowTheLayoutAndHoldTheImages) {
   write(folder_ / "path.txt", ahead(2));
   const Ended ended = captured("path.txt", "out", {"--fov", "90"});
   ASSERT_EQ(ended.code, 0) << ended.err;
-  EXPECT_EQ(namesOf(treeOf(folder_ / "out")),
+  EXPECT_EQ(getNames(readTree(folder_ / "out")),
             (std::vector<std::string>{"capture.json", "depth/000000.npy", "depth/000001.npy",
                                       "ids/000000.npy", "ids/000001.npy", "instances.json",
                                       "rgb/000000.png", "rgb/000001.png", "transforms.json"}));
@@ -125,7 +125,7 @@ TEST_F(Capture, FilesFollowTheLayoutAndHoldTheImages) {
   EXPECT_EQ(ids.at(32, 47), kFloor);
   EXPECT_EQ(ids.at(0, 0), 0U);  // past the wall's end and above its top
   EXPECT_TRUE(std::isnan(depth.at(0, 0)));
-  const auto instances = json::parse(textOf(folder_ / "out/instances.json"));
+  const auto instances = json::parse(readText(folder_ / "out/instances.json"));
   EXPECT_EQ(instances.at("2").at("path"), "room_wall");
 }
 
@@ -150,7 +150,7 @@ TEST_F(Capture, TransformsSayWhereAPixelLies) {
   write(folder_ / "path.json",
         R"([{"eye":[0,1.6,0],"look_at":[5,1,1]},{"eye":[-2,2.2,-1.5],"look_at":[5,1,0]}])");
   ASSERT_EQ(captured("path.json", "out", {"--intrinsics", "40,50,30,25"}).code, 0);
-  const auto file = json::parse(textOf(folder_ / "out/transforms.json"));
+  const auto file = json::parse(readText(folder_ / "out/transforms.json"));
   struct View {
     Eigen::Matrix4d worldFromCamera;
     Array<float> depth;
@@ -202,32 +202,32 @@ TEST_F(Capture, ShardsMergeToExactlyTheUnshardedSet) {
   ASSERT_EQ(captured("path.txt", "whole").code, 0);
   ASSERT_EQ(captured("path.txt", "first", {"--shard", "0/2"}).code, 0);
   ASSERT_EQ(captured("path.txt", "second", {"--shard", "1/2"}).code, 0);
-  EXPECT_EQ(treeOf(folder_ / "first").size(), 3 + 3 * 3U);
-  EXPECT_EQ(treeOf(folder_ / "second").size(), 3 + 3 * 2U);
+  EXPECT_EQ(readTree(folder_ / "first").size(), 3 + 3 * 3U);
+  EXPECT_EQ(readTree(folder_ / "second").size(), 3 + 3 * 2U);
   fs::copy(folder_ / "first", folder_ / "merged", fs::copy_options::recursive);
   fs::copy(folder_ / "second", folder_ / "merged",
            fs::copy_options::recursive | fs::copy_options::overwrite_existing);
-  EXPECT_EQ(treeOf(folder_ / "merged"), treeOf(folder_ / "whole"));
+  EXPECT_EQ(readTree(folder_ / "merged"), readTree(folder_ / "whole"));
 }
 
 TEST_F(Capture, OnlyAnEqualRunResumesAStoppedOne) {
   write(folder_ / "path.txt", ahead(4));
   ASSERT_EQ(captured("path.txt", "out").code, 0);
-  const auto whole = treeOf(folder_ / "out");
+  const auto whole = readTree(folder_ / "out");
   fs::remove(folder_ / "out/rgb/000001.png");
   fs::remove(folder_ / "out/depth/000003.npy");
   const Ended again = captured("path.txt", "out");
   ASSERT_EQ(again.code, 0) << again.err;
   EXPECT_EQ(json::parse(again.out).at("written"), 2);
   EXPECT_EQ(json::parse(again.out).at("already_there"), 2);
-  EXPECT_EQ(treeOf(folder_ / "out"), whole);
+  EXPECT_EQ(readTree(folder_ / "out"), whole);
   const Ended other = captured("path.txt", "out", {"--size", "32x24"});
   EXPECT_EQ(other.code, 1);
   EXPECT_NE(other.err.find("contains another capture (lens: "), std::string::npos) << other.err;
   EXPECT_NE(other.err.find("--out"), std::string::npos);
   write(folder_ / "path.txt", ahead(4) + "9 0 1.6 0 0 0 0 1\n");
   EXPECT_EQ(captured("path.txt", "out").code, 1);
-  EXPECT_EQ(treeOf(folder_ / "out"), whole);
+  EXPECT_EQ(readTree(folder_ / "out"), whole);
   fs::remove(folder_ / "out/capture.json");
   EXPECT_NE(captured("path.txt", "out").err.find("that identifies them"), std::string::npos);
 }
@@ -239,8 +239,8 @@ TEST_F(Capture, ALimitedRunContinuesWithoutLimit) {
   ASSERT_EQ(all.code, 0) << all.err;
   EXPECT_EQ(json::parse(all.out).at("already_there"), 2);
   ASSERT_EQ(captured("path.txt", "fresh").code, 0);
-  EXPECT_EQ(treeOf(folder_ / "out"), treeOf(folder_ / "fresh"));
-  const json made = json::parse(textOf(folder_ / "out/capture.json"));
+  EXPECT_EQ(readTree(folder_ / "out"), readTree(folder_ / "fresh"));
+  const json made = json::parse(readText(folder_ / "out/capture.json"));
   EXPECT_EQ(made.at("names").at("scene"), "room.obj");
   EXPECT_EQ(made.at("names").at("path"), "path.txt");
 }
@@ -291,7 +291,7 @@ TEST_F(Capture, PicturesAreTheSameForAnyNumberOfThreadsOfGl) {
                                  {"--size", "320x240", "--renderer", "gl", "--overlay", "boxes",
                                   "--channels", "rgb,depth,ids,normals"});
     EXPECT_EQ(ended.code, 0) << ended.err;
-    const auto tree = treeOf(folder_ / out);
+    const auto tree = readTree(folder_ / out);
     EXPECT_GE(tree.size(), 3 * 5U);
     if (first.empty()) first = tree;
     EXPECT_EQ(tree, first) << threads << " threads";
@@ -317,7 +317,7 @@ TEST_F(Capture, TimeOfThePathPassesInTheWorldAndShardsShowTheSame) {
   }
   for (const char* shard : {"0/2", "1/2"})
     ASSERT_EQ(captured("path.txt", "shards", {"--shard", shard}).code, 0);
-  EXPECT_EQ(treeOf(folder_ / "shards"), treeOf(folder_ / "whole"));
+  EXPECT_EQ(readTree(folder_ / "shards"), readTree(folder_ / "whole"));
 }
 
 TEST_F(Capture, AFailedScriptIsCountedAndIsAViolationWithStrict) {
@@ -341,18 +341,18 @@ TEST_F(Capture, AFullDiskLeavesOnlyCompleteFilesAndIsReported) {
   const pid_t child = start({"capture", path("room.obj"), path("path.txt"), "--out", path("out"),
                              "--size", "64x48", "--no-cache", "--no-mp4"});
   setrlimit(RLIMIT_FSIZE, &before);
-  EXPECT_EQ(codeOf(child), 1);
-  EXPECT_NE(textOf(path("stderr")).find("cannot write " + path("out") + "/depth/00000"),
+  EXPECT_EQ(awaitExitCode(child), 1);
+  EXPECT_NE(readText(path("stderr")).find("cannot write " + path("out") + "/depth/00000"),
             std::string::npos)
-      << textOf(path("stderr"));
-  for (const auto& [name, text] : treeOf(folder_ / "out")) {
+      << readText(path("stderr"));
+  for (const auto& [name, text] : readTree(folder_ / "out")) {
     EXPECT_EQ(name.find(".part"), std::string::npos) << name;
     EXPECT_FALSE(text.empty()) << name;
   }
   EXPECT_FALSE(fs::exists(folder_ / "out/depth/000000.npy"));
   EXPECT_EQ(captured("path.txt", "out").code, 0);
   ASSERT_EQ(captured("path.txt", "fresh").code, 0);
-  EXPECT_EQ(treeOf(folder_ / "out"), treeOf(folder_ / "fresh"));
+  EXPECT_EQ(readTree(folder_ / "out"), readTree(folder_ / "fresh"));
 }
 
 TEST_F(Capture, AnInterruptEndsItWith130AndWholeFiles) {
@@ -364,14 +364,14 @@ TEST_F(Capture, AnInterruptEndsItWith130AndWholeFiles) {
     for (int i = 0; i < 3000 && !fs::exists(folder_ / "out/ids/000003.npy"); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     kill(child, signal);
-    EXPECT_EQ(codeOf(child), 130);
-    const auto tree = treeOf(folder_ / "out");
+    EXPECT_EQ(awaitExitCode(child), 130);
+    const auto tree = readTree(folder_ / "out");
     EXPECT_GT(tree.size(), 3 + 3 * 3U);
     EXPECT_LT(tree.size(), 3 + 3 * 4000U);
     for (const auto& [name, text] : tree) EXPECT_EQ(name.find(".part"), std::string::npos) << name;
-    EXPECT_EQ(textOf(path("stdout")), "");
-    EXPECT_NE(textOf(path("stderr")).find("continues from there"), std::string::npos);
-    EXPECT_NE(textOf(path("stderr")).find("{\"frames\":"), std::string::npos);
+    EXPECT_EQ(readText(path("stdout")), "");
+    EXPECT_NE(readText(path("stderr")).find("continues from there"), std::string::npos);
+    EXPECT_NE(readText(path("stderr")).find("{\"frames\":"), std::string::npos);
   }
 }
 
@@ -387,13 +387,13 @@ TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
   const Ended ended = captured("walk.jsonl", "out");
   ASSERT_EQ(ended.code, 0) << ended.err;
   EXPECT_EQ(json::parse(ended.out).at("frames"), 3);
-  const auto instances = json::parse(textOf(folder_ / "out/instances.json"));
+  const auto instances = json::parse(readText(folder_ / "out/instances.json"));
   std::uint32_t ann = 0, bob = 0;
   for (const auto& [id, one] : instances.items()) {
     if (one.at("path") == "ann") ann = static_cast<std::uint32_t>(std::stoul(id));
     if (one.at("path") == "bob") bob = static_cast<std::uint32_t>(std::stoul(id));
   }
-  const auto frames = json::parse(textOf(folder_ / "out/transforms.json")).at("frames");
+  const auto frames = json::parse(readText(folder_ / "out/transforms.json")).at("frames");
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const auto ids = readNpy<std::uint32_t>(folder_ / "out" / frames[i].at("ids_file_path"));
     const bool annSees = frames[i].at("name") != "bobs";
@@ -442,7 +442,7 @@ TEST_F(Capture, AvatarsAreDrawnAsPeopleOrAsTheirShapes) {
   const auto pixels = [&](const std::string& avatars) {
     const Ended ended = captured("walk.jsonl", avatars, {"--avatars", avatars});
     EXPECT_EQ(ended.code, 0) << ended.err;
-    EXPECT_EQ(json::parse(textOf(folder_ / avatars / "capture.json")).at("avatars"), avatars);
+    EXPECT_EQ(json::parse(readText(folder_ / avatars / "capture.json")).at("avatars"), avatars);
     const auto ids = readNpy<std::uint32_t>(folder_ / avatars / "ids/000000.npy").values;
     return std::count_if(ids.begin(), ids.end(), [](std::uint32_t id) { return id > 3; });
   };
@@ -460,7 +460,7 @@ TEST_F(Capture, SamplesAndShadowsChangeOnlyTheColour) {
   const auto manifest = [&](const std::string& out, std::vector<std::string> options) {
     const Ended ended = captured("path.txt", out, std::move(options));
     EXPECT_EQ(ended.code, 0) << ended.err;
-    return json::parse(textOf(folder_ / out / "capture.json"));
+    return json::parse(readText(folder_ / out / "capture.json"));
   };
   const json plain = manifest("plain", {}), smooth = manifest("smooth", {"--samples", "4"}),
              sunless = manifest("sunless", {"--no-shadows"});
@@ -469,9 +469,10 @@ TEST_F(Capture, SamplesAndShadowsChangeOnlyTheColour) {
   EXPECT_EQ(plain.at("shadows"), true);
   EXPECT_EQ(sunless.at("shadows"), false);
   for (const char* other : {"smooth", "sunless"}) {
-    EXPECT_NE(textOf(folder_ / other / "rgb/000000.png"), textOf(folder_ / "plain/rgb/000000.png"));
+    EXPECT_NE(readText(folder_ / other / "rgb/000000.png"),
+              readText(folder_ / "plain/rgb/000000.png"));
     for (const char* file : {"ids/000000.npy", "depth/000000.npy"})
-      EXPECT_EQ(textOf(folder_ / other / file), textOf(folder_ / "plain" / file)) << other;
+      EXPECT_EQ(readText(folder_ / other / file), readText(folder_ / "plain" / file)) << other;
   }
   const Ended refused = captured("path.txt", "refused", {"--samples", "3"});
   EXPECT_EQ(refused.code, 2);
@@ -502,17 +503,18 @@ TEST_F(Capture, TheTumLayoutIsReadBackAsTheSamePath) {
   write(folder_ / "path.txt", ahead(3));
   const Ended first = captured("path.txt", "tum", {"--layout", "tum", "--channels", "rgb,depth"});
   ASSERT_EQ(first.code, 0) << first.err;
-  EXPECT_NE(textOf(folder_ / "tum/rgb.txt").find("0.033333 rgb/000001.png"), std::string::npos);
-  EXPECT_NE(textOf(folder_ / "tum/depth.txt").find("0.066667 depth/000002.png"), std::string::npos);
+  EXPECT_NE(readText(folder_ / "tum/rgb.txt").find("0.033333 rgb/000001.png"), std::string::npos);
+  EXPECT_NE(readText(folder_ / "tum/depth.txt").find("0.066667 depth/000002.png"),
+            std::string::npos);
   const Ended again = captured(
       "tum/groundtruth.txt", "again",
       {"--axes", "opencv", "--channels", "rgb,depth", "--depth", "png", "--depth-scale", "5000"});
   ASSERT_EQ(again.code, 0) << again.err;
   for (const char* file : {"rgb/000000.png", "rgb/000002.png", "depth/000001.png"})
-    EXPECT_EQ(textOf(folder_ / "again" / file), textOf(folder_ / "tum" / file)) << file;
+    EXPECT_EQ(readText(folder_ / "again" / file), readText(folder_ / "tum" / file)) << file;
   const Ended own = captured("tum/transforms.json", "own", {"--channels", "rgb"});
   ASSERT_EQ(own.code, 0) << own.err;
-  EXPECT_EQ(textOf(folder_ / "own/rgb/000001.png"), textOf(folder_ / "tum/rgb/000001.png"));
+  EXPECT_EQ(readText(folder_ / "own/rgb/000001.png"), readText(folder_ / "tum/rgb/000001.png"));
 }
 
 TEST_F(Capture, EveryChannelIsWrittenOnRequest) {
@@ -537,7 +539,7 @@ TEST_F(Capture, RaysDrawTheSameSceneAndTheManifestNamesThem) {
   ASSERT_EQ(gl.code, 0) << gl.err;
   ASSERT_EQ(rays.code, 0) << rays.err;
   EXPECT_NE(json::parse(rays.out).at("renderer"), json::parse(gl.out).at("renderer"));
-  EXPECT_EQ(json::parse(textOf(folder_ / "rays/capture.json")).at("renderer"),
+  EXPECT_EQ(json::parse(readText(folder_ / "rays/capture.json")).at("renderer"),
             json::parse(rays.out).at("renderer"));
   const auto drawn = readNpy<std::uint32_t>(folder_ / "gl/ids/000000.npy");
   const auto cast = readNpy<std::uint32_t>(folder_ / "rays/ids/000000.npy");
@@ -561,13 +563,13 @@ TEST_F(Capture, AnOverlayMarksACopyAndLeavesTheColourAlone) {
   const Ended ended = captured("walk.jsonl", "marked",
                                {"--size", "160x120", "--overlay", "boxes,paths,contacts,names"});
   ASSERT_EQ(ended.code, 0) << ended.err;
-  const auto imageOf = [&](const char* file) {
-    const std::string png = textOf(folder_ / file);
+  const auto readImage = [&](const char* file) {
+    const std::string png = readText(folder_ / file);
     return render::decodePng({png.begin(), png.end()});
   };
-  const render::Image plain = imageOf("plain/rgb/000000.png");
-  EXPECT_EQ(imageOf("marked/rgb/000000.png").rgb, plain.rgb);
-  const render::Image marked = imageOf("marked/overlay/000000.png");
+  const render::Image plain = readImage("plain/rgb/000000.png");
+  EXPECT_EQ(readImage("marked/rgb/000000.png").rgb, plain.rgb);
+  const render::Image marked = readImage("marked/overlay/000000.png");
   const auto ids = readNpy<std::uint32_t>(folder_ / "marked/ids/000000.npy");
   const auto changed = [&](int x, int y) {
     const auto i = 3 * static_cast<std::ptrdiff_t>(y * 160 + x);
@@ -624,11 +626,11 @@ TEST_F(Capture, DepthReportsAreNextToTheFramesAndAddedIfMissing) {
   write(folder_ / "path.txt", ahead(3));
   const std::vector<std::string> options{"--size", "64x48", "--channels", "rgb"};
   ASSERT_EQ(captured("path.txt", "out", options).code, 0);
-  const auto before = treeOf(folder_ / "out");
+  const auto before = readTree(folder_ / "out");
   std::vector<std::string> reporting = options;
   reporting.push_back("--report-depth");
   ASSERT_EQ(captured("path.txt", "out", reporting).code, 0);
-  const auto after = treeOf(folder_ / "out");
+  const auto after = readTree(folder_ / "out");
   EXPECT_EQ(after.size(), before.size() + 4);
   for (const auto& [name, text] : before) EXPECT_EQ(after.at(name), text) << name;
   const json whole = json::parse(after.at("depth_report.json"));
@@ -652,8 +654,8 @@ TEST_F(Capture, FfmpegMakesTheFilmWhenAllFramesAreThere) {
   const Ended all = captured("path.txt", "out", {"--channels", "rgb"});
   setenv("PATH", before.c_str(), 1);
   EXPECT_EQ(json::parse(all.out).at("video"), "video.mp4") << all.err;
-  EXPECT_NE(textOf(folder_ / "out/video.mp4").find("-framerate 30 "), std::string::npos)
-      << textOf(folder_ / "out/video.mp4");
+  EXPECT_NE(readText(folder_ / "out/video.mp4").find("-framerate 30 "), std::string::npos)
+      << readText(folder_ / "out/video.mp4");
 }
 
 TEST_F(Capture, ADryRunReportsAndWritesNothing) {
@@ -687,7 +689,7 @@ TEST_F(Capture, ErrorsAreReportedBeforeAnyOutput) {
   EXPECT_NE(ended.err.find("nan.txt:1: 'nan'"), std::string::npos) << ended.err;
   EXPECT_EQ(captured("missing.txt", "out").code, 1);
   EXPECT_EQ(captured("path.txt", "out", {"--near", "5", "--far", "4"}).code, 1);
-  EXPECT_TRUE(treeOf(folder_ / "out").empty());
+  EXPECT_TRUE(readTree(folder_ / "out").empty());
 }
 
 }  // namespace

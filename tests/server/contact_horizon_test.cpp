@@ -16,7 +16,7 @@ v1::Subscribe toHorizons(std::vector<std::uint32_t> avatars = {}, std::uint32_t 
 }
 
 /// The horizons among the received messages, by tick.
-std::map<std::uint64_t, std::vector<v1::ContactHorizon>> horizonsOf(
+std::map<std::uint64_t, std::vector<v1::ContactHorizon>> collectHorizons(
     const std::deque<v1::ServerMessage>& messages) {
   std::map<std::uint64_t, std::vector<v1::ContactHorizon>> horizons;
   for (const v1::ServerMessage& message : messages)
@@ -34,7 +34,7 @@ class ContactHorizons : public ServedRoom {
   }
 
   /// The id of an avatar that is in the world.
-  static std::uint32_t idOf(protocol::Client& client, const std::string& name) {
+  static std::uint32_t findId(protocol::Client& client, const std::string& name) {
     const v1::StepReply reply = client.step(1, true);
     for (const v1::AvatarState& avatar : reply.avatars())
       if (avatar.name() == name) return avatar.id();
@@ -50,10 +50,10 @@ TEST_F(ContactHorizons, AreReportedInTheTicksInWhichTheyChange) {
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   EXPECT_FALSE(bob.command(spawn("bob", -6, 0.001, 3)));
   ann.step(30);
-  const std::uint32_t annId = idOf(ann, "ann"), bobId = idOf(ann, "bob");
+  const std::uint32_t annId = findId(ann, "ann"), bobId = findId(ann, "bob");
   ann.subscribe(toHorizons({}, 16));
   ann.step(60);
-  const auto horizons = horizonsOf(ann.takeEvents());
+  const auto horizons = collectHorizons(ann.takeEvents());
   ASSERT_FALSE(horizons.empty());
   const auto& [tick, all] = *horizons.begin();
   ASSERT_EQ(all.size(), 2u) << "all of them first";
@@ -81,14 +81,14 @@ TEST_F(ContactHorizons, AreReportedInTheTicksInWhichTheyChange) {
     }
   }
   bob.metrics();  // what was sent before its reply has arrived then
-  EXPECT_TRUE(horizonsOf(bob.takeEvents()).empty()) << "bob did not subscribe";
+  EXPECT_TRUE(collectHorizons(bob.takeEvents()).empty()) << "bob did not subscribe";
 }
 
 TEST_F(ContactHorizons, NoContactBeginsBeforeThem) {
   protocol::Client ann = client("ann");
   EXPECT_FALSE(ann.command(spawn("ann", -1, 0.001, 0)));
   ann.step(30);
-  v1::Subscribe subscription = toHorizons({idOf(ann, "ann")}, 16);
+  v1::Subscribe subscription = toHorizons({findId(ann, "ann")}, 16);
   subscription.set_contacts(true);
   ann.subscribe(subscription);
   EXPECT_FALSE(ann.command(walkTo("ann", 1.9, 0, 0)));
@@ -121,22 +121,22 @@ TEST_F(ContactHorizons, OneClientGetsItsAvatarAndAnotherAll) {
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   EXPECT_FALSE(bob.command(spawn("bob", -2, 0.001, 3)));
   ann.step(30);
-  const std::uint32_t bobId = idOf(ann, "bob");
+  const std::uint32_t bobId = findId(ann, "bob");
   ann.subscribe(toHorizons());
   bob.subscribe(toHorizons({bobId}));
   ann.step(3);
-  EXPECT_EQ(horizonsOf(ann.takeEvents()).begin()->second.size(), 2u);
+  EXPECT_EQ(collectHorizons(ann.takeEvents()).begin()->second.size(), 2u);
   bob.metrics();  // what was sent before its reply has arrived then
-  const auto mine = horizonsOf(bob.takeEvents());
+  const auto mine = collectHorizons(bob.takeEvents());
   ASSERT_FALSE(mine.empty());
   ASSERT_EQ(mine.begin()->second.size(), 1u);
   EXPECT_EQ(mine.begin()->second[0].avatar(), bobId);
   EXPECT_EQ(mine.begin()->second[0].approaches_size(), 1) << "the default";
   ann.subscribe({});
   ann.step(60);
-  EXPECT_TRUE(horizonsOf(ann.takeEvents()).empty());
+  EXPECT_TRUE(collectHorizons(ann.takeEvents()).empty());
   bob.metrics();
-  for (const auto& [tick, horizons] : horizonsOf(bob.takeEvents()))
+  for (const auto& [tick, horizons] : collectHorizons(bob.takeEvents()))
     for (const v1::ContactHorizon& one : horizons) EXPECT_EQ(one.avatar(), bobId);
 }
 
@@ -146,7 +146,7 @@ TEST_F(ContactHorizons, StartOverAtARestart) {
   for (int run = 0; run < 2; ++run) {
     EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
     ann.step(40);
-    const auto horizons = horizonsOf(ann.takeEvents());
+    const auto horizons = collectHorizons(ann.takeEvents());
     ASSERT_FALSE(horizons.empty());
     EXPECT_EQ(horizons.begin()->first, 1u) << "with the spawn";
     v1::ClientMessage restart;
@@ -159,7 +159,7 @@ TEST_F(ContactHorizons, AListOutlivesItsAvatars) {
   protocol::Client ann = client("ann");
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(2);
-  v1::Subscribe subscription = toHorizons({idOf(ann, "ann")});
+  v1::Subscribe subscription = toHorizons({findId(ann, "ann")});
   ann.subscribe(subscription);
   v1::ClientMessage restart;
   restart.mutable_restart();
@@ -170,7 +170,7 @@ TEST_F(ContactHorizons, AListOutlivesItsAvatars) {
   EXPECT_NO_THROW(ann.subscribe(subscription));
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(40);
-  EXPECT_FALSE(horizonsOf(ann.takeEvents()).empty());
+  EXPECT_FALSE(collectHorizons(ann.takeEvents()).empty());
 }
 
 TEST_F(ContactHorizons, AreNotSentAgainBySubscribingToOtherEvents) {
@@ -184,7 +184,7 @@ TEST_F(ContactHorizons, AreNotSentAgainBySubscribingToOtherEvents) {
     subscription.set_notices(i % 2 == 0);
     ann.subscribe(subscription);
     ann.step(1);
-    for (const auto& [tick, reports] : horizonsOf(ann.takeEvents())) {
+    for (const auto& [tick, reports] : collectHorizons(ann.takeEvents())) {
       EXPECT_NE(reports[0].SerializeAsString(), lastReport) << "tick " << tick;
       lastReport = reports[0].SerializeAsString();
     }
@@ -196,7 +196,7 @@ TEST_F(ContactHorizons, InvalidRequestsAreRefusedByTheirField) {
   protocol::Client ann = client("ann");
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(2);
-  const std::uint32_t id = idOf(ann, "ann");
+  const std::uint32_t id = findId(ann, "ann");
   v1::Subscribe present = toHorizons();
   present.mutable_contact_horizon()->set_assume(v1::CannotTouchQuery::ASSUME_PRESENT_MOTION);
   for (const auto& [subscription, field] : {std::pair{toHorizons({id, 99}), "avatars[1]"},
@@ -212,12 +212,12 @@ TEST_F(ContactHorizons, InvalidRequestsAreRefusedByTheirField) {
     }
   }
   ann.step(2);
-  EXPECT_TRUE(horizonsOf(ann.takeEvents()).empty());
+  EXPECT_TRUE(collectHorizons(ann.takeEvents()).empty());
   v1::Subscribe any = toHorizons({id});
   any.mutable_contact_horizon()->set_assume(v1::CannotTouchQuery::ASSUME_ANY_COMMAND);
   ann.subscribe(any);
   ann.step(1);
-  EXPECT_EQ(horizonsOf(ann.takeEvents()).size(), 1u);
+  EXPECT_EQ(collectHorizons(ann.takeEvents()).size(), 1u);
 }
 
 }  // namespace

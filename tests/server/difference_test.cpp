@@ -39,8 +39,8 @@ double leastCost(const std::vector<WalkEvent>& before, std::size_t i,
   return best;
 }
 
-double costOf(const IndexPairs& pairs, const std::vector<WalkEvent>& before,
-              const std::vector<WalkEvent>& after) {
+double computeCost(const IndexPairs& pairs, const std::vector<WalkEvent>& before,
+                   const std::vector<WalkEvent>& after) {
   double cost =
       static_cast<double>(before.size() + after.size() - 2 * pairs.size()) * kMaxMatchDistance / 2;
   for (const auto& [i, j] : pairs) cost += (before[i].point - after[j].point).norm();
@@ -80,7 +80,7 @@ TEST(AlignEvents, NoMatchingIsCheaper) {
       after.push_back(at(place(random), static_cast<double>(after.size())));
     const IndexPairs pairs = alignEvents(before, after);
     // Times break ties between equal positions at a cost of one millimetre a second.
-    EXPECT_NEAR(costOf(pairs, before, after), leastCost(before, 0, after, 0), 0.1);
+    EXPECT_NEAR(computeCost(pairs, before, after), leastCost(before, 0, after, 0), 0.1);
     paired += static_cast<int>(pairs.size());
     possible += static_cast<int>(std::min(before.size(), after.size()));
   }

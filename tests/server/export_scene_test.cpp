@@ -15,7 +15,7 @@ TEST_F(ExportScene, ReadsBackAsTheSameScene) {
   EXPECT_EQ(report.at("objects"), 3);
   EXPECT_EQ(report.at("triangles"), 36);
   EXPECT_EQ(report.at("draw_calls"), 1);
-  const std::string bytes = textOf(path("room.glb"));
+  const std::string bytes = readText(path("room.glb"));
   EXPECT_EQ(report.at("bytes"), bytes.size());
   EXPECT_EQ(GlbReader(bytes).drawnTriangles().size(), 36u);
 
@@ -29,7 +29,7 @@ TEST_F(ExportScene, ReadsBackAsTheSameScene) {
 TEST_F(ExportScene, OptionsOfTheImportApply) {
   const Ended ended = run({"export", path("room.obj"), "--unit", "cm", "--glb", path("room.glb")});
   ASSERT_EQ(ended.code, 0) << ended.err;
-  for (const auto& triangle : GlbReader(textOf(path("room.glb"))).drawnTriangles())
+  for (const auto& triangle : GlbReader(readText(path("room.glb"))).drawnTriangles())
     EXPECT_LE(triangle.corners[0].cwiseAbs().maxCoeff(), 0.1001);
 }
 

@@ -26,7 +26,7 @@ scene::Model columnAndSheet() {
   return model;
 }
 
-double lengthOf(const ObjectSection& section) {
+double computeLength(const ObjectSection& section) {
   double length = 0;
   for (const auto& loop : section.loops)
     for (std::size_t i = 0; i < loop.size(); ++i)
@@ -42,11 +42,11 @@ TEST(FloorPlanSection, ClosedSolidsGiveOneLoopAndSingleFacesOneLine) {
   ASSERT_EQ(both.size(), 2u);
   EXPECT_EQ(both[0].loops.size(), 1u);
   EXPECT_TRUE(both[0].lines.empty());
-  EXPECT_NEAR(lengthOf(both[0]), 4, 1e-6);
+  EXPECT_NEAR(computeLength(both[0]), 4, 1e-6);
   EXPECT_EQ(both[0].box.max.y(), 3);
   EXPECT_TRUE(both[1].loops.empty());
   EXPECT_EQ(both[1].lines.size(), 1u);
-  EXPECT_NEAR(lengthOf(both[1]), 4, 1e-6);
+  EXPECT_NEAR(computeLength(both[1]), 4, 1e-6);
   for (const Vec3& point : both[0].loops[0]) EXPECT_EQ(point.y(), 1.2);
   EXPECT_EQ(cutStatic(scene, 2.5).size(), 1u);  // the column alone
   EXPECT_TRUE(cutStatic(scene, 3.5).empty());
@@ -63,7 +63,7 @@ TEST(FloorPlanSection, BodiesAreNotStaticAndAreCutAlone) {
   door.high = 1;
   model.bodies = {door};
   EXPECT_EQ(cutStatic(scene::Scene(model), 1.2).size(), 1u);
-  EXPECT_NEAR(lengthOf(cutObject(model, 1, 1.2)), 4, 1e-6);
+  EXPECT_NEAR(computeLength(cutObject(model, 1, 1.2)), 4, 1e-6);
 }
 
 TEST(FloorPlanSection, TwoOutlinesOfOneObjectAreTwoLoops) {

@@ -11,7 +11,7 @@ namespace {
 
 namespace wire = foxglove_protocol;
 
-std::string reasonOf(const wire::ClientRequest& request) {
+std::string getReason(const wire::ClientRequest& request) {
   const auto* refused = std::get_if<wire::Refused>(&request);
   return refused ? refused->reason : "";
 }
@@ -58,8 +58,8 @@ TEST(FoxgloveProtocol, RefusesTextInWords) {
         R"({"op":"subscribe","subscriptions":[{"id":-1,"channelId":1}]})",
         R"({"op":"subscribe","subscriptions":[{"id":4294967296,"channelId":1}]})",
         R"({"op":"unsubscribe","subscriptionIds":["a"]})"})
-    EXPECT_NE(reasonOf(wire::parseText(text)), "") << text;
-  EXPECT_NE(reasonOf(wire::parseText(std::string(100'000, '['))), "");
+    EXPECT_NE(getReason(wire::parseText(text)), "") << text;
+  EXPECT_NE(getReason(wire::parseText(std::string(100'000, '['))), "");
 }
 
 TEST(FoxgloveProtocol, ReadsPlaybackControlWithAndWithoutAnId) {
@@ -78,13 +78,13 @@ TEST(FoxgloveProtocol, ReadsPlaybackControlWithAndWithoutAnId) {
 
 TEST(FoxgloveProtocol, RefusesBinaryMessagesInWords) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  EXPECT_NE(reasonOf(wire::parseBinary({})), "");
-  EXPECT_NE(reasonOf(wire::parseBinary(playbackControl(2, 1, false, 0, ""))), "");
-  EXPECT_NE(reasonOf(wire::parseBinary(playbackControl(0, 0, false, 0, ""))), "");
-  EXPECT_NE(reasonOf(wire::parseBinary(playbackControl(0, kInfinity, false, 0, ""))), "");
+  EXPECT_NE(getReason(wire::parseBinary({})), "");
+  EXPECT_NE(getReason(wire::parseBinary(playbackControl(2, 1, false, 0, ""))), "");
+  EXPECT_NE(getReason(wire::parseBinary(playbackControl(0, 0, false, 0, ""))), "");
+  EXPECT_NE(getReason(wire::parseBinary(playbackControl(0, kInfinity, false, 0, ""))), "");
   auto cut = playbackControl(0, 1, false, 0, "abc");
   cut.pop_back();
-  EXPECT_NE(reasonOf(wire::parseBinary(cut)), "");
+  EXPECT_NE(getReason(wire::parseBinary(cut)), "");
 }
 
 TEST(FoxgloveProtocol, SurvivesMutatedMessages) {

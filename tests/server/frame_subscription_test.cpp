@@ -25,7 +25,7 @@ class FrameSubscriptions : public ServedRoom {
     if (!event || !event->has_frame()) return std::nullopt;
     return event->frame();
   }
-  static v1::ErrorCode codeOf(protocol::Client& client, const v1::ClientMessage& message) {
+  static v1::ErrorCode catchCode(protocol::Client& client, const v1::ClientMessage& message) {
     try {
       client.request(message);
     } catch (const protocol::ProtocolError& error) {
@@ -97,12 +97,12 @@ TEST_F(FrameSubscriptions, AnAvatarMayComeLaterAndAWatchEnds) {
 
 TEST_F(FrameSubscriptions, InvalidWatchesAreRefused) {
   protocol::Client ann = client("ann");
-  EXPECT_EQ(codeOf(ann, watching(0, 0)), v1::ERROR_BAD_MESSAGE);
-  EXPECT_EQ(codeOf(ann, watching(17, 0)), v1::ERROR_BAD_MESSAGE);
-  EXPECT_EQ(codeOf(ann, watching(1, -1)), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(catchCode(ann, watching(0, 0)), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(catchCode(ann, watching(17, 0)), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(catchCode(ann, watching(1, -1)), v1::ERROR_BAD_MESSAGE);
   v1::ClientMessage huge = watching(1, 0);
   huge.mutable_watch_frames()->mutable_frame()->set_width(5000);
-  EXPECT_EQ(codeOf(ann, huge), v1::ERROR_BAD_CAMERA);
+  EXPECT_EQ(catchCode(ann, huge), v1::ERROR_BAD_CAMERA);
 }
 
 }  // namespace

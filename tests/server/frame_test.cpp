@@ -21,7 +21,7 @@ class Frames : public ServedRoom {
 };
 
 template <typename T>
-std::vector<T> valuesOf(const protocol::ReceivedFrame& frame, v1::Channel channel) {
+std::vector<T> readValues(const protocol::ReceivedFrame& frame, v1::Channel channel) {
   const auto bytes = frame.plane(channel);
   std::vector<T> values(bytes.size() / sizeof(T));
   std::memcpy(values.data(), bytes.data(), values.size() * sizeof(T));
@@ -34,7 +34,7 @@ std::uint32_t standAt(protocol::Client& ann, double x, double z) {
   return ann.step(30, true).avatars(0).id();
 }
 
-v1::FrameRequest eyesOf(const std::string& avatar) {
+v1::FrameRequest makeEyesRequest(const std::string& avatar) {
   v1::FrameRequest request;
   request.mutable_eyes()->set_avatar(avatar);
   request.set_width(64);
@@ -45,7 +45,7 @@ v1::FrameRequest eyesOf(const std::string& avatar) {
   return request;
 }
 
-v1::ErrorCode codeOf(protocol::Client& client, const v1::FrameRequest& request) {
+v1::ErrorCode catchCode(protocol::Client& client, const v1::FrameRequest& request) {
   try {
     client.frame(request);
   } catch (const protocol::ProtocolError& error) {
@@ -58,11 +58,11 @@ TEST_F(Frames, AnAvatarSeesTheWallItFacesAtItsDistance) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   const v1::StepReply step = ann.step(30, true);
-  v1::FrameRequest request = eyesOf("ann");
+  v1::FrameRequest request = makeEyesRequest("ann");
   request.set_tick(step.tick());
   const protocol::ReceivedFrame frame = ann.frame(request);
-  const auto ids = valuesOf<std::uint32_t>(frame, v1::CHANNEL_IDS);
-  const auto depth = valuesOf<float>(frame, v1::CHANNEL_DEPTH);
+  const auto ids = readValues<std::uint32_t>(frame, v1::CHANNEL_IDS);
+  const auto depth = readValues<float>(frame, v1::CHANNEL_DEPTH);
   ASSERT_EQ(ids.size(), 64u * 48u);
   ASSERT_EQ(depth.size(), 64u * 48u);
   EXPECT_EQ(frame.plane(v1::CHANNEL_RGB).size(), 64u * 48u * 3u);
@@ -78,23 +78,23 @@ TEST_F(Frames, AnAvatarSeesTheWallItFacesAtItsDistance) {
 TEST_F(Frames, AnotherAvatarIsSeenFromAboveUnderItsOwnId) {
   protocol::Client ann = client("ann");
   const std::uint32_t id = standAt(ann, 1, 1);
-  v1::FrameRequest request = eyesOf("ann");
+  v1::FrameRequest request = makeEyesRequest("ann");
   v1::FreeCamera& camera = *request.mutable_free();
   *camera.mutable_eye() = vec(1, 6, 1);
   *camera.mutable_forward() = vec(0, -1, 0);
   *camera.mutable_up() = vec(0, 0, -1);
   camera.set_height_y(4);
-  const auto ids = valuesOf<std::uint32_t>(ann.frame(request), v1::CHANNEL_IDS);
+  const auto ids = readValues<std::uint32_t>(ann.frame(request), v1::CHANNEL_IDS);
   EXPECT_EQ(ids[24 * 64 + 32], id);
   EXPECT_EQ(ids[0], kFloor);
   camera.set_hide_avatar("ann");
-  EXPECT_EQ(valuesOf<std::uint32_t>(ann.frame(request), v1::CHANNEL_IDS)[24 * 64 + 32], kFloor);
+  EXPECT_EQ(readValues<std::uint32_t>(ann.frame(request), v1::CHANNEL_IDS)[24 * 64 + 32], kFloor);
 }
 
 TEST_F(Frames, AvatarsAreFiguresAndOnRequestTheirCollisionShapes) {
   protocol::Client ann = client("ann");
   const std::uint32_t id = standAt(ann, 1, 1);
-  v1::FrameRequest request = eyesOf("ann");
+  v1::FrameRequest request = makeEyesRequest("ann");
   v1::FreeCamera& camera = *request.mutable_free();
   *camera.mutable_eye() = vec(-1, 0.9, 1);
   *camera.mutable_forward() = vec(1, 0, 0);
@@ -102,7 +102,7 @@ TEST_F(Frames, AvatarsAreFiguresAndOnRequestTheirCollisionShapes) {
     request.set_collision_shapes(shapes);
     const protocol::ReceivedFrame frame = ann.frame(request);
     EXPECT_EQ(frame.description.collision_shapes(), shapes);
-    const auto ids = valuesOf<std::uint32_t>(frame, v1::CHANNEL_IDS);
+    const auto ids = readValues<std::uint32_t>(frame, v1::CHANNEL_IDS);
     return std::count(ids.begin(), ids.end(), id);
   };
   const auto figure = pixels(false), shape = pixels(true);
@@ -114,7 +114,7 @@ TEST_F(Frames, SamplesSmoothTheColourAloneAndOtherNumbersAreRefused) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
-  v1::FrameRequest request = eyesOf("ann");
+  v1::FrameRequest request = makeEyesRequest("ann");
   const protocol::ReceivedFrame one = ann.frame(request);
   EXPECT_EQ(one.description.samples(), 1u);
   request.set_samples(4);
@@ -140,7 +140,7 @@ TEST_F(Frames, ShadowsAreDrawnByDefaultInLargePictures) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
-  v1::FrameRequest request = eyesOf("ann");
+  v1::FrameRequest request = makeEyesRequest("ann");
   request.set_renderer(v1::RENDERER_RAYS);
   EXPECT_FALSE(ann.frame(request).description.shadows()) << "64 x 48";
   request.set_width(320);
@@ -154,7 +154,7 @@ TEST_F(Frames, APngHoldsTheSamePicture) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
-  v1::FrameRequest request = eyesOf("ann");
+  v1::FrameRequest request = makeEyesRequest("ann");
   const protocol::ReceivedFrame raw = ann.frame(request);
   request.set_rgb_encoding(v1::ENCODING_PNG);
   const protocol::ReceivedFrame packed = ann.frame(request);
@@ -167,7 +167,7 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
-  v1::FrameRequest request = eyesOf("ann");
+  v1::FrameRequest request = makeEyesRequest("ann");
   request.add_channels(v1::CHANNEL_RANGE);
   request.add_channels(v1::CHANNEL_NORMALS);
   request.set_glass(v1::GLASS_SOLID);
@@ -182,9 +182,9 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
   EXPECT_EQ(frame.description.glass(), v1::GLASS_SOLID);
   EXPECT_TRUE(frame.description.shadows());
   EXPECT_FALSE(frame.description.camera().has_fov_y());
-  const auto depth = valuesOf<float>(frame, v1::CHANNEL_DEPTH);
-  const auto range = valuesOf<float>(frame, v1::CHANNEL_RANGE);
-  const auto normals = valuesOf<float>(frame, v1::CHANNEL_NORMALS);
+  const auto depth = readValues<float>(frame, v1::CHANNEL_DEPTH);
+  const auto range = readValues<float>(frame, v1::CHANNEL_RANGE);
+  const auto normals = readValues<float>(frame, v1::CHANNEL_NORMALS);
   ASSERT_EQ(range.size(), 64u * 48u);
   ASSERT_EQ(normals.size(), 3u * 64u * 48u);
   constexpr std::size_t axis = 24 * 64 + 12, aside = 24 * 64 + 42;
@@ -192,7 +192,7 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
   EXPECT_NEAR(range[aside], depth[aside] * 1.25, 1e-4);  // 30 pixels aside: 3, 4, 5
   EXPECT_NEAR(normals[3 * axis], -1, 1e-4) << "the wall ahead looks back along x";
   request.mutable_eyes()->set_fov_y(1);
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_CAMERA) << "both kinds of opening";
+  EXPECT_EQ(catchCode(ann, request), v1::ERROR_BAD_CAMERA) << "both kinds of opening";
   request.mutable_eyes()->clear_fov_y();
   intrinsics.set_fx(0);
   try {
@@ -207,7 +207,7 @@ TEST_F(Frames, TheRequestedRendererDrawsTheSameScene) {
   protocol::Client ann = client("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
-  v1::FrameRequest request = eyesOf("ann");
+  v1::FrameRequest request = makeEyesRequest("ann");
   request.set_renderer(v1::RENDERER_GL);
   const protocol::ReceivedFrame drawn = ann.frame(request);
   request.set_renderer(v1::RENDERER_RAYS);
@@ -216,11 +216,11 @@ TEST_F(Frames, TheRequestedRendererDrawsTheSameScene) {
   EXPECT_NE(drawn.description.renderer(), cast.description.renderer());
   for (const auto* frame : {&drawn, &cast}) EXPECT_GT(frame->description.drawing_seconds(), 0);
   constexpr std::size_t middle = 24 * 64 + 32;
-  EXPECT_EQ(valuesOf<std::uint32_t>(cast, v1::CHANNEL_IDS)[middle], kWall);
-  EXPECT_NEAR(valuesOf<float>(cast, v1::CHANNEL_DEPTH)[middle],
-              valuesOf<float>(drawn, v1::CHANNEL_DEPTH)[middle], 1e-3);
+  EXPECT_EQ(readValues<std::uint32_t>(cast, v1::CHANNEL_IDS)[middle], kWall);
+  EXPECT_NEAR(readValues<float>(cast, v1::CHANNEL_DEPTH)[middle],
+              readValues<float>(drawn, v1::CHANNEL_DEPTH)[middle], 1e-3);
   request.set_renderer(static_cast<v1::Renderer>(9));
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(catchCode(ann, request), v1::ERROR_BAD_MESSAGE);
 }
 
 TEST_F(Frames, AnImageAboveTheClientLimitIsRefusedAndTheConnectionContinues) {
@@ -231,17 +231,17 @@ TEST_F(Frames, AnImageAboveTheClientLimitIsRefusedAndTheConnectionContinues) {
   request.set_height(4096);
   request.add_channels(v1::CHANNEL_DEPTH);
   request.add_channels(v1::CHANNEL_NORMALS);
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_TOO_LARGE);
+  EXPECT_EQ(catchCode(ann, request), v1::ERROR_TOO_LARGE);
   EXPECT_EQ(ann.step(1, false).tick(), 1u);
 }
 
 TEST_F(Frames, InvalidFrameRequestsAreRefusedByName) {
   protocol::Client ann = client("ann");
-  v1::FrameRequest request = eyesOf("unknown");
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_UNKNOWN_AVATAR);
+  v1::FrameRequest request = makeEyesRequest("unknown");
+  EXPECT_EQ(catchCode(ann, request), v1::ERROR_UNKNOWN_AVATAR);
   request.mutable_free();
   request.set_width(5000);
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_CAMERA);
+  EXPECT_EQ(catchCode(ann, request), v1::ERROR_BAD_CAMERA);
   request.set_width(64);
   *request.mutable_free()->mutable_forward() = vec(0, 0, 0);
   try {
@@ -253,10 +253,10 @@ TEST_F(Frames, InvalidFrameRequestsAreRefusedByName) {
   }
   *request.mutable_free()->mutable_forward() = vec(1, 0, 0);
   request.set_tick(77);
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_TICK_GONE);
+  EXPECT_EQ(catchCode(ann, request), v1::ERROR_TICK_GONE);
   request.clear_tick();
   request.add_channels(v1::CHANNEL_RGB);
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_BAD_MESSAGE) << "rgb twice";
+  EXPECT_EQ(catchCode(ann, request), v1::ERROR_BAD_MESSAGE) << "rgb twice";
   request.clear_channels();
   request.set_rgb_encoding(static_cast<v1::Encoding>(9));
   try {
@@ -275,7 +275,7 @@ TEST_F(Frames, InvalidFrameRequestsAreRefusedByName) {
     EXPECT_EQ(error.field, "frame.fov_y");
   }
   request.mutable_free()->clear_fov_y();
-  EXPECT_EQ(codeOf(ann, request), v1::ERROR_UNSPECIFIED);
+  EXPECT_EQ(catchCode(ann, request), v1::ERROR_UNSPECIFIED);
 }
 
 TEST(FrameOrder, RawImagesDoNotOvertakeEncodedOnes) {

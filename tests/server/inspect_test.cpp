@@ -126,7 +126,7 @@ TEST_F(Inspect, WritesAPageWithPlansAndEscapesTheFilesText) {
   const Ended ended =
       run({"inspect", path("room.obj"), "--unit", "m", "--html", path("report.html")});
   ASSERT_EQ(ended.code, 0) << ended.err;
-  const std::string page = textOf(path("report.html"));
+  const std::string page = readText(path("report.html"));
   EXPECT_NE(page.find("<h1>room.obj</h1>"), std::string::npos);
   EXPECT_NE(page.find("missing_material_file"), std::string::npos);
   EXPECT_NE(page.find("&lt;b&gt;absent.mtl"), std::string::npos);
@@ -147,7 +147,7 @@ TEST_F(Inspect, PagesOfPlansAreToScale) {
     const Ended drawn = run({"inspect", path("room.obj"), "--plan", path("pages"), "--plan-format",
                              "svg", "--plan-scale", scale});
     EXPECT_EQ(drawn.code, 0) << drawn.err;
-    const std::string svg = textOf(path("pages/storey-1.svg"));
+    const std::string svg = readText(path("pages/storey-1.svg"));
     EXPECT_EQ(svg.rfind("<?xml", 0), 0u);
     std::smatch width;
     EXPECT_TRUE(std::regex_search(svg, width, std::regex("viewBox=\"0 0 ([0-9.]+)")));
@@ -204,13 +204,13 @@ TEST_F(Inspect, AnUnwritablePlanIsReportedBeforeTheImport) {
     EXPECT_NE(ended.err.find("cannot write to " + folder), std::string::npos) << ended.err;
     EXPECT_NE(ended.err.find("--plan"), std::string::npos) << ended.err;
   }
-  EXPECT_EQ(textOf(path("file")), "in the way");
+  EXPECT_EQ(readText(path("file")), "in the way");
 }
 
 TEST_F(Inspect, UnwritableFilesAreNamedAndExitWithOne) {
   fs::create_symlink("/dev/full", path("stdout"));
-  EXPECT_EQ(codeOf(start({"inspect", path("room.obj"), "--json"})), 1);
-  EXPECT_NE(textOf(path("stderr")).find("stdout"), std::string::npos) << textOf(path("stderr"));
+  EXPECT_EQ(awaitExitCode(start({"inspect", path("room.obj"), "--json"})), 1);
+  EXPECT_NE(readText(path("stderr")).find("stdout"), std::string::npos) << readText(path("stderr"));
   fs::remove(path("stdout"));
   fs::create_directories(path("plans/storey-1.png"));  // blocks the path of the image
   const Ended ended = run({"inspect", path("room.obj"), "--plan", path("plans")});

@@ -20,14 +20,14 @@ std::variant<ProgramCommand, ExitCode> read(std::vector<const char*> options) {
   return readCommandLine(static_cast<int>(arguments.size()), arguments.data());
 }
 
-scene::WorldSettings lengthsOf(std::vector<const char*> options) {
+scene::WorldSettings readSettings(std::vector<const char*> options) {
   return std::get<ReplayCommand>(std::get<ProgramCommand>(read(std::move(options)))).settings;
 }
 
 TEST(MotionOptions, SetTheWorldSettingsAndArePolicies) {
   const scene::WorldSettings lengths =
-      lengthsOf({"--step-height", "0.2", "--epsilon", "0.001", "--slope", "30", "--sliding", "stop",
-                 "--speed-limit", "2.5"});
+      readSettings({"--step-height", "0.2", "--epsilon", "0.001", "--slope", "30", "--sliding",
+                    "stop", "--speed-limit", "2.5"});
   EXPECT_EQ(lengths.stepHeight, 0.2);
   EXPECT_EQ(lengths.contactOffset, 0.001);
   EXPECT_EQ(lengths.maxSpeed, 2.5);
@@ -36,8 +36,8 @@ TEST(MotionOptions, SetTheWorldSettingsAndArePolicies) {
   EXPECT_NEAR(policies.walkable_slope(), 30 * 3.14159265358979 / 180, 1e-12);
   EXPECT_EQ(policies.sliding(), "stop");
   EXPECT_GT(policies.jump_limit(), 0);
-  EXPECT_EQ(toProto(lengthsOf({})).sliding(), "slide");
-  EXPECT_EQ(lengthsOf({}).stepHeight, scene::WorldSettings().stepHeight);
+  EXPECT_EQ(toProto(readSettings({})).sliding(), "slide");
+  EXPECT_EQ(readSettings({}).stepHeight, scene::WorldSettings().stepHeight);
 }
 
 TEST(MotionOptions, SettingsOutOfRangeAreUsageErrors) {

@@ -151,7 +151,7 @@ class MeshCache : public ProgramFixture {
       if (file.path().extension() == ".text") files.push_back(file.path());
     return files;
   }
-  static nlohmann::json pointsOf(const Ended& ended) {
+  static nlohmann::json parsePoints(const Ended& ended) {
     return nlohmann::json::parse(ended.out).at("points");
   }
 };
@@ -161,7 +161,7 @@ TEST_F(MeshCache, TheNextStartReadsTheMeshes) {
   EXPECT_TRUE(hasBuilt(first)) << first.err;
   const Ended second = route();
   EXPECT_FALSE(hasBuilt(second)) << second.err;
-  EXPECT_EQ(pointsOf(second), pointsOf(first));
+  EXPECT_EQ(parsePoints(second), parsePoints(first));
   EXPECT_TRUE(hasBuilt(route({"--radius", "0.2"}))) << "another size";
   EXPECT_TRUE(hasBuilt(route({"--no-cache"})));
   setenv("ENFILADE_CACHE", "off", 1);
@@ -171,13 +171,13 @@ TEST_F(MeshCache, TheNextStartReadsTheMeshes) {
 TEST_F(MeshCache, ADamagedFileIsReportedAndBuiltAgain) {
   const Ended first = route();
   ASSERT_EQ(meshFiles().size(), 1u);
-  std::string bytes = textOf(meshFiles()[0]);
+  std::string bytes = readText(meshFiles()[0]);
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
   write(meshFiles()[0], bytes);
   const Ended second = route();
   EXPECT_TRUE(hasBuilt(second));
   EXPECT_NE(second.err.find("damaged"), std::string::npos) << second.err;
-  EXPECT_EQ(pointsOf(second), pointsOf(first));
+  EXPECT_EQ(parsePoints(second), parsePoints(first));
   EXPECT_FALSE(hasBuilt(route())) << "it was written again";
 }
 

@@ -64,13 +64,13 @@ TEST(PathMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
   EXPECT_GT(countPale(drawMap(trace, {blank}).value()), 300u);
   trace.paths[0].isEarlier = false;
   // The blank image lacks the room's walls; the map shows them dark.
-  const auto inkOf = [](const render::Image& image) {
+  const auto countInk = [](const render::Image& image) {
     std::size_t ink = 0;
     for (std::size_t i = 0; i < image.rgb.size(); i += 3) ink += image.rgb[i] < 80;
     return ink;
   };
   const auto room = smallRoom();
-  EXPECT_GT(inkOf(drawMap(trace, {blank, room.get()}).value()), inkOf(*map) + 500);
+  EXPECT_GT(countInk(drawMap(trace, {blank, room.get()}).value()), countInk(*map) + 500);
 }
 
 }  // namespace

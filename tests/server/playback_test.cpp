@@ -35,18 +35,18 @@ class ProgramPlayback : public ProgramFixture {
     more.insert(more.begin(), {path(file), "--verify"});
     return replay(more);
   }
-  static nlohmann::json reportOf(const Ended& ended) {
+  static nlohmann::json readReport(const Ended& ended) {
     return nlohmann::json::parse(ended.out, nullptr, false);
   }
 };
 
 TEST_F(ProgramPlayback, IsVerifiedFromTheCheckpointBeforeATick) {
-  const auto whole = reportOf(verify("walk.mcap"));
+  const auto whole = readReport(verify("walk.mcap"));
   const std::uint64_t ticks = whole.value("ticks", 0u);
   ASSERT_GT(ticks, 2400u);
   const Ended late = verify("walk.mcap", {"--from", std::to_string(ticks - 100)});
   EXPECT_EQ(late.code, 0) << late.err;
-  const auto report = reportOf(late);
+  const auto report = readReport(late);
   const std::uint64_t began = report.value("from_checkpoint", 0u);
   EXPECT_GT(began, 0u);
   EXPECT_LE(began, ticks - 100);
@@ -58,7 +58,7 @@ TEST_F(ProgramPlayback, AContinuedWalkEndsIdentically) {
   const Ended branched = replay({path("walk.mcap"), "--from", "1500", "--then", path("wait.jsonl"),
                                  "--out", path("branch"), "--record", path("branch.mcap")});
   ASSERT_EQ(branched.code, 0) << branched.err;
-  const auto whole = reportOf(verify("branch.mcap"));
+  const auto whole = readReport(verify("branch.mcap"));
   EXPECT_GE(whole.value("ticks", 0u), 600u);
   // Ann continues her orders: after the same tick the recorded walk has the same hash.
   const std::uint64_t end = 1500 + whole.value("ticks", std::uint64_t{0});
@@ -67,7 +67,7 @@ TEST_F(ProgramPlayback, AContinuedWalkEndsIdentically) {
       replay({path("walk.mcap"), "--from", std::to_string(end), "--then", path("none.jsonl"),
               "--out", path("other"), "--record", path("other.mcap")});
   if (other.code == 0) {
-    const auto made = reportOf(verify("other.mcap"));
+    const auto made = readReport(verify("other.mcap"));
     EXPECT_EQ(made.value("ticks", 1u), 0u);
     EXPECT_EQ(made.value("state_hash", ""), whole.value("state_hash", "-"));
   } else {  // the branch continued beyond the recording's end
@@ -84,8 +84,8 @@ TEST_F(ProgramPlayback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
                     path("bob.jsonl"), "--out", path("b"), "--record", path("b.mcap")})
                 .code,
             0);
-  const auto whole = reportOf(verify("b.mcap"));
-  const auto part = reportOf(verify("b.mcap", {"--from", "900"}));
+  const auto whole = readReport(verify("b.mcap"));
+  const auto part = readReport(verify("b.mcap", {"--from", "900"}));
   EXPECT_EQ(part.value("state_hash", ""), whole.value("state_hash", "-"));
   EXPECT_EQ(part.value("from_checkpoint", 0u), 700u);
   const Ended early = verify("b.mcap", {"--from", "699"});

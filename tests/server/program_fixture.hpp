@@ -22,7 +22,7 @@ extern char** environ;
 
 namespace enfilade::server::testing {
 
-inline std::string textOf(const std::filesystem::path& file) {
+inline std::string readText(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   text << stream.rdbuf();
@@ -61,21 +61,21 @@ class ProgramFixture : public ::testing::Test {
     return child;
   }
 
-  static int codeOf(pid_t child) {
+  static int awaitExitCode(pid_t child) {
     int status = 0;
     waitpid(child, &status, 0);
     return WIFEXITED(status) ? WEXITSTATUS(status) : -WTERMSIG(status);
   }
 
   Ended run(const std::vector<std::string>& arguments) const {
-    const int code = codeOf(start(arguments));
-    return {code, textOf(path("stdout")), textOf(path("stderr"))};
+    const int code = awaitExitCode(start(arguments));
+    return {code, readText(path("stdout")), readText(path("stderr"))};
   }
 
   /// The port from the ready line, once it was printed.
   int awaitReady() const {
     for (int i = 0; i < 3000; ++i) {
-      const auto ready = nlohmann::json::parse(textOf(path("stdout")), nullptr, false);
+      const auto ready = nlohmann::json::parse(readText(path("stdout")), nullptr, false);
       if (!ready.is_discarded() && ready.value("ready", false)) return ready.at("port");
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }

@@ -24,7 +24,7 @@ constexpr const char* kWalk = R"({"spawn":"ann","at":[0,0.01,0],"facing":0}
 )";
 
 std::ptrdiff_t countDarkPixels(const std::string& file) {
-  const std::string bytes = textOf(file);
+  const std::string bytes = readText(file);
   const render::Image image = render::decodePng({bytes.begin(), bytes.end()});
   std::ptrdiff_t dark = 0;
   for (std::size_t i = 0; i < image.rgb.size(); i += 3) dark += image.rgb[i] < 80 ? 1 : 0;
@@ -192,8 +192,9 @@ TEST_F(Program, AFailedWriteToStdoutExitsWithOne) {
            {"capture", path("room.obj"), path("path.txt"), "--out", path("frames"), "--dry-run"},
            {"capture", path("room.obj"), path("path.txt"), "--out", path("frames"), "--size",
             "16x16", "--renderer", "rays"}}) {
-    EXPECT_EQ(codeOf(start(arguments)), 1) << ::testing::PrintToString(arguments);
-    EXPECT_NE(textOf(path("stderr")).find("stdout"), std::string::npos) << textOf(path("stderr"));
+    EXPECT_EQ(awaitExitCode(start(arguments)), 1) << ::testing::PrintToString(arguments);
+    EXPECT_NE(readText(path("stderr")).find("stdout"), std::string::npos)
+        << readText(path("stderr"));
   }
 }
 
@@ -205,9 +206,9 @@ TEST_F(Program, AFileBeyondTheLimitIsAnErrorNotADeath) {
   const pid_t child = start({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"),
                              "--record", path("walk.mcap")});
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
-  EXPECT_EQ(codeOf(child), 1);
-  EXPECT_NE(textOf(path("stderr")).find("File too large"), std::string::npos)
-      << textOf(path("stderr"));
+  EXPECT_EQ(awaitExitCode(child), 1);
+  EXPECT_NE(readText(path("stderr")).find("File too large"), std::string::npos)
+      << readText(path("stderr"));
 }
 
 TEST_F(Program, ServingAPublicAddressExitsWithOne) {
@@ -229,7 +230,7 @@ TEST_F(Program, SignalsEndAServerInOrder) {
     const pid_t child = start({"serve", path("room.obj"), "--listen", "127.0.0.1:0"});
     EXPECT_GT(awaitReady(), 0);
     kill(child, signal);
-    EXPECT_EQ(codeOf(child), code);
+    EXPECT_EQ(awaitExitCode(child), code);
   }
 }
 
@@ -249,7 +250,7 @@ TEST_F(Program, StrictTurnsABlockedWalkIntoThree) {
 }
 
 /// Reads contacts.jsonl, without the contacts that end with the walk.
-std::vector<nlohmann::json> contactsOf(const fs::path& out, std::uint64_t lastTick) {
+std::vector<nlohmann::json> readContacts(const fs::path& out, std::uint64_t lastTick) {
   std::ifstream lines(out / "contacts.jsonl");
   std::vector<nlohmann::json> contacts;
   for (std::string line; std::getline(lines, line);) {
@@ -295,12 +296,12 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
   const Ended walked =
       run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--out", path("walked")});
   kill(server, SIGTERM);
-  EXPECT_EQ(codeOf(server), 0);
+  EXPECT_EQ(awaitExitCode(server), 0);
   ASSERT_EQ(walked.code, 0) << walked.err;
 
   const auto summary = nlohmann::json::parse(replayed.out);
   const auto socketSummary = nlohmann::json::parse(walked.out);
-  EXPECT_EQ(summary, nlohmann::json::parse(textOf(path("replayed/summary.json"))));
+  EXPECT_EQ(summary, nlohmann::json::parse(readText(path("replayed/summary.json"))));
   for (const char* key : {"ticks", "state_hash", "contacts", "worst_penetration", "pairs", "walks",
                           "outcomes", "scene_hash", "blocked", "arrived", "audit"}) {
     EXPECT_EQ(summary.at(key), socketSummary.at(key)) << key;
@@ -315,7 +316,7 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
     EXPECT_TRUE(summary["stages_us"].contains(stage)) << stage;
   }
   const std::uint64_t last = summary["ticks"];
-  EXPECT_EQ(contactsOf(path("replayed"), last), contactsOf(path("walked"), last));
+  EXPECT_EQ(readContacts(path("replayed"), last), readContacts(path("walked"), last));
   expectBalanced(path("replayed"));
   expectBalanced(path("walked"));
   if (summary["renderer"] == "") {
@@ -323,8 +324,8 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
     GTEST_SKIP() << "no EGL device: pictures are not compared";
   }
   for (const char* file : {"frames/wall.png", "sheet.png"}) {
-    EXPECT_FALSE(textOf(path("replayed/") + file).empty()) << file;
-    EXPECT_EQ(textOf(path("replayed/") + file), textOf(path("walked/") + file)) << file;
+    EXPECT_FALSE(readText(path("replayed/") + file).empty()) << file;
+    EXPECT_EQ(readText(path("replayed/") + file), readText(path("walked/") + file)) << file;
   }
   // Only the process with the scene can cut the walls and fill them.
   EXPECT_GT(countDarkPixels(path("replayed/map.png")),

@@ -62,7 +62,7 @@ class Pairs : public ServedRoom {
 };
 
 template <class Ask>
-protocol::ProtocolError refusalOf(const Ask& ask) {
+protocol::ProtocolError catchRefusal(const Ask& ask) {
   try {
     ask();
   } catch (const protocol::ProtocolError& error) {
@@ -179,7 +179,7 @@ TEST_F(Pairs, InvalidQueriesAreRefusedByTheirField) {
   serve(limits, bodyRoom());
   protocol::Client ann = inTheRoom();
   const auto distance = [&](const v1::DistanceQuery& query) {
-    return refusalOf([&] { ann.distances(query); });
+    return catchRefusal([&] { ann.distances(query); });
   };
   const auto expect = [](const protocol::ProtocolError& error, v1::ErrorCode code,
                          const std::string& field) {
@@ -200,11 +200,11 @@ TEST_F(Pairs, InvalidQueriesAreRefusedByTheirField) {
   query.set_tick(7);
   expect(distance(query), v1::ERROR_TICK_GONE, "distances.tick");
   for (const double within : {-1.0, std::nan(""), 1001.0, std::numeric_limits<double>::infinity()})
-    expect(refusalOf([&] { ann.touching(near("ann", within)); }), v1::ERROR_BAD_MESSAGE,
+    expect(catchRefusal([&] { ann.touching(near("ann", within)); }), v1::ERROR_BAD_MESSAGE,
            "touching.within");
   for (const double least : {-1.0, std::nan(""), 3601.0})
-    expect(refusalOf([&] { ann.cannotTouch(apart("ann", "left", least)); }), v1::ERROR_BAD_MESSAGE,
-           "cannot_touch.least");
+    expect(catchRefusal([&] { ann.cannotTouch(apart("ann", "left", least)); }),
+           v1::ERROR_BAD_MESSAGE, "cannot_touch.least");
   EXPECT_EQ(ann.distances(between("left", "end")).pairs_size(), 1) << "the connection continues";
 }
 
@@ -217,7 +217,7 @@ TEST_F(Pairs, AnAvatarThatLeftIsUnknown) {
   ASSERT_FALSE(ann.command(leave));
   ann.step(2);
   for (const v1::DistanceQuery& query : {between("ann", "floor"), between(id, "floor")}) {
-    const auto refusal = refusalOf([&] { ann.distances(query); });
+    const auto refusal = catchRefusal([&] { ann.distances(query); });
     EXPECT_EQ(refusal.code, v1::ERROR_UNKNOWN_ENTITY);
   }
 }

@@ -24,7 +24,7 @@ v1::RayQuery oneRay(const v1::Vec3& origin, const v1::Vec3& direction, double re
   return query;
 }
 
-protocol::ProtocolError refusalOf(protocol::Client& client, const v1::RayQuery& query) {
+protocol::ProtocolError catchRefusal(protocol::Client& client, const v1::RayQuery& query) {
   try {
     client.rays(query);
   } catch (const protocol::ProtocolError& error) {
@@ -142,29 +142,29 @@ TEST_F(Rays, InvalidRaysAreRefusedByTheirField) {
   limits.scanRays = 100;
   serve(limits);
   protocol::Client ann = client("ann");
-  EXPECT_EQ(refusalOf(ann, {}).field, "rays");
+  EXPECT_EQ(catchRefusal(ann, {}).field, "rays");
   v1::RayQuery query = oneRay(vec(0, std::nan(""), 0), vec(1, 0, 0));
-  EXPECT_EQ(refusalOf(ann, query).field, "rays.rays[0].origin");
-  EXPECT_EQ(refusalOf(ann, oneRay(vec(0, 1, 0), vec(0, 0, 0))).field, "rays.rays[0].direction");
-  EXPECT_EQ(refusalOf(ann, oneRay(vec(0, 1, 0), vec(1, 0, 0), -1)).field, "rays.rays[0].reach");
+  EXPECT_EQ(catchRefusal(ann, query).field, "rays.rays[0].origin");
+  EXPECT_EQ(catchRefusal(ann, oneRay(vec(0, 1, 0), vec(0, 0, 0))).field, "rays.rays[0].direction");
+  EXPECT_EQ(catchRefusal(ann, oneRay(vec(0, 1, 0), vec(1, 0, 0), -1)).field, "rays.rays[0].reach");
   query = oneRay(vec(0, 1, 0), vec(1, 0, 0));
   query.set_tick(7);
-  EXPECT_EQ(refusalOf(ann, query).code, v1::ERROR_TICK_GONE);
+  EXPECT_EQ(catchRefusal(ann, query).code, v1::ERROR_TICK_GONE);
   query.clear_tick();
   query.set_through_avatar("bob");
-  EXPECT_EQ(refusalOf(ann, query).code, v1::ERROR_UNKNOWN_AVATAR);
+  EXPECT_EQ(catchRefusal(ann, query).code, v1::ERROR_UNKNOWN_AVATAR);
   for (int i = 0; i < 2; ++i) *query.add_rays() = query.rays(0);
-  EXPECT_EQ(refusalOf(ann, query).code, v1::ERROR_TOO_LARGE);
+  EXPECT_EQ(catchRefusal(ann, query).code, v1::ERROR_TOO_LARGE);
   v1::RayQuery scan;
   scan.mutable_scan()->set_columns(1);
-  EXPECT_EQ(refusalOf(ann, scan).field, "rays.scan");
+  EXPECT_EQ(catchRefusal(ann, scan).field, "rays.scan");
   *scan.mutable_scan()->mutable_at() = vec(0, 1, 0);
   *scan.mutable_scan()->mutable_up() = vec(3, 0, 0);
-  EXPECT_EQ(refusalOf(ann, scan).field, "rays.scan.up");
+  EXPECT_EQ(catchRefusal(ann, scan).field, "rays.scan.up");
   scan.mutable_scan()->clear_up();
   scan.mutable_scan()->set_columns(4'000'000'000u);
   scan.mutable_scan()->set_rows(4'000'000'000u);
-  EXPECT_EQ(refusalOf(ann, scan).code, v1::ERROR_TOO_LARGE);
+  EXPECT_EQ(catchRefusal(ann, scan).code, v1::ERROR_TOO_LARGE);
   EXPECT_EQ(ann.rays(oneRay(vec(0, 1, 0), vec(1, 0, 0))).hits(0).entity(), kWall)
       << "still answers";
 }

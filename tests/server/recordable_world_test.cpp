@@ -25,7 +25,7 @@ RecordingOptions optionsFor(const std::filesystem::path& file) {
   return options;
 }
 
-std::string bytesOf(const std::filesystem::path& file) {
+std::string readBytes(const std::filesystem::path& file) {
   std::ifstream stream(file, std::ios::binary);
   return {std::istreambuf_iterator<char>(stream), {}};
 }
@@ -37,7 +37,7 @@ struct Items {
   std::string error;
 };
 
-Items itemsOf(const std::filesystem::path& file) {
+Items readItems(const std::filesystem::path& file) {
   Items read;
   try {
     protocol::RecordingReader reader(file);
@@ -119,8 +119,8 @@ TEST(RecordableWorld, ARestartDropsPendingCommands) {
 TEST(RecordableWorld, AFlippedBitIsReportedOrHarmless) {
   const auto file = fileFor("whole"), spoilt = fileFor("spoilt");
   recordWalk(file);
-  const std::string bytes = bytesOf(file);
-  const Items whole = itemsOf(file);
+  const std::string bytes = readBytes(file);
+  const Items whole = readItems(file);
   ASSERT_TRUE(whole.closed);
   ASSERT_GT(whole.items.size(), 120u);
   const char* asked = std::getenv("ENFILADE_FLIPS");
@@ -132,7 +132,7 @@ TEST(RecordableWorld, AFlippedBitIsReportedOrHarmless) {
     const std::size_t at = random() % bytes.size();
     other[at] = static_cast<char>(other[at] ^ (1 << (random() % 8)));
     std::ofstream(spoilt, std::ios::binary) << other;
-    const Items read = itemsOf(spoilt);
+    const Items read = readItems(spoilt);
     const bool failed = !read.error.empty() || !read.closed;
     reported += failed;
     ASSERT_LE(read.items.size(), whole.items.size()) << "byte " << at;

@@ -39,7 +39,7 @@ void spoilEach(Message& part, const std::string& path, double bad, const Visit& 
   }
 }
 
-v1::Command commandOf(const std::string& avatar) {
+v1::Command makeCommand(const std::string& avatar) {
   v1::Command command;
   command.set_avatar(avatar);
   return command;
@@ -51,7 +51,7 @@ v1::Vec3 point() {
 }
 
 v1::Command fullSpawn() {
-  v1::Command command = commandOf("bob");
+  v1::Command command = makeCommand("bob");
   v1::Spawn& spawn = *command.mutable_spawn();
   *spawn.mutable_at() = point();
   spawn.set_facing(30);
@@ -74,7 +74,7 @@ v1::Command fullSpawn() {
 }
 
 std::vector<v1::Command> everyOrder() {
-  std::vector<v1::Command> orders(7, commandOf("ann"));
+  std::vector<v1::Command> orders(7, makeCommand("ann"));
   orders[0] = fullSpawn();
   *orders[1].mutable_walk()->add_along() = point();
   *orders[1].mutable_walk()->add_along() = point();
@@ -85,10 +85,10 @@ std::vector<v1::Command> everyOrder() {
   orders[5].mutable_jump()->set_height(0.5);
   *orders[5].mutable_jump()->mutable_velocity() = point();
   orders[6].mutable_crouch()->set_height(1);
-  orders.push_back(commandOf("ann"));
+  orders.push_back(makeCommand("ann"));
   orders[7].mutable_drive_joints()->add_to()->set_value(0.25);
   orders[7].mutable_drive_joints()->set_speed(2);
-  orders.push_back(commandOf("ann"));
+  orders.push_back(makeCommand("ann"));
   *orders[8].mutable_go()->mutable_to()->mutable_point() = point();
   orders[8].mutable_go()->set_speed(2);
   return orders;
@@ -183,7 +183,7 @@ std::vector<v1::ClientMessage> everyRequest(bool frames) {
 }
 
 /// The error reply; nullopt if the request was done.
-std::optional<v1::Error> refusalOf(protocol::Client& client, const v1::ClientMessage& request) {
+std::optional<v1::Error> catchRefusal(protocol::Client& client, const v1::ClientMessage& request) {
   try {
     const v1::ServerMessage reply = client.request(request);
     if (!reply.has_command() || reply.command().accepted()) return std::nullopt;
@@ -230,7 +230,7 @@ TEST_F(RefusedNumbers, OfEachRequestAreReportedByFieldAndChangeNothing) {
     for (v1::ClientMessage& request : everyRequest(!server_->rendererName().empty())) {
       spoilEach(request, "", number, [&](const std::string& path) {
         ++spoilt;
-        const auto error = refusalOf(ann, request);
+        const auto error = catchRefusal(ann, request);
         ASSERT_TRUE(error) << path << " = " << number << " was taken";
         EXPECT_FALSE(error->field().empty()) << path << " = " << number << error->message();
         EXPECT_GT(error->message().size(), 10u) << path;

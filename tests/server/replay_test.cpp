@@ -258,17 +258,17 @@ TEST_F(Replays, AWatchContinuesWithAnImageOfTheSoughtTick) {
   watch.mutable_frame()->set_width(800);
   watch.mutable_frame()->set_height(800);
   driver.request(message);
-  const auto pictureOf = [&](std::uint64_t tick) {
+  const auto awaitFrame = [&](std::uint64_t tick) {
     while (const auto event = driver.nextEvent(std::chrono::seconds(20)))
       if (event->has_frame() && event->frame().tick() == tick) return true;
     return false;
   };
   driver.seek(700);  // while the first image is being drawn
-  EXPECT_TRUE(pictureOf(700));
+  EXPECT_TRUE(awaitFrame(700));
   driver.seek(400);
-  EXPECT_TRUE(pictureOf(400)) << "also back, where less than a second has gone by";
+  EXPECT_TRUE(awaitFrame(400)) << "also back, where less than a second has gone by";
   driver.step(60);
-  EXPECT_TRUE(pictureOf(460));
+  EXPECT_TRUE(awaitFrame(460));
 }
 
 TEST_F(Replays, ALateClientGetsTheStateOfTheReplay) {
@@ -375,7 +375,7 @@ TEST_F(Replays, AvatarsThatAreNotTakenOverFinishTheirOrders) {
 }
 
 /// Reads a branch: its contacts pair, and those active at its start have their first tick.
-Live beginningOf(const std::filesystem::path& file) {
+Live readBeginning(const std::filesystem::path& file) {
   protocol::RecordingReader reader(file);
   Live live, beginning;
   std::uint64_t first = 0;
@@ -410,8 +410,8 @@ TEST_F(Replays, BranchesAreRecordingsOfTheirOwn) {
   server_->stop();
   EXPECT_EQ(verified(file("branch")), first);
   EXPECT_EQ(verified(file("branch-2")), second);
-  EXPECT_EQ(beginningOf(file("branch")), walked_.live[1000]);
-  EXPECT_EQ(beginningOf(file("branch-2")), walked_.live[640]);
+  EXPECT_EQ(readBeginning(file("branch")), walked_.live[1000]);
+  EXPECT_EQ(readBeginning(file("branch-2")), walked_.live[640]);
   EXPECT_TRUE(server_->isRecordingComplete());
   const server::Playback branch(file("branch"));
   EXPECT_EQ(branch.start().parent().file(), std::filesystem::absolute(file("walk")));

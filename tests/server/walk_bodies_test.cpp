@@ -40,8 +40,8 @@ class WalkBodies : public ProgramFixture {
   }
 };
 
-std::uint64_t tickOf(const std::vector<nlohmann::json>& contacts, const std::string& event,
-                     const std::string& a, const std::string& b) {
+std::uint64_t findTick(const std::vector<nlohmann::json>& contacts, const std::string& event,
+                       const std::string& a, const std::string& b) {
   for (const auto& contact : contacts)
     if (contact["event"] == event && contact["a"] == a && contact["b"] == b) return contact["tick"];
   return 0;
@@ -51,11 +51,11 @@ TEST_F(WalkBodies, AreInTheContactsAndEqualOverTheSocket) {
   const Ended replayed = run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("a")});
   ASSERT_EQ(replayed.code, 0) << replayed.err;
   const auto events = contacts("a");
-  const std::uint64_t enters = tickOf(events, "enter", "ann", "door mat");
-  const std::uint64_t leaves = tickOf(events, "leave", "ann", "door mat");
+  const std::uint64_t enters = findTick(events, "enter", "ann", "door mat");
+  const std::uint64_t leaves = findTick(events, "leave", "ann", "door mat");
   EXPECT_GT(enters, 30u) << "she waits until the gate is open";
   EXPECT_GT(leaves, enters + 20) << "1.6 m at 3 m/s";
-  EXPECT_GT(tickOf(events, "begin", "crate", "room_floor"), 0u);
+  EXPECT_GT(findTick(events, "begin", "crate", "room_floor"), 0u);
   const auto summary = nlohmann::json::parse(replayed.out);
   EXPECT_EQ(summary["arrived"], 1) << "the gate is out of the way";
   EXPECT_EQ(summary["refused"], 2) << "a gate has no levels, and there is no dragon";
@@ -69,13 +69,13 @@ TEST_F(WalkBodies, AreInTheContactsAndEqualOverTheSocket) {
   const Ended walked =
       run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--out", path("b")});
   kill(server, SIGTERM);
-  EXPECT_EQ(codeOf(server), 0);
+  EXPECT_EQ(awaitExitCode(server), 0);
   ASSERT_EQ(walked.code, 0) << walked.err;
   const auto over = nlohmann::json::parse(walked.out);
   for (const char* key : {"ticks", "state_hash", "contacts", "refused", "arrived", "outcomes"})
     EXPECT_EQ(summary.at(key), over.at(key)) << key;
-  EXPECT_EQ(tickOf(contacts("b"), "enter", "ann", "door mat"), enters);
-  EXPECT_EQ(tickOf(contacts("b"), "leave", "ann", "door mat"), leaves);
+  EXPECT_EQ(findTick(contacts("b"), "enter", "ann", "door mat"), enters);
+  EXPECT_EQ(findTick(contacts("b"), "leave", "ann", "door mat"), leaves);
 }
 
 TEST_F(WalkBodies, AnInvalidSidecarIsReportedWithItsPlaceAndNothingIsServed) {

@@ -27,7 +27,7 @@ class HostedWorlds : public ServedRoom {
 };
 
 /// The error of a request; ERROR_UNSPECIFIED if it succeeded.
-v1::ErrorCode codeOf(const std::function<void()>& request) {
+v1::ErrorCode catchCode(const std::function<void()>& request) {
   try {
     request();
   } catch (const protocol::ProtocolError& error) {
@@ -58,7 +58,7 @@ std::vector<v1::World> list(protocol::Client& by) {
   return {worlds.worlds().begin(), worlds.worlds().end()};
 }
 
-std::vector<std::string> namesOf(const std::vector<v1::World>& worlds) {
+std::vector<std::string> getNames(const std::vector<v1::World>& worlds) {
   std::vector<std::string> names;
   for (const v1::World& world : worlds) names.push_back(world.name());
   return names;
@@ -119,7 +119,7 @@ TEST_F(HostedWorlds, EachIsListedWithItsOwnTicksAndClients) {
   main.step(5);
   bob.step(7);
   const std::vector<v1::World> worlds = list(main);
-  EXPECT_EQ(namesOf(worlds), (std::vector<std::string>{"main", "b", chosen}));
+  EXPECT_EQ(getNames(worlds), (std::vector<std::string>{"main", "b", chosen}));
   EXPECT_EQ(worlds[0].tick(), 5u);
   EXPECT_EQ(worlds[1].tick(), 7u);
   EXPECT_EQ(worlds[2].tick(), 0u);
@@ -135,17 +135,17 @@ TEST_F(HostedWorlds, NamesAreValidated) {
   protocol::Client ann = client("ann");
   EXPECT_EQ(ann.welcome().limits().max_worlds(), 3u);
   for (const char* bad : {"a b", "../a", ".a", "a/b", "\xc3\xa9"})
-    EXPECT_EQ(codeOf([&] { create(ann, bad); }), v1::ERROR_BAD_MESSAGE) << bad;
-  EXPECT_EQ(codeOf([&] { create(ann, std::string(65, 'a')); }), v1::ERROR_BAD_MESSAGE);
-  EXPECT_EQ(codeOf([&] { create(ann, "b", "cathedral"); }), v1::ERROR_UNKNOWN_WORLD);
-  EXPECT_EQ(codeOf([&] { create(ann, "main"); }), v1::ERROR_NOT_ALLOWED);
+    EXPECT_EQ(catchCode([&] { create(ann, bad); }), v1::ERROR_BAD_MESSAGE) << bad;
+  EXPECT_EQ(catchCode([&] { create(ann, std::string(65, 'a')); }), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(catchCode([&] { create(ann, "b", "cathedral"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(catchCode([&] { create(ann, "main"); }), v1::ERROR_NOT_ALLOWED);
   create(ann, "b");
-  EXPECT_EQ(codeOf([&] { create(ann, "b"); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchCode([&] { create(ann, "b"); }), v1::ERROR_NOT_ALLOWED);
   create(ann, "c");
-  EXPECT_EQ(codeOf([&] { create(ann, "d"); }), v1::ERROR_TOO_LARGE);
-  EXPECT_EQ(codeOf([&] { drop(ann, "d"); }), v1::ERROR_UNKNOWN_WORLD);
-  EXPECT_EQ(codeOf([&] { drop(ann, "main"); }), v1::ERROR_NOT_ALLOWED);
-  EXPECT_EQ(codeOf([&] { clientIn("d"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(catchCode([&] { create(ann, "d"); }), v1::ERROR_TOO_LARGE);
+  EXPECT_EQ(catchCode([&] { drop(ann, "d"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(catchCode([&] { drop(ann, "main"); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchCode([&] { clientIn("d"); }), v1::ERROR_UNKNOWN_WORLD);
 }
 
 TEST_F(HostedWorlds, OnlyAnAdminMakesAndDropsThem) {
@@ -154,9 +154,9 @@ TEST_F(HostedWorlds, OnlyAnAdminMakesAndDropsThem) {
   serve({}, smallRoom(), access);
   protocol::Client driver = client("driver", "driver-0123456789");
   protocol::Client admin = client("admin", "admin-0123456789");
-  EXPECT_EQ(codeOf([&] { create(driver, "b"); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchCode([&] { create(driver, "b"); }), v1::ERROR_NOT_ALLOWED);
   create(admin, "b");
-  EXPECT_EQ(codeOf([&] { drop(driver, "b"); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchCode([&] { drop(driver, "b"); }), v1::ERROR_NOT_ALLOWED);
   EXPECT_EQ(list(driver).size(), 2u);
   EXPECT_EQ(client("in b", "driver-0123456789", "b").welcome().role(), v1::ROLE_DRIVE);
   drop(admin, "b");
@@ -184,7 +184,7 @@ TEST_F(HostedWorlds, ClientsOfADroppedWorldAreNotifiedAndTheirContactsEnd) {
   EXPECT_EQ(bye.reason(), "the world 'b' was dropped");
   EXPECT_EQ(received.count(v1::ContactEvent::KIND_END), 1u);
   EXPECT_EQ(main.step().tick(), 1u) << "the others go on";
-  EXPECT_EQ(codeOf([&] { clientIn("b"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(catchCode([&] { clientIn("b"); }), v1::ERROR_UNKNOWN_WORLD);
   EXPECT_EQ(create(main, "b").tick(), 0u) << "the name is free";
 }
 
@@ -196,7 +196,7 @@ TEST_F(HostedWorlds, OneIsDroppedUnderAWaitingStep) {
   ASSERT_FALSE(bob.command(spawn("bob", 0, 0.001, 0)));
   bob.step(1);
   auto stepping = std::async(std::launch::async, [&] {
-    return codeOf([&] {
+    return catchCode([&] {
       for (;;) bob.step(36'000);
     });
   });
@@ -374,7 +374,7 @@ TEST(Listening, AClientThatConnectsDuringTheShutdownIsNotified) {
   std::thread network([&] { context.run(); });
   worlds.stop();
   const v1::ErrorCode code =
-      codeOf([&] { protocol::Client("127.0.0.1", listener.port(), protocol::ClientOptions{}); });
+      catchCode([&] { protocol::Client("127.0.0.1", listener.port(), protocol::ClientOptions{}); });
   EXPECT_EQ(code, v1::ERROR_SHUTTING_DOWN);
   boost::asio::post(context, [&] { listener.stop(); });
   network.join();

@@ -106,7 +106,7 @@ FeederFindings FeederCheck::evaluate(const std::vector<PlacedPart>& parts, const
   std::vector<collision::Mat3> rotations;
   collision::SortAndSweep near({});
   for (const PlacedPart& part : parts) rotations.push_back(part.rotation.toRotationMatrix());
-  const auto bodyOf = [&](std::size_t i) {
+  const auto makeBody = [&](std::size_t i) {
     if (i >= parts.size()) {
       const Hull& hull = tray_[i - parts.size()];
       return collision::PlacedConvex{hull.vertices, tray, nullptr, &hull};
@@ -115,7 +115,7 @@ FeederFindings FeederCheck::evaluate(const std::vector<PlacedPart>& parts, const
     return collision::PlacedConvex{hull.vertices, parts[i].position, &rotations[i], &hull};
   };
   for (std::size_t i = 0; i < parts.size() + tray_.size(); ++i) {
-    const auto body = bodyOf(i);
+    const auto body = makeBody(i);
     near.insert(collision::computeTightAabb(
         *body.hull, body.rotation ? *body.rotation : collision::Mat3::Identity(),
         body.translation));
@@ -124,7 +124,7 @@ FeederFindings FeederCheck::evaluate(const std::vector<PlacedPart>& parts, const
   for (const auto& pair : near.addedPairs()) {
     if (pair.proxy >= parts.size() && pair.other >= parts.size()) continue;
     collision::FeatureCache cache;
-    const auto a = bodyOf(pair.proxy), b = bodyOf(pair.other);
+    const auto a = makeBody(pair.proxy), b = makeBody(pair.other);
     if (collision::computeSeparation(a, b, cache).verdict != collision::Verdict::penetrating)
       continue;
     collision::DepthCache none;
@@ -200,7 +200,7 @@ void Feeder::moveBoxes(double lookout) {
 /// Parts after part `i` that it may touch.
 void Feeder::findMet(std::size_t i, double lookout) {
   met_[i].clear();
-  for (const auto& partner : broadPhase_.overlapsOf(movers_[i - 1])) {
+  for (const auto& partner : broadPhase_.getOverlaps(movers_[i - 1])) {
     const std::uint32_t other = solidOfMover_[partner.id];
     if (other > i && scene::mayMeet(spheres_[i], spheres_[other], lookout))
       met_[i].push_back(other);
@@ -213,7 +213,7 @@ void Feeder::findPairs() {
   const std::uint32_t size = static_cast<std::uint32_t>(dynamics_.bodies.size());
   std::vector<scene::PartPairKey> keys;
   for (std::uint32_t i = 1; i < size; ++i)
-    for (const auto& partner : broadPhase_.overlapsOf(movers_[i - 1]))
+    for (const auto& partner : broadPhase_.getOverlaps(movers_[i - 1]))
       if (solidOfMover_[partner.id] == 0) keys.push_back({0, i, partOfMover_[partner.id], 0});
   met_.resize(size), spheres_.clear();
   for (const scene::PhysicsBody& solid : dynamics_.bodies)

@@ -55,14 +55,14 @@ void mergeLowerPriorityBodies(Model& model, std::vector<BodySpec> bodies,
 
 void attachCollisionShapes(Model& model) {
   constexpr std::size_t kNone = static_cast<std::size_t>(-1);
-  std::vector<std::size_t> bodyOf(model.objects.size(), kNone);
+  std::vector<std::size_t> bodyByObject(model.objects.size(), kNone);
   for (std::size_t b = 0; b < model.bodies.size(); ++b)
-    for (const std::uint32_t object : model.bodies[b].objects) bodyOf[object] = b;
+    for (const std::uint32_t object : model.bodies[b].objects) bodyByObject[object] = b;
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
     const Object& object = model.objects[i];
-    if (object.usage != Object::Usage::collisionOnly || !object.partOf || bodyOf[i] != kNone)
+    if (object.usage != Object::Usage::collisionOnly || !object.partOf || bodyByObject[i] != kNone)
       continue;
-    const std::size_t body = bodyOf[*object.partOf];
+    const std::size_t body = bodyByObject[*object.partOf];
     if (body != kNone) model.bodies[body].objects.push_back(i);
   }
 }

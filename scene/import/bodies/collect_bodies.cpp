@@ -31,7 +31,7 @@ std::string readFile(const std::filesystem::path& file) {
   return text.str();
 }
 
-Sidecar applySidecarOf(Model& model, const std::filesystem::path& file) {
+Sidecar applySidecarFile(Model& model, const std::filesystem::path& file) {
   const std::filesystem::path sidecar = sidecarPath(file);
   std::error_code problem;
   if (!std::filesystem::exists(sidecar, problem)) return {};
@@ -122,7 +122,7 @@ void collectBodies(Model& model, const std::filesystem::path& file, IfcDoors doo
   model.bodies.clear();
   // Doors are split before the sidecar is read, because it may name their leaves and frames.
   ofIfc = splitDoors(model);
-  const Sidecar sidecar = applySidecarOf(model, file);
+  const Sidecar sidecar = applySidecarFile(model, file);
   const auto firstOfIfc =
       std::stable_partition(ofFile.begin(), ofFile.end(),
                             [](const BodySpec& body) { return body.source != BodySource::ifc; });

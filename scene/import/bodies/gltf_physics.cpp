@@ -158,10 +158,12 @@ class PhysicsReader {
   }
 
  private:
-  const std::string& pathOf(std::size_t number) const { return tree_.transforms().at(number).path; }
+  const std::string& getPath(std::size_t number) const {
+    return tree_.transforms().at(number).path;
+  }
   void reportUnsupported(std::size_t number, const std::string& what) {
     addDiagnostic(model_.diagnostics, "unsupported_physics",
-                  "node '" + pathOf(number) + "': " + what);
+                  "node '" + getPath(number) + "': " + what);
   }
   void reportUnsupportedKeys(std::size_t number, const Json* json,
                              std::initializer_list<const char*> keys) {
@@ -186,9 +188,9 @@ class PhysicsReader {
   std::uint32_t addShape(std::size_t number, const char* name, std::vector<std::uint32_t> meshes,
                          const Eigen::Affine3d& worldFromMesh) {
     Object object;
-    object.path = pathOf(number) + name;
+    object.path = getPath(number) + name;
     for (int repeat = 2; !paths_.insert(object.path).second; ++repeat)
-      object.path = pathOf(number) + name + "#" + std::to_string(repeat);
+      object.path = getPath(number) + name + "#" + std::to_string(repeat);
     object.meshes = std::move(meshes);
     object.worldFromMesh = worldFromMesh;
     object.usage = Object::Usage::collisionOnly;
@@ -214,7 +216,7 @@ class PhysicsReader {
                           "shape " + std::to_string(*shape) + " is missing, unknown or invalid");
         return std::nullopt;
       }
-      mesh->name = pathOf(number);
+      mesh->name = getPath(number);
       model_.meshes.push_back(std::move(*mesh));
       const auto index = static_cast<std::uint32_t>(model_.meshes.size() - 1);
       return addShape(number, name, {index}, tree_.worldFromNode(number));
@@ -281,7 +283,7 @@ class PhysicsReader {
     BodySpec body;
     body.kind = BodyKind::trigger;
     body.source = BodySource::khr;
-    body.name = pathOf(number);
+    body.name = getPath(number);
     body.objects = {*object};
     bodies_.push_back(std::move(body));
   }
@@ -299,7 +301,7 @@ class PhysicsReader {
       reportUnsupported(number, "gravityFactor ignored");
     BodySpec body;
     body.source = BodySource::khr;
-    body.name = pathOf(number);
+    body.name = getPath(number);
     body.objects = objects->second;
     body.mass = readNumberMember(motion, "mass");
     const Eigen::Matrix3d axes = extractAxes(tree_.worldFromNode(number));

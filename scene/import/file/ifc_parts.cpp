@@ -77,7 +77,7 @@ class IfcDivider {
 
   std::vector<IfcPart> divide() {
     for (const std::uint32_t id : products_)
-      if (const StepStatement* product = find(id)) isProduct_[indexOf(*product)] = true;
+      if (const StepStatement* product = find(id)) isProduct_[getIndex(*product)] = true;
     for (const std::uint32_t id : products_) assign(id);
     isInShape_.resize(masks_.size());
     for (std::size_t i = 0; i < masks_.size(); ++i) isInShape_[i] = masks_[i] != 0;
@@ -94,7 +94,7 @@ class IfcDivider {
     return index == kNoStatement ? nullptr : &file_.statements()[index];
   }
 
-  std::size_t indexOf(const StepStatement& statement) const {
+  std::size_t getIndex(const StepStatement& statement) const {
     return static_cast<std::size_t>(&statement - file_.statements().data());
   }
 
@@ -110,7 +110,7 @@ class IfcDivider {
       part = partOfMap_.try_emplace(*map, part).first->second;
     parts_[part].products.push_back(id);
     if (shape != nullptr)
-      weights_[part] += mark(indexOf(*shape), static_cast<PartMask>(1U << part));
+      weights_[part] += mark(getIndex(*shape), static_cast<PartMask>(1U << part));
   }
 
   const StepStatement* findShape(const StepStatement& product) const {
@@ -151,7 +151,7 @@ class IfcDivider {
       const StepStatement& next = file_.statements()[open.back()];
       open.pop_back();
       visitReferences(next.arguments, [&](std::uint32_t id) {
-        if (const StepStatement* target = find(id)) visit(indexOf(*target));
+        if (const StepStatement* target = find(id)) visit(getIndex(*target));
       });
     }
     return bytes;
@@ -160,15 +160,15 @@ class IfcDivider {
   /// Keeps in all parts what a statement outside of the shapes needs of them.
   void keepReferences(const StepStatement& from) {
     if (isAboutShapes(from.type)) return;
-    const bool isWanted = isProduct_[indexOf(from)];
+    const bool isWanted = isProduct_[getIndex(from)];
     bool skip = isAboutFirst(from.type) && from.arguments.starts_with('#');
     visitReferences(from.arguments, [&](std::uint32_t id) {
       const StepStatement* target = skip ? nullptr : find(id);
       skip = false;
-      if (target == nullptr || !isInShape_[indexOf(*target)]) return;
+      if (target == nullptr || !isInShape_[getIndex(*target)]) return;
       const bool isOwnShape = isWanted && isProductShape(target->type);
       if (isOwnShape || target->type == "IFCREPRESENTATIONMAP") return;
-      mark(indexOf(*target), static_cast<PartMask>((1U << parts_.size()) - 1));
+      mark(getIndex(*target), static_cast<PartMask>((1U << parts_.size()) - 1));
     });
   }
 

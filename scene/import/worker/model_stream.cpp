@@ -323,7 +323,7 @@ void readHeader(StreamReader& in, std::size_t size) {
   }
 }
 
-void writeAllOf(StreamWriter& out, const Model& model, std::uint64_t length) {
+void writeModel(StreamWriter& out, const Model& model, std::uint64_t length) {
   out.put(kMagic);
   out.put(kModelStreamVersion);
   out.put(length);
@@ -355,13 +355,13 @@ void writeAllOf(StreamWriter& out, const Model& model, std::uint64_t length) {
 std::uint64_t measureModelStream(const Model& model) {
   const ModelStreamSink none;
   StreamWriter out(none);
-  writeAllOf(out, model, 0);
+  writeModel(out, model, 0);
   return out.finish();
 }
 
 void writeModelStream(const Model& model, std::uint64_t size, const ModelStreamSink& sink) {
   StreamWriter out(sink);
-  writeAllOf(out, model, size);
+  writeModel(out, model, size);
   if (out.finish() != size) throw ModelStreamError("model stream: its size was measured wrong");
 }
 

@@ -59,7 +59,7 @@ template <class Open, class Visit>
 void descendParts(const CollisionGeometry& geometry, const Aabb& core, const Open& open,
                   const Visit& visit) {
   const auto descendTree = [&](const collision::BoxTree& tree, const Vec3& origin,
-                               const auto& partOf) {
+                               const auto& getPart) {
     using Box = collision::FloatAabb;
     const Vec3 at = origin + tree.origin;
     const Vec3 pad = 0x1p-50 * (at.cwiseAbs().array() + tree.extent).matrix();  // sums below: < 4u
@@ -74,7 +74,7 @@ void descendParts(const CollisionGeometry& geometry, const Aabb& core, const Ope
           return computeSquaredGap(toScene(a), core) < computeSquaredGap(toScene(b), core);
         },
         [&](std::uint32_t first, std::uint32_t count) {
-          for (std::uint32_t i = first; i < first + count; ++i) visit(partOf(i));
+          for (std::uint32_t i = first; i < first + count; ++i) visit(getPart(i));
         });
   };
   descendTree(geometry.hullTree, Vec3::Zero(),

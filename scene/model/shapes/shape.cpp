@@ -46,17 +46,17 @@ std::vector<Index> weldVertices(std::span<const Mesh> meshes, std::span<const In
   std::unordered_map<Eigen::Vector3f, Index, PositionHash> vertexAt;
   for (const Index mesh : meshIndices) {
     const auto& positions = meshes[mesh].positions;
-    std::vector<Index> vertexOf(positions.size(), kUnknown);
+    std::vector<Index> vertexByPosition(positions.size(), kUnknown);
     corners.reserve(corners.size() + meshes[mesh].indices.size());
     for (const Index i : meshes[mesh].indices) {
-      if (vertexOf[i] == kUnknown) {
+      if (vertexByPosition[i] == kUnknown) {
         const Eigen::Vector3f position = positions[i].array() + 0.0F;  // turns -0 into 0
         const auto next = static_cast<Index>(vertices.size());
         const auto [known, isNew] = vertexAt.try_emplace(position, next);
         if (isNew) vertices.push_back(positions[i]);
-        vertexOf[i] = known->second;
+        vertexByPosition[i] = known->second;
       }
-      corners.push_back(vertexOf[i]);
+      corners.push_back(vertexByPosition[i]);
     }
   }
   return corners;

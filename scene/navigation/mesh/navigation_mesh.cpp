@@ -123,9 +123,9 @@ void NavigationMesh::collectPortals() {
         a = snapToVertex(to.ref, start + low * edge, edge.norm() / 255);
         b = snapToVertex(to.ref, start + high * edge, edge.norm() / 255);
       }
-      const Vec3 &inside = centres_[indexOf(reference)], toA = a - inside, toB = b - inside;
+      const Vec3 &inside = centres_[getPolygonIndex(reference)], toA = a - inside, toB = b - inside;
       if (toA.x() * toB.z() < toA.z() * toB.x()) std::swap(a, b);
-      portals_.push_back({.to = indexOf(to.ref), .low = a, .high = b});
+      portals_.push_back({.to = getPolygonIndex(to.ref), .low = a, .high = b});
     }
   }
   firstPortal_.push_back(static_cast<std::uint32_t>(portals_.size()));
@@ -144,7 +144,7 @@ Vec3 NavigationMesh::snapToVertex(std::uint32_t reference, const Vec3& point,
   return point;
 }
 
-std::uint32_t NavigationMesh::indexOf(std::uint32_t reference) const {
+std::uint32_t NavigationMesh::getPolygonIndex(std::uint32_t reference) const {
   unsigned salt = 0, tile = 0, polygon = 0;
   detour_->mesh.decodePolyId(reference, salt, tile, polygon);
   return firstPolygonOfTile_[tile] + polygon;
@@ -186,7 +186,8 @@ std::vector<std::uint32_t> NavigationMesh::findPolygons(const Vec3& point,
     found.resize(2 * found.size());
   }
   std::vector<std::uint32_t> polygons;
-  for (int i = 0; i < count; ++i) polygons.push_back(indexOf(found[static_cast<std::size_t>(i)]));
+  for (int i = 0; i < count; ++i)
+    polygons.push_back(getPolygonIndex(found[static_cast<std::size_t>(i)]));
   return polygons;
 }
 

@@ -108,7 +108,7 @@ class NavigationMesh {
   /// The vertex of a polygon above or below a point, within `distance` metres, or the point. Detour
   /// stores the ends of portals between tiles in 255ths of an edge.
   Vec3 snapToVertex(std::uint32_t reference, const Vec3& point, double distance) const;
-  std::uint32_t indexOf(std::uint32_t reference) const;
+  std::uint32_t getPolygonIndex(std::uint32_t reference) const;
 
   std::unique_ptr<Detour> detour_;
   std::vector<std::uint32_t> firstPolygonOfTile_;  ///< by index of the tile in Detour

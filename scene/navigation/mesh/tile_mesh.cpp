@@ -137,10 +137,10 @@ Polygons buildPolygons(TileBuild& build, rcHeightfield& field, const CellSizes& 
 /// Whether nothing solid is above the floor of a polygon at a place. The polygon is flat: the floor
 /// may be higher or lower.
 bool isUnderSky(const rcHeightfield& field, const Vec3& place) {
-  const auto cellOf = [&](int axis) {
+  const auto computeCell = [&](int axis) {
     return static_cast<int>((place[axis] - field.bmin[axis]) / field.cs);
   };
-  const int x = cellOf(0), z = cellOf(2);
+  const int x = computeCell(0), z = computeCell(2);
   if (x < 0 || z < 0 || x >= field.width || z >= field.height) return false;
   const double height = (place.y() - field.bmin[1]) / field.ch;
   const rcSpan* floor = nullptr;

@@ -10,7 +10,7 @@ namespace {
 
 /// Unites the avatar with those that its motion bounds overlap.
 void uniteWithNeighbours(const WorldData& world, std::uint32_t index, DisjointSets& islands) {
-  for (const auto& overlap : world.broadPhase.dynamicOverlapsOf(world.avatars[index].proxy))
+  for (const auto& overlap : world.broadPhase.getDynamicOverlaps(world.avatars[index].proxy))
     if (const Avatar* other = world.findAvatarByProxy(overlap.id))
       islands.unite(index, static_cast<std::uint32_t>(other - world.avatars.data()));
 }

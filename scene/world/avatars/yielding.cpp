@@ -111,7 +111,7 @@ Leader findLeader(const WorldData& world, const std::vector<GroundWalk>& walks,
   Leader leader;
   const bool stalled = isStalled(world.settings, avatar);
   for (const auto& overlap :
-       world.broadPhase.dynamicOverlapsOf(avatar.proxy)) {  // of the last tick
+       world.broadPhase.getDynamicOverlaps(avatar.proxy)) {  // of the last tick
     const Avatar* other = world.findAvatarByProxy(overlap.id);
     if (!other) continue;
     const auto index = static_cast<std::size_t>(other - world.avatars.data());

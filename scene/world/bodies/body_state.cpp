@@ -62,7 +62,7 @@ std::shared_ptr<const std::vector<BodySnapshot>> makeBodySnapshots(const WorldDa
 }
 
 void updatePartBoxes(const WorldData& world, Body& body) {
-  if (!world.broadPhase.overlapsOf(body.proxy).empty()) makePartBoxes(body);
+  if (!world.broadPhase.getOverlaps(body.proxy).empty()) makePartBoxes(body);
 }
 
 bool isBodyBusy(const Body& body) {

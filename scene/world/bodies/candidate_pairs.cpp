@@ -151,7 +151,7 @@ void addOverlaps(WorldData& world, std::uint32_t activeBody, const SweptBounds& 
   PartFronts& fronts = dynamicBodies.partFronts[dynamicBodies.physicsBodyOf[activeBody]];
   PartFronts oldFronts = std::exchange(fronts, {});
   DynamicPairCollector collector{world, bounds, activeBody, fronts, oldFronts, found.pairs};
-  for (const auto& overlap : world.broadPhase.overlapsOf(world.bodies[activeBody].proxy)) {
+  for (const auto& overlap : world.broadPhase.getOverlaps(world.bodies[activeBody].proxy)) {
     const std::uint32_t otherBody = overlap.isDynamic ? world.findBodyByProxy(overlap.id) : kNoBody;
     if (otherBody == kNoBody || !isDynamic(dynamicBodies, otherBody)) {
       found.others.emplace_back(activeBody, overlap);
@@ -262,7 +262,7 @@ std::vector<std::uint32_t> collectActiveBodies(const WorldData& world) {
     pending.push_back(body);
   };
   const auto addNeighbours = [&](collision::ProxyId proxy) {
-    for (const auto& overlap : world.broadPhase.overlapsOf(proxy)) {
+    for (const auto& overlap : world.broadPhase.getOverlaps(proxy)) {
       if (!overlap.isDynamic) continue;
       const std::uint32_t body = world.findBodyByProxy(overlap.id);
       if (body != kNoBody) add(body);

@@ -238,7 +238,7 @@ double computePushMargin(const WorldData& world, const Avatar& avatar) {
   }
   // Dynamic bodies push and carry, too, as far as kinematic bodies drive them.
   double maxPush = 0;
-  for (const auto& overlap : world.broadPhase.overlapsOf(avatar.proxy)) {
+  for (const auto& overlap : world.broadPhase.getOverlaps(avatar.proxy)) {
     const std::uint32_t body = overlap.isDynamic ? world.findBodyByProxy(overlap.id) : kNoBody;
     if (body != kNoBody) maxPush = std::max(maxPush, world.bodies[body].kinematicPushBound);
   }

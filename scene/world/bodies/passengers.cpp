@@ -66,7 +66,7 @@ std::vector<CarriedBody> findCarriedBodies(const WorldData& world, const Body& b
 /// Avatars that overlap the body in the broad phase, sorted by name.
 std::vector<Avatar*> findNearbyAvatars(WorldData& world, const Body& body) {
   std::vector<Avatar*> avatars;
-  for (const auto& overlap : world.broadPhase.overlapsOf(body.proxy))
+  for (const auto& overlap : world.broadPhase.getOverlaps(body.proxy))
     if (Avatar* avatar = overlap.isDynamic ? world.findAvatarByProxy(overlap.id) : nullptr)
       avatars.push_back(avatar);
   std::ranges::sort(avatars);  // by name, as WorldData::avatars

@@ -81,7 +81,7 @@ std::uint32_t ensureAvatarPart(WorldData& world, const Avatar& avatar, std::uint
   const Vec3 before = physicsBody.position;
   if (physicsBody.hull != part.hull) {
     assignShape(physicsBody, part.hull);
-    erasePairsOf(dynamicBodies.physicsWorld, physicsBodyIndex);
+    erasePairs(dynamicBodies.physicsWorld, physicsBodyIndex);
   }
   const collision::PlacedConvex placed = placeAvatarPart(part, avatar.footPosition);
   physicsBody.position = physicsBody.motion.centre = placed.translation;
@@ -127,7 +127,7 @@ void removeAvatarFromSolver(WorldData& world, const Avatar& avatar) {
   const auto first = dynamicBodies.physicsBodyByPart.lower_bound({avatar.id, 0});
   const auto end = dynamicBodies.physicsBodyByPart.lower_bound({avatar.id + 1, 0});
   for (auto entry = first; entry != end; ++entry) {
-    erasePairsOf(dynamicBodies.physicsWorld, entry->second);
+    erasePairs(dynamicBodies.physicsWorld, entry->second);
     dynamicBodies.physicsWorld.bodies[entry->second] = {};
     dynamicBodies.entities[entry->second] = 0;
     dynamicBodies.freeSlots.push_back(entry->second);

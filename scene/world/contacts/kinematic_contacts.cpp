@@ -126,7 +126,7 @@ std::set<EntityPair> collectMovedPairs(const WorldData& world) {
   for (const std::uint32_t i : world.movingBodies) {
     const Body& body = world.bodies[i];
     if (!body.moved) continue;
-    for (const auto& overlap : world.broadPhase.overlapsOf(body.proxy)) {
+    for (const auto& overlap : world.broadPhase.getOverlaps(body.proxy)) {
       if (!overlap.isDynamic) {
         pairs.insert({body.id, world.scene->solidObjects()[overlap.id] + 1});
       } else if (const std::uint32_t other = world.findBodyByProxy(overlap.id);

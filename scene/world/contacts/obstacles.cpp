@@ -266,7 +266,7 @@ void updateObstaclePose(const WorldData& world, Obstacle& obstacle) {
 
 bool areNeighboursStationary(const WorldData& world, const Avatar& avatar) {
   return std::ranges::none_of(
-      world.broadPhase.dynamicOverlapsOf(avatar.proxy),
+      world.broadPhase.getDynamicOverlaps(avatar.proxy),
       [&](const collision::SortAndSweep::Overlap& overlap) { return mayMove(world, overlap.id); });
 }
 
@@ -299,7 +299,7 @@ void prefetchSurroundings(const WorldData& world) {
 
 void prepareBodyObstacles(WorldData& world, const Avatar& avatar) {
   if (hasAllObstacles(avatar)) return;
-  for (const auto& overlap : world.broadPhase.dynamicOverlapsOf(avatar.proxy))
+  for (const auto& overlap : world.broadPhase.getDynamicOverlaps(avatar.proxy))
     if (const std::uint32_t body = world.findBodyByProxy(overlap.id); body != kNoBody)
       makePartBoxes(world.bodies[body]);
 }
@@ -313,7 +313,7 @@ void collectObstacles(const WorldData& world, Avatar& avatar) {
   std::swap(last, obstacles);
   avatar.hasBodyObstacles = false;
   avatar.cachedBounds = inflated(avatar.motionBounds, kCollectMargin);
-  for (const auto& overlap : world.broadPhase.overlapsOf(avatar.proxy)) {
+  for (const auto& overlap : world.broadPhase.getOverlaps(avatar.proxy)) {
     if (!overlap.isDynamic) {
       collectStaticObstacles(*world.scene, world.scene->solidObjects()[overlap.id],
                              avatar.cachedBounds, obstacles);

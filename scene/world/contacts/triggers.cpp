@@ -22,7 +22,7 @@ struct Visitor {
 
 std::vector<Visitor> findVisitors(const WorldData& world, const Body& trigger) {
   std::vector<Visitor> visitors;
-  for (const auto& overlap : world.broadPhase.overlapsOf(trigger.proxy)) {
+  for (const auto& overlap : world.broadPhase.getOverlaps(trigger.proxy)) {
     if (!overlap.isDynamic) continue;
     if (const Avatar* avatar = world.findAvatarByProxy(overlap.id)) {
       visitors.push_back({avatar->id, !avatar->idle, avatar, nullptr});

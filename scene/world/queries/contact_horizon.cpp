@@ -42,7 +42,7 @@ collision::PairSchedule::BodyPair makePair(EntityId a, EntityId b) {
   return a < b ? std::pair{a, b} : std::pair{b, a};
 }
 
-EntityId otherOf(const collision::PairSchedule::BodyPair& pair, EntityId one) {
+EntityId getOther(const collision::PairSchedule::BodyPair& pair, EntityId one) {
   return pair.first == one ? pair.second : pair.first;
 }
 
@@ -113,7 +113,7 @@ void ContactHorizons::markDirty(const BodyPair& pair) {
 void ContactHorizons::endTouching(const BodyPair& pair) {
   if (touching_.erase(pair) == 0) return;
   for (const EntityId entity : {pair.first, pair.second})
-    if (Tracked* tracked = findTracked(entity)) tracked->touching.erase(otherOf(pair, entity));
+    if (Tracked* tracked = findTracked(entity)) tracked->touching.erase(getOther(pair, entity));
 }
 
 void ContactHorizons::setTime(const BodyPair& pair, double time) {
@@ -126,7 +126,7 @@ void ContactHorizons::setTouching(const BodyPair& pair) {
   schedule_.remove(pair.first, pair.second);
   if (!touching_.insert(pair).second) return;
   for (const EntityId entity : {pair.first, pair.second})
-    if (Tracked* tracked = findTracked(entity)) tracked->touching.insert(otherOf(pair, entity));
+    if (Tracked* tracked = findTracked(entity)) tracked->touching.insert(getOther(pair, entity));
   markDirty(pair);
 }
 
@@ -137,13 +137,13 @@ void ContactHorizons::removePair(const BodyPair& pair) {
   markDirty(pair);
 }
 
-void ContactHorizons::removePairsOf(EntityId avatar, bool keepTracked) {
+void ContactHorizons::removePairs(EntityId avatar, bool keepTracked) {
   std::vector<BodyPair> pairs;
   for (const Entry& entry : schedule_.findEntries(avatar)) pairs.push_back(entry.pair);
   for (const BodyPair& pair : touching_)
     if (pair.first == avatar || pair.second == avatar) pairs.push_back(pair);
   for (const BodyPair& pair : pairs)
-    if (!keepTracked || !isTracked(otherOf(pair, avatar))) removePair(pair);
+    if (!keepTracked || !isTracked(getOther(pair, avatar))) removePair(pair);
 }
 
 bool ContactHorizons::spendWork(std::size_t cost) {
@@ -161,7 +161,7 @@ void ContactHorizons::removeLeftAvatars() {
   for (const EntityId avatar : state_.left()) {
     tracked_.erase(avatar);
     horizons_.erase(avatar);
-    removePairsOf(avatar, false);
+    removePairs(avatar, false);
   }
 }
 
@@ -175,7 +175,7 @@ void ContactHorizons::updateSelection() {
       }
       at = tracked_.erase(at);
       horizons_.erase(avatar);
-      removePairsOf(avatar, true);
+      removePairs(avatar, true);
     }
   for (const AvatarSnapshot& avatar : state_.snapshot()->avatars)
     if (!selected_ || selected_->contains(avatar.id))
@@ -209,7 +209,7 @@ void ContactHorizons::replacePairs(const AvatarSnapshot& avatar, Tracked& tracke
   for (const auto& neighbour : neighbours)
     earliest[makePair(avatar.id, neighbour.entity)] = neighbour.earliest;
   for (const Entry& entry : schedule_.findEntries(avatar.id)) {
-    const auto other = tracked_.find(otherOf(entry.pair, avatar.id));
+    const auto other = tracked_.find(getOther(entry.pair, avatar.id));
     const bool needed = other != tracked_.end() && tracked.restUntil < other->second.restUntil;
     if (!earliest.contains(entry.pair) && !needed) removePair(entry.pair);
   }
@@ -333,7 +333,7 @@ void ContactHorizons::composeHorizon(EntityId avatar, Tracked& tracked) {
   horizon.touching.assign(tracked.touching.begin(), tracked.touching.end());
   for (const Entry& entry : schedule_.findEntries(avatar))
     if (entry.time <= tracked.restUntil)
-      horizon.approaches.push_back({otherOf(entry.pair, avatar), entry.time});
+      horizon.approaches.push_back({getOther(entry.pair, avatar), entry.time});
   if (tracked.restUntil < kInfinity) horizon.approaches.push_back({0, tracked.restUntil});
   const std::size_t count = std::min(horizon.approaches.size(), ContactHorizon::kMaxApproaches);
   std::ranges::partial_sort(horizon.approaches,
@@ -348,7 +348,7 @@ void ContactHorizons::validate() const {
   std::size_t count = 0;
   for (const auto& [avatar, tracked] : tracked_) {
     for (const Entry& entry : schedule_.findEntries(avatar)) {
-      const EntityId other = otherOf(entry.pair, avatar);
+      const EntityId other = getOther(entry.pair, avatar);
       if (touching_.contains(entry.pair))
         throw std::logic_error("a touching pair is in the schedule");
       count += isTracked(other) && other < avatar ? 0 : 1;

@@ -100,7 +100,7 @@ class ContactHorizons {
   void setTime(const BodyPair& pair, double time);
   void setTouching(const BodyPair& pair);
   void removePair(const BodyPair& pair);
-  void removePairsOf(EntityId avatar, bool keepTracked);
+  void removePairs(EntityId avatar, bool keepTracked);
 
   bool spendWork(std::size_t cost);
   void removeLeftAvatars();

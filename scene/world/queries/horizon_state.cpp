@@ -14,7 +14,7 @@ constexpr std::uint32_t kBoxesPerLeaf = 4;
 /// Exceeds the rounding of sums of speeds, and of simulated times.
 constexpr double kRoundUp = 1 + 1e-12;
 
-const BodySpec& specOf(const Scene& scene, const BodySnapshot& body) {
+const BodySpec& getSpec(const Scene& scene, const BodySnapshot& body) {
   return scene.model().bodies[body.index];
 }
 
@@ -70,7 +70,7 @@ void HorizonState::updateBodies(const Snapshot& next, bool consecutive) {
   pushers_.clear();
   for (std::size_t i = 0; i < bodies_.size(); ++i) {
     const BodySnapshot& body = (*next.bodies)[i];
-    const BodySpec& spec = specOf(*scene_, body);
+    const BodySpec& spec = getSpec(*scene_, body);
     BodyState& state = bodies_[i];
     const bool moved = !consecutive || hasMoved((*snapshot_->bodies)[i], body);
     if (moved) {
@@ -135,13 +135,13 @@ double HorizonState::speedWithin(EntityId entity, double seconds) const {
   return body ? bodies_[body->index].speed : 0;
 }
 
-double HorizonState::growthOf(EntityId entity) const {
+double HorizonState::getGrowthLimit(EntityId entity) const {
   const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt(), entity);
   return avatar ? computeGrowthLimit(*avatar) : 0;
 }
 
 double HorizonState::computeTime(EntityId a, EntityId b, double gap, double speed) const {
-  return computeTime(gap, growthOf(a) + growthOf(b), speed);
+  return computeTime(gap, getGrowthLimit(a) + getGrowthLimit(b), speed);
 }
 
 double HorizonState::computeTime(double gap, double growth, double speed) const {
@@ -150,7 +150,7 @@ double HorizonState::computeTime(double gap, double growth, double speed) const 
 }
 
 double HorizonState::boxTime(EntityId a, EntityId b, double speed) const {
-  return boxTime(computeBox(a), computeBox(b), growthOf(a) + growthOf(b), speed);
+  return boxTime(computeBox(a), computeBox(b), getGrowthLimit(a) + getGrowthLimit(b), speed);
 }
 
 double HorizonState::boxTime(const Aabb& own, const Aabb& other, double growth,
@@ -188,7 +188,7 @@ std::vector<HorizonState::Neighbour> HorizonState::findNeighbours(const AvatarSn
     if (earliest < seconds) neighbours.push_back({id, earliest});
   };
   for (const BodySnapshot& body : *snapshot_->bodies)
-    if (isKinematic(specOf(*scene_, body).kind))
+    if (isKinematic(getSpec(*scene_, body).kind))
       consider(body.id, bodies_[body.index].box, 0, bodies_[body.index].speed);
   for (const AvatarSnapshot& other : snapshot_->avatars)
     if (other.id != avatar.id)
@@ -205,7 +205,7 @@ HorizonState::NearestBody HorizonState::findNearestDynamicBody(const AvatarSnaps
   NearestBody nearest{0, std::numeric_limits<double>::infinity()};
   const Aabb own = placeBox(avatar.shape->box, avatar.footPosition);
   for (const BodySnapshot& body : *snapshot_->bodies) {
-    if (!isDynamic(specOf(*scene_, body).kind)) continue;
+    if (!isDynamic(getSpec(*scene_, body).kind)) continue;
     const double gap = computeGap(own, bodies_[body.index].box);
     if (gap < nearest.gap) nearest = {body.id, gap};
   }

@@ -42,7 +42,7 @@ class HorizonState {
   /// bodies.
   double speedWithin(EntityId entity, double seconds) const;
   /// Metres by which the entity may grow at once.
-  double growthOf(EntityId entity) const;
+  double getGrowthLimit(EntityId entity) const;
 
   /// A solid entity with bounded motion.
   struct Neighbour {

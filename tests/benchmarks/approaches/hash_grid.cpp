@@ -16,7 +16,7 @@ constexpr double kEdge = 2;  // metres: about the size of an avatar, the usual a
 
 using Place = std::array<std::int32_t, 3>;
 
-Place placeOf(const Vec3& p) {
+Place computePlace(const Vec3& p) {
   const auto along = [&](int axis) {
     return static_cast<std::int32_t>(std::floor(p[axis] / kEdge));
   };
@@ -25,8 +25,8 @@ Place placeOf(const Vec3& p) {
 
 template <typename Visit>
 void forEachPlace(const Aabb& box, Visit&& visit) {
-  const Place low = placeOf(box.min);
-  const Place high = placeOf(box.max);
+  const Place low = computePlace(box.min);
+  const Place high = computePlace(box.max);
   for (std::int32_t x = low[0]; x <= high[0]; ++x) {
     for (std::int32_t y = low[1]; y <= high[1]; ++y) {
       for (std::int32_t z = low[2]; z <= high[2]; ++z) visit(Place{x, y, z});
@@ -41,11 +41,11 @@ class PlaceTable {
 
   std::uint32_t find(const Place& place) const {
     if (slots_.empty()) return kNone;
-    return slots_[slotOf(place)];
+    return slots_[computeSlot(place)];
   }
   std::uint32_t findOrAdd(const Place& place) {
     if (2 * (places_.size() + 1) > slots_.size()) grow();
-    const std::size_t slot = slotOf(place);
+    const std::size_t slot = computeSlot(place);
     if (slots_[slot] == kNone) {
       slots_[slot] = static_cast<std::uint32_t>(places_.size());
       places_.push_back(place);
@@ -59,7 +59,7 @@ class PlaceTable {
   std::size_t size() const { return places_.size(); }
 
  private:
-  std::size_t slotOf(const Place& place) const {
+  std::size_t computeSlot(const Place& place) const {
     // Teschner et al. 2003, "Optimized spatial hashing": three large primes.
     const auto part = [](std::int32_t x, std::uint64_t prime) {
       return static_cast<std::uint64_t>(static_cast<std::uint32_t>(x)) * prime;
@@ -75,7 +75,7 @@ class PlaceTable {
   }
   void grow() {
     slots_.assign(std::max<std::size_t>(64, 2 * slots_.size()), kNone);
-    for (std::uint32_t k = 0; k < places_.size(); ++k) slots_[slotOf(places_[k])] = k;
+    for (std::uint32_t k = 0; k < places_.size(); ++k) slots_[computeSlot(places_[k])] = k;
   }
 
   std::vector<std::uint32_t> slots_;
@@ -117,7 +117,7 @@ class HashGrid : public BroadPhase {
 
  private:
   static bool ownsPair(const Place& place, const Aabb& a, const Aabb& b) {
-    return placeOf(a.min.cwiseMax(b.min)) == place;
+    return computePlace(a.min.cwiseMax(b.min)) == place;
   }
 
   void reportStatic(std::uint32_t id, const Aabb& box, const Place& place, PairTally& tally) {

@@ -56,8 +56,8 @@ class LooseOctree : public BroadPhase {
     std::uint32_t node = 0;
     if (((at - centre).array().abs() > 0.5 * edge).any()) return 0;
     for (int level = 0; level < kMaxLevels && 0.5 * edge >= size; ++level) {
-      const std::size_t octant = octantOf(at, centre);
-      centre += 0.25 * edge * directionOf(octant);
+      const std::size_t octant = getOctant(at, centre);
+      centre += 0.25 * edge * getDirection(octant);
       edge *= 0.5;
       if (nodes_[node].child[octant] == 0) {
         nodes_[node].child[octant] = static_cast<std::uint32_t>(nodes_.size());
@@ -68,11 +68,11 @@ class LooseOctree : public BroadPhase {
     return node;
   }
 
-  static std::size_t octantOf(const Vec3& at, const Vec3& centre) {
+  static std::size_t getOctant(const Vec3& at, const Vec3& centre) {
     return (at.x() > centre.x() ? 1u : 0u) + (at.y() > centre.y() ? 2u : 0u) +
            (at.z() > centre.z() ? 4u : 0u);
   }
-  static Vec3 directionOf(std::size_t octant) {
+  static Vec3 getDirection(std::size_t octant) {
     return {octant & 1 ? 1.0 : -1.0, octant & 2 ? 1.0 : -1.0, octant & 4 ? 1.0 : -1.0};
   }
 
@@ -103,7 +103,7 @@ class LooseOctree : public BroadPhase {
     }
     for (std::size_t octant = 0; octant < 8; ++octant) {
       if (node.child[octant] == 0) continue;
-      const Vec3 at = centre + 0.25 * edge * directionOf(octant);
+      const Vec3 at = centre + 0.25 * edge * getDirection(octant);
       // The child's loose bounds: its cube of edge/2, inflated by edge/4 on every side, and by
       // rounding.
       const Vec3 reach = Vec3::Constant(0.5001 * edge);

@@ -17,7 +17,7 @@ void fill(btConvexHullShape& shape, const Points& points) {
   shape.recalcLocalAabb();
 }
 
-btTransform transformOf(const RigidTransform& at) {
+btTransform toTransform(const RigidTransform& at) {
   const Mat3& r = at.rotation;
   const Vec3& t = at.translation;
   const btMatrix3x3 rotation(r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2), r(2, 0), r(2, 1),
@@ -34,8 +34,8 @@ class BulletPair : public PairOfBodies {
   void forget() override { known_ = false; }
 
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
-    const btTransform atA = transformOf(a);
-    const btTransform atB = transformOf(b);
+    const btTransform atA = toTransform(a);
+    const btTransform atB = toTransform(b);
     btVector3 guess = known_ ? guess_ : atB.getOrigin() - atA.getOrigin();
     if (guess.length2() == 0) guess = btVector3(1, 0, 0);
     btGjkEpaSolver2::sResults result{};

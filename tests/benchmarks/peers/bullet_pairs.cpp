@@ -33,7 +33,7 @@ btVector3 roundUp(const Vec3& v) {
 }
 
 /// A proxy's user pointer holds an integer: 2 * id, plus 1 for movers.
-std::uintptr_t tagOf(const btBroadphaseProxy& proxy) {
+std::uintptr_t getTag(const btBroadphaseProxy& proxy) {
   return reinterpret_cast<std::uintptr_t>(proxy.m_clientObject);
 }
 
@@ -86,8 +86,8 @@ class BulletPairs : public BroadPhase {
     const btBroadphasePairArray& pairs =
         broadphase_->getOverlappingPairCache()->getOverlappingPairArray();
     for (int k = 0; k < pairs.size(); ++k) {
-      std::uintptr_t a = tagOf(*pairs[k].m_pProxy0);
-      std::uintptr_t b = tagOf(*pairs[k].m_pProxy1);
+      std::uintptr_t a = getTag(*pairs[k].m_pProxy0);
+      std::uintptr_t b = getTag(*pairs[k].m_pProxy1);
       if (a % 2 == 0) std::swap(a, b);
       const auto mover = static_cast<std::uint32_t>(a / 2);
       const auto other = static_cast<std::uint32_t>(b / 2);

@@ -16,13 +16,13 @@ struct Shape {
   const RigidTransform* at = nullptr;
 };
 
-Vec3 vectorOf(const ccd_vec3_t& v) {
+Vec3 toVector(const ccd_vec3_t& v) {
   return {ccdVec3X(&v), ccdVec3Y(&v), ccdVec3Z(&v)};
 }
 
 void support(const void* object, const ccd_vec3_t* direction, ccd_vec3_t* result) {
   const Shape& shape = *static_cast<const Shape*>(object);
-  const Vec3 local = shape.at->rotation.transpose() * vectorOf(*direction);
+  const Vec3 local = shape.at->rotation.transpose() * toVector(*direction);
   const Vec3* best = &shape.vertices.front();
   double most = best->dot(local);
   for (const Vec3& vertex : shape.vertices) {
@@ -42,7 +42,7 @@ void centre(const void* object, ccd_vec3_t* result) {
   ccdVec3Set(result, world.x(), world.y(), world.z());
 }
 
-Shape shapeOf(const Points& points) {
+Shape makeShape(const Points& points) {
   Shape shape{collision::buildHull(points).vertices};
   for (const Vec3& vertex : shape.vertices) {
     shape.centre += vertex / static_cast<double>(shape.vertices.size());
@@ -53,7 +53,7 @@ Shape shapeOf(const Points& points) {
 class CcdPair : public PairOfBodies {
  public:
   CcdPair(const Points& a, const Points& b, bool depth)
-      : a_(shapeOf(a)), b_(shapeOf(b)), depth_(depth) {
+      : a_(makeShape(a)), b_(makeShape(b)), depth_(depth) {
     CCD_INIT(&ccd_);
     ccd_.support1 = ccd_.support2 = support;
     ccd_.center1 = ccd_.center2 = centre;

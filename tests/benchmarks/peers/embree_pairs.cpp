@@ -20,7 +20,7 @@ float above(double x) {
   return -below(-x);
 }
 
-void boundsOf(const RTCBoundsFunctionArguments* args) {
+void writeBounds(const RTCBoundsFunctionArguments* args) {
   const Aabb& box =
       static_cast<const std::span<const Aabb>*>(args->geometryUserPtr)->data()[args->primID];
   RTCBounds& b = *args->bounds_o;
@@ -37,7 +37,7 @@ class EmbreeBvh : public BroadPhase {
   explicit EmbreeBvh(std::span<const Aabb> still)
       : device_(rtcNewDevice("threads=1,set_affinity=0")), still_(still) {
     rtcSetDeviceMemoryMonitorFunction(device_, countBytes, this);
-    stillScene_ = sceneOf(&still_, RTC_BUILD_QUALITY_MEDIUM, stillGeometry_);
+    stillScene_ = makeScene(&still_, RTC_BUILD_QUALITY_MEDIUM, stillGeometry_);
     rtcCommitScene(stillScene_);
   }
   ~EmbreeBvh() override {
@@ -52,7 +52,7 @@ class EmbreeBvh : public BroadPhase {
   void tick(std::span<const Aabb> movers, PairTally& tally) override {
     movers_ = movers;
     if (moverScene_ == nullptr) {
-      moverScene_ = sceneOf(&movers_, RTC_BUILD_QUALITY_LOW, moverGeometry_);
+      moverScene_ = makeScene(&movers_, RTC_BUILD_QUALITY_LOW, moverGeometry_);
     } else {
       rtcCommitGeometry(moverGeometry_);
     }
@@ -64,7 +64,7 @@ class EmbreeBvh : public BroadPhase {
   std::size_t hiddenBytes() const override { return static_cast<std::size_t>(bytes_); }
 
  private:
-  RTCScene sceneOf(std::span<const Aabb>* boxes, RTCBuildQuality quality, RTCGeometry& geometry) {
+  RTCScene makeScene(std::span<const Aabb>* boxes, RTCBuildQuality quality, RTCGeometry& geometry) {
     RTCScene scene = rtcNewScene(device_);
     rtcSetSceneBuildQuality(scene, quality);
     if (quality == RTC_BUILD_QUALITY_LOW) rtcSetSceneFlags(scene, RTC_SCENE_FLAG_DYNAMIC);
@@ -72,7 +72,7 @@ class EmbreeBvh : public BroadPhase {
     rtcSetGeometryBuildQuality(geometry, quality);
     rtcSetGeometryUserPrimitiveCount(geometry, static_cast<unsigned>(boxes->size()));
     rtcSetGeometryUserData(geometry, boxes);
-    rtcSetGeometryBoundsFunction(geometry, boundsOf, nullptr);
+    rtcSetGeometryBoundsFunction(geometry, writeBounds, nullptr);
     rtcCommitGeometry(geometry);
     rtcAttachGeometry(scene, geometry);
     rtcReleaseGeometry(geometry);  // the scene holds a reference

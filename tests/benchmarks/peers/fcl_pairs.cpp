@@ -24,14 +24,14 @@ struct PairQuery {
 };
 
 /// An object's user pointer holds an integer: 2 * id, plus 1 for movers.
-std::uintptr_t tagOf(const Object& object) {
+std::uintptr_t getTag(const Object& object) {
   return reinterpret_cast<std::uintptr_t>(object.getUserData());
 }
 
 bool reportPairs(Object* first, Object* second, void* data) {
   const PairQuery& query = *static_cast<PairQuery*>(data);
-  std::uintptr_t a = tagOf(*first);
-  std::uintptr_t b = tagOf(*second);
+  std::uintptr_t a = getTag(*first);
+  std::uintptr_t b = getTag(*second);
   if (a % 2 == 0) std::swap(a, b);
   const auto mover = static_cast<std::uint32_t>(a / 2);
   const auto other = static_cast<std::uint32_t>(b / 2);

@@ -13,14 +13,14 @@ struct PairQuery {
   PairTally* tally;
 };
 
-std::uintptr_t tagOf(dGeomID geom) {
+std::uintptr_t getTag(dGeomID geom) {
   return reinterpret_cast<std::uintptr_t>(dGeomGetData(geom));
 }
 
 void reportPairs(void* data, dGeomID first, dGeomID second) {
   const PairQuery& query = *static_cast<PairQuery*>(data);
-  std::uintptr_t a = tagOf(first);
-  std::uintptr_t b = tagOf(second);
+  std::uintptr_t a = getTag(first);
+  std::uintptr_t b = getTag(second);
   if (a % 2 == 0) std::swap(a, b);
   const auto mover = static_cast<std::uint32_t>(a / 2);
   const auto other = static_cast<std::uint32_t>(b / 2);
