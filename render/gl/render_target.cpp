@@ -70,12 +70,15 @@ void RenderTarget::begin(const Channels& channels, bool planeDepth) {
   constexpr std::array<GLfloat, 4> kNoDepth{kNaN, kNaN, kNaN, kNaN};
   constexpr std::array<GLuint, 4> kNothing{0, 0, 0, 0};
   constexpr GLfloat kFarthest = 0;
-  glDepthMask(GL_TRUE);
   if (channels.rgb) glClearNamedFramebufferfv(fbo, GL_COLOR, 0, kBlack.data());
   if (channels.ids) glClearNamedFramebufferuiv(fbo, GL_COLOR, 1, kNothing.data());
   if (channels.normals) glClearNamedFramebufferfv(fbo, GL_COLOR, 2, kNone.data());
   if (planeDepth) glClearNamedFramebufferfv(fbo, GL_COLOR, 3, kNoDepth.data());
-  glClearNamedFramebufferfv(fbo, GL_DEPTH, 0, &kFarthest);
+  // Not by the framebuffer: NVIDIA's driver 580.159 then culled visible fragments by the depth of
+  // an earlier frame, in blocks of 8 pixels, where a small frame followed another in the same
+  // layer.
+  glClearTexSubImage(depth_.name(), 0, 0, 0, layer_, width_, height_, 1, GL_DEPTH_COMPONENT,
+                     GL_FLOAT, &kFarthest);
 }
 
 void RenderTarget::setShadowMask(const std::vector<std::uint8_t>& mask) {

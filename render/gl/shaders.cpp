@@ -31,7 +31,9 @@ layout(location = 10) in vec4 colour;  // sRGB with linear alpha
 out vec4 tint;                         // linear
 #endif
 
-invariant gl_Position;  // prepass and shading must compute equal depth
+// Prepass and shading must compute equal depth. Drivers compile a program again after its first
+// draws, with other contractions; `precise` forbids these, `invariant` does not.
+invariant gl_Position;
 out vec3 point;
 out vec3 softNormal;
 out vec2 texCoord;
@@ -41,8 +43,10 @@ flat out vec4 finish;
 flat out uint entity;
 
 void main() {
-  vec4 p = vec4(position, 1.0);
-  point = vec3(dot(rowX, p), dot(rowY, p), dot(rowZ, p));
+  precise vec3 relative =
+      vec3(rowX.x, rowY.x, rowZ.x) * position.x + vec3(rowX.y, rowY.y, rowZ.y) * position.y +
+      vec3(rowX.z, rowY.z, rowZ.z) * position.z + vec3(rowX.w, rowY.w, rowZ.w);
+  point = relative;
   // The rows of the cofactor matrix: correct for non-uniform scales, and for mirroring up to the
   // sign, which the fragment shader determines.
   softNormal = normal.w == 0.0 ? vec3(0.0)
@@ -58,7 +62,9 @@ void main() {
   glow = emissive;
   finish = surface;
   entity = id;
-  gl_Position = clipFromRelative * vec4(point, 1.0);
+  precise vec4 clip = clipFromRelative[0] * relative.x + clipFromRelative[1] * relative.y +
+                      clipFromRelative[2] * relative.z + clipFromRelative[3];
+  gl_Position = clip;
 #ifdef ROUNDED
   // Vertices behind the eye are clipped first and keep their positions.
   vec2 grid = 256.0 * vec2(rightByX.w, upByY.w);
