@@ -10,6 +10,7 @@
 #include <array>
 #include <cstdio>
 #include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <random>
@@ -97,6 +98,7 @@ struct Bench {
 
 struct Walked {
   bool isFound = false, isArrived = false;
+  bool isRefused = false;  ///< the start: a closed door stands there
   double penetration = 0;
   std::string text;
   bool hasDoors = false, hasLifts = false, hasDrops = false;  ///< on the path
@@ -138,6 +140,7 @@ Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const
       if (notice.avatar != name) continue;
       using Kind = scene::Notice::Kind;
       walked.isArrived |= notice.kind == Kind::arrived;
+      walked.isRefused |= notice.kind == Kind::refused;
       if (notice.kind == Kind::blocked || notice.kind == Kind::refused || notice.kind == Kind::left)
         walked.text = notice.text + " " + findEntityName(world, notice.obstacle);
     }
@@ -152,7 +155,7 @@ void measureWalks(Bench& bench, const Effort& effort, nlohmann::json& row) {
   const auto starts = bench.drawPlaces(effort.pairs, 1, v1::NavigationQuery::DOORS_OPEN);
   const auto goals = bench.drawPlaces(effort.pairs, 2, v1::NavigationQuery::DOORS_OPEN);
   std::optional<scene::World> world;
-  int found = 0, wrong = 0, silent = 0, doors = 0, lifts = 0, drops = 0;
+  std::map<std::string, int> counts;
   double penetration = 0;
   const std::size_t pairs = std::min(starts.size(), goals.size());
   for (std::size_t i = 0; i < pairs; ++i) {
@@ -160,25 +163,26 @@ void measureWalks(Bench& bench, const Effort& effort, nlohmann::json& row) {
       world.emplace(bench.scene);
     const Walked walked = go(bench, *world, static_cast<int>(i), starts[i], goals[i]);
     penetration = std::max(penetration, walked.penetration);
-    found += walked.isFound ? 1 : 0;
-    doors += walked.hasDoors ? 1 : 0;
-    lifts += walked.hasLifts ? 1 : 0;
-    drops += walked.hasDrops ? 1 : 0;
-    silent += !walked.isFound && walked.text.size() < 10 ? 1 : 0;
-    if (!walked.isFound || (walked.isArrived && walked.penetration == 0)) continue;
-    if (++wrong <= 5)
+    counts["without_reason"] += !walked.isFound && walked.text.size() < 10 ? 1 : 0;
+    if (walked.isRefused || !walked.isFound) {
+      counts["starts_refused"] += walked.isRefused ? 1 : 0;
+      continue;
+    }
+    ++counts["found"];
+    counts["walked_doors"] += walked.hasDoors ? 1 : 0;
+    counts["walked_lifts"] += walked.hasLifts ? 1 : 0;
+    counts["walked_drops"] += walked.hasDrops ? 1 : 0;
+    if (walked.isArrived && walked.penetration == 0) continue;
+    if (++counts[walked.hasDoors ? "wrong_with_doors" : "wrong"] <= 5)
       std::printf("  wrong: pair %zu, (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %s\n", i,
                   starts[i].x(), starts[i].y(), starts[i].z(), goals[i].x(), goals[i].y(),
                   goals[i].z(), walked.text.c_str());
   }
   row["pairs"] = pairs;
-  row["found"] = found;
-  row["wrong"] = wrong;
-  row["without_reason"] = silent;
   row["max_penetration"] = penetration;
-  row["walked_doors"] = doors;
-  row["walked_lifts"] = lifts;
-  row["walked_drops"] = drops;
+  for (const char* name : {"found", "wrong", "wrong_with_doors", "without_reason", "starts_refused",
+                           "walked_doors", "walked_lifts", "walked_drops"})
+    row[name] = counts[name];
 }
 
 void measureTimes(Bench& bench, const Effort& effort, nlohmann::json& row) {
