@@ -1,6 +1,7 @@
 // The kinds of renderers, and the rule that chooses between them.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>

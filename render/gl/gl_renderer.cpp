@@ -162,7 +162,8 @@ void GlRenderer::State::prepareTarget(const Camera& camera, std::size_t layers) 
   while (depthPyramids.size() < layers) depthPyramids.emplace_back();
 }
 
-/// The instances of each view's snapshot.
+/// The instances of each view's snapshot. Slots are given in the order of the views: as long as
+/// that stays, only what moved is uploaded.
 std::vector<const DynamicInstances*> GlRenderer::State::updateInstances(
     std::span<const View* const> views) {
   std::vector<const scene::Snapshot*> snapshots;  // by index into `dynamicInstances`

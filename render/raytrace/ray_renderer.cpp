@@ -10,8 +10,10 @@
 #include <cmath>
 #include <deque>
 #include <limits>
+#include <map>
 #include <optional>
 #include <span>
+#include <utility>
 
 #include "render/ambient_occlusion.hpp"
 #include "render/raytrace/lens_frame.hpp"
@@ -342,25 +344,33 @@ RayRenderer::~RayRenderer() = default;
 
 std::vector<Frame> RayRenderer::renderOnce(std::span<const View> views) {
   State& s = *state_;
-  std::vector<Frame> frames;
-  for (std::size_t from = 0; from < views.size();) {
-    // The trees hold one snapshot, and one form of the avatars.
-    std::size_t to = from + 1, pixels = countPixels(views[from].camera);
-    const auto joins = [&](const View& view) {
-      pixels += countPixels(view.camera);
-      return pixels <= kMaxPixelsTogether && !view.camera.lens &&
-             view.snapshot == views[from].snapshot &&
-             view.options.avatars == views[from].options.avatars;
+  // The trees hold one snapshot, and one form of the avatars.
+  std::map<std::pair<const scene::Snapshot*, AvatarForm>, std::vector<std::size_t>> groups;
+  for (std::size_t i = 0; i < views.size(); ++i)
+    groups[{views[i].snapshot, views[i].options.avatars}].push_back(i);
+  std::vector<Frame> frames(views.size());
+  for (const auto& [key, group] : groups) {
+    s.scene.update(*key.first, key.second);
+    std::vector<View> together;
+    std::vector<std::size_t> indices;  // of `together`
+    std::size_t pixels = 0;
+    const auto traceTogether = [&] {
+      std::vector<Frame> traced = traceFrames(s, together);
+      for (std::size_t i = 0; i < traced.size(); ++i) frames[indices[i]] = std::move(traced[i]);
+      together.clear(), indices.clear();
+      pixels = 0;
     };
-    s.scene.update(*views[from].snapshot, views[from].options.avatars);
-    if (views[from].camera.lens) {
-      frames.push_back(traceThroughLens(s, views[from]));
-    } else {
-      while (to < views.size() && joins(views[to])) ++to;
-      for (Frame& frame : traceFrames(s, views.subspan(from, to - from)))
-        frames.push_back(std::move(frame));
+    for (const std::size_t i : group) {
+      if (views[i].camera.lens) {
+        frames[i] = traceThroughLens(s, views[i]);
+        continue;
+      }
+      pixels += countPixels(views[i].camera);
+      if (pixels > kMaxPixelsTogether && !together.empty()) traceTogether();
+      together.push_back(views[i]);
+      indices.push_back(i);
     }
-    from = to;
+    traceTogether();
   }
   for (Frame& frame : frames) frame.renderer = s.name, frame.software = true;
   return frames;

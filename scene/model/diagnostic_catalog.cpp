@@ -37,11 +37,12 @@ constexpr std::array kCatalog{
                    "data after the announced triangles or elements is not read; export it again"},
     DiagnosticKind{"unit_assumed", warning, "the file's unit is doubtful; set it with --unit"},
     // placement
-    DiagnosticKind{"broken_transform_dropped", error,
-                   "its transform is malformed, not finite or out of range: ignored"},
+    DiagnosticKind{
+        "broken_transform_dropped", error,
+        "a part of its transform is malformed, not allowed, not finite or out of range: ignored"},
     DiagnosticKind{
         "shared_node", warning,
-        "a glTF node has several parents, which glTF does not allow: it stands below each"},
+        "a glTF node is listed several times, which glTF does not allow: it stands at each place"},
     DiagnosticKind{"coarse_coordinates", warning,
                    "far from its own origin: its vertices have low precision"},
     DiagnosticKind{"coarse_placement", warning,

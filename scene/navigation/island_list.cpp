@@ -139,10 +139,13 @@ void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, dou
   std::vector<std::uint32_t> order;  // of the islands that remain, the largest first
   for (std::uint32_t number = 0; number < joinedTo.size(); ++number) {
     const std::uint32_t first = findFirst(number);
-    if (first == number)
+    if (first == number) {
       order.push_back(number);
-    else
-      list.islands[first].area += list.islands[number].area;
+      continue;
+    }
+    Island& joined = list.islands[first];
+    joined.area += list.islands[number].area;
+    joined.isRoof = joined.isRoof && list.islands[number].isRoof;
   }
   std::ranges::stable_sort(order, std::greater(),
                            [&](std::uint32_t number) { return list.islands[number].area; });
@@ -155,6 +158,7 @@ void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, dou
   for (std::uint32_t& number : list.numberOf)
     if (number != kNoIsland) number = rank[findFirst(number)];
   list.islands = std::move(islands);
+  chooseDrawn(list.islands);
 }
 
 std::vector<IslandNeighbour> findNeighbours(const NavigationMesh& mesh, const IslandList& list,

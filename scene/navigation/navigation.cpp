@@ -392,7 +392,7 @@ NavigationMap Navigation::drawMap(double cell, double height, double tolerance) 
                     {}};
   map.cells.assign(std::size_t{map.width} * map.height, 0);
   const CellGrid grid{bounds.min.x(), bounds.min.z(), cell, map.width, map.height};
-  const double highest = height + tolerance + grid_.cellHeight;
+  const double lowest = height - tolerance, highest = height + tolerance + grid_.cellHeight;
   const auto measureFloor = [&](const Vec3& onMesh, double top) {
     const Vec3 above(onMesh.x(), top + kHeightError, onMesh.z());
     const auto place = standAt(*walker_, above, above.y() - onMesh.y() + kHeightError);
@@ -400,7 +400,7 @@ NavigationMap Navigation::drawMap(double cell, double height, double tolerance) 
   };
   for (std::uint32_t polygon = 0; polygon < ample_->polygonCount(); ++polygon)
     if (islands_.numberOf[polygon] != kNoIsland)
-      ample_->rasterize(polygon, grid, height - tolerance, highest, measureFloor, map.cells);
+      ample_->rasterize(polygon, grid, lowest, highest, measureFloor, map.cells);
   return map;
 }
 
@@ -410,9 +410,8 @@ std::vector<Vec3> Navigation::collectTriangles(const std::optional<std::uint32_t
   for (std::uint32_t polygon = 0; polygon < ample_->polygonCount(); ++polygon) {
     const std::uint32_t number = islands_.numberOf[polygon];
     if (number == kNoIsland || (island && number != *island)) continue;
-    const std::vector<Vec3> corners = ample_->corners(polygon);
-    for (std::size_t i = 2; i < corners.size(); ++i)
-      triangles.insert(triangles.end(), {corners[0], corners[i - 1], corners[i]});
+    const std::vector<Vec3> own = ample_->makeTriangles(polygon);
+    triangles.insert(triangles.end(), own.begin(), own.end());
   }
   return triangles;
 }

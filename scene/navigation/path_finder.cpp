@@ -27,6 +27,8 @@ constexpr int kMaxRepairs = 12;            // of a leg
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
+constexpr const char* kNotFound = "no way was found within the limits of the search";
+constexpr double kSameFloor = 1;  // metres between the heights of a mesh and its floor
 
 double computeLength(const std::vector<Vec3>& points) {
   double length = 0;
@@ -82,6 +84,12 @@ bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& cor
   return false;
 }
 
+/// Whether a walk arrived, also in height: the height of its goal does not stop it.
+bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError) {
+  return outcome.kind == WalkOutcome::Kind::arrived &&
+         std::abs(outcome.footPosition.y() - goal.y()) <= heightError;
+}
+
 /// Walks from corner to corner, with repairs. Appends the places to `path`, which has the first
 /// one.
 bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance clearance,
@@ -93,8 +101,7 @@ bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance cl
       if (!isLast && computeGroundDistance(from, corners[i]) < kArrivalDistance) break;
       finder.walker.returnTo(from);
       const WalkOutcome outcome = finder.walker.walkTo(corners[i]);
-      const bool isHigh = std::abs(outcome.footPosition.y() - corners[i].y()) > 1;
-      if (outcome.kind == WalkOutcome::Kind::arrived && !isHigh) {
+      if (isThere(outcome, corners[i], kSameFloor)) {
         path.points.push_back(outcome.footPosition);
         break;
       }
@@ -272,23 +279,28 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
     GridSearch search{kCoarseSpacing, 1, 20'000};
     finder.walker.returnTo(places.back());
     const WalkOutcome outcome = finder.walker.walkTo(*place);
-    if (outcome.kind == WalkOutcome::Kind::arrived) {
+    if (isThere(outcome, *place, kSameFloor)) {
       places.push_back(finder.walker.footPosition());
       continue;
     }
     const auto around = findGridPath(finder.walker, places.back(), *place, search);
     if (!around) {
-      explain(finder, *line, outcome, path);
+      path.reason = kNotFound;  // it may stand above or below the corner
+      if (outcome.kind != WalkOutcome::Kind::arrived) explain(finder, *line, outcome, path);
       return path;
     }
     places.insert(places.end(), around->begin() + 1, around->end());
   }
-  path.points = shortenPath(finder.walker, places, Shortcuts::all);
-  path.length = computeLength(path.points);
-  if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof)) return path;
-  path = {};
-  path.obstruction = proof.met.back();
-  path.reason = "no way was found within the limits of the search";
+  path.reason = kNotFound;
+  if (std::abs(places.back().y() - to.y()) > kHeightError) return path;
+  std::vector<Vec3> points = shortenPath(finder.walker, places, Shortcuts::all);
+  if (finder.walker.takeCrossedSteps() && !walksOn(finder.walker, points, proof)) {
+    path.obstruction = proof.met.back();
+    return path;
+  }
+  path.reason.clear();
+  path.length = computeLength(points);
+  path.points = std::move(points);
   return path;
 }
 

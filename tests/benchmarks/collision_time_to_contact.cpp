@@ -10,7 +10,10 @@
 // of any vertex. A bound is broken if the bodies provably meet before it. `rod` is a
 // counter-example to it: a rod along a wall rotates about its middle, which is closest and at rest.
 
+#include <array>
+#include <cstdio>
 #include <functional>
+#include <vector>
 
 #include "collision/motion/time_of_impact.hpp"
 #include "collision/motion/time_to_contact.hpp"

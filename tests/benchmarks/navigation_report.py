@@ -13,19 +13,19 @@ from pathlib import Path
 from report import machine, read, short, table
 
 
-def walks(row):
+def make_walk_row(row):
     return [row["scene"], f"{row['pairs']:,}", row["starts_refused"], f"{row['found']:,}", row["wrong"],
             row["without_reason"], short(row["max_penetration"]),
             f"{row['walked_doors']:,} ({row['wrong_with_doors']})", row["walked_lifts"], row["walked_drops"]]
 
 
-def fills(row):
+def make_fill_row(row):
     return [row["scene"], f"{row['fill_places']:,}", row["reach_compared"], row["reach_wrong"],
             row["reach_near_width"], row["reach_skipped"], row["islands_wrong"], row["lengths"], short(row["length_median"]),
             f"{row['length_max']:.4f}" if row["length_max"] else "–", row["length_above"]]
 
 
-def times(row):
+def make_time_row(row):
     return [row["scene"], short(row["area"]), row["islands"], short(row["build_seconds"]),
             short(row["median_us"]), short(row["p99_us"]), short(row["not_found_p99_us"])]
 
@@ -49,7 +49,7 @@ are counted by themselves: a door may press an avatar that starts in its swing a
 the start. *Silent*: no path and no reason.
 
 {table(["scene", "pairs", "refused", "paths", "wrong", "silent", "penetration m", "with doors (wrong)",
-        "with lifts", "with drops"], [walks(row) for row in rows])}
+        "with lifts", "with drops"], [make_walk_row(row) for row in rows])}
 
 ## Reach and length
 
@@ -61,14 +61,14 @@ found between two islands, or none on one. Lengths are those of paths as a share
 shortest way in the fill, pulled straight.
 
 {table(["scene", "places of the fill", "compared", "wrong", "near", "skipped", "islands", "lengths", "median share",
-        "largest", "above 1.02"], [fills(row) for row in rows])}
+        "largest", "above 1.02"], [make_fill_row(row) for row in rows])}
 
 ## Time
 
 Of a query for a path, with its proof, doors as they are, answered in process on one thread.
 
 {table(["scene", "navigable m²", "islands", "build s", "µs a path, median", "99 %", "µs without a path, 99 %"],
-       [times(row) for row in rows])}
+       [make_time_row(row) for row in rows])}
 """)
 
 

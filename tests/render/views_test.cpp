@@ -1,9 +1,13 @@
 // Views that are rendered together have the frames that they have alone.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cstring>
+#include <future>
 #include <limits>
+#include <memory>
 #include <random>
+#include <vector>
 
 #include "render/culling/occlusion_culler.hpp"
 #include "render/raytrace/ray_renderer.hpp"
@@ -28,7 +32,7 @@ std::shared_ptr<const scene::Snapshot> twoAvatars() {
 }
 
 /// Views of several sizes, channels and kinds of cameras, from the same and from other places.
-std::vector<View> manyViews(const std::vector<const scene::Snapshot*>& snapshots) {
+std::vector<View> makeViews(const std::vector<const scene::Snapshot*>& snapshots) {
   std::vector<View> views;
   std::mt19937 random(11);
   const auto number = [&](double size) {
@@ -82,7 +86,7 @@ void expectFramesOfEachAlone(const std::vector<View>& views, Renderer& together,
 
 TEST(Views, TogetherHaveTheFramesOfEachAlone) {
   const auto snapshot = twoAvatars();
-  const std::vector<View> views = manyViews({snapshot.get()});
+  const std::vector<View> views = makeViews({snapshot.get()});
   for (const DepthSource depthSource : {DepthSource::buffer, DepthSource::plane}) {
     const DeviceChoice device{.device = "", .depthSource = depthSource};
     GlRenderer together(heap(), device), alone(heap(), device);
@@ -93,7 +97,7 @@ TEST(Views, TogetherHaveTheFramesOfEachAlone) {
 }
 
 /// A heap whose second box is a lift.
-std::shared_ptr<const scene::Scene> heapWithLift() {
+std::shared_ptr<const scene::Scene> makeHeapWithLift() {
   scene::Model model = heap()->model();
   scene::BodySpec lift;
   lift.name = "lift";
@@ -106,7 +110,7 @@ std::shared_ptr<const scene::Scene> heapWithLift() {
 }
 
 TEST(Views, OfSeveralWorldsHaveTheFramesOfEachAlone) {
-  const auto scene = heapWithLift();
+  const auto scene = makeHeapWithLift();
   std::vector<scene::Snapshot> snapshots;
   std::vector<const scene::Snapshot*> shown;
   for (const double height : {0.0, 0.6, 1.2, 3.0}) {
@@ -114,7 +118,10 @@ TEST(Views, OfSeveralWorldsHaveTheFramesOfEachAlone) {
     if (height != 1.2) snapshots.back().avatars = {avatarAt(1000, {1 - height, -4, -6})};
   }
   for (const scene::Snapshot& snapshot : snapshots) shown.push_back(&snapshot);
-  const std::vector<View> views = manyViews(shown);
+  const std::vector<View> views = makeViews(shown);
+  GlRenderer any(scene);
+  EXPECT_NE(any.render(snapshots[0], squareCamera(64)).ids,
+            any.render(snapshots[3], squareCamera(64)).ids);
   GlRenderer together(scene), alone(scene);
   expectFramesOfEachAlone(views, together, alone);
   RayRenderer raysTogether(scene), raysAlone(scene);

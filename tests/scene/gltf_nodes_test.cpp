@@ -107,15 +107,15 @@ TEST(GltfNodes, TheSameKeyInSeveralObjectsIsNoDuplicate) {
 
 // ---- references to nothing ----------------------------------------------------------------------
 
-TEST(GltfNodes, ANodeWithTwoParentsIsReportedAndStandsBelowEach) {
+TEST(GltfNodes, ANodeWithTwoParentsIsReportedOnceAndStandsBelowEach) {
   const TemporaryFolder folder;
   const Model model = importModel(folder.write("a.gltf", tests::gltf(BoxMesh({1, 2, 3}), "0,1",
                                                                      R"({"name":"a","children":[2]},
                                {"name":"b","translation":[5,0,0],"children":[2]},
-                               {"name":"box","mesh":0})")));
+                               {"name":"shared","children":[3]},{"name":"box","mesh":0})")));
   EXPECT_EQ(model.objects.size(), 2u);
   EXPECT_EQ(countDiagnostics(model, "shared_node"), 1u);
-  EXPECT_EQ(diagnosticText(model, "shared_node"), "nodes[2] 'box' has several parents");
+  EXPECT_EQ(diagnosticText(model, "shared_node"), "nodes[2] 'shared' is listed several times");
 }
 
 TEST(GltfNodes, AReferenceToNothingCostsItselfAlone) {

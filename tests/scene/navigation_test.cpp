@@ -105,6 +105,62 @@ TEST(Navigation, StairsAreClimbedAndALedgeIsNot) {
   EXPECT_NE(ledge.reason.find("no floor, step or stair"), std::string::npos) << ledge.reason;
 }
 
+/// Below the gallery the floor is even: a walk towards a place on it arrives, but a storey too low.
+TEST(Navigation, AGalleryWhoseStairIsTooNarrowIsNotReachedFromBelow) {
+  std::vector<NamedBox> boxes{{"floor", {0, -0.2, -3}, {12, 0, 3}},
+                              {"gallery", {7, 2.3, -3}, {12, 2.5, 3}},
+                              {"rail/left", {3.5, 0, 0.25}, {7, 4.5, 0.35}},
+                              {"rail/right", {3.5, 0, -0.35}, {7, 4.5, -0.25}}};
+  for (int step = 0; step < 10; ++step)
+    boxes.push_back({"stair/" + std::to_string(step),
+                     {4 + 0.3 * step, 0, -0.25},
+                     {7, 0.25 * (step + 1), 0.25}});
+  Navigation navigation(boxScene(boxes), {}, {});
+  const NavigationPath path = navigation.findPath({1, 0.1, 0}, {10, 2.6, 0});
+  EXPECT_FALSE(path.found()) << path.points.back().transpose();
+  EXPECT_NE(path.reason, "");
+  NavigationAgent thin;
+  thin.radius = 0.2;
+  Navigation thinner(boxScene(boxes), {}, thin);
+  EXPECT_TRUE(thinner.findPath({1, 0.1, 0}, {10, 2.6, 0}).found());
+}
+
+/// A roof of two slopes of 27 degrees: its polygons span the ridge.
+TEST(Navigation, TheRidgeOfARoofHasTheHeightOfTheRoof) {
+  Model model = boxModel({{"ground", {-20, -0.2, -20}, {20, 0, 20}}});
+  Mesh roof;
+  for (const Vec3& corner : {Vec3(-6, 2, -6), Vec3(6, 2, -6), Vec3(-6, 5, 0), Vec3(6, 5, 0),
+                             Vec3(-6, 2, 6), Vec3(6, 2, 6)})
+    roof.positions.push_back(corner.cast<float>());
+  roof.indices = {0, 2, 1, 1, 2, 3, 2, 4, 3, 3, 4, 5};
+  Object object;
+  object.path = "roof";
+  object.meshes = {static_cast<std::uint32_t>(model.meshes.size())};
+  model.meshes.push_back(roof);
+  model.objects.push_back(object);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  Navigation navigation(scene, {}, {});
+  const auto ridge = navigation.snap({0, 5.1, 0}, 0.2), eaves = navigation.snap({0, 2.9, 4.5}, 0.5);
+  ASSERT_TRUE(ridge && eaves);
+  EXPECT_TRUE(navigation.findIsland(*ridge));
+  EXPECT_EQ(navigation.findIsland(*ridge), navigation.findIsland(*eaves));
+  const NavigationPath path = navigation.findPath(*eaves, {0, 2.9, -4.5});
+  EXPECT_TRUE(path.found()) << path.reason;
+  double highest = 0;
+  for (const Vec3& corner : navigation.collectTriangles(navigation.findIsland(*ridge)))
+    highest = std::max(highest, corner.y());
+  EXPECT_NEAR(highest, 5, 0.2);
+  const NavigationMap map = navigation.drawMap(0.1, 4.7, 0.4);  // the ridge alone
+  const auto at = [&](double x, double z) {
+    const auto column = static_cast<std::size_t>((x - map.corner.x()) / map.cell);
+    const auto row = static_cast<std::size_t>((z - map.corner.z()) / map.cell);
+    return map.cells[row * map.width + column];
+  };
+  EXPECT_EQ(at(0.05, 0.45), 1);
+  EXPECT_EQ(at(0.05, 3.05), 0);
+  EXPECT_EQ(at(12.05, 0.05), 0);
+}
+
 TEST(Navigation, RefusesAStartInsideAWallAndAGoalInTheAir) {
   Navigation navigation(boxScene(twoRooms(1)), {}, {});
   EXPECT_NE(navigation.findPath({4, 0.1, 2}, {7, 0.1, 0}).reason.find("at the start"),

@@ -5,6 +5,7 @@
 #include <gmpxx.h>
 
 #include <array>
+#include <cstddef>
 #include <optional>
 #include <set>
 #include <vector>

@@ -7,6 +7,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
+#include <utility>
 
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"
@@ -112,15 +113,16 @@ class NodeMatcher {
     if (depth > kMaxNodeDepth) return;  // refused by the reader of the tree
     if (index >= nodes_.size() || !nodes_[index].isObject) return reportUnmatched(node);
     const PlainNode& plain = nodes_[index];
-    if (isVisited_[index]) {
+    const bool isShared = isVisited_[index];
+    if (isShared && !isBelowShared_)
       addDiagnostic(diagnostics_, "shared_node",
-                    describeNode(index, node) + " has several parents");
-    } else {
-      reportTransform(plain.transform, index, node);
-    }
+                    describeNode(index, node) + " is listed several times");
+    if (!isShared) reportTransform(plain.transform, index, node);
     isVisited_[index] = true;
     matchedNodes_.emplace(&node, GltfNode{plain.transform.parentFromNode, index, plain.attributes});
+    const bool wasBelowShared = std::exchange(isBelowShared_, isBelowShared_ || isShared);
     visitChildren(plain.children, node, depth + 1);
+    isBelowShared_ = wasBelowShared;
   }
 
   void visitChildren(const std::vector<std::size_t>& indices, const aiNode& parent, int depth) {
@@ -151,6 +153,7 @@ class NodeMatcher {
   GltfNodes& matchedNodes_;
   std::vector<Diagnostic>& diagnostics_;
   std::vector<bool> isVisited_;  ///< by node
+  bool isBelowShared_ = false;   ///< what is below a shared node is not reported by itself
 };
 
 Eigen::Affine3d readMatrix(const std::array<double, 16>& numbers, const char*& fault) {
@@ -170,7 +173,8 @@ StatedTransform readNodeTransform(const Json& node) {
   StatedTransform result;
   if (const auto m = readNumbers<16>(node, "matrix")) {
     result.parentFromNode = readMatrix(*m, result.fault);
-    if (std::ranges::any_of(std::array{"translation", "rotation", "scale"},
+    if (result.fault == nullptr &&
+        std::ranges::any_of(std::array{"translation", "rotation", "scale"},
                             [&](const char* member) { return node.contains(member); }))
       result.fault = "its matrix counts, and its translation, rotation and scale do not";
     return result;

@@ -97,7 +97,8 @@ void NavigationMesh::collectPortals() {
       references_.push_back(base | static_cast<dtPolyRef>(p));
       Float3 centre{};
       dtCalcPolyCenter(centre.data(), polygon.verts, polygon.vertCount, tile->verts);
-      centres_.push_back(toVec3(centre.data()));
+      const auto index = static_cast<std::uint32_t>(references_.size()) - 1;
+      centres_.push_back(closestPoint(index, toVec3(centre.data())));
       double twice = 0;
       const auto corner = [&](int k) { return toVec3(&tile->verts[polygon.verts[k] * 3]); };
       for (int k = 2; k < polygon.vertCount; ++k) {
@@ -327,12 +328,21 @@ Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) con
   return closestPoint(index, toVec3(point.data()));
 }
 
-std::vector<Vec3> NavigationMesh::corners(std::uint32_t index) const {
+std::vector<Vec3> NavigationMesh::makeTriangles(std::uint32_t index) const {
   const dtPoly* polygon = nullptr;
   const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
+  const dtPolyDetail& detail = tile.detailMeshes[polygon - tile.polys];
   std::vector<Vec3> corners;
-  for (int i = 0; i < polygon->vertCount; ++i)
-    corners.push_back(toVec3(&tile.verts[polygon->verts[i] * 3]));
+  for (unsigned i = 0; i < detail.triCount; ++i) {
+    const unsigned char* triangle = &tile.detailTris[std::size_t{4} * (detail.triBase + i)];
+    for (int k = 0; k < 3; ++k) {
+      const unsigned vertex = triangle[k];
+      corners.push_back(vertex < polygon->vertCount
+                            ? toVec3(&tile.verts[polygon->verts[vertex] * 3])
+                            : toVec3(&tile.detailVerts[std::size_t{3} * (detail.vertBase + vertex -
+                                                                         polygon->vertCount)]));
+    }
+  }
   return corners;
 }
 
@@ -343,11 +353,10 @@ void NavigationMesh::rasterize(
   const dtPoly* polygon = nullptr;
   const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
   std::array<float, 3 * DT_VERTS_PER_POLYGON> corners{};
-  Aabb box;
-  for (int i = 0; i < polygon->vertCount; ++i) {
+  for (int i = 0; i < polygon->vertCount; ++i)
     std::copy_n(&tile.verts[polygon->verts[i] * 3], 3, &corners[static_cast<std::size_t>(3 * i)]);
-    box.include(toVec3(&corners[static_cast<std::size_t>(3 * i)]));
-  }
+  Aabb box;
+  for (const Vec3& corner : makeTriangles(index)) box.include(corner);
   if (box.max.y() < lowest || box.min.y() > highest) return;
   const bool isInside = box.min.y() >= lowest && box.max.y() <= highest;
   const auto first = [&](double least, double origin) {

@@ -62,7 +62,8 @@ class NavigationMesh {
   double area() const;  ///< square metres, horizontal, of all polygons
   double polygonArea(std::uint32_t polygon) const { return areas_[polygon]; }
   const Vec3& centre(std::uint32_t polygon) const { return centres_[polygon]; }
-  std::vector<Vec3> corners(std::uint32_t polygon) const;
+  /// Three corners per triangle, with the heights of the floor within the polygon.
+  std::vector<Vec3> makeTriangles(std::uint32_t polygon) const;
   bool isUnderSky(std::uint32_t polygon) const { return isUnderSky_[polygon]; }
   /// The point of a polygon that is closest to `point`.
   Vec3 closestPoint(std::uint32_t polygon, const Vec3& point) const;

@@ -16,7 +16,9 @@ namespace {
 
 constexpr std::string_view kMagic = "EnfMesh3";
 constexpr std::size_t kWordBytes = 8;
-constexpr int kMaxCount = 1 << 22;  // of anything in a tile
+constexpr int kMaxCount = 1 << 22;             // of anything in a tile
+constexpr float kMaxCoordinate = 1e8f;         // metres: Detour's squares do not overflow
+constexpr unsigned kBoundaryEdges = 0b010101;  // flags of a triangle of the detail mesh
 
 std::uint64_t computeMeshChecksum(std::span<const std::uint8_t> bytes) {
   Hasher hash;
@@ -90,10 +92,11 @@ bool isTileSafe(const TileMesh& tile, const TileGrid& grid) {
       reader.read<unsigned char>(4 * std::clamp(header.detailTriCount, -1, kMaxCount / 4));
   const auto nodes = reader.read<dtBVNode>(header.bvNodeCount);
   if (!reader.isWhole()) return false;
-  const auto isFinite = [](float value) { return std::isfinite(value); };
-  if (!std::ranges::all_of(vertices, isFinite) || !std::ranges::all_of(detailVertices, isFinite) ||
-      !std::ranges::all_of(header.bmin, isFinite) || !std::ranges::all_of(header.bmax, isFinite) ||
-      !std::isfinite(header.bvQuantFactor))
+  const auto isCoordinate = [](float value) { return std::abs(value) <= kMaxCoordinate; };
+  if (!std::ranges::all_of(vertices, isCoordinate) ||
+      !std::ranges::all_of(detailVertices, isCoordinate) ||
+      !std::ranges::all_of(header.bmin, isCoordinate) ||
+      !std::ranges::all_of(header.bmax, isCoordinate) || !std::isfinite(header.bvQuantFactor))
     return false;
   for (std::size_t i = 0; i < polygons.size(); ++i) {
     const dtPolyDetail& detail = details[i];
@@ -103,9 +106,13 @@ bool isTileSafe(const TileMesh& tile, const TileGrid& grid) {
         std::uint64_t{detail.triBase} + detail.triCount >
             static_cast<std::uint64_t>(header.detailTriCount))
       return false;
-    for (std::size_t t = detail.triBase; t < std::size_t{detail.triBase} + detail.triCount; ++t)
+    bool hasBoundary = false;  // Detour takes the closest point of an edge on the boundary
+    for (std::size_t t = detail.triBase; t < std::size_t{detail.triBase} + detail.triCount; ++t) {
       for (std::size_t k = 0; k < 3; ++k)
         if (detailTriangles[4 * t + k] >= polygons[i].vertCount + detail.vertCount) return false;
+      hasBoundary |= (detailTriangles[4 * t + 3] & kBoundaryEdges) != 0;
+    }
+    if (!hasBoundary) return false;
   }
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const std::int64_t index = nodes[i].i;  // negative: nodes to skip

@@ -42,7 +42,7 @@ using ContourSet = std::unique_ptr<rcContourSet, FreeBy<rcFreeContourSet>>;
 using PolyMesh = std::unique_ptr<rcPolyMesh, FreeBy<rcFreePolyMesh>>;
 using DetailMesh = std::unique_ptr<rcPolyMeshDetail, FreeBy<rcFreePolyMeshDetail>>;
 
-/// Polygons are flat in plan alone; the detail mesh has the heights of the floor within them.
+/// Polygons have heights at their corners alone; the detail mesh has those of the floor within.
 struct Polygons {
   PolyMesh flat;
   DetailMesh heights;
@@ -134,8 +134,8 @@ Polygons buildPolygons(TileBuild& build, rcHeightfield& field, const CellSizes& 
   return {std::move(polygons), std::move(heights)};
 }
 
-/// Whether nothing solid is above the floor of a polygon at a place. The polygon is flat: the floor
-/// may be higher or lower.
+/// Whether nothing solid is above the floor of a polygon at a place. The polygon has heights at its
+/// corners alone: the floor may be higher or lower.
 bool isUnderSky(const rcHeightfield& field, const Vec3& place) {
   const auto computeCell = [&](int axis) {
     return static_cast<int>((place[axis] - field.bmin[axis]) / field.cs);
