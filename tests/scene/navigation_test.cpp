@@ -105,24 +105,20 @@ TEST(Navigation, StairsAreClimbedAndALedgeIsNot) {
   EXPECT_NE(ledge.reason.find("no floor, step or stair"), std::string::npos) << ledge.reason;
 }
 
-/// Below the gallery the floor is even: a walk towards a place on it arrives, but a storey too low.
-TEST(Navigation, AGalleryWhoseStairIsTooNarrowIsNotReachedFromBelow) {
-  std::vector<NamedBox> boxes{{"floor", {0, -0.2, -3}, {12, 0, 3}},
-                              {"gallery", {7, 2.3, -3}, {12, 2.5, 3}},
-                              {"rail/left", {3.5, 0, 0.25}, {7, 4.5, 0.35}},
-                              {"rail/right", {3.5, 0, -0.35}, {7, 4.5, -0.25}}};
+/// The stair to the gallery is too narrow, and both of its ends too low to stand there. A straight
+/// walk to the goal arrives all the same, below the gallery.
+TEST(Navigation, AGalleryIsNotReachedByAWalkBelowIt) {
+  std::vector<NamedBox> boxes{
+      {"floor", {0, -0.2, -3}, {12, 0, 3}},      {"gallery", {7, 2.3, -3}, {12, 2.5, 3}},
+      {"wall/left", {4, 0, 0.2}, {7, 4.5, 0.3}}, {"wall/right", {4, 0, -0.3}, {7, 4.5, -0.2}},
+      {"canopy/low", {3, 1, -1}, {4, 1.2, 1}},   {"canopy/high", {7, 3.5, -1}, {8.2, 3.7, 1}}};
   for (int step = 0; step < 10; ++step)
-    boxes.push_back({"stair/" + std::to_string(step),
-                     {4 + 0.3 * step, 0, -0.25},
-                     {7, 0.25 * (step + 1), 0.25}});
+    boxes.push_back(
+        {"stair/" + std::to_string(step), {4 + 0.3 * step, 0, -0.2}, {7, 0.25 * (step + 1), 0.2}});
   Navigation navigation(boxScene(boxes), {}, {});
-  const NavigationPath path = navigation.findPath({1, 0.1, 0}, {10, 2.6, 0});
+  const NavigationPath path = navigation.findPath({1, 0.1, -2.5}, {10, 2.6, -2.5});
   EXPECT_FALSE(path.found()) << path.points.back().transpose();
   EXPECT_NE(path.reason, "");
-  NavigationAgent thin;
-  thin.radius = 0.2;
-  Navigation thinner(boxScene(boxes), {}, thin);
-  EXPECT_TRUE(thinner.findPath({1, 0.1, 0}, {10, 2.6, 0}).found());
 }
 
 /// A roof of two slopes of 27 degrees: its polygons span the ridge.
