@@ -365,12 +365,13 @@ std::vector<Frame> RayRenderer::renderOnce(std::span<const View> views) {
         frames[i] = traceThroughLens(s, views[i]);
         continue;
       }
-      pixels += countPixels(views[i].camera);
-      if (pixels > kMaxPixelsTogether && !together.empty()) traceTogether();
+      const std::size_t more = countPixels(views[i].camera);
+      if (pixels + more > kMaxPixelsTogether && !together.empty()) traceTogether();
       together.push_back(views[i]);
       indices.push_back(i);
+      pixels += more;
     }
-    traceTogether();
+    if (!together.empty()) traceTogether();
   }
   for (Frame& frame : frames) frame.renderer = s.name, frame.software = true;
   return frames;

@@ -117,7 +117,6 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
   for (std::size_t i = 0; i < kept.size(); ++i)
     list.islands[i].isRoof =
         isRoof(mesh, list.numberOf, kept[i], list.islands[i].area, bounds.min.y());
-  chooseDrawn(list.islands);
   return list;
 }
 

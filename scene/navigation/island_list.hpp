@@ -29,12 +29,14 @@ struct IslandList {
   std::vector<Island> islands;          ///< by number: the largest first
 };
 
-/// Leaves out islands on which no place to stand is found, as those in the inside of solids.
+/// Leaves out islands on which no place to stand is found, as those in the inside of solids. Which
+/// are drawn is decided by joinIslands().
 /// `bounds`: of the scene.
 IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb& bounds);
 
-/// Makes one of islands that are close to each other and joined. Portals of a mesh need
-/// some centimetres more than an agent, so a gap that it just passes separates them at first.
+/// Makes one of islands that are close to each other and joined, and decides which are drawn.
+/// Portals of a mesh need some centimetres more than an agent, so a gap that it just passes
+/// separates them at first.
 /// `isJoined(from, to)`: an agent walks from one side of a gap to the other.
 void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
                  const std::function<bool(const Vec3&, const Vec3&)>& isJoined);

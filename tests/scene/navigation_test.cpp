@@ -52,6 +52,13 @@ double measureLength(const std::vector<Vec3>& points) {
   return length;
 }
 
+/// 1 if the cell at a place, in metres, is walkable.
+int getCell(const NavigationMap& map, double x, double z) {
+  const auto column = static_cast<std::size_t>((x - map.corner.x()) / map.cell);
+  const auto row = static_cast<std::size_t>((z - map.corner.z()) / map.cell);
+  return map.cells[row * map.width + column];
+}
+
 TEST(Navigation, APathThroughANarrowDoorIsWalked) {
   const auto scene = boxScene(twoRooms(0.62));
   Navigation navigation(scene, {}, {});
@@ -147,14 +154,9 @@ TEST(Navigation, TheRidgeOfARoofHasTheHeightOfTheRoof) {
     highest = std::max(highest, corner.y());
   EXPECT_NEAR(highest, 5, 0.2);
   const NavigationMap map = navigation.drawMap(0.1, 4.7, 0.4);  // the ridge alone
-  const auto at = [&](double x, double z) {
-    const auto column = static_cast<std::size_t>((x - map.corner.x()) / map.cell);
-    const auto row = static_cast<std::size_t>((z - map.corner.z()) / map.cell);
-    return map.cells[row * map.width + column];
-  };
-  EXPECT_EQ(at(0.05, 0.45), 1);
-  EXPECT_EQ(at(0.05, 3.05), 0);
-  EXPECT_EQ(at(12.05, 0.05), 0);
+  EXPECT_EQ(getCell(map, 0.05, 0.45), 1);
+  EXPECT_EQ(getCell(map, 0.05, 3.05), 0);
+  EXPECT_EQ(getCell(map, 12.05, 0.05), 0);
 }
 
 TEST(Navigation, RefusesAStartInsideAWallAndAGoalInTheAir) {
@@ -271,14 +273,9 @@ TEST(Navigation, AMapShowsTheRoomsAndTheWallBetween) {
   Navigation navigation(boxScene(twoRooms(0.5)), {}, {});
   const NavigationMap map = navigation.drawMap(0.1, 0);
   ASSERT_EQ(map.cells.size(), std::size_t{map.width} * map.height);
-  const auto at = [&](double x, double z) {
-    const auto column = static_cast<std::size_t>((x - map.corner.x()) / map.cell);
-    const auto row = static_cast<std::size_t>((z - map.corner.z()) / map.cell);
-    return map.cells[row * map.width + column];
-  };
-  EXPECT_EQ(at(2.05, 0.05), 1);
-  EXPECT_EQ(at(6.05, 0.05), 1);
-  EXPECT_EQ(at(4.05, 0.05), 0);
+  EXPECT_EQ(getCell(map, 2.05, 0.05), 1);
+  EXPECT_EQ(getCell(map, 6.05, 0.05), 1);
+  EXPECT_EQ(getCell(map, 4.05, 0.05), 0);
   double area = 0;
   for (const double island : navigation.report().islandAreas) area += island;
   const auto walkable = std::count(map.cells.begin(), map.cells.end(), 1);

@@ -262,7 +262,7 @@ class Navigation:
                 for one in self._ask(islands=query)[0].islands]
 
     def top_down(self, height: float, cell: float = 0.05, tolerance: float = 0.5) -> Map:
-        """Returns a map of the floors within `tolerance` metres of a height; floors up to 5 cm higher may show."""
+        """Returns a map of the floors within `tolerance` metres of a height; floors up to 5 cm beyond may show."""
         query = messages.NavigationQuery.Map(cell=cell, height=height, tolerance=tolerance, format="FORMAT_BITS")
         reply, attachment = self._ask(map=query)
         rows = np.frombuffer(attachment, np.uint8).reshape(reply.map_height, -1)
