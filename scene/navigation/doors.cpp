@@ -128,6 +128,40 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
   return doors;
 }
 
+DoorSwing::DoorSwing(EntityIndex& index, const WorldSettings& settings, const Snapshot& snapshot,
+                     const NavigationAgent& agent, std::uint32_t body)
+    : index_(index),
+      spec_(index.scene().model().bodies[body]),
+      bodies_(std::make_shared<std::vector<BodySnapshot>>(*snapshot.bodies)),
+      prism_(makePrismShape(agent.radius, agent.height, agent.height, settings)),
+      door_((*bodies_)[body]),
+      from_(door_.jointPosition),
+      to_(findOpenLimit(spec_)),
+      distance_(computeDisplacementBound(*index.scene().bodyShape(body),
+                                         computeJointPose(spec_, from_),
+                                         computeJointPose(spec_, to_))) {
+  ENFILADE_ASSERT(door_.index == body);
+  moved_.bodies = bodies_;
+}
+
+double DoorSwing::measureDistance(const Vec3& feet, double jointPosition) {
+  door_.jointPosition = jointPosition;
+  door_.pose = computeBodyPose(spec_, computeJointPose(spec_, jointPosition));
+  const auto separation = computeSeparationFromShape(index_, moved_, prism_, feet, door_.id);
+  return separation ? separation->distance : 0;
+}
+
+/// Conservative advancement: the door opens by as much as it can without coming to the agent.
+bool DoorSwing::touches(const Vec3& feet) {
+  constexpr double kRoom = 0.01;  // metres
+  for (double share = 0;;) {
+    const double distance = measureDistance(feet, from_ + share * (to_ - from_));
+    if (distance <= kRoom) return true;
+    if (share >= 1 || !(distance_ > 0)) return false;
+    share = std::min(1.0, share + (distance - 0.5 * kRoom) / distance_);
+  }
+}
+
 bool isLastOnLine(const std::vector<DoorOnPath>& doors, std::size_t index) {
   return index + 1 == doors.size() || doors[index + 1].point != doors[index].point;
 }

@@ -1,6 +1,7 @@
 // Doors for navigation: the state in which all are open, and the closed ones on a path through it.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -35,6 +36,30 @@ struct DoorOnPath {
 std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings& settings,
                                         const Snapshot& snapshot, const NavigationAgent& agent,
                                         const std::vector<Vec3>& points);
+
+/// The space that a door sweeps over while it opens from where it is in a snapshot.
+class DoorSwing {
+ public:
+  /// `body`: index into Model::bodies. The index must outlive the swing.
+  DoorSwing(EntityIndex& index, const WorldSettings& settings, const Snapshot& snapshot,
+            const NavigationAgent& agent, std::uint32_t body);
+
+  /// Whether the door comes within 1 cm of an agent at `feet`.
+  bool touches(const Vec3& feet);
+  const BodySpec& spec() const { return spec_; }
+
+ private:
+  double measureDistance(const Vec3& feet, double jointPosition);
+
+  EntityIndex& index_;
+  const BodySpec& spec_;
+  std::shared_ptr<std::vector<BodySnapshot>> bodies_;
+  Snapshot moved_;  ///< has `bodies_`, with the door elsewhere
+  std::shared_ptr<const AvatarShape> prism_;
+  BodySnapshot& door_;        ///< of `bodies_`
+  double from_ = 0, to_ = 0;  ///< joint positions
+  double distance_ = 0;       ///< metres: at least what any of its points moves in between
+};
 
 /// False: the next door stands on the same line. Such doors, as the leaves of one, open together.
 bool isLastOnLine(const std::vector<DoorOnPath>& doors, std::size_t index);

@@ -58,15 +58,16 @@ bool walks(Walker& walker, const Vec3& from, const Vec3& to) {
          std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
 }
 
-}  // namespace
+/// The place that a search looks for.
+struct Target {
+  Aabb window;                                   ///< that the way may not leave
+  std::function<double(const Vec3&)> estimate;   ///< metres to the end, at most those of the way
+  std::function<bool(const Vec3&)> isReachedAt;  ///< the way ends there
+};
 
-std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
-                                              GridSearch& search) {
+std::optional<std::vector<Vec3>> findWay(Walker& walker, const Vec3& from, const Target& end,
+                                         GridSearch& search) {
   const Grid grid{from, search.spacing};
-  Aabb window;
-  window.include(from);
-  window.include(to);
-  window = inflated(window, search.margin);
   std::map<Cell, Place> places;
   using Entry = std::pair<double, Cell>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
@@ -81,16 +82,12 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
     here.done = true;
     const Vec3 feet = here.feet;
     const double cost = here.cost;
-    if (computeGroundDistance(feet, to) < 1.5 * search.spacing && walks(walker, feet, to)) {
-      std::vector<Vec3> path = collectPlaces(places, cell);
-      path.push_back(to);
-      return path;
-    }
+    if (end.isReachedAt(feet)) return collectPlaces(places, cell);
     for (const auto& [dx, dz] : kDirections) {
       const int x = cell.x + dx, z = cell.z + dz;
       const Vec3 target = grid.centre(x, z);
-      if (target.x() < window.min.x() || target.x() > window.max.x() ||
-          target.z() < window.min.z() || target.z() > window.max.z())
+      if (target.x() < end.window.min.x() || target.x() > end.window.max.x() ||
+          target.z() < end.window.min.z() || target.z() > end.window.max.z())
         continue;
       const double next = cost + computeGroundDistance(feet, target);
       const auto known = places.find({x, z, cell.storey});
@@ -106,10 +103,35 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
         if (at->second.done || at->second.cost <= next) continue;
         at->second = {reached, next, cell, false};
       }
-      open.push({next + (to - reached).norm(), to2});
+      open.push({next + end.estimate(reached), to2});
     }
   }
   return std::nullopt;
+}
+
+}  // namespace
+
+std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
+                                              GridSearch& search) {
+  Aabb window;
+  window.include(from);
+  window.include(to);
+  const Target end{
+      inflated(window, search.margin), [&](const Vec3& at) { return (to - at).norm(); },
+      [&](const Vec3& at) {
+        return computeGroundDistance(at, to) < 1.5 * search.spacing && walks(walker, at, to);
+      }};
+  auto way = findWay(walker, from, end, search);
+  if (way) way->push_back(to);
+  return way;
+}
+
+std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& from,
+                                                 const std::function<bool(const Vec3&)>& isWanted,
+                                                 GridSearch& search) {
+  const Target end{inflated(Aabb{from, from}, search.margin), [](const Vec3&) { return 0.0; },
+                   isWanted};
+  return findWay(walker, from, end, search);
 }
 
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind) {

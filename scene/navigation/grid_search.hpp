@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -21,6 +22,12 @@ struct GridSearch {
 /// found within the limits. Each leg was walked. Subtracts the walks from `search.maxWalks`.
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
                                               GridSearch& search);
+
+/// As findGridPath(), to the closest place that is wanted and at most `search.margin` metres away
+/// on each axis.
+std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& from,
+                                                 const std::function<bool(const Vec3&)>& isWanted,
+                                                 GridSearch& search);
 
 /// Lines between places of a path that are tried as shortcuts. A line that is stopped is walked
 /// tick by tick, which takes long: this pays after a search on a grid, and rarely at the corners of

@@ -260,6 +260,12 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
   return findLinkedPath(finder, *links_, *bodies_, from, to, std::move(path));
 }
 
+NavigationPath Navigation::findWayOut(const Vec3& from,
+                                      const std::function<bool(const Vec3&)>& isWanted) {
+  const std::lock_guard lock(mutex_);
+  return scene::findWayOut(*walker_, from, isWanted);
+}
+
 std::optional<NarrowPlace> Navigation::findNarrowest(const std::vector<Vec3>& points) {
   const std::lock_guard lock(mutex_);
   const NarrowPlace narrowest = measureNarrowest(world_.data(), agent_, points, Vec3::Zero(),

@@ -89,6 +89,8 @@ class Navigation {
   /// A path from where an agent at `from` stands to where it stands at `to`. Both may be up to a
   /// step above the floor. With jumps and lifts it is the quickest that is found.
   NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {});
+  /// As scene::findWayOut().
+  NavigationPath findWayOut(const Vec3& from, const std::function<bool(const Vec3&)>& isWanted);
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
   std::optional<NarrowPlace> findNarrowest(const std::vector<Vec3>& points);
   /// The standing place in a named place that is horizontally closest to its middle. `start`: a

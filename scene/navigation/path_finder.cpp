@@ -336,4 +336,21 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
   return findUnobstructedPath(finder, start, goal, proof);
 }
 
+NavigationPath findWayOut(Walker& walker, const Vec3& from,
+                          const std::function<bool(const Vec3&)>& isWanted) {
+  NavigationPath path;
+  if (const auto error = walker.place(from, kMaxStandDrop)) {
+    path.reason = "at the start " + *error;
+    return path;
+  }
+  GridSearch search{kCoarseSpacing, 2, 20'000};
+  const auto way = findGridPathOut(walker, walker.footPosition(), isWanted, search);
+  if (!way) return path;
+  path.points = shortenPath(walker, *way, Shortcuts::all);
+  path.length = computeLength(path.points);
+  path.seconds = path.length / walker.agent().speed;
+  path.legs.push_back({PathLeg::Kind::aside, 0, path.length, path.seconds});
+  return path;
+}
+
 }  // namespace enfilade::scene

@@ -20,7 +20,8 @@ struct Obstruction {
 
 /// A part of a path, up to the first point of the next one.
 struct PathLeg {
-  enum class Kind : std::uint8_t { walk, drop, lift };
+  /// aside: a walk to a place that no door sweeps over which opens after it.
+  enum class Kind : std::uint8_t { walk, drop, lift, aside };
   Kind kind = Kind::walk;
   std::size_t first = 0;         ///< index of its first point
   double length = 0;             ///< metres that the agent walks
@@ -54,5 +55,10 @@ struct PathFinder {
 
 /// A path from where an agent at `from` stands to where it stands at `to`.
 NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& to);
+
+/// A walk of PathLeg::Kind::aside to the closest place that is wanted, at most some 2 m away.
+/// The reason is given only if no agent can stand at `from`.
+NavigationPath findWayOut(Walker& walker, const Vec3& from,
+                          const std::function<bool(const Vec3&)>& isWanted);
 
 }  // namespace enfilade::scene

@@ -74,9 +74,12 @@ const char* toString(scene::PathLeg::Kind kind) {
       return "drop";
     case scene::PathLeg::Kind::lift:
       return "lift";
-    default:
+    case scene::PathLeg::Kind::aside:
+      return "aside";
+    case scene::PathLeg::Kind::walk:
       return "walk";
   }
+  return "";
 }
 
 Json makeLegs(const scene::NavigationPath& path, const scene::Scene& scene) {

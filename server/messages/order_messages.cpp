@@ -73,6 +73,7 @@ OrderOrError walkFromProto(const v1::Walk& message) {
   for (const v1::Vec3& point : message.along()) walk.waypoints.push_back(vectorFromProto(point));
   if (message.has_speed()) walk.speed = message.speed();
   walk.opens.assign(message.opens().begin(), message.opens().end());
+  walk.opensFrom = message.opens_from();
   for (const v1::Walk::Ride& ride : message.rides())
     walk.rides.push_back({ride.waypoint(), ride.lift(), ride.level()});
   return scene::Order(std::move(walk));

@@ -44,6 +44,8 @@ void addBodies(const v1::NavigationPath& path, int skipped, v1::Walk& walk) {
     ride.set_lift(leg.name());
     ride.set_level(level);
   };
+  if (path.legs_size() > 1 && path.legs(0).kind() == v1::NavigationLeg::KIND_ASIDE)
+    walk.set_opens_from(path.legs(1).first() + 1 - static_cast<std::uint32_t>(skipped));
   for (const v1::NavigationLeg& leg : path.legs()) {
     const int first = static_cast<int>(leg.first());
     // Also a door that a touch would open: its leaf may swing towards the walker.

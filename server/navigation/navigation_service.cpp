@@ -39,6 +39,7 @@ struct Answer {
   const scene::Snapshot& meshSnapshot;  ///< the poses of bodies that the meshes have
   /// The same with open doors; builds meshes at the first call. Only if there are doors.
   std::function<scene::Navigation&()> withOpenDoors;
+  std::function<scene::Navigation&()> asTheyAre;  ///< the same with doors as they are
   std::optional<scene::EntityIndex>& lazyIndex;
   const std::shared_ptr<const scene::Scene>& shared;
   const PathPlaces& places;  ///< of a path query
@@ -67,13 +68,10 @@ struct Answer {
   }
 
   PathAnswer paths() const {
-    return {scene,
-            navigation,
-            *state.snapshot,
-            state.settings,
-            doorsOpen,
-            withOpenDoors,
-            [this]() -> scene::EntityIndex& { return index(); }};
+    return {scene,           navigation,
+            *state.snapshot, state.settings,
+            doorsOpen,       withOpenDoors,
+            asTheyAre,       [this]() -> scene::EntityIndex& { return index(); }};
   }
 
   std::optional<v1::Error> operator()(const v1::NavigationQuery::Path& query) const {
@@ -311,11 +309,13 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   v1::NavigationReply reply;
   reply.set_tick(state.snapshot->tick);
   reply.set_time(state.snapshot->time);
+  const auto withDoors = [&](bool open) {
+    return [&, open]() -> scene::Navigation& { return *prepare(agent, open, state).navigation; };
+  };
   std::function<scene::Navigation&()> withOpenDoors;
-  if (scene::hasDoors(*scene_))
-    withOpenDoors = [&]() -> scene::Navigation& { return *prepare(agent, true, state).navigation; };
-  const Answer answer{*scene_,         navigation,    reply,  state,  doorsOpen,
-                      *entry.snapshot, withOpenDoors, index_, scene_, places};
+  if (scene::hasDoors(*scene_)) withOpenDoors = withDoors(true);
+  const Answer answer{*scene_,       navigation,       reply,  state,  doorsOpen, *entry.snapshot,
+                      withOpenDoors, withDoors(false), index_, scene_, places};
   std::optional<v1::Error> error;
   switch (query.query_case()) {
     case v1::NavigationQuery::kPath:

@@ -1,7 +1,9 @@
 #include "server/navigation/path_answer.hpp"
 
 #include <algorithm>
+#include <iterator>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "scene/navigation/doors.hpp"
@@ -11,6 +13,18 @@ namespace enfilade::server {
 namespace {
 
 using scene::Vec3;
+
+/// A path and another one from its end.
+scene::NavigationPath join(scene::NavigationPath path, const scene::NavigationPath& next) {
+  for (scene::PathLeg leg : next.legs) {
+    leg.first += path.points.size() - 1;
+    path.legs.push_back(leg);
+  }
+  path.points.insert(path.points.end(), next.points.begin() + 1, next.points.end());
+  path.length += next.length;
+  path.seconds += next.seconds;
+  return path;
+}
 
 struct PathWriter {
   const PathAnswer& answer;
@@ -48,6 +62,48 @@ struct PathWriter {
     leg.set_id(spec.objects.front() + 1);
     leg.set_name(spec.name);
     leg.set_by_touch(spec.openedBy == scene::OpenedBy::touch);
+  }
+
+  /// The doors on the path that touch an agent at `feet` when they open.
+  std::vector<scene::DoorSwing> findSwings(const std::vector<scene::DoorOnPath>& doors,
+                                           const Vec3& feet) const {
+    std::vector<scene::DoorSwing> swings;
+    for (const scene::DoorOnPath& door : doors) {
+      if (!door.isInTheWay) continue;
+      swings.emplace_back(answer.index(), answer.settings, answer.snapshot,
+                          answer.navigation.agent(), door.body);
+      if (!swings.back().touches(feet)) swings.pop_back();
+    }
+    return swings;
+  }
+
+  /// Lets a path that starts where doors on it sweep begin with a walk out of their way. If there
+  /// is none, or no path from its end, it becomes a path that is not found.
+  void stepAside(const Vec3& to, const scene::PathOptions& options, scene::NavigationPath& path,
+                 std::vector<scene::DoorOnPath>& doors) const {
+    constexpr int kMaxTries = 4;  // the place aside may be in the way of other doors
+    const Vec3 start = path.points.front();
+    std::vector<scene::DoorSwing> swings, more = findSwings(doors, start);
+    for (int tries = 0; !more.empty(); ++tries) {
+      std::ranges::move(more, std::back_inserter(swings));
+      const std::string reason = "the door '" + swings.back().spec().name +
+                                 "' opens over the start, and there is no room to step aside";
+      scene::NavigationPath aside = answer.asTheyAre().findWayOut(start, [&](const Vec3& feet) {
+        return std::ranges::none_of(swings, [&](auto& swing) { return swing.touches(feet); });
+      });
+      if (!aside.reason.empty()) return;  // an agent can be there only when the doors are open
+      path = aside.found() && tries < kMaxTries
+                 ? answer.navigation.findPath(aside.points.back(), to, options)
+                 : scene::NavigationPath();
+      if (!path.found()) {
+        path.reason = reason;
+        return;
+      }
+      const Vec3 end = aside.points.back();
+      path = join(std::move(aside), path);
+      doors = findDoors(answer.navigation, path.points);
+      more = findSwings(doors, end);
+    }
   }
 
   /// The parts of a walk before, at and after its doors.
@@ -91,6 +147,10 @@ struct PathWriter {
         case scene::PathLeg::Kind::walk:
           addWalk(path, leg, end, doors, message);
           break;
+        case scene::PathLeg::Kind::aside:
+          addLeg(v1::NavigationLeg::KIND_ASIDE, leg.first, leg.length, leg.seconds, std::nullopt,
+                 message);
+          break;
         case scene::PathLeg::Kind::drop:
           addLeg(v1::NavigationLeg::KIND_DROP, leg.first, leg.length, leg.seconds, std::nullopt,
                  message);
@@ -129,7 +189,12 @@ struct PathWriter {
 void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
                const scene::PathOptions& options, bool measuresWidth, v1::NavigationPath& message) {
   const PathWriter writer{answer};
-  const scene::NavigationPath path = answer.navigation.findPath(from, to, options);
+  scene::NavigationPath path = answer.navigation.findPath(from, to, options);
+  std::vector<scene::DoorOnPath> doors;
+  if (path.found() && answer.doorsOpen) {
+    doors = writer.findDoors(answer.navigation, path.points);
+    writer.stepAside(to, options, path, doors);
+  }
   message.set_found(path.found());
   for (const Vec3& point : path.points) *message.add_points() = toProto(point);
   message.set_length(path.length);
@@ -141,8 +206,6 @@ void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
     message.set_clear_width(path.obstruction->clearWidth);
   }
   if (!path.found()) return writer.explainByDoors(from, to, options, message);
-  const auto doors = answer.doorsOpen ? writer.findDoors(answer.navigation, path.points)
-                                      : std::vector<scene::DoorOnPath>();
   writer.addDoors(doors, message);
   writer.addLegs(path, doors, message);
   if (!measuresWidth) return;

@@ -20,7 +20,8 @@ struct PathAnswer {
   bool doorsOpen = false;  ///< of `navigation`
   /// The same with open doors; builds meshes at the first call. Only if there are doors.
   std::function<scene::Navigation&()> withOpenDoors;
-  std::function<scene::EntityIndex&()> index;  ///< built at the first call
+  std::function<scene::Navigation&()> asTheyAre;  ///< the same with doors as they are
+  std::function<scene::EntityIndex&()> index;     ///< built at the first call
 };
 
 /// The path from one place to another. `measuresWidth`: also its narrowest place.

@@ -449,6 +449,34 @@ class DoorsTest(unittest.TestCase):
             ann.leave()
             client.step(240)  # the door closes
 
+    def alley(self, **boxes):
+        """The leaf opens into an alley of 0.86 m before it, which is closed to the other side."""
+        return self.server(sidecar="""{"walk":1,"bodies":[{"name":"door","kind":"hinged","objects":["leaf"],
+            "anchor":[0,0,-0.48],"limits":[0,90],"speed":60}]}""", shelf=((0.96, 0, -0.6), (1.2, 2, 1.5)),
+                           end=((0.1, 0, -1), (1.2, 2, -0.6)), **boxes)
+
+    def test_go_steps_out_of_the_swing_of_a_door_before_it_opens(self):
+        client = self.alley()
+        client.subscribe(contacts=True)
+        ann = client.spawn("ann", at=(0.5, 0, 0.1))
+        path = client.navigation(doors="open").path((0.5, 0, 0.1), (-3, 0, 0))
+        self.assertEqual(path.legs[0].kind, "aside")
+        self.assertGreater(path.points[path.legs[1].first][2], 0.6)
+        self.assertAlmostEqual(sum(leg.length for leg in path.legs), path.length, places=9)
+        self.assertEqual(ann.go_and_wait((-3, 0, 0), doors="open"), "arrived")
+        self.assertNotIn("door", [one.b_name for one in client.contacts()])
+        ann.leave()
+        bob = client.spawn("bob", at=(-3, 0, 0))  # the door stands open now
+        self.assertEqual(client.navigation(doors="open").path((0.5, 0, 1), (-3, 0, 0)).legs[0].kind, "walk")
+        with self.assertRaisesRegex(enfilade.ServerError, "opens_from is 2; there are 1 way points"):
+            bob.walk((-2, 0, 0), opens=["door"], opens_from=2)
+
+    def test_a_door_that_opens_over_the_only_place_is_the_reason(self):
+        path = self.alley(wall=((0.1, 0, 0.55), (1.2, 2, 0.7))).navigation(doors="open").path(
+            (0.5, 0, 0.1), (-3, 0, 0))
+        self.assertFalse(path.found)
+        self.assertIn("door 'door' opens over the start", path.reason)
+
     def test_open_doors_leave_other_bodies_where_they_stand(self):
         client = self.server(',"closes_after":1},{"name":"crate","kind":"lift","objects":["crate"],"stops":[-3,0]',
                              crate=((0.5, 3.05, -0.45), (1.5, 4.5, 0.45)))

@@ -158,8 +158,9 @@ void commandWalkBodies(WorldData& world, const Walk& walk, Avatar& avatar) {
     if (ride.waypoint == avatar.walk.waypointIndex)
       if (const Body* lift = world.findBodyByName(ride.lift))
         prepareLift(world, walk, avatar, *lift, ride.level);
-  for (const std::string& name : walk.opens)
-    if (const Body* door = world.findBodyByName(name)) prepareDoor(world, walk, avatar, *door);
+  if (avatar.walk.waypointIndex >= walk.opensFrom)
+    for (const std::string& name : walk.opens)
+      if (const Body* door = world.findBodyByName(name)) prepareDoor(world, walk, avatar, *door);
   if (avatar.walk.waitsFor != before) avatar.walk.timeoutLeft = world.settings.stuckTimeout;
 }
 

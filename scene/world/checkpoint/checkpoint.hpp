@@ -16,7 +16,7 @@
 namespace enfilade::scene {
 
 /// Increases with every change of the layout.
-inline constexpr std::uint32_t kCheckpointVersion = 8;
+inline constexpr std::uint32_t kCheckpointVersion = 9;
 
 /// Reason why the bytes are not a valid checkpoint, with the place.
 struct CheckpointError : std::runtime_error {

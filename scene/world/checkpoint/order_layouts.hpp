@@ -33,8 +33,8 @@ void archiveMembers(A& a, MaybeConst<A, Ride>& ride) {
 }
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, Walk>& walk) {
-  auto& [waypoints, speed, opens, rides] = walk;
-  a(waypoints, speed, opens, rides);
+  auto& [waypoints, speed, opens, rides, opensFrom] = walk;
+  a(waypoints, speed, opens, rides, opensFrom);
 }
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, Look>& look) {

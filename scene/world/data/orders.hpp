@@ -62,6 +62,7 @@ struct Walk {
   double speed = 1.4;                   ///< metres per second, > 0
   std::vector<std::string> opens = {};  ///< BodySpec::name of doors
   std::vector<Ride> rides = {};         ///< ascending way points
+  std::size_t opensFrom = 0;            ///< way points to reach before it opens any door
 };
 /// Limits of a Walk order.
 inline constexpr std::size_t kMaxWalkDoors = 256, kMaxRides = 256;

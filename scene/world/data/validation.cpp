@@ -102,6 +102,9 @@ OptionalError validateOrder(const Walk& walk, const WorldSettings& settings) {
       return error;
   if (walk.opens.size() > kMaxWalkDoors)
     return "opens has more than " + std::to_string(kMaxWalkDoors) + " doors";
+  if (walk.opensFrom > walk.waypoints.size())
+    return "opens_from is " + std::to_string(walk.opensFrom) + "; there are " +
+           std::to_string(walk.waypoints.size()) + " way points";
   if (walk.rides.size() > kMaxRides)
     return "rides has more than " + std::to_string(kMaxRides) + " rides";
   for (std::size_t i = 0; i < walk.rides.size(); ++i) {

@@ -43,12 +43,15 @@ class Avatar:
                           "another call set the clock or drop its spawn?")
 
     def walk(self, *along: Point, speed: Optional[float] = None, opens: Sequence[str] = (),
-             rides: Sequence[Tuple[int, str, int]] = ()) -> int:
-        """Walks to each of the points in turn. Opens the doors `opens` when they are in its way. `rides`:
-        before point number WAYPOINT a LIFT must stand at a LEVEL; it is called."""
-        order = messages.Walk(along=[vec(point) for point in along], opens=opens, rides=[
-            messages.Walk.Ride(waypoint=whole(waypoint, "rides: the way point"), lift=lift,
-                               level=whole(level, "rides: the level")) for waypoint, lift, level in rides])
+             opens_from: int = 0, rides: Sequence[Tuple[int, str, int]] = ()) -> int:
+        """Walks to each of the points in turn. Opens the doors `opens` when they are in its way, after it has
+        reached `opens_from` points. `rides`: before point number WAYPOINT a LIFT must stand at a LEVEL; it
+        is called."""
+        order = messages.Walk(
+            along=[vec(point) for point in along], opens=opens, opens_from=whole(opens_from, "opens_from"),
+            rides=[messages.Walk.Ride(waypoint=whole(waypoint, "rides: the way point"), lift=lift,
+                                      level=whole(level, "rides: the level"))
+                   for waypoint, lift, level in rides])
         if speed is not None:
             order.speed = speed
         return self._client.command(self.name, walk=order)

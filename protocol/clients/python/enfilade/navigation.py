@@ -55,7 +55,7 @@ class Door:
 @dataclass(frozen=True)
 class Leg:
     """A part of a path, up to the first point of the next one."""
-    kind: str  # "walk", "door", "drop" or "lift"
+    kind: str  # "walk", "door", "drop", "lift", or "aside": out of the swing of doors, which open after it
     first: int  # index of its first point
     length: float  # metres walked
     seconds: float  # expected
