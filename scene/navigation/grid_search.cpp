@@ -134,6 +134,32 @@ std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& fro
   return findWay(walker, from, end, search);
 }
 
+void pullTight(Walker& walker, std::vector<Vec3>& places) {
+  constexpr int kMaxPasses = 4;
+  constexpr double kMinGain = 0.01;  // metres
+  bool isMoved = true;
+  for (int pass = 0; pass < kMaxPasses && isMoved; ++pass) {
+    isMoved = false;
+    for (std::size_t i = 1; i + 1 < places.size(); ++i) {
+      const Vec3 &before = places[i - 1], &after = places[i + 1], here = places[i];
+      const Vec3 line = projectToGround(after - before);
+      const double squaredLength = line.squaredNorm();
+      if (!(squaredLength > 0)) continue;
+      const double share = std::clamp(line.dot(here - before) / squaredLength, 0.0, 1.0);
+      const Vec3 aside = projectToGround(before + share * line - here);
+      for (double part = 1; part * aside.norm() > kMinGain; part *= 0.5) {
+        walker.returnTo(before);
+        if (walker.walkTo(here + part * aside).kind != WalkOutcome::Kind::arrived) continue;
+        const Vec3 reached = walker.footPosition();
+        if (!walks(walker, reached, after)) continue;
+        places[i] = reached;
+        isMoved = true;
+        break;
+      }
+    }
+  }
+}
+
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind) {
   const auto canWalk = [&](const Vec3& from, const Vec3& to) {
     if (kind == Shortcuts::all) return walks(walker, from, to);

@@ -34,6 +34,10 @@ std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& fro
 /// a shortest line.
 enum class Shortcuts : std::uint8_t { all, free };
 
+/// Moves the places between both ends towards the lines between their neighbours, as long as the
+/// legs can be walked.
+void pullTight(Walker& walker, std::vector<Vec3>& places);
+
 /// Leaves out places of a way as long as the legs between the others can be walked.
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind);
 

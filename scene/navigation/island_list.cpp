@@ -121,7 +121,7 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
 }
 
 void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
-                 const std::function<bool(const Vec3&, const Vec3&)>& isJoined) {
+                 const std::function<bool(const Vec3&, const Vec3&, double)>& isJoined) {
   std::vector<std::uint32_t> joinedTo(list.islands.size());  // a smaller number, or itself
   std::iota(joinedTo.begin(), joinedTo.end(), 0u);
   const auto findFirst = [&](std::uint32_t number) {
@@ -131,7 +131,7 @@ void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, dou
   for (std::uint32_t number = 1; number < joinedTo.size(); ++number) {
     for (const IslandNeighbour& near : findNeighbours(mesh, list, number, reach, heightReach)) {
       const std::uint32_t a = findFirst(number), b = findFirst(near.number);
-      if (a == b || !isJoined(near.from, near.to)) continue;
+      if (a == b || !isJoined(near.from, near.to, list.islands[number].area)) continue;
       joinedTo[std::max(a, b)] = std::min(a, b);
     }
   }
@@ -190,6 +190,38 @@ std::vector<IslandNeighbour> findNeighbours(const NavigationMesh& mesh, const Is
   for (const auto& [to, near] : found) neighbours.push_back(near);
   std::ranges::stable_sort(neighbours, {}, &IslandNeighbour::distance);
   return neighbours;
+}
+
+std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const IslandList& list,
+                                          Walker& walker, const Vec3& place) {
+  const double reach = 2 * walker.agent().radius;
+  constexpr double kOnMesh = 0.02;  // metres
+  struct Near {
+    double distance;
+    Vec3 point;
+    std::uint32_t number;
+  };
+  std::vector<Near> nearby;
+  for (const std::uint32_t polygon : mesh.findPolygons(place, {reach, kHeightError, reach})) {
+    const Vec3 point = mesh.closestPoint(polygon, place);
+    if (std::abs(point.y() - place.y()) <= kHeightError)
+      nearby.push_back({(point - place).norm(), point, list.numberOf[polygon]});
+  }
+  std::ranges::stable_sort(nearby, {}, &Near::distance);
+  const auto standing =
+      nearby.empty() || computeGroundDistance(nearby.front().point, place) <= kOnMesh
+          ? std::nullopt
+          : standAt(walker, place);
+  for (const Near& near : nearby) {
+    if (standing) {
+      walker.returnTo(*standing);
+      if (walker.walkTo(near.point).kind != WalkOutcome::Kind::arrived ||
+          std::abs(walker.footPosition().y() - near.point.y()) > kHeightError)
+        continue;
+    }
+    return near.number == kNoIsland ? std::nullopt : std::optional(near.number);
+  }
+  return std::nullopt;
 }
 
 }  // namespace enfilade::scene

@@ -12,6 +12,7 @@
 #include <utility>
 
 #include "scene/model/shapes/space_solid.hpp"
+#include "scene/navigation/grid_search.hpp"
 #include "scene/navigation/link_routes.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
 #include "scene/navigation/stand.hpp"
@@ -29,21 +30,6 @@ constexpr double kMaxGapDetour = 3;   // metres: a longer way around a gap does 
 void placeBody(const collision::Pose& pose, Body& own) {
   setBodyPose(own, pose.translation, pose.rotation);
   own.motionBounds = own.boxes.whole;
-}
-
-/// Points whose closest places may be in the named place: its middle on the floor, and for a room
-/// that may not fill its box the points of a grid in it.
-std::vector<Vec3> listAims(const NamedPlace& named, const Vec3& middle) {
-  constexpr int kLines = 8;
-  std::vector<Vec3> aims{middle};
-  if (named.space == nullptr) return aims;
-  const Vec3 step = named.box.size() / kLines;
-  for (int i = 0; i < kLines * kLines; ++i) {
-    const double x = named.box.min.x() + (i % kLines + 0.5) * step.x();
-    const double z = named.box.min.z() + (i / kLines + 0.5) * step.z();
-    if (isInSpace(*named.space, {x, named.middle.y(), z})) aims.emplace_back(x, middle.y(), z);
-  }
-  return aims;
 }
 
 /// Calls `work` with 0 to `count` - 1. Progress is reported by the calling thread.
@@ -139,6 +125,7 @@ void Navigation::assembleMeshes() {
   walker_.emplace(world_.data(), agent_);
   links_.reset();
   unobstructed_.reset();
+  refusals_.clear();
   ample_.emplace(grid_, ampleTiles_);
   scarce_.emplace(grid_, scarceTiles_);
   islands_ = collectIslands(*ample_, *walker_, world_.scene().bounds());
@@ -161,28 +148,36 @@ void Navigation::assembleMeshes() {
 
 void Navigation::joinIslands() {
   const std::vector<std::uint32_t> scarce = scarce_->findIslands();
-  scene::joinIslands(
-      *ample_, islands_, kWallAndDoor + 2 * agent_.radius, world_.settings().stepHeight,
-      [&](const Vec3& from, const Vec3& to) { return isGapPassable(from, to, scarce); });
+  scene::joinIslands(*ample_, islands_, kWallAndDoor + 2 * agent_.radius,
+                     world_.settings().stepHeight,
+                     [&](const Vec3& from, const Vec3& to, double area) {
+                       return isGapPassable(from, to, area, scarce);
+                     });
 }
 
-/// `scarce`: islands of the mesh with portals that may be too narrow.
-bool Navigation::isGapPassable(const Vec3& from, const Vec3& to,
+/// `area`: of the island of `from`. `scarce`: islands of the mesh with portals that may be too
+/// narrow. From a small island a search on a grid comes to an end soon.
+bool Navigation::isGapPassable(const Vec3& from, const Vec3& to, double area,
                                const std::vector<std::uint32_t>& scarce) {
   constexpr std::size_t kMaxRepairWalks = 2000;
+  constexpr double kSmallIsland = 2;  // square metres
   const Vec3 extent(agent_.radius, 0.5, agent_.radius);
   const auto a = scarce_->findNearest(from, extent), b = scarce_->findNearest(to, extent);
-  if (!a || !b || scarce[a->polygon] != scarce[b->polygon]) return false;
+  const bool isOneScarce = a && b && scarce[a->polygon] == scarce[b->polygon];
+  if (!isOneScarce && area > kSmallIsland) return false;
   const auto known =
       std::ranges::find_if(gaps_, [&](const Gap& gap) { return gap.from == from && gap.to == to; });
   if (known != gaps_.end()) return known->isPassable;
   const auto start = standNear(*walker_, from), goal = standNear(*walker_, to);
   bool isPassable = false;
-  if (start && goal) {
+  if (start && goal && isOneScarce) {
     const PathFinder finder{world_.data(), agent_,  *walker_,       *ample_,
                             *scarce_,      nullptr, kMaxRepairWalks};
     const NavigationPath path = scene::findPath(finder, *start, *goal);
     isPassable = path.found() && path.length <= (*goal - *start).norm() + kMaxGapDetour;
+  } else if (start && goal) {
+    GridSearch search{0.12, 1, kMaxRepairWalks};
+    isPassable = findGridPath(*walker_, *start, *goal, search).has_value();
   }
   gaps_.push_back({from, to, isPassable});
   return isPassable;
@@ -248,8 +243,11 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
     if (!unobstructed_) unobstructed_.emplace(buildUnobstructed(2));
     return *unobstructed_;
   };
-  const PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};
+  PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};
+  const auto first = islandAt(from), last = islandAt(to);
+  if (first && last && first != last) finder.refusals = &refusals_[{*first, *last}];
   NavigationPath path = scene::findPath(finder, from, to);
+  finder.refusals = nullptr;
   if (path.found()) {
     path.seconds = path.length / agent_.speed;
     path.legs.push_back({PathLeg::Kind::walk, 0, path.length, path.seconds});
@@ -422,21 +420,8 @@ std::vector<Vec3> Navigation::collectTriangles(const std::optional<std::uint32_t
   return triangles;
 }
 
-/// The mesh ends at a distance from the rim of a floor. A place there has the island of the mesh at
-/// its own height, never that of a floor below: as in snapTo(), the rim of a table without mesh has
-/// none.
-std::optional<std::uint32_t> Navigation::islandAt(const Vec3& place) const {
-  double least = std::numeric_limits<double>::infinity();
-  std::uint32_t number = kNoIsland;
-  for (const std::uint32_t polygon :
-       ample_->findPolygons(place, Vec3(2 * agent_.radius, kHeightError, 2 * agent_.radius))) {
-    const Vec3 closest = ample_->closestPoint(polygon, place);
-    const double distance = (closest - place).norm();
-    if (!(distance < least) || std::abs(closest.y() - place.y()) > kHeightError) continue;
-    least = distance;
-    number = islands_.numberOf[polygon];
-  }
-  return number == kNoIsland ? std::nullopt : std::optional(number);
+std::optional<std::uint32_t> Navigation::islandAt(const Vec3& place) {
+  return findIslandAt(*ample_, islands_, *walker_, place);
 }
 
 std::optional<std::uint32_t> Navigation::findIsland(const Vec3& place) {

@@ -2,13 +2,16 @@
 // the ways; each leg of a path is walked by the motion of avatars before it is returned.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <random>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "scene/navigation/clear_width.hpp"
@@ -125,9 +128,10 @@ class Navigation {
   void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
   void assembleMeshes();
   void joinIslands();
-  bool isGapPassable(const Vec3& from, const Vec3& to, const std::vector<std::uint32_t>& scarce);
+  bool isGapPassable(const Vec3& from, const Vec3& to, double area,
+                     const std::vector<std::uint32_t>& scarce);
   NavigationMesh buildUnobstructed(int threads) const;
-  std::optional<std::uint32_t> islandAt(const Vec3& place) const;
+  std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;
   /// As findPlaceIn(), on an island, or anywhere.
   std::optional<Vec3> findPlaceOn(const NamedPlace& named,
@@ -147,7 +151,8 @@ class Navigation {
     bool isPassable;
   };
   std::vector<Gap> gaps_;  ///< between islands, that were examined
-  PolygonSampler drawn_;   ///< of islands with Island::isDrawn
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Refusals> refusals_;  ///< by islands
+  PolygonSampler drawn_;  ///< of islands with Island::isDrawn
   NavigationReport report_;
 };
 

@@ -23,11 +23,16 @@ constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the ob
 // Failures at a portal, without a proved path through it meanwhile, after which it is not tried
 // again.
 constexpr int kRefutations = 4;
-constexpr int kMaxRepairs = 12;            // of a leg
+constexpr int kMaxRefusals = 3;  // searches for the reason; afterwards it is that of the last one
+constexpr int kMaxRepairs = 12;  // of a leg
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
 constexpr const char* kNotFound = "no way was found within the limits of the search";
+constexpr double kOnMesh = 0.05;      // metres from a polygon of the mesh
+constexpr double kMaxConnection = 3;  // metres between places that are connected without a mesh
+constexpr GridSearch kCoarseConnection{kCoarseSpacing, 1.5, 5000};
+constexpr GridSearch kFineConnection{kFineSpacing, 0.7, 20'000};
 constexpr double kSameFloor = 1;  // metres between the heights of a mesh and its floor
 
 double computeLength(const std::vector<Vec3>& points) {
@@ -205,6 +210,7 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
     if (proveLegs(finder, corners, clearance, path, proof)) {
       path.points = shortenPath(finder.walker, path.points,
                                 proof.isRepaired ? Shortcuts::all : Shortcuts::free);
+      if (proof.isRepaired) pullTight(finder.walker, path.points);
       path.length = computeLength(path.points);
       if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof)) {
         for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
@@ -294,11 +300,79 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
   path.reason = kNotFound;
   if (std::abs(places.back().y() - to.y()) > kHeightError) return path;
   std::vector<Vec3> points = shortenPath(finder.walker, places, Shortcuts::all);
+  pullTight(finder.walker, points);
   if (finder.walker.takeCrossedSteps() && !walksOn(finder.walker, points, proof)) {
     path.obstruction = proof.met.back();
     return path;
   }
   path.reason.clear();
+  path.length = computeLength(points);
+  path.points = std::move(points);
+  return path;
+}
+
+NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                Proof& proof) {
+  NavigationPath best = findPathOn(finder, finder.ample, Clearance::ample, start, goal, proof);
+  const Vec3 extent(finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
+                    finder.agent.radius);
+  const auto first = finder.scarce.findNearest(start, extent),
+             last = finder.scarce.findNearest(goal, extent);
+  const auto shortcut = first && last ? findCorridor(finder.scarce, *first, *last) : std::nullopt;
+  if (shortcut && (!best.found() ||
+                   computeLength(finder.scarce.straighten(*shortcut, first->point, last->point)) *
+                           kWorthTrying <
+                       best.length)) {
+    NavigationPath other = findPathOn(finder, finder.scarce, Clearance::scarce, start, goal, proof);
+    if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
+  }
+  return best;
+}
+
+/// Whether a mesh has a polygon at the height of a place, and about there.
+bool isOnMesh(const NavigationMesh& mesh, const Vec3& place) {
+  const auto nearest = mesh.findNearest(place, {kOnMesh, kHeightError, kOnMesh});
+  return nearest && std::abs(nearest->point.y() - place.y()) <= kHeightError;
+}
+
+/// Places without a mesh, as narrow ones on furniture, are connected with it by walks on a grid,
+/// and with one another if they are near.
+NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                 Proof& proof) {
+  Walker& walker = finder.walker;
+  const auto isOn = [&](const Vec3& place) { return isOnMesh(finder.ample, place); };
+  NavigationPath path;
+  if (isOn(start) && isOn(goal)) return path;
+  const auto search = [](const auto& find) {
+    std::optional<std::vector<Vec3>> way;
+    for (GridSearch grid : {kCoarseConnection, kFineConnection})
+      if (!way) way = find(grid);
+    return way;
+  };
+  const auto connect = [&](const Vec3& from, const Vec3& to) {
+    return search([&](GridSearch& grid) { return findGridPath(walker, from, to, grid); });
+  };
+  const auto leave = [&](const Vec3& place) {
+    if (isOn(place)) return std::optional(std::vector<Vec3>{place});
+    return search([&](GridSearch& grid) { return findGridPathOut(walker, place, isOn, grid); });
+  };
+  walker.takeCrossedSteps();
+  std::optional<std::vector<Vec3>> way;
+  if (computeGroundDistance(start, goal) < kMaxConnection) way = connect(start, goal);
+  if (!way) {
+    way = leave(start);
+    // A walk may lead down where none leads up: the way back from the mesh is walked, too.
+    const auto fromGoal = way ? leave(goal) : std::nullopt;
+    const auto last = fromGoal ? connect(fromGoal->back(), goal) : std::nullopt;
+    if (!last) return path;
+    const NavigationPath middle = findPathByMeshes(finder, way->back(), last->front(), proof);
+    if (!middle.found()) return path;
+    way->insert(way->end(), middle.points.begin() + 1, middle.points.end());
+    way->insert(way->end(), last->begin() + 1, last->end());
+  }
+  std::vector<Vec3> points = shortenPath(walker, *way, Shortcuts::all);
+  pullTight(walker, points);
+  if (walker.takeCrossedSteps() && !walksOn(walker, points, proof)) return path;
   path.length = computeLength(points);
   path.points = std::move(points);
   return path;
@@ -319,21 +393,14 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
   }
   const Vec3 goal = finder.walker.footPosition();
   Proof proof(finder.maxRepairWalks);
-  NavigationPath best = findPathOn(finder, finder.ample, Clearance::ample, start, goal, proof);
-  const Vec3 extent(finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
-                    finder.agent.radius);
-  const auto first = finder.scarce.findNearest(start, extent),
-             last = finder.scarce.findNearest(goal, extent);
-  const auto shortcut = first && last ? findCorridor(finder.scarce, *first, *last) : std::nullopt;
-  if (shortcut && (!best.found() ||
-                   computeLength(finder.scarce.straighten(*shortcut, first->point, last->point)) *
-                           kWorthTrying <
-                       best.length)) {
-    NavigationPath other = findPathOn(finder, finder.scarce, Clearance::scarce, start, goal, proof);
-    if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
-  }
+  NavigationPath best = findPathByMeshes(finder, start, goal, proof);
   if (best.found() || !finder.unobstructed) return best;
-  return findUnobstructedPath(finder, start, goal, proof);
+  Refusals* refusals = finder.refusals;
+  if (refusals && refusals->count >= kMaxRefusals) return refusals->last;
+  best = findPathOffMeshes(finder, start, goal, proof);
+  if (!best.found()) best = findUnobstructedPath(finder, start, goal, proof);
+  if (refusals && !best.found()) *refusals = {refusals->count + 1, best};
+  return best;
 }
 
 NavigationPath findWayOut(Walker& walker, const Vec3& from,

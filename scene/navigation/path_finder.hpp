@@ -41,6 +41,12 @@ struct NavigationPath {
   bool found() const { return !points.empty(); }
 };
 
+/// Searches between two islands that found nothing.
+struct Refusals {
+  int count = 0;
+  NavigationPath last = {};  ///< the reason
+};
+
 /// Inputs of a search. A search may close portals of the meshes.
 struct PathFinder {
   const WorldData& world;
@@ -51,6 +57,8 @@ struct PathFinder {
   /// The mesh of Clearance::none; built at the first call. Null: reasons are not sought.
   std::function<const NavigationMesh&()> unobstructed;
   std::size_t maxRepairWalks = 100'000;  ///< of a path: some tenths of a second
+  /// Of the islands of both ends; null: these are one, or not known.
+  Refusals* refusals = nullptr;
 };
 
 /// A path from where an agent at `from` stands to where it stands at `to`.

@@ -90,6 +90,19 @@ Aabb inflateAround(const Aabb& object, double reach) {
   return box;
 }
 
+std::vector<Vec3> listAims(const NamedPlace& named, const Vec3& middle) {
+  constexpr int kLines = 8;
+  std::vector<Vec3> aims{middle};
+  if (named.space == nullptr) return aims;
+  const Vec3 step = named.box.size() / kLines;
+  for (int i = 0; i < kLines * kLines; ++i) {
+    const double x = named.box.min.x() + (i % kLines + 0.5) * step.x();
+    const double z = named.box.min.z() + (i / kLines + 0.5) * step.z();
+    if (isInSpace(*named.space, {x, named.middle.y(), z})) aims.emplace_back(x, middle.y(), z);
+  }
+  return aims;
+}
+
 std::optional<NamedPlace> findNamedPlace(const Scene& scene, const std::string& name,
                                          double reach) {
   const auto after = [&](std::string_view prefix) -> std::optional<std::string_view> {

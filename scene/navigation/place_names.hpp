@@ -3,6 +3,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "scene/world/data/body.hpp"
 #include "scene/world/data/scene.hpp"
@@ -20,6 +21,10 @@ struct NamedPlace {
 
 /// The box of places next to an object: `reach` metres to the sides, and on floors below.
 Aabb inflateAround(const Aabb& object, double reach);
+
+/// Points whose closest places to stand may be in the named place: its middle on the floor, and for
+/// a room that may not fill its box the points of a grid in it.
+std::vector<Vec3> listAims(const NamedPlace& named, const Vec3& middle);
 
 /// `name`: a space's name, long name or GlobalId, a storey's, then an object's path or GlobalId,
 /// or a body's name; with the prefix "room:", "storey:", "object:" or "body:" only one of these.

@@ -123,11 +123,11 @@ void reportBoxWork(WorldData& world, TickReport& report) {
 }
 
 void reportQueries(const WorldData& world, QueryCount count, TickReport& report) {
-  AvatarWork& costliest = report.costliestAvatar;
+  report.avatarWork.reserve(world.avatars.size());
   for (const Avatar& avatar : world.avatars) {
     count.add(avatar.work);
-    if (avatar.work.narrow > costliest.narrowQueries)
-      costliest = {avatar.id, avatar.work.narrow, avatar.work.partsLookedAt, avatar.footPosition};
+    report.avatarWork.push_back(
+        {avatar.id, avatar.work.narrow, avatar.work.partsLookedAt, avatar.footPosition});
   }
   report.narrowQueries = count.narrow;
   report.rationalQueries = count.rational;

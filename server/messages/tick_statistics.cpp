@@ -13,6 +13,8 @@ namespace {
 constexpr double kBucketsPerOctave = 64;
 constexpr std::size_t kBucketCount = 64 * 46;  // 2^46 ns
 
+constexpr std::size_t kMaxAvatarWork = 1000;  // in a message
+
 std::size_t findBucket(double seconds) {
   const double nanoseconds = seconds * 1e9;
   if (!(nanoseconds > 1)) return 0;
@@ -24,8 +26,7 @@ double bucketMidpoint(std::size_t bucket) {
   return std::exp2((static_cast<double>(bucket) + 0.5) / kBucketsPerOctave) * 1e-9;
 }
 
-void fillCostliestAvatar(v1::CostliestAvatar& message, const scene::AvatarWork& work,
-                         std::uint64_t tick) {
+void fillAvatarWork(v1::AvatarWork& message, const scene::AvatarWork& work, std::uint64_t tick) {
   message.set_id(work.id);
   message.set_tick(tick);
   message.set_narrow_queries(work.narrowQueries);
@@ -91,10 +92,13 @@ void TickStatistics::addTick(const scene::TickReport& report) {
   verticesLookedAt_ += report.verticesLookedAt;
   partBoxesMade_ += report.partBoxesMade;
   partsLookedAt_ += report.partsLookedAt;
-  if (report.costliestAvatar.narrowQueries > costliestAvatar_.narrowQueries) {
-    costliestAvatar_ = report.costliestAvatar;
+  for (const scene::AvatarWork& work : report.avatarWork) {
+    if (work.narrowQueries <= costliestAvatar_.narrowQueries) continue;
+    costliestAvatar_ = work;
     costliestTick_ = report.snapshot->tick;
   }
+  avatarWork_ = report.avatarWork;
+  lastTick_ = report.snapshot->tick;
   pairs_ = report.pairs;
   activeContacts_ = report.activeContacts;
   avatars_ = static_cast<std::uint32_t>(report.snapshot->avatars.size());
@@ -123,7 +127,9 @@ v1::Metrics TickStatistics::makeMetrics() const {
   metrics.set_part_boxes_made(partBoxesMade_);
   metrics.set_parts_looked_at(partsLookedAt_);
   if (costliestAvatar_.id != 0)
-    fillCostliestAvatar(*metrics.mutable_costliest_avatar(), costliestAvatar_, costliestTick_);
+    fillAvatarWork(*metrics.mutable_costliest_avatar(), costliestAvatar_, costliestTick_);
+  for (std::size_t i = 0; i < std::min(avatarWork_.size(), kMaxAvatarWork); ++i)
+    fillAvatarWork(*metrics.add_avatar_work(), avatarWork_[i], lastTick_);
   metrics.set_avatars(avatars_);
   if (audit_.ticks > 0) fillAudit(*metrics.mutable_audit(), audit_, auditDurations_);
   return metrics;

@@ -40,8 +40,9 @@ class TickStatistics {
   DurationHistogram tickDurations_;
   std::uint64_t contacts_ = 0, narrowQueries_ = 0, rationalQueries_ = 0, crushedBodies_ = 0,
                 verticesLookedAt_ = 0, partBoxesMade_ = 0, partsLookedAt_ = 0;
-  scene::AvatarWork costliestAvatar_;
-  std::uint64_t costliestTick_ = 0;
+  scene::AvatarWork costliestAvatar_;          ///< the most narrow-phase queries in a tick
+  std::vector<scene::AvatarWork> avatarWork_;  ///< of the last tick
+  std::uint64_t costliestTick_ = 0, lastTick_ = 0;
   std::uint32_t pairs_ = 0, activeContacts_ = 0, avatars_ = 0;
   double worstPenetration_ = 0;  ///< metres
   AuditTotals audit_;

@@ -77,8 +77,8 @@ struct PathWriter {
     return swings;
   }
 
-  /// Lets a path that starts where doors on it sweep begin with a walk out of their way. If there
-  /// is none, or no path from its end, it becomes a path that is not found.
+  /// Lets a path that starts where doors on it sweep begin with a walk out of their way. Without
+  /// one, or without a path from its end, the path counts as not found.
   void stepAside(const Vec3& to, const scene::PathOptions& options, scene::NavigationPath& path,
                  std::vector<scene::DoorOnPath>& doors) const {
     constexpr int kMaxTries = 4;  // the place aside may be in the way of other doors

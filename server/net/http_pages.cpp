@@ -198,7 +198,7 @@ std::string makeMetricsPage(std::span<const WorldMetrics> worlds) {
       [](const M& m) { return m.vertices_looked_at(); });
   add("part_boxes_made_total", "counter", "Part boxes computed, of bodies with several parts.",
       [](const M& m) { return m.part_boxes_made(); });
-  add("parts_looked_at_total", "counter", "Parts of dense objects that avatars looked at.",
+  add("parts_looked_at_total", "counter", "Parts in reach of the queries of avatars.",
       [](const M& m) { return m.parts_looked_at(); });
   add("costliest_avatar_queries", "gauge", "Most narrow-phase queries of an avatar in a tick.",
       [](const M& m) { return m.costliest_avatar().narrow_queries(); });

@@ -276,6 +276,14 @@ std::string RunReport::writeSummary(const RunSummary& runSummary,
                {"frames", frames},
                {"walks", walks},
                {"outcomes", outcomesToJson(result)}};
+  if (metrics.has_costliest_avatar()) {
+    const v1::AvatarWork& work = metrics.costliest_avatar();
+    summary["costliest_avatar"] = {{"id", work.id()},
+                                   {"tick", work.tick()},
+                                   {"narrow_queries", work.narrow_queries()},
+                                   {"parts_looked_at", work.parts_looked_at()},
+                                   {"position", toJson(work.position())}};
+  }
   if (metrics.has_audit()) summary["audit"] = toJson(metrics.audit());
   const auto replace = Json::error_handler_t::replace;
   render::writeFileAtomically(folder_ / "summary.json",

@@ -12,13 +12,13 @@ from pathlib import Path
 
 from report import machine, read, short, table
 
-HEAD = ["scene", "triangles", "µs an avatar, median", "tick µs, 99 %", "tick µs, maximum",
+HEAD = ["scene", "objects", "triangles", "µs an avatar, median", "tick µs, 99 %", "tick µs, maximum",
         "narrow queries an avatar", "parts looked at an avatar", "contacts compared", "wrong",
         "penetration m"]
 
 
 def line(row):
-    return [row["scene"], f"{row['triangles']:,}", short(row["avatar_us"]), short(row["tick_p99_us"]),
+    return [row["scene"], f"{row['objects']:,}", f"{row['triangles']:,}", short(row["avatar_us"]), short(row["tick_p99_us"]),
             short(row["tick_max_us"]), short(row["queries"]), short(row["parts"]), row["contacts"],
             row["wrong"], short(row["penetration_m"])]
 
@@ -26,13 +26,13 @@ def line(row):
 def main():
     results, report = Path(sys.argv[1]), Path(sys.argv[2])
     rows = read(results, "dense")
-    scenes = "\n".join(dict.fromkeys(f"- *{row['scene']}*: {row['description']}" for row in rows))
+    scenes = "\n".join(dict.fromkeys(f"- *{row['scene']}*: {row['description']}" for row in rows if row["description"]))
     report.mkdir(parents=True, exist_ok=True)
     text = f"""# Walkers among dense triangles
 
 Made by `./dev bench dense{" --quick" if "--quick" in sys.argv else ""}` on \
 {datetime.date.today().isoformat()}: {machine()}.
-Ten avatars walk at 1.5 m/s for {rows[0]["ticks"]} ticks in scenes that the benchmark generates:
+Ten avatars walk at 1.5 m/s for {rows[0]["ticks"]} ticks in real scenes, and in those that the benchmark generates:
 
 {scenes}
 

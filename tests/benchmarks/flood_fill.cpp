@@ -28,7 +28,8 @@ constexpr double kLift = FloodFill::kLift;
 }  // namespace
 
 FloodFill::FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
-                     const std::vector<Vec3>& starts, std::size_t maxPlaces)
+                     const std::vector<Vec3>& starts, std::size_t maxPlaces,
+                     const std::optional<Vec3>& goal)
     : stepHeight_(world.settings.stepHeight) {
   const scene::Aabb bounds = world.scene->bounds();
   corner_ = bounds.min - Vec3(1, 0, 1);
@@ -50,7 +51,7 @@ FloodFill::FloodFill(const scene::WorldData& world, const scene::NavigationAgent
       continue;
     }
     places_.back().height = static_cast<float>(standing->y());
-    fill(walker, static_cast<std::int32_t>(places_.size()) - 1, maxPlaces);
+    fill(walker, static_cast<std::int32_t>(places_.size()) - 1, maxPlaces, goal);
     if (places_.size() >= maxPlaces) unfinished_ = component;
     ++component;
   }
@@ -129,7 +130,8 @@ std::optional<Vec3> FloodFill::stepTo(scene::Walker& walker, const Vec3& from, d
   return std::nullopt;
 }
 
-void FloodFill::fill(scene::Walker& walker, std::int32_t start, std::size_t maxPlaces) {
+void FloodFill::fill(scene::Walker& walker, std::int32_t start, std::size_t maxPlaces,
+                     const std::optional<Vec3>& goal) {
   std::queue<std::int32_t> open;
   open.push(start);
   const std::int32_t component = places_[static_cast<std::size_t>(start)].component;
@@ -143,8 +145,12 @@ void FloodFill::fill(scene::Walker& walker, std::int32_t start, std::size_t maxP
       if (computeColumn(x, z) < 0) continue;
       const std::int32_t next = column + dx + dz * width_;
       if (findPlace(next, from.y()) >= 0) continue;
-      if (const auto standing = stepTo(walker, from, x, z))
-        open.push(add(next, standing->y(), component));
+      const auto standing = stepTo(walker, from, x, z);
+      if (!standing) continue;
+      open.push(add(next, standing->y(), component));
+      if (goal && (*standing - *goal).squaredNorm() < kSpacing * kSpacing &&
+          findComponent(*goal).has_value())
+        return;
     }
   }
 }
@@ -205,11 +211,11 @@ bool FloodFill::isStraight(const Vec3& from, const Vec3& to) const {
   return true;
 }
 
-std::optional<double> FloodFill::measureShortest(const Vec3& from, const Vec3& to) const {
+std::vector<Vec3> FloodFill::findShortest(const Vec3& from, const Vec3& to) const {
   const std::int32_t start = findNearest(from), goal = findNearest(to);
-  if (start < 0 || goal < 0) return std::nullopt;
+  if (start < 0 || goal < 0) return {};
   const std::vector<std::int32_t> way = findWay(start, goal);
-  if (way.empty()) return std::nullopt;
+  if (way.empty()) return {};
   std::vector<Vec3> points{from};
   const std::size_t stride = std::max<std::size_t>(1, way.size() / 200);
   for (std::size_t i = stride; i + 1 < way.size(); i += stride)
@@ -217,13 +223,20 @@ std::optional<double> FloodFill::measureShortest(const Vec3& from, const Vec3& t
   points.push_back(to);
   // The shortest chain of points of which neighbours see each other.
   std::vector<double> best(points.size(), std::numeric_limits<double>::infinity());
+  std::vector<std::size_t> before(points.size(), 0);
   best[0] = 0;
   for (std::size_t j = 1; j < points.size(); ++j)
     for (std::size_t i = j; i-- > 0;) {
       const double length = best[i] + (points[j] - points[i]).norm();
-      if (length < best[j] && (i + 1 == j || isStraight(points[i], points[j]))) best[j] = length;
+      if (length >= best[j] || (i + 1 != j && !isStraight(points[i], points[j]))) continue;
+      best[j] = length;
+      before[j] = i;
     }
-  return best.back();
+  std::vector<Vec3> chain;
+  for (std::size_t at = points.size() - 1; at > 0; at = before[at]) chain.push_back(points[at]);
+  chain.push_back(from);
+  std::reverse(chain.begin(), chain.end());
+  return chain;
 }
 
 }  // namespace enfilade::benchmarks

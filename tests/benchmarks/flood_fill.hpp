@@ -17,9 +17,11 @@ class FloodFill {
   static constexpr double kLift = 2e-3;  ///< metres above a place: an avatar can be put down there
 
   /// Fills from each of `starts` that is not filled yet, until `maxPlaces` places are found. A
-  /// place that can be left but not reached again is in the component of its start.
+  /// place that can be left but not reached again is in the component of its start. Ends early when
+  /// it comes to `goal`.
   FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
-            const std::vector<scene::Vec3>& starts, std::size_t maxPlaces);
+            const std::vector<scene::Vec3>& starts, std::size_t maxPlaces,
+            const std::optional<scene::Vec3>& goal = std::nullopt);
 
   std::size_t size() const { return places_.size(); }
   scene::Vec3 at(std::size_t place) const {
@@ -33,9 +35,9 @@ class FloodFill {
   /// The connected places around a place to stand; nullopt: no place of the grid is within 3 cm.
   std::optional<Component> findComponent(const scene::Vec3& place) const;
 
-  /// Length of the shortest way on the grid, pulled straight where all places below the straight
-  /// line are filled, metres. nullopt: no way.
-  std::optional<double> measureShortest(const scene::Vec3& from, const scene::Vec3& to) const;
+  /// The shortest way on the grid, pulled straight where all places below the straight line are
+  /// filled. Empty: no way.
+  std::vector<scene::Vec3> findShortest(const scene::Vec3& from, const scene::Vec3& to) const;
 
  private:
   struct Place {
@@ -52,7 +54,8 @@ class FloodFill {
   std::int32_t add(std::int32_t column, double height, std::int32_t component);
   std::optional<scene::Vec3> stepTo(scene::Walker& walker, const scene::Vec3& from, double x,
                                     double z) const;
-  void fill(scene::Walker& walker, std::int32_t start, std::size_t maxPlaces);
+  void fill(scene::Walker& walker, std::int32_t start, std::size_t maxPlaces,
+            const std::optional<scene::Vec3>& goal);
   std::vector<std::int32_t> findWay(std::int32_t from, std::int32_t to) const;
   bool isStraight(const scene::Vec3& from, const scene::Vec3& to) const;
 

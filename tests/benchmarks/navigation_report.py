@@ -45,8 +45,7 @@ An agent of 0.3 m radius and 1.75 m height.
 An avatar enters at a random place and goes to another one with the order `go`, which opens doors and rides
 lifts; in every sixth pair it may fall by up to 2 m. Doors and lifts are as in the file again after 25 walks. A walk is
 *wrong* if it is blocked, leaves the scene or penetrates anything. Walks through doors
-are counted by themselves: a door may press an avatar that starts in its swing against a wall. *Refused*: a closed door stands at
-the start. *Silent*: no path and no reason.
+are counted by themselves, too. *Refused*: a closed door stands at the start. *Silent*: no path and no reason.
 
 {table(["scene", "pairs", "refused", "paths", "wrong", "silent", "penetration m", "with doors (wrong)",
         "with lifts", "with drops"], [make_walk_row(row) for row in rows])}
@@ -56,9 +55,9 @@ the start. *Silent*: no path and no reason.
 A flood fill tries every place of a grid of 2 cm by standing there (`flood_fill.hpp`): it uses no navigation
 mesh. A pair of places, drawn on all islands or anywhere in the fill, is *wrong* if a path is found and the fill
 does not connect it, or the other way round. *Near*: half a centimetre of radius decides. *Skipped*: an end is
-at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: a path is
-found between two islands, or none on one. Lengths are those of paths as a share of the
-shortest way in the fill, pulled straight.
+at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
+found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
+shortest way in the fill, pulled straight, where an avatar can walk that.
 
 {table(["scene", "places of the fill", "compared", "wrong", "near", "skipped", "islands", "lengths", "median share",
         "largest", "above 1.02"], [make_fill_row(row) for row in rows])}

@@ -130,7 +130,7 @@ TEST(DenseObjects, AWalkOnAFineFloorAsksAsLittleAsOnACoarseOne) {
     for (int i = 0; i < 120; ++i) {
       const TickReport report = run.step();
       queries += report.narrowQueries;
-      EXPECT_EQ(report.costliestAvatar.narrowQueries, report.narrowQueries);
+      EXPECT_EQ(report.avatarWork.at(0).narrowQueries, report.narrowQueries);
       EXPECT_GT(report.partsLookedAt, 0u);
     }
     EXPECT_GT(run.feet("ann").x(), 4.9);

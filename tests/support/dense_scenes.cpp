@@ -3,6 +3,7 @@
 #include "tests/support/dense_scenes.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
@@ -178,6 +179,60 @@ Model makeOffice(std::size_t triangles) {
   return builder.model;
 }
 
+/// An open thing of 60 triangles: a vase, a bowl, a folded sheet or a bent strip.
+Mesh makeThing(int kind, Random& random) {
+  const double size = random.uniform(0.03, 0.1), bend = random.uniform(0.2, 0.6);
+  Mesh mesh;
+  addSurface(mesh, 5, 6, [&](double u, double v) {
+    const double angle = v == 1 ? 0 : kTurn * v;
+    switch (kind % 4) {
+      case 0: {
+        const double radius = size * (0.5 + bend * std::sin(3 * u));
+        return Vec3(radius * std::cos(angle), 2 * size * u, radius * std::sin(angle));
+      }
+      case 1:
+        return Vec3(size * u * std::cos(angle), size * u * u, size * u * std::sin(angle));
+      case 2:
+        return Vec3(2 * size * (u - 0.5), size * (0.5 + bend * std::sin(9 * u)),
+                    2 * size * (v - 0.5));
+      default:
+        return Vec3(3 * size * (u - 0.5), 0.01 + bend * size * u * u, 0.3 * size * (v - 0.5));
+    }
+  });
+  return mesh;
+}
+
+/// A room of 10 x 11 m like the office of a simulator: racks of boards full of small objects, and
+/// some on the floor.
+Model makeShop(std::size_t triangles) {
+  Random random(11);
+  scene::testing::Builder builder;
+  addRoom(builder, 10, 11);
+  constexpr int kRacks = 4, kBoards = 5, kKinds = 24;
+  Model& model = builder.model;
+  for (int rack = 0; rack < kRacks; ++rack)
+    for (int board = 0; board < kBoards; ++board) {
+      const Vec3 at(1 + 2.4 * rack, 0.1 + 0.4 * board, 1);
+      builder.box("board " + std::to_string(rack) + "." + std::to_string(board), at,
+                  at + Vec3(0.5, 0.02, 9));
+    }
+  std::array<std::uint32_t, kKinds> kinds{};
+  for (int kind = 0; kind < kKinds; ++kind)
+    kinds[static_cast<std::size_t>(kind)] = addMesh(model, makeThing(kind, random));
+  const int count = std::max(1, static_cast<int>(triangles / 60));
+  for (int i = 0; i < count; ++i) {
+    const bool isOnFloor = i % 50 == 0;
+    const double board = std::floor(random.uniform(0, kBoards));
+    const Vec3 at =
+        isOnFloor ? Vec3(random.uniform(0.2, 9.8), 0.001, random.uniform(0.2, 10.8))
+                  : Vec3(1 + 2.4 * std::floor(random.uniform(0, kRacks)) + random.uniform(0, 0.5),
+                         0.121 + 0.4 * board, random.uniform(1, 10));
+    place(model, "thing " + std::to_string(i), kinds[static_cast<std::size_t>(i % kKinds)], at,
+          random.uniform(0, kTurn));
+  }
+  return builder.model;
+}
+
 /// A room of 12 x 12 m with pipes of all sizes along the walls, across the floor and overhead, each
 /// with an elbow.
 Model makePlantRoom(std::size_t triangles) {
@@ -271,6 +326,7 @@ const std::vector<DenseScene>& denseScenes() {
   static const std::vector<DenseScene> scenes{
       {"scan", "a scanned room of 10 m, one mesh with holes", makeScan},
       {"office", "an office of 10 x 11 m: 20 chairs, 12 plants, 40 cables", makeOffice},
+      {"shop", "a shop of 10 x 11 m: racks full of small objects of 60 triangles each", makeShop},
       {"plant_room", "a plant room of 12 m: 60 pipes with elbows", makePlantRoom},
       {"terrain", "a landscape of 60 m with 150 boulders", makeTerrain}};
   return scenes;

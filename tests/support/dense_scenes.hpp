@@ -16,7 +16,7 @@ struct DenseScene {
   scene::Model (*make)(std::size_t triangles);
 };
 
-/// scan, office, plant_room and terrain.
+/// scan, office, shop, plant_room and terrain.
 const std::vector<DenseScene>& denseScenes();
 
 /// Null if no scene has this name.

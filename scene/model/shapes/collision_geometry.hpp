@@ -47,9 +47,8 @@ struct CollisionGeometry {
   std::size_t bytes() const;
 };
 
-/// An object of more parts is dense: no query lists its parts, and they are built before avatars
-/// come near.
-inline constexpr std::uint32_t kMaxListedParts = 64;
+/// An object of more parts is dense: no query lists its parts.
+inline constexpr std::uint32_t kMaxListedParts = 32;
 
 /// Calls visit(part) for each part such that open(box) is true for all branches above it. `box` is
 /// of a branch, scene frame, and contains all its parts. A branch is opened after everything before

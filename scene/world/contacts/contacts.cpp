@@ -133,9 +133,11 @@ std::vector<Contact> findNearby(Avatar& avatar, const ContactDistances& distance
       inflated(placeBox(avatar.shape->box, avatar.footPosition), distances.reportLimit);
   for (Obstacle& obstacle : avatar.obstacles.list) {
     if (!overlaps(box, obstacle.box)) continue;
-    for (std::size_t i = 0; i < searches.size(); ++i)
-      if (overlaps(searches[i].box, obstacle.box))
-        searches[i].addObstacle(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
+    for (std::size_t i = 0; i < searches.size(); ++i) {
+      if (!overlaps(searches[i].box, obstacle.box)) continue;
+      ++count.partsLookedAt;
+      searches[i].addObstacle(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
+    }
   }
   for (const DenseObject& object : avatar.obstacles.dense)
     findCloseDense(avatar, object, distances, found, count);

@@ -184,6 +184,7 @@ ShapeCastHit castAvatarShape(const AvatarShape& shape, const Vec3& footPosition,
     PartCast cast(shape.parts[i], footPosition, displacement, contactOffset, rest, hit, count);
     for (Obstacle& obstacle : obstacles.list) {
       if (!cast.reaches(obstacle.box)) continue;
+      ++count.partsLookedAt;
       cast.castAgainst(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
       if (hit.fraction == 0) return hit;
     }
@@ -211,8 +212,9 @@ bool isClear(const AvatarShape& shape, const Vec3& footPosition, double clearanc
       clear = false;
     };
     for (Obstacle& obstacle : obstacles.list) {
-      if (overlaps(box, obstacle.box))
-        query(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
+      if (!overlaps(box, obstacle.box)) continue;
+      ++count.partsLookedAt;
+      query(obstacle.entity, obstacle.convex, obstacle.cacheFor(i));
       if (!clear) return false;
     }
     for (const DenseObject& object : obstacles.dense) {

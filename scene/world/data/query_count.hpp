@@ -12,7 +12,7 @@ struct QueryCount {
   std::uint32_t narrow = 0;
   std::uint32_t rational = 0;
   std::uint32_t bounded = 0;        ///< casts that stopped at their iteration limit
-  std::uint32_t partsLookedAt = 0;  ///< triangles and hulls of dense objects
+  std::uint32_t partsLookedAt = 0;  ///< triangles and hulls in reach of queries
 
   void add(const collision::MotionResult& cast) {
     narrow += cast.queries;

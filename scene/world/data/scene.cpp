@@ -91,6 +91,8 @@ class Scene::Prefetcher {
 
 namespace {
 
+constexpr std::size_t kManyTriangles = 64;
+
 std::uint64_t hashMesh(const Mesh& mesh) {
   Hasher hash;
   hash.add(std::uint64_t{mesh.positions.size()});
@@ -206,12 +208,13 @@ void requireValidIndices(const Model& model) {
   }
 }
 
-/// True if the object has so many triangles that its collision geometry may be dense.
-bool mayBeDense(const Model& model, std::uint32_t object) {
+/// True if the object has so many triangles that its collision geometry is built before avatars
+/// come near.
+bool hasManyTriangles(const Model& model, std::uint32_t object) {
   std::size_t triangles = 0;
   for (const std::uint32_t mesh : model.objects[object].meshes)
     triangles += model.meshes[mesh].indices.size() / 3;
-  return triangles > kMaxListedParts;
+  return triangles > kManyTriangles;
 }
 
 }  // namespace
@@ -232,7 +235,7 @@ Scene::Scene(Model model) : model_(std::move(model)) {
   shapes_ = std::make_unique<LazyArray<Shape>>(meshesOfShape_.size());
   collisionGeometries_ = std::make_unique<LazyArray<CollisionGeometry>>(model_.objects.size());
   for (std::uint32_t i = 0; i < solidObjects_.size(); ++i)
-    if (mayBeDense(model_, solidObjects_[i])) denseIndices_.push_back(i);
+    if (hasManyTriangles(model_, solidObjects_[i])) denseIndices_.push_back(i);
   prefetcher_ = std::make_unique<Prefetcher>(*this);
 }
 

@@ -35,7 +35,7 @@ struct TickAudit {
 
 /// The work of one avatar in a tick.
 struct AvatarWork {
-  EntityId id = 0;  ///< 0: no avatar made a query
+  EntityId id = 0;
   std::uint32_t narrowQueries = 0;
   std::uint32_t partsLookedAt = 0;
   Vec3 footPosition = Vec3::Zero();  ///< after the tick
@@ -111,8 +111,8 @@ struct TickReport {
   std::uint32_t iterationLimitedCasts = 0;  ///< shape casts stopped at their iteration limit
   std::uint64_t verticesLookedAt = 0;       ///< for the boxes of moving bodies and chain links
   std::uint64_t partBoxesMade = 0;          ///< of bodies with several parts
-  std::uint64_t partsLookedAt = 0;          ///< of dense objects, by avatars
-  AvatarWork costliestAvatar;               ///< the one with the most narrow-phase queries
+  std::uint64_t partsLookedAt = 0;          ///< triangles and hulls in reach of avatars' queries
+  std::vector<AvatarWork> avatarWork;       ///< of all avatars, ascending ids
   std::uint32_t activeContacts = 0;
   std::uint32_t crushedBodies = 0;  ///< penetrating pairs of a kinematic and a rigid body
   /// Maximum depth of avatars and rigid bodies, metres, by the exact verdict; 0: no penetration.
