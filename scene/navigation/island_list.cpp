@@ -18,6 +18,7 @@ namespace {
 constexpr std::size_t kMaxCentres = 8;        // polygons of an island whose centre is tried
 constexpr int kMaxTrials = 64;                // further places of an island that are tried
 constexpr double kMinDrawnArea = 1;           // square metres
+constexpr double kMaxSmallArea = 1;           // square metres: its exits are searched on a grid
 constexpr double kBelowRoof = 1;              // metres: a floor below is lower by more
 constexpr double kBesideFloor = 1;            // metres: walls and furniture interrupt floors below
 constexpr std::size_t kMaxSearchFrom = 2000;  // polygons of an island whose neighbours are sought
@@ -121,7 +122,8 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
 }
 
 void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
-                 const std::function<bool(const Vec3&, const Vec3&, double)>& isJoined) {
+                 const std::function<bool(const Vec3&, const Vec3&)>& isJoined,
+                 const std::function<std::optional<std::uint32_t>(std::uint32_t)>& findExit) {
   std::vector<std::uint32_t> joinedTo(list.islands.size());  // a smaller number, or itself
   std::iota(joinedTo.begin(), joinedTo.end(), 0u);
   const auto findFirst = [&](std::uint32_t number) {
@@ -131,7 +133,12 @@ void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, dou
   for (std::uint32_t number = 1; number < joinedTo.size(); ++number) {
     for (const IslandNeighbour& near : findNeighbours(mesh, list, number, reach, heightReach)) {
       const std::uint32_t a = findFirst(number), b = findFirst(near.number);
-      if (a == b || !isJoined(near.from, near.to, list.islands[number].area)) continue;
+      if (a == b || !isJoined(near.from, near.to)) continue;
+      joinedTo[std::max(a, b)] = std::min(a, b);
+    }
+    if (joinedTo[number] != number || list.islands[number].area > kMaxSmallArea) continue;
+    if (const auto other = findExit(number)) {
+      const std::uint32_t a = findFirst(number), b = findFirst(*other);
       joinedTo[std::max(a, b)] = std::min(a, b);
     }
   }

@@ -37,9 +37,11 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
 /// Makes one of islands that are close to each other and joined, and decides which are drawn.
 /// Portals of a mesh need some centimetres more than an agent, so a gap that it just passes
 /// separates them at first.
-/// `isJoined(from, to, area)`: an agent walks over a gap from an island of `area` square metres.
+/// `isJoined(from, to)`: an agent walks from one side of a gap to the other. `findExit(number)`: an
+/// island to which an agent walks from a small one, and back.
 void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
-                 const std::function<bool(const Vec3&, const Vec3&, double)>& isJoined);
+                 const std::function<bool(const Vec3&, const Vec3&)>& isJoined,
+                 const std::function<std::optional<std::uint32_t>(std::uint32_t)>& findExit);
 
 /// The number of the island on which an agent stands; nullopt: on none. The mesh ends at a distance
 /// from the rim of a floor: a place there has the island of the closest mesh to which it can walk.

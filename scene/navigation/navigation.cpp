@@ -24,7 +24,7 @@ namespace {
 constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile beyond the radius
 constexpr int kMaxRandomTries = 200;
 constexpr double kWallAndDoor = 1.5;  // metres between floors on both sides of a thick wall
-constexpr double kMaxGapDetour = 3;   // metres: a longer way around a gap does not pass it
+constexpr double kMaxGapDetour = 6;   // metres: a longer way around a gap does not pass it
 
 /// Puts a body where it rests.
 void placeBody(const collision::Pose& pose, Body& own) {
@@ -148,39 +148,50 @@ void Navigation::assembleMeshes() {
 
 void Navigation::joinIslands() {
   const std::vector<std::uint32_t> scarce = scarce_->findIslands();
-  scene::joinIslands(*ample_, islands_, kWallAndDoor + 2 * agent_.radius,
-                     world_.settings().stepHeight,
-                     [&](const Vec3& from, const Vec3& to, double area) {
-                       return isGapPassable(from, to, area, scarce);
-                     });
+  scene::joinIslands(
+      *ample_, islands_, kWallAndDoor + 2 * agent_.radius, world_.settings().stepHeight,
+      [&](const Vec3& from, const Vec3& to) { return isGapPassable(from, to, scarce); },
+      [&](std::uint32_t number) { return findExit(number); });
 }
 
-/// `area`: of the island of `from`. `scarce`: islands of the mesh with portals that may be too
-/// narrow. From a small island a search on a grid comes to an end soon.
-bool Navigation::isGapPassable(const Vec3& from, const Vec3& to, double area,
+/// `scarce`: islands of the mesh with portals that may be too narrow.
+bool Navigation::isGapPassable(const Vec3& from, const Vec3& to,
                                const std::vector<std::uint32_t>& scarce) {
   constexpr std::size_t kMaxRepairWalks = 2000;
-  constexpr double kSmallIsland = 2;  // square metres
   const Vec3 extent(agent_.radius, 0.5, agent_.radius);
   const auto a = scarce_->findNearest(from, extent), b = scarce_->findNearest(to, extent);
-  const bool isOneScarce = a && b && scarce[a->polygon] == scarce[b->polygon];
-  if (!isOneScarce && area > kSmallIsland) return false;
+  if (!a || !b || scarce[a->polygon] != scarce[b->polygon]) return false;
   const auto known =
       std::ranges::find_if(gaps_, [&](const Gap& gap) { return gap.from == from && gap.to == to; });
   if (known != gaps_.end()) return known->isPassable;
   const auto start = standNear(*walker_, from), goal = standNear(*walker_, to);
   bool isPassable = false;
-  if (start && goal && isOneScarce) {
+  if (start && goal) {
     const PathFinder finder{world_.data(), agent_,  *walker_,       *ample_,
                             *scarce_,      nullptr, kMaxRepairWalks};
     const NavigationPath path = scene::findPath(finder, *start, *goal);
     isPassable = path.found() && path.length <= (*goal - *start).norm() + kMaxGapDetour;
-  } else if (start && goal) {
-    GridSearch search{0.12, 1, kMaxRepairWalks};
-    isPassable = findGridPath(*walker_, *start, *goal, search).has_value();
   }
   gaps_.push_back({from, to, isPassable});
   return isPassable;
+}
+
+/// Searches on a grid from a small island, where this comes to an end soon, for a way to another
+/// one and back.
+std::optional<std::uint32_t> Navigation::findExit(std::uint32_t number) {
+  constexpr double kOnMesh = 0.05;  // metres
+  const Vec3& place = islands_.islands[number].place;
+  const auto numberAt = [&](const Vec3& feet) {
+    const auto nearest = ample_->findNearest(feet, {kOnMesh, kHeightError, kOnMesh});
+    return nearest ? islands_.numberOf[nearest->polygon] : kNoIsland;
+  };
+  GridSearch out{0.12, kMaxGapDetour, 300}, back = out;
+  const auto way = findGridPathOut(
+      *walker_, place,
+      [&](const Vec3& feet) { return numberAt(feet) != number && numberAt(feet) != kNoIsland; },
+      out);
+  if (!way || !findGridPath(*walker_, way->back(), place, back)) return std::nullopt;
+  return numberAt(way->back());
 }
 
 std::size_t Navigation::update(const Snapshot& snapshot, int threads) {

@@ -128,8 +128,8 @@ class Navigation {
   void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
   void assembleMeshes();
   void joinIslands();
-  bool isGapPassable(const Vec3& from, const Vec3& to, double area,
-                     const std::vector<std::uint32_t>& scarce);
+  bool isGapPassable(const Vec3& from, const Vec3& to, const std::vector<std::uint32_t>& scarce);
+  std::optional<std::uint32_t> findExit(std::uint32_t island);
   NavigationMesh buildUnobstructed(int threads) const;
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;
