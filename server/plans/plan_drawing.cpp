@@ -120,7 +120,7 @@ void drawBody(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
   if (body.kind == scene::BodyKind::lift) return drawLiftCross(canvas, view, scene, body);
   const ObjectSection section = cutBody(scene, body, view.floor + kPlanCutHeight);
   if (section.empty() || isTrigger(body.kind)) return;
-  const bool isDoor = body.kind == scene::BodyKind::hinged || body.kind == scene::BodyKind::sliding;
+  const bool isDoor = getTraits(body.kind).isDoor;
   canvas.fill(toPage(view, section.loops), isDoor ? kDoor : kFurniture);
   strokeSection(canvas, view, section, view.unit, isDoor ? kDoor : kOutline);
   if (body.kind == scene::BodyKind::hinged && std::abs(body.axis.y()) > 0.9)
