@@ -208,9 +208,14 @@ Model importByFormat(const ImportRequest& request) {
     case ModelFormat::ply:
     case ModelFormat::stl:
       return importScan(request.file, format, request.options, sendProgress);
-    default:
-      return importByAssimp(request);
+    case ModelFormat::gltf:
+    case ModelFormat::glb:
+    case ModelFormat::obj:
+    case ModelFormat::collada:
+    case ModelFormat::fbx:
+      break;
   }
+  return importByAssimp(request);
 }
 
 void sendModel(const Model& model) {
