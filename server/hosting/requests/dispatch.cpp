@@ -24,9 +24,29 @@ void handleBye(const RequestContext& context) {
   context.client.out->finish(encodeShared(message));
 }
 
+/// The lowest role that may send this navigation request.
+Role requiredRole(v1::NavigationQuery::QueryCase query) {
+  switch (query) {  // no `default`, as below
+    case v1::NavigationQuery::kPath:
+    case v1::NavigationQuery::kRandom:
+    case v1::NavigationQuery::kSnap:
+    case v1::NavigationQuery::kSteps:
+    case v1::NavigationQuery::kClearance:
+    case v1::NavigationQuery::kMap:
+    case v1::NavigationQuery::kIslands:
+    case v1::NavigationQuery::kMesh:
+    case v1::NavigationQuery::kSaveMesh:
+    case v1::NavigationQuery::QUERY_NOT_SET:
+      return Role::observe;
+    case v1::NavigationQuery::kLoadMesh:
+      return Role::drive;
+  }
+  return Role::admin;
+}
+
 /// The lowest role that may send this request.
-Role requiredRole(v1::ClientMessage::BodyCase body) {
-  switch (body) {  // no `default`: the compiler rejects a request without a role
+Role requiredRole(const v1::ClientMessage& message) {
+  switch (message.body_case()) {  // no `default`: the compiler rejects a request without a role
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::kSubscribe:
     case v1::ClientMessage::kFrame:
@@ -35,7 +55,6 @@ Role requiredRole(v1::ClientMessage::BodyCase body) {
     case v1::ClientMessage::kDistances:
     case v1::ClientMessage::kTouching:
     case v1::ClientMessage::kCannotTouch:
-    case v1::ClientMessage::kNavigation:
     case v1::ClientMessage::kDescribe:
     case v1::ClientMessage::kMetrics:
     case v1::ClientMessage::kListWorlds:
@@ -45,6 +64,8 @@ Role requiredRole(v1::ClientMessage::BodyCase body) {
     case v1::ClientMessage::kBye:
     case v1::ClientMessage::BODY_NOT_SET:
       return Role::observe;
+    case v1::ClientMessage::kNavigation:
+      return requiredRole(message.navigation().query_case());
     case v1::ClientMessage::kCommand:
     case v1::ClientMessage::kBodyCommand:
     case v1::ClientMessage::kStep:
@@ -76,8 +97,7 @@ void refuseUnknownEnum(const RequestContext& context, const std::string& unknown
 
 void dispatchRequest(const RequestContext& context) {
   const v1::ClientMessage& message = context.message;
-  const Role required =
-      message.navigation().has_load_mesh() ? Role::drive : requiredRole(message.body_case());
+  const Role required = requiredRole(message);
   if (context.client.role < required) {
     return replyError(context, v1::ERROR_NOT_ALLOWED,
                       std::string("this needs a token with the role ") + toString(required) +
