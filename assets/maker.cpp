@@ -21,6 +21,8 @@ MakerArguments parseArguments(std::span<const char* const> texts) {
   if (texts.empty() || texts.size() > 3) throw std::invalid_argument("1 to 3 arguments wanted");
   MakerArguments arguments;
   arguments.file = texts[0];
+  if (arguments.file.starts_with('-'))
+    throw std::invalid_argument("unknown option '" + arguments.file + "'");
   if (texts.size() > 1) arguments.number = parseNumber(texts[1]);
   if (texts.size() > 2) arguments.seed = parseNumber(texts[2]);
   return arguments;
@@ -31,6 +33,10 @@ MakerArguments parseArguments(std::span<const char* const> texts) {
 int runMaker(int argc, const char* const* argv, const char* usage,
              const std::function<void(const MakerArguments&)>& make) {
   const std::span<const char* const> texts(argv + 1, static_cast<std::size_t>(argc - 1));
+  if (texts.size() == 1 && texts[0] == std::string_view("--help")) {
+    std::printf("%s\n", usage);
+    return 0;
+  }
   try {
     make(parseArguments(texts));
     return 0;

@@ -14,9 +14,9 @@ struct MakerArguments {
   std::optional<std::uint64_t> seed;
 };
 
-/// Parses `OUT [NUMBER [SEED]]` and calls `make`. Returns the exit code: 0; 1 if `make` throws; 2,
-/// with `usage` on stderr, if an argument is invalid, also where `make` throws
-/// std::invalid_argument.
+/// Parses `OUT [NUMBER [SEED]]` and calls `make`; `--help` alone prints `usage`. Returns the exit
+/// code: 0; 1 if `make` throws; 2, with `usage` on stderr, if an argument is invalid, also where
+/// `make` throws std::invalid_argument.
 int runMaker(int argc, const char* const* argv, const char* usage,
              const std::function<void(const MakerArguments&)>& make);
 

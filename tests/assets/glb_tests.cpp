@@ -54,6 +54,9 @@ TEST(Maker, ParsesFileNumberAndSeed) {
   for (const std::vector<const char*>& bad : std::vector<std::vector<const char*>>{
            {}, {"a", "many"}, {"a", "-1"}, {"a", "1.5"}, {"a", "1", ""}, {"a", "1", "2", "3"}})
     EXPECT_EQ(runMakerWith(bad, made), 2) << ::testing::PrintToString(bad);
+  EXPECT_EQ(runMakerWith({"-o"}, made), 2);
+  EXPECT_EQ(runMakerWith({"--help", "7000"}, made), 2);
+  EXPECT_EQ(runMakerWith({"--help"}, made), 0);
   EXPECT_EQ(runMakerWith({"full"}, made), 1);
   EXPECT_EQ(made.size(), 2u);
 }
