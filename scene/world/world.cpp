@@ -65,29 +65,22 @@ std::unique_ptr<WorldData> makeWorldData(std::shared_ptr<const Scene> scene,
   return world;
 }
 
-std::optional<std::string> validateBodyCommand(const World& world, const BodyCommand& command) {
-  if (const Body* body = world.data().findBodyByName(command.body))
-    return validateBodyCommandFields(*body, command, world.settings());
-  return "body: no body named '" + command.body + "'";
+/// Replaces the name by the index.
+std::optional<std::string> resolveBody(const WorldData& world, BodyHandle& body) {
+  const auto found = world.bodyIndexByName.find(body.name);
+  if (found == world.bodyIndexByName.end()) return "body: no body named '" + body.name + "'";
+  body = BodyHandle(found->second);
+  return std::nullopt;
 }
 
-/// The doors and lifts of a walk must exist. `field` names the list.
-std::optional<std::string> validateWalkBodies(const World& world, const Order& order) {
-  const Walk* walk = std::get_if<Walk>(&order);
-  if (!walk) return std::nullopt;
-  const auto validate = [&](const std::string& field, BodyCommand command) {
-    auto error = validateBodyCommand(world, command);
-    return error ? std::optional(field + ": " + *error) : std::nullopt;
-  };
-  for (std::size_t i = 0; i < walk->opens.size(); ++i)
-    if (auto error = validate("opens[" + std::to_string(i) + "]",
-                              {walk->opens[i], BodyCommand::Action::open, 0, 0, std::nullopt}))
-      return error;
-  for (std::size_t i = 0; i < walk->rides.size(); ++i)
-    if (auto error = validate("rides[" + std::to_string(i) + "]",
-                              {walk->rides[i].lift, BodyCommand::Action::moveToLevel, 0,
-                               walk->rides[i].level, std::nullopt}))
-      return error;
+/// The same for the doors and lifts of a walk. The error names the list.
+std::optional<std::string> resolveWalkBodies(const WorldData& world, Walk& walk) {
+  for (std::size_t i = 0; i < walk.opens.size(); ++i)
+    if (auto error = resolveBody(world, walk.opens[i]))
+      return "opens[" + std::to_string(i) + "]: " + *error;
+  for (std::size_t i = 0; i < walk.rides.size(); ++i)
+    if (auto error = resolveBody(world, walk.rides[i].lift))
+      return "rides[" + std::to_string(i) + "]: " + *error;
   return std::nullopt;
 }
 
@@ -111,8 +104,11 @@ std::shared_ptr<const Snapshot> World::snapshot() const {
 
 std::optional<std::string> submitAvatarCommand(World& world, Command command) {
   if (auto error = validateCommandFields(command, world.settings())) return error;
-  if (auto error = validateWalkBodies(world, command.order)) return error;
   WorldData& data = world.data();
+  if (Walk* walk = std::get_if<Walk>(&command.order)) {
+    if (auto error = resolveWalkBodies(data, *walk)) return error;
+    if (auto error = validateWalkBodies(data, *walk)) return error;
+  }
   if (data.queuedOrderCount + computeOrderCost(command.order) > kMaxQueuedOrders)
     return std::to_string(kMaxQueuedOrders) +
            " orders and way points are already queued; send more when some have ended";
@@ -122,7 +118,8 @@ std::optional<std::string> submitAvatarCommand(World& world, Command command) {
 }
 
 std::optional<std::string> submitBodyCommand(World& world, BodyCommand command) {
-  if (auto error = validateBodyCommand(world, command)) return error;
+  if (auto error = resolveBody(world.data(), command.body)) return error;
+  if (auto error = validateBodyCommand(world.data(), command)) return error;
   world.data().pendingBodyCommands.push_back(std::move(command));
   return std::nullopt;
 }

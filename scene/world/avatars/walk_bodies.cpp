@@ -103,8 +103,8 @@ void call(WorldData& world, const Walk& walk, Avatar& avatar, const BodyCommand&
   world.pendingBodyCommands.push_back(command);  // acts at the next tick
 }
 
-BodyCommand makeOpenCommand(const Body& door) {
-  return {door.spec->name, BodyCommand::Action::open, 0, 0, std::nullopt};
+BodyCommand makeOpenCommand(const BodyHandle& door) {
+  return {door, BodyCommand::Action::open, 0, 0, std::nullopt};
 }
 
 /// Whether a door that stands open will close by itself in the next ticks.
@@ -116,14 +116,15 @@ bool isAboutToClose(const Body& door, double tick) {
 }
 
 /// Opens the door if the avatar comes to it, and holds it until the avatar has left its swing.
-void prepareDoor(WorldData& world, const Walk& walk, Avatar& avatar, const Body& door) {
+void prepareDoor(WorldData& world, const Walk& walk, Avatar& avatar, const BodyHandle& handle) {
+  const Body& door = world.bodies[handle.index];
   const double tick = world.settings.tickDuration, open = findOpenLimit(*door.spec);
   const Vec3& feet = avatar.footPosition;
   const Aabb swing = computeSwing(door);
   const Aabb swingOfFeet = growForFeet(swing, avatar, kSideRoom + walk.speed * tick);
   if (isOpen(door)) {
     if (isAboutToClose(door, tick) && isAhead(walk, avatar, swingOfFeet, walk.speed * (2 * kEarly)))
-      world.pendingBodyCommands.push_back(makeOpenCommand(door));
+      world.pendingBodyCommands.push_back(makeOpenCommand(handle));
     return;
   }
   const double way =
@@ -134,18 +135,18 @@ void prepareDoor(WorldData& world, const Walk& walk, Avatar& avatar, const Body&
                way + across.norm()))
     return;
   if (!door.drive.moving || door.drive.target != open)
-    call(world, walk, avatar, makeOpenCommand(door));
+    call(world, walk, avatar, makeOpenCommand(handle));
   if (contains(swingOfFeet, {feet, feet})) waitFor(door, open, world.settings, avatar);
 }
 
 /// Calls the lift if it is not at the stop.
-void prepareLift(WorldData& world, const Walk& walk, Avatar& avatar, const Body& lift,
-                 std::uint32_t level) {
-  const double stop = lift.spec->stops[level];
+void prepareLift(WorldData& world, const Walk& walk, Avatar& avatar, const Ride& ride) {
+  const Body& lift = world.bodies[ride.lift.index];
+  const double stop = lift.spec->stops[ride.level];
   if (!lift.drive.moving && lift.drive.jointPosition == stop) return;
   if (!lift.drive.moving || lift.drive.target != stop)
     call(world, walk, avatar,
-         {lift.spec->name, BodyCommand::Action::moveToLevel, 0, level, std::nullopt});
+         {ride.lift, BodyCommand::Action::moveToLevel, 0, ride.level, std::nullopt});
   waitFor(lift, stop, world.settings, avatar);
 }
 
@@ -155,12 +156,9 @@ void commandWalkBodies(WorldData& world, const Walk& walk, Avatar& avatar) {
   const EntityId before = std::exchange(avatar.walk.waitsFor, 0);
   if (countBodies(walk) == 0) return;
   for (const Ride& ride : walk.rides)
-    if (ride.waypoint == avatar.walk.waypointIndex)
-      if (const Body* lift = world.findBodyByName(ride.lift))
-        prepareLift(world, walk, avatar, *lift, ride.level);
+    if (ride.waypoint == avatar.walk.waypointIndex) prepareLift(world, walk, avatar, ride);
   if (avatar.walk.waypointIndex >= walk.opensFrom)
-    for (const std::string& name : walk.opens)
-      if (const Body* door = world.findBodyByName(name)) prepareDoor(world, walk, avatar, *door);
+    for (const BodyHandle& door : walk.opens) prepareDoor(world, walk, avatar, door);
   if (avatar.walk.waitsFor != before) avatar.walk.timeoutLeft = world.settings.stuckTimeout;
 }
 

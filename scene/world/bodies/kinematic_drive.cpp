@@ -195,7 +195,7 @@ void initKinematicDrive(Body& body) {
 
 void applyBodyCommands(WorldData& world) {
   for (const BodyCommand& command : world.pendingBodyCommands)
-    if (Body* body = world.findBodyByName(command.body)) applyBodyCommand(*body, command);
+    applyBodyCommand(world.bodies[command.body.index], command);
   world.pendingBodyCommands.clear();
   openTouchedDoors(world);
 }
@@ -255,9 +255,11 @@ std::string describeAcceptedCommands(const BodySpec& spec) {
 
 }  // namespace
 
-std::optional<std::string> validateBodyCommandFields(const Body& body, const BodyCommand& command,
-                                                     const WorldSettings& settings) {
+std::optional<std::string> validateBodyCommand(const WorldData& world, const BodyCommand& command) {
   using Action = BodyCommand::Action;
+  if (command.body.index >= world.bodies.size())
+    return "there is no body " + std::to_string(command.body.index);
+  const Body& body = world.bodies[command.body.index];
   const BodySpec& spec = *body.spec;
   const std::string kind = toString(spec.kind);
   if (!isKinematic(spec.kind))
@@ -283,10 +285,27 @@ std::optional<std::string> validateBodyCommandFields(const Body& body, const Bod
   if (!command.speed) return std::nullopt;
   if (auto error = validateSpeed(*command.speed)) return error;
   const double maxSpeed = *command.speed * computeMaxPointSpeed(spec, body.shape->radius);
-  if (maxSpeed <= settings.maxSpeed) return std::nullopt;
+  if (maxSpeed <= world.settings.maxSpeed) return std::nullopt;
   return "speed is " + std::to_string(*command.speed) + ", which moves a point at " +
-         std::to_string(maxSpeed) + " m/s; the limit is " + std::to_string(settings.maxSpeed) +
-         " m/s";
+         std::to_string(maxSpeed) + " m/s; the limit is " +
+         std::to_string(world.settings.maxSpeed) + " m/s";
+}
+
+std::optional<std::string> validateWalkBodies(const WorldData& world, const Walk& walk) {
+  const auto validate = [&](const std::string& field, const BodyCommand& command) {
+    auto error = validateBodyCommand(world, command);
+    return error ? std::optional(field + ": " + *error) : std::nullopt;
+  };
+  for (std::size_t i = 0; i < walk.opens.size(); ++i)
+    if (auto error = validate("opens[" + std::to_string(i) + "]",
+                              {walk.opens[i], BodyCommand::Action::open, 0, 0, std::nullopt}))
+      return error;
+  for (std::size_t i = 0; i < walk.rides.size(); ++i)
+    if (auto error = validate("rides[" + std::to_string(i) + "]",
+                              {walk.rides[i].lift, BodyCommand::Action::moveToLevel, 0,
+                               walk.rides[i].level, std::nullopt}))
+      return error;
+  return std::nullopt;
 }
 
 }  // namespace enfilade::scene

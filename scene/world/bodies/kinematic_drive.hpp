@@ -10,9 +10,10 @@ namespace enfilade::scene {
 
 /// Sets a kinematic body to its initial joint position and pose.
 void initKinematicDrive(Body& body);
-/// Error of a command for this body; nullopt if it is valid.
-std::optional<std::string> validateBodyCommandFields(const Body& body, const BodyCommand& command,
-                                                     const WorldSettings& settings);
+/// Error of a command whose body is resolved; nullopt if it is valid.
+std::optional<std::string> validateBodyCommand(const WorldData& world, const BodyCommand& command);
+/// Error of the resolved doors and lifts of a walk; nullopt if they are valid.
+std::optional<std::string> validateWalkBodies(const WorldData& world, const Walk& walk);
 /// Applies the pending body commands.
 void applyBodyCommands(WorldData& world);
 /// Computes the target of each kinematic body for this tick, and its motion bounds.

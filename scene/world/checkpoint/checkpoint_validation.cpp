@@ -133,19 +133,19 @@ struct CheckpointChecker {
       checkQueue(a);
     }
   }
+  void checkCommand(const Command& command) const {
+    requireValid(validateCommandFields(command, settings()), command.avatar);
+    if (const Walk* walk = std::get_if<Walk>(&command.order))
+      requireValid(validateWalkBodies(world, *walk), command.avatar);
+  }
   void checkOrders() const {
     require(doNamesAscend(world.queues), "names of queues do not ascend");
     for (const OrderQueue& queue : world.queues)
       for (const QueuedOrder& queued : queue.orders)
-        requireValid(validateCommandFields({queue.name, queued.order, queued.tag}, settings()),
-                     queue.name);
-    for (const Command& command : world.pendingCommands)
-      requireValid(validateCommandFields(command, settings()), command.avatar);
-    for (const BodyCommand& command : world.pendingBodyCommands) {
-      const Body* body = world.findBodyByName(command.body);
-      require(body != nullptr, "no body named '" + command.body + "'");
-      requireValid(validateBodyCommandFields(*body, command, settings()), command.body);
-    }
+        checkCommand({queue.name, queued.order, queued.tag});
+    for (const Command& command : world.pendingCommands) checkCommand(command);
+    for (const BodyCommand& command : world.pendingBodyCommands)
+      requireValid(validateBodyCommand(world, command), "a command");
     require(world.queuedOrderCount <= kMaxQueuedOrders, "too many orders are queued");
   }
   void checkBodies() const {

@@ -26,6 +26,12 @@ void archiveMembers(A& a, MaybeConst<A, Spawn>& spawn) {
   auto& [position, facing, radius, height, flying, parts, links, selfContact] = spawn;
   a(position, facing, radius, height, flying, parts, links, selfContact);
 }
+/// Names are resolved before a command is stored.
+template <class A>
+void archiveMembers(A& a, MaybeConst<A, BodyHandle>& body) {
+  auto& [name, index] = body;
+  a(index);
+}
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, Ride>& ride) {
   auto& [waypoint, lift, level] = ride;

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -14,6 +15,18 @@
 namespace enfilade::scene {
 
 using collision::Vec3;
+
+/// A body of the scene. Clients name it; submission replaces the name by the index.
+struct BodyHandle {
+  BodyHandle() = default;
+  BodyHandle(std::string bodyName) : name(std::move(bodyName)) {}
+  BodyHandle(const char* bodyName) : name(bodyName) {}
+  explicit BodyHandle(std::uint32_t bodyIndex) : index(bodyIndex) {}
+
+  std::string name;         ///< BodySpec::name; empty after submission
+  std::uint32_t index = 0;  ///< into Model::bodies; valid after submission
+  bool operator==(const BodyHandle&) const = default;
+};
 
 /// Maximum number of queued orders and way points in one world: about 30 MB.
 inline constexpr std::size_t kMaxQueuedOrders = 1'000'000;
@@ -52,17 +65,17 @@ struct Spawn {
 /// A lift must stand at a stop before a walk continues.
 struct Ride {
   std::uint32_t waypoint = 0;  ///< index: before the walk to this one
-  std::string lift;            ///< BodySpec::name
-  std::uint32_t level = 0;     ///< stop number, from 0
+  BodyHandle lift;
+  std::uint32_t level = 0;  ///< stop number, from 0
   bool operator==(const Ride&) const = default;
 };
 /// Walks to the way points in sequence. Opens doors in its way, calls lifts, and waits for them.
 struct Walk {
-  std::vector<Vec3> waypoints;          ///< way points, at least one
-  double speed = 1.4;                   ///< metres per second, > 0
-  std::vector<std::string> opens = {};  ///< BodySpec::name of doors
-  std::vector<Ride> rides = {};         ///< ascending way points
-  std::size_t opensFrom = 0;            ///< way points to reach before it opens any door
+  std::vector<Vec3> waypoints;         ///< way points, at least one
+  double speed = 1.4;                  ///< metres per second, > 0
+  std::vector<BodyHandle> opens = {};  ///< doors
+  std::vector<Ride> rides = {};        ///< ascending way points
+  std::size_t opensFrom = 0;           ///< way points to reach before it opens any door
 };
 /// Limits of a Walk order.
 inline constexpr std::size_t kMaxWalkDoors = 256, kMaxRides = 256;
@@ -150,7 +163,7 @@ struct BodyCommand {
     moveToLevel,  ///< lifts: to stop number `level`, counted from 0
     run           ///< paths: continue; restart if the end was reached
   };
-  std::string body;  ///< BodySpec::name
+  BodyHandle body;
   Action action = Action::open;
   double target = 0;
   std::uint32_t level = 0;

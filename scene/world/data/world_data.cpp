@@ -56,9 +56,6 @@ const Body* WorldData::findBodyByName(std::string_view name) const {
   const auto at = bodyIndexByName.find(name);
   return at == bodyIndexByName.end() ? nullptr : &bodies[at->second];
 }
-Body* WorldData::findBodyByName(std::string_view name) {
-  return const_cast<Body*>(std::as_const(*this).findBodyByName(name));
-}
 
 EntityId WorldData::insertAvatar(Avatar avatar) {
   const EntityId id = firstAvatarId() + static_cast<EntityId>(avatarNames.size());

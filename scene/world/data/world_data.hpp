@@ -82,7 +82,6 @@ struct WorldData {
   Avatar* findAvatarByProxy(collision::ProxyId proxy);
   std::uint32_t findBodyByProxy(collision::ProxyId proxy) const;  ///< kNoBody: no body
   const Body* findBodyByName(std::string_view name) const;        ///< null: no body
-  Body* findBodyByName(std::string_view name);
 
   /// Adds an avatar that has a proxy, under the next id, which it returns.
   EntityId insertAvatar(Avatar avatar);
