@@ -69,7 +69,7 @@ void RenderTarget::begin(const Channels& channels, bool planeDepth) {
   constexpr GLfloat kNaN = std::numeric_limits<GLfloat>::quiet_NaN();
   constexpr std::array<GLfloat, 4> kNoDepth{kNaN, kNaN, kNaN, kNaN};
   constexpr std::array<GLuint, 4> kNothing{0, 0, 0, 0};
-  constexpr GLfloat kFarthest = 0;
+  constexpr GLfloat kFarDepth = 0;
   if (channels.rgb) glClearNamedFramebufferfv(fbo, GL_COLOR, 0, kBlack.data());
   if (channels.ids) glClearNamedFramebufferuiv(fbo, GL_COLOR, 1, kNothing.data());
   if (channels.normals) glClearNamedFramebufferfv(fbo, GL_COLOR, 2, kNone.data());
@@ -78,7 +78,7 @@ void RenderTarget::begin(const Channels& channels, bool planeDepth) {
   // an earlier frame, in blocks of 8 pixels, where a small frame followed another in the same
   // layer.
   glClearTexSubImage(depth_.name(), 0, 0, 0, layer_, width_, height_, 1, GL_DEPTH_COMPONENT,
-                     GL_FLOAT, &kFarthest);
+                     GL_FLOAT, &kFarDepth);
 }
 
 void RenderTarget::setShadowMask(const std::vector<std::uint8_t>& mask) {

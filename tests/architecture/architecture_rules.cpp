@@ -413,7 +413,9 @@ Faults oddWords(const Sources& sources) {
   static const std::regex words(
       "\\b([Tt]old|[Tt]ells|[Aa]new|[Ll]est|[Bb]esides?|[Ss]omebody|[Nn]obody|[Ww]hoever|[Tt]"
       "hereof|"
-      "has the say|goes on|stands for|is none|k(Most|Least|Few)[A-Z]\\w*)\\b");
+      "has the say|goes on|stands for|is none|k(Most|Least|Few)[A-Z]\\w*|"
+      "k(Farthest|Largest|Longest|Greatest|Fastest)\\w*|"
+      "_?(MOST|LEAST|FARTHEST|LARGEST|LONGEST|GREATEST|FASTEST)(_\\w*)?)\\b");
   // A comment names its subject.
   static const std::regex subjects("^\\s*//+<? (What|Which|Who)\\b");
   Faults faults;

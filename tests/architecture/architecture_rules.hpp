@@ -49,7 +49,7 @@ Faults crowdedFolders(const Sources& sources, int maxFiles);
 
 /// Words of HOUSE.md's list that do not belong in technical English, one fault a place. Comments,
 /// messages and pages count; identifiers that merely contain such a word do not. Constants are
-/// named kMax.. and kMin.., not kMost.. and kLeast...
+/// named kMax.. and kMin.., not kMost.., kLeast.. and kLargest...
 Faults oddWords(const Sources& sources);
 
 /// Functions of the product that are named by a noun, as `areaOf()`. The convention is verb + noun:

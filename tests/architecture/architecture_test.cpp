@@ -282,6 +282,9 @@ TEST(ArchitectureRules, SmallFaultsAreFound) {
   EXPECT_EQ(
       oddWords({{"scene/a.cpp", "constexpr int kMostParts = 1, kLeastArea = 2, kMostly = 3;\n"}}),
       (Faults{"scene/a.cpp:1: kMostParts", "scene/a.cpp:1: kLeastArea"}));
+  EXPECT_EQ(oddWords({{"a.cpp", "float kFarthest = 0, kFar = 1;\n"},
+                      {"b.py", "_MOST_PARTS = 3\nLARGEST = 4\nALMOST = 5\n"}}),
+            (Faults{"a.cpp:1: kFarthest", "b.py:1: _MOST_PARTS", "b.py:2: LARGEST"}));
   EXPECT_EQ(longFiles(sources, 2), Faults{"a.hpp: 3 lines"});
   EXPECT_EQ(unfinishedWork(sources), Faults{"a.hpp:2: // " + word + ": more"});
   EXPECT_EQ(brokenLinks(sources), Faults{"b.md:1: links to c.hpp, which is not there"});

@@ -16,7 +16,7 @@ import plot
 from report import find, machine, names, picture, read, short, table
 
 OURS = {"GL renderer", "rays robust (renderer)"}
-LEAST_ERROR = 1e-6  # mm, where an error of 0 is drawn
+MIN_ERROR = 1e-6  # mm, where an error of 0 is drawn
 # About rows measured with Mesa on a busy machine.
 WAITING = """
 Wall-clock time beyond the CPU time is waiting for a busy core: in 12 s of frames of the district, measured
@@ -86,7 +86,7 @@ def speed_error(rows, out, scene, size, report):
         if row["scene"] != scene or row["size"] != size:
             continue
         most = row["depth"]["away_from_edges"]["max_mm"]
-        points.append((row["method"], max(LEAST_ERROR, most), row["ms"], ""))
+        points.append((row["method"], max(MIN_ERROR, most), row["ms"], ""))
     name = f"{report}_{scene.replace(' ', '_')}"
     title = f"Speed against error of depth: {scene}, {size.replace('x', '×')}"
     plot.marks(out / f"{name}.svg", title, "maximum error away from edges, mm",

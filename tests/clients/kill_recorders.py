@@ -20,7 +20,7 @@ import enfilade.process
 from recorded import other_reader, verify
 from room import obj
 
-_LONGEST = 1.5  # seconds of life at most
+_MAX_LIFE = 1.5  # seconds
 
 
 class KilledRecorders:
@@ -32,7 +32,7 @@ class KilledRecorders:
 
     def kill(self, number):
         self.file.unlink(missing_ok=True)
-        seconds = self.chance.random() * _LONGEST
+        seconds = self.chance.random() * _MAX_LIFE
         (self._server if number % 2 else self._replay)(seconds)
         if not self.file.exists() or self.file.stat().st_size == 0:
             return  # it had not come so far

@@ -8,7 +8,7 @@ import { FileDescriptorSetSchema } from "@bufbuild/protobuf/wkt";
 
 export const PROTOCOL_VERSION = "1.0.0";
 const LENGTHS = 8; // bytes before a message: total, header_length
-const LARGEST_MESSAGE = 1 << 28; // bytes, as in the other clients
+const MAX_MESSAGE = 1 << 28; // bytes, as in the other clients
 
 /** An error that the server reported. `fatal`: the connection ended with it. */
 export class ServerError extends Error {
@@ -163,7 +163,7 @@ export class Client {
       const view = new DataView(data.buffer, data.byteOffset + start);
       const total = view.getUint32(0, true);
       const headerLength = view.getUint32(4, true);
-      if (total > LARGEST_MESSAGE || headerLength + 4 > total) {
+      if (total > MAX_MESSAGE || headerLength + 4 > total) {
         this.#end(new ConnectionFailed(`a message claims ${total} bytes`));
         return this.#socket.close();
       }

@@ -23,8 +23,8 @@ from .results import (Apart, Contact, Frame, Hits, Horizon, Notice, Pair, Replay
 
 PROTOCOL_VERSION = "1.0.0"
 KEPT_FRAMES = 16  # of watches, until frames() takes them; the oldest are dropped first
-LONGEST_RUN = 36_000  # ticks that run_until_idle() runs before it gives up
-MOST_AT_ONCE = 10_000  # messages that are received without waiting, before their content is returned
+MAX_RUN_TICKS = 36_000  # ticks that run_until_idle() runs before it gives up
+MAX_AT_ONCE = 10_000  # messages that are received without waiting, before their content is returned
 
 Entity = Union[int, str, Avatar]  # an id, a name or a path
 Reply = Tuple[Any, memoryview]  # a message and its attachment
@@ -235,15 +235,15 @@ class Client:
         reply, _ = self.request(step=messages.Step(ticks=count, avatars=avatars))
         return results.step(reply.step)
 
-    def run_until_idle(self, most: int = LONGEST_RUN, *, at_a_time: int = 60) -> Step:
-        """Steps until every queue is empty. Raises OrderFailed after `most` ticks."""
+    def run_until_idle(self, max_ticks: int = MAX_RUN_TICKS, *, at_a_time: int = 60) -> Step:
+        """Steps until every queue is empty. Raises OrderFailed after `max_ticks` ticks."""
         if at_a_time < 1:
             raise ValueError(f"at_a_time: give at least 1, not {at_a_time}")
-        for made in range(0, most, at_a_time):
-            done = self.step(min(at_a_time, most - made), avatars=True)
+        for made in range(0, max_ticks, at_a_time):
+            done = self.step(min(at_a_time, max_ticks - made), avatars=True)
             if done.idle:
                 return done
-        raise OrderFailed(f"the world is not idle after {most} ticks; is an avatar driven?")
+        raise OrderFailed(f"the world is not idle after {max_ticks} ticks; is an avatar driven?")
 
     def lockstep(self) -> None:
         """Only step() runs ticks."""
@@ -271,7 +271,7 @@ class Client:
     def replay(self) -> Optional[Replay]:
         """The state of the replay, as last reported: at each change, not at each tick. None: the
         world plays no recording."""
-        for _ in range(MOST_AT_ONCE):
+        for _ in range(MAX_AT_ONCE):
             if self._connection.broken or not self._await_events(0.0):
                 break
         return self._replay
@@ -441,7 +441,7 @@ class Client:
 
     def _taken(self, kept: Deque[Any], seconds: float) -> Iterator[Any]:
         while True:
-            for _ in range(MOST_AT_ONCE):
+            for _ in range(MAX_AT_ONCE):
                 if not self._await_events(0.0):
                     break
             if not kept and not self._waited_for(kept, seconds):

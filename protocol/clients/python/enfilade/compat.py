@@ -22,8 +22,8 @@ import numpy as np
 from .navigation import Navigation, Spot
 
 _NOWHERE = np.full(3, np.nan)
-_MOST_ACTIONS = 2000  # of find_path(): 500 m of steps ahead
-_FARTHEST = 20.0  # metres that the server searches for obstacles
+_MAX_ACTIONS = 2000  # of find_path(): 500 m of steps ahead
+_MAX_SEARCH_RADIUS = 20.0  # metres that the server searches for obstacles
 _EXTENTS = (2.0, 4.0, 2.0)  # metres: habitat projects a point within this box on either side
 
 
@@ -113,7 +113,7 @@ class GreedyGeodesicFollower:
         """Returns the keys of all actions to the goal, which end with the stop key. Raises ValueError if there
         is no path, or if steps of this length do not come within `goal_radius`."""
         taken: List[Optional[str]] = []
-        while len(taken) < _MOST_ACTIONS:
+        while len(taken) < _MAX_ACTIONS:
             action = self._next(position, heading, goal)
             taken.append(self.keys[action])
             if action == "stop":
@@ -123,7 +123,7 @@ class GreedyGeodesicFollower:
                 position = self.pathfinder.try_step(position, np.asarray(position, float) + ahead)
             else:
                 heading += self.turn_amount if action == "left" else -self.turn_amount
-        raise ValueError(f"goal_radius: the goal is not within {self.goal_radius:g} m after {_MOST_ACTIONS} "
+        raise ValueError(f"goal_radius: the goal is not within {self.goal_radius:g} m after {_MAX_ACTIONS} "
                          f"actions; give more, or a smaller forward_amount than {self.forward_amount:g} m")
 
     def _next(self, position: Sequence[float], heading: float, goal: Sequence[float]) -> str:
@@ -280,9 +280,9 @@ class PathFinder:
                                        max_search_radius: float = 2.0) -> "HitRecord":
         """`hit_dist` as distance_to_closest_obstacle(); equal to `max_search_radius` without an obstacle."""
         radius = self.navigation.radius
-        most = _FARTHEST - radius
-        if not 0 < max_search_radius <= most:
-            raise ValueError(f"max_search_radius: give metres above 0 and up to {most:g}, not {max_search_radius}")
+        max_radius = _MAX_SEARCH_RADIUS - radius
+        if not 0 < max_search_radius <= max_radius:
+            raise ValueError(f"max_search_radius: give metres above 0 and up to {max_radius:g}, not {max_search_radius}")
         spot = self._projected([pt])[0]
         found = spot and self.navigation.clearance(spot.at, max(0.1, max_search_radius + radius))
         if found is None:

@@ -19,8 +19,8 @@ from . import messages
 from .errors import ConnectionFailed, ServerError
 
 MAGIC = b"ENF1"
-LARGEST_MESSAGE = 1 << 28  # bytes; the C++ client accepts as much
-LARGEST_HEADER = 1 << 24
+MAX_MESSAGE = 1 << 28  # bytes; the C++ client accepts as much
+MAX_HEADER = 1 << 24
 _LENGTHS = struct.Struct("<II")
 _BUFFER = 1 << 14  # bytes; longer messages get memory of their own
 _ALIGNMENT = 64  # bytes, of attachments
@@ -160,7 +160,7 @@ class Connection:
     def _read_one(self) -> Received:
         self._fill(8)
         total, header_length = _LENGTHS.unpack_from(self._came.view, self._came.start)
-        if total > LARGEST_MESSAGE or header_length > LARGEST_HEADER or 4 + header_length > total:
+        if total > MAX_MESSAGE or header_length > MAX_HEADER or 4 + header_length > total:
             raise self._failed(f"a message claims {total} bytes, {header_length} of them header")
         self._make_room(4 + total, 8 + header_length)
         self._fill(4 + total)

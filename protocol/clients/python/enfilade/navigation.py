@@ -20,8 +20,8 @@ if TYPE_CHECKING:
 # A point of the feet, an Avatar, or the name of a room, a storey, an object or a body.
 Place = Union[Point, str, "Avatar"]
 
-_MOST_POINTS = 10_000  # of one query
-_MOST_GOALS = 100
+_MAX_POINTS = 10_000  # of one query
+_MAX_GOALS = 100
 
 
 @dataclass(frozen=True)
@@ -178,9 +178,9 @@ class Navigation:
               max_drop: float = 0.0, lifts: bool = False) -> List[Path]:
         """Returns the paths from one place to many, in their order; options as for path()."""
         found: List[Path] = []
-        for first in range(0, len(goals), _MOST_GOALS):
+        for first in range(0, len(goals), _MAX_GOALS):
             reply, _ = self._ask(path=messages.NavigationQuery.Path(
-                **{"from": _place(start)}, to=[_place(goal) for goal in goals[first:first + _MOST_GOALS]],
+                **{"from": _place(start)}, to=[_place(goal) for goal in goals[first:first + _MAX_GOALS]],
                 narrowest=narrowest, max_drop=max_drop, lifts=lifts))
             found += [_path(one) for one in reply.paths]
         return found
@@ -226,8 +226,8 @@ class Navigation:
         options = {} if extents is None else {"extents": vec(extents)}
         array = points(where, "snap")
         found: List[Optional[Spot]] = []
-        for first in range(0, len(array), _MOST_POINTS):
-            page = array[first:first + _MOST_POINTS]
+        for first in range(0, len(array), _MAX_POINTS):
+            page = array[first:first + _MAX_POINTS]
             query = messages.NavigationQuery.Snap(
                 points=[vec(p) for p in page], max_distance=max_distance, drawn=drawn,
                 island=optional_whole(island, "island", high=UINT32), **options)

@@ -102,9 +102,9 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
     def _in_worlds(self, maker: Client, scene: str) -> Sequence[Client]:
         """Creates num_envs worlds, and a client in each: all on one connection."""
-        most = maker.limits.max_worlds - len(maker.worlds())
-        if self.num_envs > most:
-            raise ValueError(f"num_envs: the server accepts {most} more worlds, "
+        max_worlds = maker.limits.max_worlds - len(maker.worlds())
+        if self.num_envs > max_worlds:
+            raise ValueError(f"num_envs: the server accepts {max_worlds} more worlds, "
                              f"not {self.num_envs}")
         worlds = [maker.create_world(scene=scene or maker.scenes[0], drop_when_empty=True).name
                   for _ in range(self.num_envs)]

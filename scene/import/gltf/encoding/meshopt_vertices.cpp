@@ -208,15 +208,16 @@ std::string decodeMeshoptVertices(std::string_view source, std::size_t count, st
   VertexStream stream;
   stream.stride = stride;
   if (std::string fault = openStream(source, stream); !fault.empty()) return fault;
-  const std::size_t most = std::min(kBlockBytes / stride / kGroup * kGroup, kBlockElements);
+  const std::size_t maxElements = std::min(kBlockBytes / stride / kGroup * kGroup, kBlockElements);
   // A block has at least one byte for each channel, in version 0 for each byte of the element.
-  const std::size_t blocks = count / most + (count % most > 0 ? 1 : 0);
+  const std::size_t blocks = count / maxElements + (count % maxElements > 0 ? 1 : 0);
   if (blocks > stream.blocks.size() / (stride / 4)) return "its compressed data ends too early";
   bytes.resize(count * stride);
   std::array<char, kMaxStride> previous{};
   stream.first.copy(previous.data(), stride);
-  for (std::size_t done = 0; done < count; done += most)
-    if (!decodeBlock(stream, std::min(most, count - done), previous, bytes.data() + done * stride))
+  for (std::size_t done = 0; done < count; done += maxElements)
+    if (!decodeBlock(stream, std::min(maxElements, count - done), previous,
+                     bytes.data() + done * stride))
       return "its compressed data ends too early";
   return stream.blocks.empty() ? ""
                                : "its compressed data has " + std::to_string(stream.blocks.size()) +
