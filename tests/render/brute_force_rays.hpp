@@ -1,5 +1,5 @@
 // Reference implementation of the ray renderer: every pixel's ray against every triangle, in
-// doubles, by another formula (Moeller and Trumbore 1997). Opaque scenes only.
+// doubles, by another formula (Möller and Trumbore 1997). Opaque scenes only.
 #pragma once
 
 #include <cmath>
