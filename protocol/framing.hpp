@@ -98,7 +98,7 @@ std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,
 /// The same without the attachment, whose bytes the caller sends after it.
 std::vector<std::uint8_t> encodeHead(const google::protobuf::MessageLite& header,
                                      std::size_t attachmentLength);
-/// Encodes a header whose only field, number `field`, is a message in two serialised parts: one per
+/// Encodes a header whose only field, number `field`, is a message in two serialized parts: one per
 /// client and one that all share. Protobuf merges messages by concatenating their bytes. The caller
 /// sends the second part after the returned bytes. Throws std::length_error, as encode().
 std::vector<std::uint8_t> encodeSplicedHead(std::uint32_t field, std::string_view first,

@@ -1,4 +1,4 @@
-// Nesting depth of JSON values. nlohmann serialises by recursion, so that a file of brackets would
+// Nesting depth of JSON values. nlohmann serializes by recursion, so that a file of brackets would
 // overflow the stack.
 #pragma once
 

@@ -91,17 +91,17 @@ void OcclusionCuller::markVisible(const std::vector<std::uint32_t>& items, std::
   }
 }
 
-/// One search for all views.
-struct OcclusionCuller::Search {
+/// One traversal for all views.
+struct OcclusionCuller::CullingPass {
   const OcclusionCuller& culler;
-  std::span<const View> views;
+  std::span<const CullingView> views;
   std::vector<CullingResult> found;  ///< one per view
   std::vector<Vec3> eyeFromTree;     ///< one per view
 
-  Search(const OcclusionCuller& one, std::span<const View> all)
+  CullingPass(const OcclusionCuller& one, std::span<const CullingView> all)
       : culler(one), views(all), found(all.size()) {
     const Vec3& origin = culler.tree_.origin;
-    for (const View& view : views)
+    for (const CullingView& view : views)
       eyeFromTree.push_back(view.visibility.toEyeSpace({origin, origin}).centre);
   }
 
@@ -112,7 +112,7 @@ struct OcclusionCuller::Search {
   }
 
   void testItem(std::uint32_t item, std::size_t v, const scene::Aabb& box) {
-    const View& view = views[v];
+    const CullingView& view = views[v];
     if (culler.items_[item].object + 1 == view.hiddenEntity) return;
     if (count(v, view.visibility.test(view.visibility.toEyeSpace(box), view.depth), 1))
       found[v].items.push_back(item);
@@ -171,7 +171,7 @@ struct OcclusionCuller::Search {
 };
 
 std::vector<OcclusionCuller::CullingResult> OcclusionCuller::findVisible(
-    std::span<const View> views) {
+    std::span<const CullingView> views) {
   ENFILADE_ASSERT(!views.empty() && views.size() <= kMaxViews);
   ++generation_;
   std::uint64_t all = 0;
@@ -179,11 +179,11 @@ std::vector<OcclusionCuller::CullingResult> OcclusionCuller::findVisible(
     markVisible(views[v].drawn, std::uint64_t{1} << v);
     all |= std::uint64_t{1} << v;
   }
-  Search search(*this, views);
-  search.testTree(all);
-  for (const std::uint32_t item : dynamicItems_) search.testDynamicItem(item, all);
-  for (CullingResult& result : search.found) std::sort(result.items.begin(), result.items.end());
-  return std::move(search.found);
+  CullingPass pass(*this, views);
+  pass.testTree(all);
+  for (const std::uint32_t item : dynamicItems_) pass.testDynamicItem(item, all);
+  for (CullingResult& result : pass.found) std::sort(result.items.begin(), result.items.end());
+  return std::move(pass.found);
 }
 
 }  // namespace enfilade::render

@@ -18,7 +18,7 @@ class OcclusionCuller {
   explicit OcclusionCuller(const std::vector<DrawItem>& items);
 
   /// A view of findVisible().
-  struct View {
+  struct CullingView {
     const BoxVisibility& visibility;
     const DepthPyramid& depth;                ///< contains some or all of the drawn items
     const std::vector<std::uint32_t>& drawn;  ///< known to be visible
@@ -31,7 +31,7 @@ class OcclusionCuller {
   };
   static constexpr std::size_t kMaxViews = 64;
   /// One result per view, of 1..kMaxViews. All views share one traversal.
-  std::vector<CullingResult> findVisible(std::span<const View> views);
+  std::vector<CullingResult> findVisible(std::span<const CullingView> views);
 
  private:
   std::uint32_t linkNodes(std::uint32_t node);
@@ -50,7 +50,7 @@ class OcclusionCuller {
     std::uint32_t generation = 0;
     std::uint64_t views = 0;
   };
-  struct Search;
+  struct CullingPass;
   void markVisible(const std::vector<std::uint32_t>& items, std::uint64_t view);
   std::uint64_t getMarkedViews(const Mark& mark) const {
     return mark.generation == generation_ ? mark.views : 0;

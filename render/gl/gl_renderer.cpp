@@ -302,7 +302,7 @@ void GlRenderer::State::drawPredicted(FrameInProgress& view) {
 
 /// Finds possibly visible items that are not drawn. The pyramids hold the depth of those drawn.
 void GlRenderer::State::findDisoccluded(const FramesInProgress& views) {
-  std::vector<OcclusionCuller::View> tested;
+  std::vector<OcclusionCuller::CullingView> tested;
   for (const FrameInProgress* view : views)
     tested.push_back({view->visibility, view->pyramid, view->drawn.items,
                       view->dynamic.bodyPlacements(), view->options.hiddenEntity});

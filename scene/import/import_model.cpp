@@ -108,7 +108,7 @@ class MessageListener {
 
   bool handleModel(std::span<const std::byte> body) {
     try {
-      model_ = deserialiseModel(body);
+      model_ = deserializeModel(body);
     } catch (const ModelStreamError& error) {
       throw ImportError(file_.string() + ": the import process sent invalid data during '" +
                         stage_ + "' (" + error.what() + "); re-export the file as glTF");

@@ -29,9 +29,8 @@ struct IslandList {
   std::vector<Island> islands;          ///< by number: the largest first
 };
 
-/// Leaves out islands on which no place to stand is found, as those in the inside of solids. Which
-/// are drawn is decided by joinIslands().
-/// `bounds`: of the scene.
+/// Leaves out islands on which no place to stand is found, as those in the inside of solids.
+/// joinIslands() decides whether an island is drawn. `bounds`: of the scene.
 IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb& bounds);
 
 /// Makes one of islands that are close to each other and joined, and decides which are drawn.

@@ -406,7 +406,7 @@ NavigationMap Navigation::drawMap(double cell, double height, double tolerance) 
                     static_cast<std::uint32_t>(std::max(1.0, depth)),
                     {}};
   map.cells.assign(std::size_t{map.width} * map.height, 0);
-  const CellGrid grid{bounds.min.x(), bounds.min.z(), cell, map.width, map.height};
+  const MapCells grid{bounds.min.x(), bounds.min.z(), cell, map.width, map.height};
   const double lowest = height - tolerance, highest = height + tolerance + grid_.cellHeight;
   const auto measureFloor = [&](const Vec3& onMesh, double top) {
     const Vec3 above(onMesh.x(), top + kHeightError, onMesh.z());

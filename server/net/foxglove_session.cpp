@@ -206,7 +206,7 @@ void FoxgloveSession::applySubscriptions(bool sceneIsNew) {
 }
 
 /// Starts or ends the pictures of an avatar's view.
-void FoxgloveSession::applyViewSubscription(const std::string& avatar, View& view) {
+void FoxgloveSession::applyViewSubscription(const std::string& avatar, ViewChannels& view) {
   const bool wanted = isSubscribed(view.imageChannel) || isSubscribed(view.imageChannel + 1);
   if (wanted == (view.watch != 0)) return;
   v1::ClientMessage message;
@@ -329,7 +329,7 @@ void FoxgloveSession::sendImages(const v1::Frame& frame, std::span<const std::ui
   });
   if (found == views_.end()) return;
   const std::string& avatar = found->first;
-  const View& view = found->second;
+  const ViewChannels& view = found->second;
   const auto image = extractImage(frame, attachment);
   if (!image) return;
   ViewerSink sink;

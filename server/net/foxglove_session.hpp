@@ -43,7 +43,7 @@ class FoxgloveSession : public ClientConnection,
     EncodedMessage bytes;
   };
   /// The channels of an avatar's view: image, and calibration with the next id.
-  struct View {
+  struct ViewChannels {
     std::uint32_t imageChannel = 0;
     std::uint32_t watch = 0;  ///< of the world's client; 0: not subscribed
   };
@@ -54,7 +54,7 @@ class FoxgloveSession : public ClientConnection,
   void subscribe(const foxglove_protocol::Subscribe& request);
   void unsubscribe(const foxglove_protocol::Unsubscribe& request);
   void applySubscriptions(bool sceneIsNew);
-  void applyViewSubscription(const std::string& avatar, View& view);
+  void applyViewSubscription(const std::string& avatar, ViewChannels& view);
   void requestSceneModel();
   void controlPlayback(const foxglove_protocol::PlaybackControl& request);
 
@@ -90,7 +90,7 @@ class FoxgloveSession : public ClientConnection,
   ClientId client_ = 0;
   std::uint64_t lastRequest_ = 0;
   std::map<std::uint32_t, std::uint32_t> subscriptions_;  ///< subscription, by channel
-  std::map<std::string, View> views_;                     ///< by avatar
+  std::map<std::string, ViewChannels> views_;             ///< by avatar
   std::uint32_t nextViewChannel_;
   std::uint64_t now_ = 0;  ///< nanoseconds of simulated time
   double tickSeconds_ = 0;

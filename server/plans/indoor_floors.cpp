@@ -23,7 +23,7 @@ constexpr std::size_t kMaxFaces = 200'000;  // triangles with rays: a second
 constexpr double kRayLift = 0.01;           // metres that a ray starts above its triangle
 
 /// Point i of a sequence that covers a triangle evenly (Roberts, the R2 sequence, folded).
-Vec3 samplePoint(const FloorFace& face, int i) {
+Vec3 samplePoint(const FloorTriangle& face, int i) {
   constexpr double kFirst = 0.7548776662466927, kSecond = 0.5698402909980532;
   double u = std::fmod(0.5 + i * kFirst, 1.0), v = std::fmod(0.5 + i * kSecond, 1.0);
   if (u + v > 1) u = 1 - u, v = 1 - v;
@@ -32,7 +32,7 @@ Vec3 samplePoint(const FloorFace& face, int i) {
 }
 
 /// Area of a triangle that lies indoors, square metres.
-double measureIndoors(const scene::RayCaster& rays, const FloorFace& face) {
+double measureIndoors(const scene::RayCaster& rays, const FloorTriangle& face) {
   const int count =
       static_cast<int>(std::clamp(std::ceil(face.area / kSampleArea), 1.0, kMaxFaceSamples));
   int indoors = 0;
@@ -45,9 +45,10 @@ double measureIndoors(const scene::RayCaster& rays, const FloorFace& face) {
 
 }  // namespace
 
-double findIndoorFloor(const scene::Scene& scene, std::span<const FloorFace> faces, double height) {
-  std::vector<const FloorFace*> near;
-  for (const FloorFace& face : faces)
+double findIndoorFloor(const scene::Scene& scene, std::span<const FloorTriangle> faces,
+                       double height) {
+  std::vector<const FloorTriangle*> near;
+  for (const FloorTriangle& face : faces)
     if (face.area > 0 && std::abs(face.height() - height) < kMaxDistance) near.push_back(&face);
   const std::size_t stride = near.size() / kMaxFaces + 1;
   // The caster lives only in this function.

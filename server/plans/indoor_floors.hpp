@@ -10,7 +10,7 @@
 namespace enfilade::server {
 
 /// An upward triangle; scene frame, metres.
-struct FloorFace {
+struct FloorTriangle {
   std::array<Vec3, 3> corners;
   double area = 0;  ///< square metres, projected to the ground
 
@@ -19,6 +19,7 @@ struct FloorFace {
 
 /// The height with most indoor floor that is less than a storey away from `height`; `height`
 /// itself if the floor there is mostly indoors, or if no floor near it is.
-double findIndoorFloor(const scene::Scene& scene, std::span<const FloorFace> faces, double height);
+double findIndoorFloor(const scene::Scene& scene, std::span<const FloorTriangle> faces,
+                       double height);
 
 }  // namespace enfilade::server

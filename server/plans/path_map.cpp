@@ -30,7 +30,7 @@ constexpr double kBorder = 48, kLineHeight = 26;  // pixels
 constexpr double kTitleSize = 18, kHeadingSize = 14;  // pixels
 constexpr std::size_t kMaxTitleLines = 4;
 
-struct StoreyPlan {
+struct MapStorey {
   double floor = 0;
   render::Camera camera;
   PlanPicture picture;
@@ -135,7 +135,7 @@ const StoreyFloor* findStoreyAt(const std::vector<StoreyFloor>& storeys, double 
 }
 
 /// The storey's name, if it has any, and its floor; in lines of at most `width` pixels.
-std::vector<std::string> makeHeading(const StoreyPlan& storey, double width) {
+std::vector<std::string> makeHeading(const MapStorey& storey, double width) {
   const std::string text = formatFloorAndCut(storey.floor);
   const bool isNamed = storey.named != nullptr && !storey.named->name.empty();
   return Canvas(1, 1, kPlanPaper)
@@ -156,8 +156,8 @@ double computeHeight(const std::vector<std::string>& lines) {
 }
 
 /// Gives the storeys their places, one below the other, and returns the height of all.
-double placeStoreys(std::vector<StoreyPlan>& storeys, double top) {
-  for (StoreyPlan& storey : storeys) {
+double placeStoreys(std::vector<MapStorey>& storeys, double top) {
+  for (MapStorey& storey : storeys) {
     top += computeHeight(storey.heading);
     storey.view = makePlanView(storey.camera, storey.floor, {kBorder, top},
                                storey.camera.height / storey.camera.heightY, 1);
@@ -166,9 +166,9 @@ double placeStoreys(std::vector<StoreyPlan>& storeys, double top) {
   return top;
 }
 
-double computeSheetWidth(const std::vector<StoreyPlan>& storeys) {
+double computeSheetWidth(const std::vector<MapStorey>& storeys) {
   double width = 640;
-  for (const StoreyPlan& storey : storeys)
+  for (const MapStorey& storey : storeys)
     width = std::max(width, storey.camera.width + 2 * kBorder);
   return width;
 }
@@ -184,16 +184,16 @@ struct MapLayout {
   double inner() const { return width - 2 * kBorder; }
 };
 
-void layOutMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
+void layOutMap(const WalkTrace& trace, std::vector<MapStorey>& storeys,
                const std::vector<double>& floors, const scene::Scene* scene, MapLayout& layout) {
   layout.width = computeSheetWidth(storeys);
   layout.title =
       Canvas(1, 1, kPlanPaper)
           .wrap(trace.title, makeStyle(kTitleSize, true), layout.inner(), kMaxTitleLines);
-  for (StoreyPlan& storey : storeys) storey.heading = makeHeading(storey, layout.inner());
+  for (MapStorey& storey : storeys) storey.heading = makeHeading(storey, layout.inner());
   layout.legendTop =
       placeStoreys(storeys, kBorder + computeHeight(layout.title) + kLineHeight) + 2 * kLineHeight;
-  for (const StoreyPlan& storey : storeys) {
+  for (const MapStorey& storey : storeys) {
     std::optional<PlanStorey> rooms;
     if (storey.named != nullptr && storey.named->storey)
       rooms = PlanStorey{&scene->model(), *storey.named->storey};
@@ -206,10 +206,10 @@ void layOutMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
   layout.height = layout.entriesTop + measureEntries(layout.entries, layout.inner(), 1) + kBorder;
 }
 
-Image composeMap(const WalkTrace& trace, std::vector<StoreyPlan>& storeys,
+Image composeMap(const WalkTrace& trace, std::vector<MapStorey>& storeys,
                  const std::vector<double>& floors, const scene::Scene* scene) {
   const std::vector<StoreyFloor> named = scene ? findStoreys(*scene) : std::vector<StoreyFloor>();
-  for (StoreyPlan& storey : storeys) storey.named = findStoreyAt(named, storey.floor);
+  for (MapStorey& storey : storeys) storey.named = findStoreyAt(named, storey.floor);
   MapLayout layout;
   layOutMap(trace, storeys, floors, scene, layout);
   Canvas canvas(static_cast<int>(layout.width), static_cast<int>(layout.height), kPlanPaper);
@@ -252,9 +252,9 @@ std::optional<Image> drawMap(const WalkTrace& trace, const MapBackground& backgr
     if (std::ranges::none_of(floors, [&](double one) { return std::abs(one - floor) < 1; }))
       floors.push_back(floor);
   std::ranges::sort(floors);
-  std::vector<StoreyPlan> storeys;
+  std::vector<MapStorey> storeys;
   for (const double floor : floors) {
-    StoreyPlan storey;
+    MapStorey storey;
     storey.floor = floor;
     storey.camera =
         makePlanCamera(computeWalkedBounds(trace.paths), floor, kMaxMapWidth, kMaxMapHeight);

@@ -30,7 +30,7 @@ constexpr double kMaxNameDistance = 0.6;   // metres between a storey's floor an
 
 /// Adds the upward faces of an object. For open shells both sides count, because their orientation
 /// is unknown.
-void addFloors(const scene::Scene& scene, std::uint32_t object, std::vector<FloorFace>& faces) {
+void addFloors(const scene::Scene& scene, std::uint32_t object, std::vector<FloorTriangle>& faces) {
   const scene::Shape& shape = scene.shape(object);
   const Eigen::Affine3d& worldFromMesh = scene.model().objects[object].worldFromMesh;
   const double mirror = worldFromMesh.linear().determinant() < 0 ? -1 : 1;
@@ -111,8 +111,8 @@ std::string findStoreyName(const scene::Scene& scene, double floor) {
   return mostFrequent == names.end() ? "" : mostFrequent->first;
 }
 
-std::vector<FloorFace> collectFloors(const scene::Scene& scene) {
-  std::vector<FloorFace> faces;
+std::vector<FloorTriangle> collectFloors(const scene::Scene& scene) {
+  std::vector<FloorTriangle> faces;
   for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
     const Vec3 size = scene.staticBoxes()[i].size();
     if (size.x() * size.z() >= kMinFloorArea) addFloors(scene, scene.solidObjects()[i], faces);
@@ -120,14 +120,15 @@ std::vector<FloorFace> collectFloors(const scene::Scene& scene) {
   return faces;
 }
 
-std::vector<WeightedHeight> weighFloors(const std::vector<FloorFace>& faces) {
+std::vector<WeightedHeight> weighFloors(const std::vector<FloorTriangle>& faces) {
   std::vector<WeightedHeight> heights;
-  for (const FloorFace& face : faces) heights.push_back({face.height(), face.area});
+  for (const FloorTriangle& face : faces) heights.push_back({face.height(), face.area});
   return heights;
 }
 
 /// The heights with much floor, each moved to the indoor floor near it.
-std::vector<double> findFloorHeights(const scene::Scene& scene, const std::vector<FloorFace>& faces,
+std::vector<double> findFloorHeights(const scene::Scene& scene,
+                                     const std::vector<FloorTriangle>& faces,
                                      const std::vector<WeightedHeight>& heights) {
   std::vector<double> found;
   for (const double height : findStoreyHeights(heights, kMinStoreyShare, kMaxStoreys))
@@ -169,7 +170,7 @@ std::vector<StoreyFloor> findStatedStoreys(const scene::Scene& scene,
 }  // namespace
 
 std::vector<StoreyFloor> findStoreys(const scene::Scene& scene) {
-  const std::vector<FloorFace> faces = collectFloors(scene);
+  const std::vector<FloorTriangle> faces = collectFloors(scene);
   const std::vector<WeightedHeight> heights = weighFloors(faces);
   std::vector<StoreyFloor> storeys = findStatedStoreys(scene, heights);
   if (!storeys.empty()) return storeys;

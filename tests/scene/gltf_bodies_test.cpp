@@ -317,9 +317,9 @@ TEST(Sources, BodiesOfTheFilePassThroughTheStream) {
   const Model model = importNodes(
       "0", R"({"name":"a","mesh":0,"extras":{"walk_kind":"path","walk_keys":[{"time":0},)"
            R"({"time":2,"offset":[1,0,0],"turn":90}],"walk_speed":0.5}})");
-  const std::vector<std::byte> bytes = serialiseModel(model);
-  const Model back = deserialiseModel(bytes);
-  EXPECT_EQ(serialiseModel(back), bytes);
+  const std::vector<std::byte> bytes = serializeModel(model);
+  const Model back = deserializeModel(bytes);
+  EXPECT_EQ(serializeModel(back), bytes);
   ASSERT_EQ(back.bodies.size(), 1u);
   EXPECT_EQ(back.bodies[0].keys[1].offset, Vec3(1, 0, 0));
   EXPECT_EQ(back.bodies[0].speed, 0.5);

@@ -60,7 +60,7 @@ TEST_F(CachedModel, TheSecondLoadIsTheSameModelWithoutAnImport) {
   const LoadedModel first = load(), second = load();
   EXPECT_FALSE(first.fromCache);
   EXPECT_TRUE(second.fromCache);
-  EXPECT_EQ(serialiseModel(second.model), serialiseModel(first.model));
+  EXPECT_EQ(serializeModel(second.model), serializeModel(first.model));
   EXPECT_EQ(second.importSeconds, first.importSeconds);
   EXPECT_EQ(entries().size(), 1u);
   EXPECT_TRUE(first.notes.empty() && second.notes.empty());
@@ -127,7 +127,7 @@ TEST_F(CachedModel, APictureThatWasMissingAndCameIsSeen) {
 }
 
 TEST_F(CachedModel, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
-  const std::vector<std::byte> expected = serialiseModel(load().model);
+  const std::vector<std::byte> expected = serializeModel(load().model);
   const fs::path entry = entries().at(0);
   const std::string whole = readContent(entry);
   std::mt19937 random(1);
@@ -143,7 +143,7 @@ TEST_F(CachedModel, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
     const LoadedModel again = load();
     EXPECT_FALSE(again.fromCache) << place;
     EXPECT_EQ(again.notes.size(), 1u) << place;
-    EXPECT_EQ(serialiseModel(again.model), expected);
+    EXPECT_EQ(serializeModel(again.model), expected);
     EXPECT_EQ(readContent(entry).size(), whole.size()) << "the entry was not rewritten";
     EXPECT_TRUE(load().fromCache);
   }

@@ -57,9 +57,9 @@ Model smallModel() {
 }
 
 TEST(ModelStream, RoundTripKeepsEveryByte) {
-  const std::vector<std::byte> bytes = serialiseModel(smallModel());
-  const Model back = deserialiseModel(bytes);
-  EXPECT_EQ(serialiseModel(back), bytes);
+  const std::vector<std::byte> bytes = serializeModel(smallModel());
+  const Model back = deserializeModel(bytes);
+  EXPECT_EQ(serializeModel(back), bytes);
   EXPECT_EQ(back.objects[0].path, "house/door#2");
   EXPECT_EQ(back.objects[0].worldFromMesh.matrix(), smallModel().objects[0].worldFromMesh.matrix());
   EXPECT_EQ(back.meshes[1].positions, smallModel().meshes[1].positions);
@@ -91,40 +91,40 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
 TEST(ModelStream, ColoursThatAreNotOnePerVertexAreRefused) {
   Model model = smallModel();
   model.meshes[0].colours.pop_back();
-  EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
+  EXPECT_THROW(deserializeModel(serializeModel(model)), ModelStreamError);
 }
 
 TEST(ModelStream, ASpaceWhoseSurfaceIsCutOffOrOutsideItsBoxIsRefused) {
   Model model = smallModel();
   model.spaces[0].surface[1].x() = 3.5;
-  EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
+  EXPECT_THROW(deserializeModel(serializeModel(model)), ModelStreamError);
   model.spaces[0].surface = {{0, 1, 0}};
-  EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
+  EXPECT_THROW(deserializeModel(serializeModel(model)), ModelStreamError);
 }
 
 TEST(ModelStream, AStoreyThatIsMissingIsRefused) {
   Model model = smallModel();
   model.storeys.pop_back();
-  EXPECT_THROW(deserialiseModel(serialiseModel(model)), ModelStreamError);
+  EXPECT_THROW(deserializeModel(serializeModel(model)), ModelStreamError);
 }
 
 TEST(ModelStream, EveryShorterStreamIsRefused) {
-  const std::vector<std::byte> bytes = serialiseModel(smallModel());
+  const std::vector<std::byte> bytes = serializeModel(smallModel());
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     std::vector<std::byte> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
-    EXPECT_THROW(deserialiseModel(cut), ModelStreamError) << size;
+    EXPECT_THROW(deserializeModel(cut), ModelStreamError) << size;
     if (size < 16) continue;
     const std::uint64_t length = size;  // the same with a corrected length
     std::memcpy(cut.data() + 8, &length, sizeof length);
-    EXPECT_THROW(deserialiseModel(cut), ModelStreamError) << size;
+    EXPECT_THROW(deserializeModel(cut), ModelStreamError) << size;
   }
 }
 
 TEST(ModelStream, AnotherVersionIsRefusedByItsNumber) {
-  std::vector<std::byte> bytes = serialiseModel(smallModel());
+  std::vector<std::byte> bytes = serializeModel(smallModel());
   bytes[4] = std::byte{99};
   try {
-    deserialiseModel(bytes);
+    deserializeModel(bytes);
     FAIL();
   } catch (const ModelStreamError& error) {
     EXPECT_NE(std::string(error.what()).find("99"), std::string::npos);
@@ -147,7 +147,7 @@ void expectSafe(const Model& model) {
 }
 
 TEST(ModelStream, CorruptedStreamsAreRefusedOrHarmless) {
-  const std::vector<std::byte> bytes = serialiseModel(smallModel());
+  const std::vector<std::byte> bytes = serializeModel(smallModel());
   std::mt19937 random(20240607);
   const auto below = [&](std::size_t n) { return random() % n; };
   std::size_t refused = 0;
@@ -159,7 +159,7 @@ TEST(ModelStream, CorruptedStreamsAreRefusedOrHarmless) {
       noisy[at] = static_cast<std::byte>(below(256));
     }
     try {
-      expectSafe(deserialiseModel(noisy));
+      expectSafe(deserializeModel(noisy));
     } catch (const ModelStreamError&) {
       ++refused;
     }
@@ -169,10 +169,10 @@ TEST(ModelStream, CorruptedStreamsAreRefusedOrHarmless) {
 }
 
 TEST(ModelStream, AHugeCountIsRefusedBeforeAnythingIsAllocated) {
-  std::vector<std::byte> bytes = serialiseModel(Model());
+  std::vector<std::byte> bytes = serializeModel(Model());
   const std::uint64_t huge = std::uint64_t{1} << 60;
   std::memcpy(bytes.data() + 16, &huge, sizeof huge);  // the length of the source's name
-  EXPECT_THROW(deserialiseModel(bytes), ModelStreamError);
+  EXPECT_THROW(deserializeModel(bytes), ModelStreamError);
 }
 
 }  // namespace

@@ -18,7 +18,7 @@ namespace {
 
 constexpr int kMaxDepth = 16;  // nested lists and objects
 
-/// Returns whether the nesting is deeper than `depth`. (nlohmann serialises by recursion.)
+/// Returns whether the nesting is deeper than `depth`. (nlohmann serializes by recursion.)
 bool isDeeperThan(const json& value, int depth) {
   if (!value.is_structured()) return false;
   if (depth == 0) return true;

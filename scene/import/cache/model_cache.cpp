@@ -157,7 +157,7 @@ std::optional<CacheEntry> findEntry(const fs::path& file, const fs::path& path,
   const MappedFile mapped(path);
   if (!mapped.exists()) return std::nullopt;
   try {
-    CacheEntry entry = deserialiseEntry(mapped.bytes());
+    CacheEntry entry = deserializeEntry(mapped.bytes());
     if (!(entry.key == key)) throw ModelStreamError("cache entry: belongs to another file");
     const bool same = std::all_of(entry.dependencies.begin(), entry.dependencies.end(),
                                   [&](const Dependency& dependency) {
@@ -323,7 +323,7 @@ LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
     // The file may have been saved during the import.
     if (!isProvisional(loaded.model) && computeKey(file, options) == key) {
       newEntry.model = std::move(loaded.model);
-      const std::string failure = storeBytes(*cache, path, serialiseEntry(newEntry));
+      const std::string failure = storeBytes(*cache, path, serializeEntry(newEntry));
       if (!failure.empty()) notes.push_back("not cached for the next start: " + failure);
       loaded.model = std::move(newEntry.model);
     }

@@ -57,7 +57,7 @@ class EntryReader {
 
 }  // namespace
 
-std::vector<std::byte> serialiseEntry(const CacheEntry& entry) {
+std::vector<std::byte> serializeEntry(const CacheEntry& entry) {
   EntryWriter out;
   out.append(kMagic);
   out.append(entry.key);
@@ -69,14 +69,14 @@ std::vector<std::byte> serialiseEntry(const CacheEntry& entry) {
     out.append(std::uint64_t{file.exists});
     out.append(file.content);
   }
-  const std::vector<std::byte> stream = serialiseModel(entry.model);
+  const std::vector<std::byte> stream = serializeModel(entry.model);
   out.bytes.reserve(out.bytes.size() + stream.size() + kChecksumSize);
   out.append(stream.data(), stream.size());
   out.append(computeContentHash(out.bytes));
   return std::move(out.bytes);
 }
 
-CacheEntry deserialiseEntry(std::span<const std::byte> bytes) {
+CacheEntry deserializeEntry(std::span<const std::byte> bytes) {
   if (bytes.size() < kChecksumSize) throw ModelStreamError("cache entry: too short");
   const auto body = bytes.first(bytes.size() - kChecksumSize);
   if (!(EntryReader(bytes.last(kChecksumSize)).readHash() == computeContentHash(body))) {
@@ -95,7 +95,7 @@ CacheEntry deserialiseEntry(std::span<const std::byte> bytes) {
     file.content = in.readHash();
     entry.dependencies.push_back(std::move(file));
   }
-  entry.model = deserialiseModel(in.remaining);
+  entry.model = deserializeModel(in.remaining);
   return entry;
 }
 

@@ -1,4 +1,4 @@
-// Serialises an entry of the model cache: its key and dependencies, a model stream, and a checksum.
+// Serializes an entry of the model cache: its key and dependencies, a model stream, and a checksum.
 // Private to scene/.
 #pragma once
 
@@ -28,9 +28,9 @@ struct CacheEntry {
   Model model;
 };
 
-std::vector<std::byte> serialiseEntry(const CacheEntry& entry);
+std::vector<std::byte> serializeEntry(const CacheEntry& entry);
 
 /// Checks the checksum before it reads anything else. Throws ModelStreamError with the reason.
-CacheEntry deserialiseEntry(std::span<const std::byte> bytes);
+CacheEntry deserializeEntry(std::span<const std::byte> bytes);
 
 }  // namespace enfilade::scene

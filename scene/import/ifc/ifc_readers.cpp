@@ -263,7 +263,7 @@ AssimpReadResult readIfcWithAssimp(const IfcInput& input, double timeLimit,
         if (kind != ImportMessage::model)
           return handleMessage(kind, body, progress, status, noMeshes);
         try {
-          result.model = deserialiseModel(body);
+          result.model = deserializeModel(body);
         } catch (const ModelStreamError&) {
           return false;
         }

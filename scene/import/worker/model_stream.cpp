@@ -365,7 +365,7 @@ void writeModelStream(const Model& model, std::uint64_t size, const ModelStreamS
   if (out.finish() != size) throw ModelStreamError("model stream: its size was measured wrong");
 }
 
-std::vector<std::byte> serialiseModel(const Model& model) {
+std::vector<std::byte> serializeModel(const Model& model) {
   const std::uint64_t size = measureModelStream(model);
   std::vector<std::byte> bytes;
   bytes.reserve(size);
@@ -375,7 +375,7 @@ std::vector<std::byte> serialiseModel(const Model& model) {
   return bytes;
 }
 
-Model deserialiseModel(std::span<const std::byte> bytes) {
+Model deserializeModel(std::span<const std::byte> bytes) {
   StreamReader in(bytes);
   readHeader(in, bytes.size());
   Model model;

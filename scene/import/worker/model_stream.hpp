@@ -1,4 +1,4 @@
-// Serialises a Model as one block of bytes: the answer of an import worker, and the content of a
+// Serializes a Model as one block of bytes: the answer of an import worker, and the content of a
 // cache entry.
 #pragma once
 
@@ -33,10 +33,10 @@ void writeModelStream(const Model& model, std::uint64_t size, const ModelStreamS
 
 /// The stream in one piece. Little-endian: magic, version, total length, then the fields in the
 /// order of model.hpp.
-std::vector<std::byte> serialiseModel(const Model& model);
+std::vector<std::byte> serializeModel(const Model& model);
 
 /// Validates everything: counts against the remaining bytes, indices against their targets, enums
 /// against their values. Throws ModelStreamError.
-Model deserialiseModel(std::span<const std::byte> bytes);
+Model deserializeModel(std::span<const std::byte> bytes);
 
 }  // namespace enfilade::scene

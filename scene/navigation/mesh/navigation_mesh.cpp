@@ -347,7 +347,7 @@ std::vector<Vec3> NavigationMesh::makeTriangles(std::uint32_t index) const {
 }
 
 void NavigationMesh::rasterize(
-    std::uint32_t index, const CellGrid& grid, double lowest, double highest,
+    std::uint32_t index, const MapCells& grid, double lowest, double highest,
     const std::function<double(const Vec3& onMesh, double top)>& measureFloor,
     std::vector<std::uint8_t>& cells) const {
   const dtPoly* polygon = nullptr;

@@ -45,7 +45,7 @@ struct BoundaryEdge {
 };
 
 /// Square cells seen from above, in metres. Cell 0 has its corner at (x, z); rows run along x.
-struct CellGrid {
+struct MapCells {
   double x = 0, z = 0, cell = 0;
   std::uint32_t width = 0, height = 0;
 };
@@ -96,7 +96,7 @@ class NavigationMesh {
   /// Sets the cells to 1 whose middle lies over a polygon from `lowest` to `highest`. If only a
   /// part of it may, `measureFloor` returns the height below or above a point of it; `top` is its
   /// highest.
-  void rasterize(std::uint32_t polygon, const CellGrid& grid, double lowest, double highest,
+  void rasterize(std::uint32_t polygon, const MapCells& grid, double lowest, double highest,
                  const std::function<double(const Vec3& onMesh, double top)>& measureFloor,
                  std::vector<std::uint8_t>& cells) const;
   /// For each polygon the number of its island: polygons joined by open portals. The largest island

@@ -55,9 +55,10 @@ double computeRest(const Interval& interval, Vec3 goal) {
   return length(goal - root);
 }
 
-class Search {
+class CorridorSearch {
  public:
-  Search(const NavigationMesh& mesh, const MeshPoint& from, const MeshPoint& to, double bound)
+  CorridorSearch(const NavigationMesh& mesh, const MeshPoint& from, const MeshPoint& to,
+                 double bound)
       : mesh_(mesh), from_(from), to_(to), bound_(bound) {}
 
   std::optional<Corridor> run() {
@@ -187,7 +188,7 @@ class Search {
 std::optional<Corridor> findShortestCorridor(const NavigationMesh& mesh, const MeshPoint& from,
                                              const MeshPoint& to, double bound) {
   if (from.polygon == to.polygon) return std::nullopt;  // a corridor of one polygon is the shortest
-  return Search(mesh, from, to, bound).run();
+  return CorridorSearch(mesh, from, to, bound).run();
 }
 
 }  // namespace enfilade::scene

@@ -37,7 +37,7 @@ std::vector<float> collectSolidTriangles(const WorldData& world, const Aabb& box
 inline constexpr std::uint16_t kWalkableFlag = 1;
 inline constexpr std::uint16_t kUnderSkyFlag = 2;  ///< nothing solid is above most of it
 
-/// A tile of a Detour navigation mesh, serialised; empty: nothing to walk on.
+/// A tile of a Detour navigation mesh, serialized; empty: nothing to walk on.
 using TileMesh = std::vector<std::uint8_t>;
 
 /// Builds a tile at each of some clearances. Throws std::runtime_error if Recast fails, which names
