@@ -54,13 +54,13 @@ def main():
     parser.add_argument("scenes", nargs="+")
     parser.add_argument("--episodes", type=int, default=200)
     parser.add_argument("--seed", type=int, default=1)
-    asked = parser.parse_args()
-    for scene in asked.scenes:
+    arguments = parser.parse_args()
+    for scene in arguments.scenes:
         with enfilade.WalkEnv(scene, starts="anywhere", goals="anywhere", channels=(), radius=0.2, height=1.5,
                               goal_radius=0.2, max_steps=500) as env:
             for name, policy in (("follower", follower), ("random", chance)):
-                episodes = asked.episodes if policy is follower else max(1, asked.episodes // 10)
-                success, spl = measure(env, policy, episodes, asked.seed)
+                episodes = arguments.episodes if policy is follower else max(1, arguments.episodes // 10)
+                success, spl = measure(env, policy, episodes, arguments.seed)
                 print(f"{scene}: {name}: success {success:.3f}, SPL {spl:.3f} over {episodes} episodes")
 
 

@@ -70,7 +70,7 @@ bool isMemorySocket(std::string_view name) {
 struct PackedStep {
   std::uint64_t tick = 0, stateHash = 0;
   std::array<double, 3> feet{kMissing, kMissing, kMissing};
-  std::string stoppedBy;
+  std::string blockedBy;
   std::uint64_t lastStoppedTick = 0;
   static constexpr double kMissing = std::numeric_limits<double>::quiet_NaN();
 };
@@ -82,7 +82,7 @@ PackedStep packStep(const v1::StepReply& reply, const std::string& avatarName) {
   for (const v1::AvatarState& avatar : reply.avatars()) {
     if (avatar.name() != avatarName) continue;
     step.feet = {avatar.feet().x(), avatar.feet().y(), avatar.feet().z()};
-    step.stoppedBy = avatar.move().stopped_by_name();
+    step.blockedBy = avatar.move().stopped_by_name();
     step.lastStoppedTick = avatar.last_stopped_tick();
   }
   return step;
@@ -262,7 +262,7 @@ void WorldGroup::Round::packSteps(v1::PackedSteps& steps) const {
     steps.add_tick(step.tick);
     steps.add_state_hash(step.stateHash);
     for (const double coordinate : step.feet) steps.add_feet(coordinate);
-    steps.add_stopped_by_name(step.stoppedBy);
+    steps.add_stopped_by_name(step.blockedBy);
     steps.add_last_stopped_tick(step.lastStoppedTick);
   }
 }

@@ -183,9 +183,9 @@ class WalkEnv(spaces.EnvBase):
         limit = self.client.welcome.policies.speed_limit
         if self.speed > limit:
             raise ValueError(f"speed: {self.speed:g} m/s exceeds the server's limit of {limit:g}")
-        most = self.client.limits.max_ticks_per_step
-        if self.ticks_per_step > most:
-            raise ValueError(f"ticks_per_step: the server runs at most {most} at a time")
+        max_ticks = self.client.limits.max_ticks_per_step
+        if self.ticks_per_step > max_ticks:
+            raise ValueError(f"ticks_per_step: the server runs at most {max_ticks} at a time")
         widest, highest = self.client.limits.max_picture_width, self.client.limits.max_picture_height
         for one in self.cameras:
             width, height = one.camera.size
@@ -486,7 +486,7 @@ class WalkEnv(spaces.EnvBase):
 
     def _judged(self, before: np.ndarray, info: Dict[str, Any],
                 path: Any) -> Tuple[float, bool, bool, Dict[str, Any]]:
-        """What step() returns after the observation. `path`: to the goal; None if it is not geodesic."""
+        """The results of step() after the observation. `path`: to the goal; None if it is not geodesic."""
         after = self._feet
         assert after is not None
         if path is not None:

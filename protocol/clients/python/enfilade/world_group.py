@@ -209,7 +209,7 @@ class _StepManyRequest:
 
 
 class _MemberConnection:
-    """What a Client needs of a Connection, for one world of a group."""
+    """The part of a Connection that a Client uses, for one world of a group."""
 
     def __init__(self, group: WorldGroup, world: str) -> None:
         self.peer = f"{group._client._connection.peer}, world {world}"

@@ -72,11 +72,11 @@ export function makeTroubleDialog(app: App, onToken: (token: string) => void): H
     if (trouble.kind === "token") token.focus();
     if (trouble.kind !== "waiting") return;
     let left = Math.ceil(trouble.seconds);
-    const tell = () => setText(detail, left > 0 ? `Trying again in ${left} s …` : "Connecting …");
-    tell();
+    const showCountdown = () => setText(detail, left > 0 ? `Trying again in ${left} s …` : "Connecting …");
+    showCountdown();
     countdown = window.setInterval(() => {
       --left;
-      tell();
+      showCountdown();
     }, 1000);
   };
   app.troubled.listen(showTrouble);

@@ -128,7 +128,7 @@ export class Tree {
     }
     const shown = MAX_ROWS + (this.#more.get(group.key) ?? 0);
     for (const entity of group.objects.slice(0, shown)) {
-      // Without the path above it, a name may stand for many objects.
+      // Without the path above it, a name may name many objects.
       this.#addObject(entity, level + 1, this.#grouping === "path" ? lastName(entity.path) : shortName(entity.path));
     }
     if (group.objects.length <= shown) return;
