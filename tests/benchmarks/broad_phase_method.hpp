@@ -24,9 +24,13 @@ struct PairTally {
   std::uint64_t count = 0, sum = 0;
   std::vector<ProxyPair>* kept = nullptr;
 
-  void addStill(std::uint32_t mover, std::uint32_t still) { add({mover, still, false}); }
+  void addStaticPair(std::uint32_t dynamicBox, std::uint32_t staticBoxes) {
+    add({dynamicBox, staticBoxes, false});
+  }
   /// Two dynamic proxies, in any order.
-  void addMovers(std::uint32_t a, std::uint32_t b) { add({std::min(a, b), std::max(a, b), true}); }
+  void addDynamicPair(std::uint32_t a, std::uint32_t b) {
+    add({std::min(a, b), std::max(a, b), true});
+  }
   bool sameAs(const PairTally& other) const { return count == other.count && sum == other.sum; }
 
  private:
@@ -50,7 +54,7 @@ class BroadPhase {
   virtual ~BroadPhase() = default;
   /// Moves every proxy to its new box (the first call inserts them) and reports exactly all
   /// overlapping pairs of closed boxes: a dynamic and a static one, or two dynamic ones.
-  virtual void tick(std::span<const Aabb> movers, PairTally& tally) = 0;
+  virtual void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) = 0;
   /// Bytes allocated without malloc.
   virtual std::size_t hiddenBytes() const { return 0; }
   /// Whether the method reads the given static boxes after construction, so that it needs no copy.
@@ -61,17 +65,17 @@ struct BroadPhaseMethod {
   std::string name;
   enum class Kind { ours, approach, peer } kind;
   /// The method is skipped above this number of static objects, for `reason`.
-  std::size_t mostObjects;
+  std::size_t maxObjects;
   std::string reason;
-  /// `still` outlives the method.
-  std::function<std::unique_ptr<BroadPhase>(std::span<const Aabb> still)> make;
-  std::size_t mostMovers = SIZE_MAX;  ///< the method is skipped above it
+  /// `staticBoxes` outlives the method.
+  std::function<std::unique_ptr<BroadPhase>(std::span<const Aabb> staticBoxes)> make;
+  std::size_t maxDynamicBoxes = SIZE_MAX;  ///< the method is skipped above it
 };
 
 template <typename Method, typename... Arguments>
 auto maker(Arguments... arguments) {
-  return [arguments...](std::span<const Aabb> still) -> std::unique_ptr<BroadPhase> {
-    return std::make_unique<Method>(still, arguments...);
+  return [arguments...](std::span<const Aabb> staticBoxes) -> std::unique_ptr<BroadPhase> {
+    return std::make_unique<Method>(staticBoxes, arguments...);
   };
 }
 

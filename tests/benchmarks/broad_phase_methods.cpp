@@ -5,22 +5,22 @@ namespace {
 
 class OurSortAndSweep : public BroadPhase {
  public:
-  explicit OurSortAndSweep(std::span<const Aabb> still) : sweep_(still) {}
+  explicit OurSortAndSweep(std::span<const Aabb> staticBoxes) : sweep_(staticBoxes) {}
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    for (std::uint32_t id = 0; id < movers.size(); ++id) {
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
       if (inserted_) {
-        sweep_.move(id, movers[id]);
+        sweep_.move(id, dynamicBoxes[id]);
       } else {
-        sweep_.insert(movers[id]);
+        sweep_.insert(dynamicBoxes[id]);
       }
     }
     inserted_ = true;
     sweep_.update();
-    for (std::uint32_t id = 0; id < movers.size(); ++id) {
+    for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
       for (const auto& partner : sweep_.getOverlaps(id)) {
-        if (!partner.isDynamic) tally.addStill(id, partner.id);
-        if (partner.isDynamic && id < partner.id) tally.addMovers(id, partner.id);
+        if (!partner.isDynamic) tally.addStaticPair(id, partner.id);
+        if (partner.isDynamic && id < partner.id) tally.addDynamicPair(id, partner.id);
       }
     }
   }

@@ -17,21 +17,21 @@ double heapBytes() {
   return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
 }
 
-BroadPhaseRun build(const BroadPhaseMethod& method, std::span<const Aabb> still) {
+BroadPhaseRun build(const BroadPhaseMethod& method, std::span<const Aabb> staticBoxes) {
   BroadPhaseRun run;
   run.method = &method;
   const double before = heapBytes();
   const auto start = Clock::now();
-  run.phase = method.make(still);
+  run.phase = method.make(staticBoxes);
   run.buildSeconds = secondsSince(start);
   const double bytes = heapBytes() - before + static_cast<double>(run.phase->hiddenBytes());
-  run.bytesAnObject = bytes / static_cast<double>(still.size());
+  run.bytesAnObject = bytes / static_cast<double>(staticBoxes.size());
   if (!run.phase->readsGivenBoxes()) run.bytesAnObject -= sizeof(Aabb);
   return run;
 }
 
 /// Runs some ticks of one method. The first tick finds the caches full of other methods' data (and
-/// the very first inserts the movers), so it is not timed.
+/// the very first inserts the dynamic boxes), so it is not timed.
 void turn(BroadPhaseRun& run, const RecordedBoxes& recorded, double secondsAMethod) {
   const std::size_t until =
       std::min(recorded.boxes.size(), run.tick + recorded.boxes.size() / kTurns + 1);
@@ -71,15 +71,15 @@ void takeLeast(BroadPhaseRun& best, const BroadPhaseRun& again) {
 }  // namespace
 
 std::vector<BroadPhaseRun> runMethods(std::span<const BroadPhaseMethod* const> methods,
-                                      std::span<const Aabb> still, const RecordedBoxes& recorded,
-                                      double secondsAMethod) {
+                                      std::span<const Aabb> staticBoxes,
+                                      const RecordedBoxes& recorded, double secondsAMethod) {
   std::vector<BroadPhaseRun> best;
-  for (const BroadPhaseMethod* method : methods) best.push_back(build(*method, still));
+  for (const BroadPhaseMethod* method : methods) best.push_back(build(*method, staticBoxes));
   runInTurns(best, recorded, secondsAMethod);
   for (int k = 1; k < kRuns; ++k) {
     std::vector<BroadPhaseRun> again;
     for (const BroadPhaseRun& run : best) {
-      if (run.buildSeconds < kLongToBuild) again.push_back(build(*run.method, still));
+      if (run.buildSeconds < kLongToBuild) again.push_back(build(*run.method, staticBoxes));
     }
     runInTurns(again, recorded, secondsAMethod);
     for (const BroadPhaseRun& run : again) {

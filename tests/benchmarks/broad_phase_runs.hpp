@@ -26,19 +26,19 @@ struct BroadPhaseRun {
   const BroadPhaseMethod* method = nullptr;
   std::unique_ptr<BroadPhase> phase;  ///< null after the run
   double buildSeconds = 0;
-  /// The method's heap without the static boxes themselves, before movers are added: 48 bytes a box
-  /// are subtracted if the method copied them.
+  /// The method's heap without the static boxes themselves, before dynamic boxes are added: 48
+  /// bytes a box are subtracted if the method copied them.
   double bytesAnObject = 0;
   double spent = 0;                  ///< seconds
-  double firstTick = 0;              ///< seconds; it inserts all movers
+  double firstTick = 0;              ///< seconds; it inserts all dynamic boxes
   std::vector<double> microseconds;  ///< by tick; 0 if not timed
   std::size_t tick = 0, wrong = 0;
 };
 
 /// Runs all methods. Each gets `secondsAMethod` for its ticks, and at least a few ticks.
 std::vector<BroadPhaseRun> runMethods(std::span<const BroadPhaseMethod* const> methods,
-                                      std::span<const Aabb> still, const RecordedBoxes& recorded,
-                                      double secondsAMethod);
+                                      std::span<const Aabb> staticBoxes,
+                                      const RecordedBoxes& recorded, double secondsAMethod);
 
 const char* kindName(BroadPhaseMethod::Kind kind);
 

@@ -14,11 +14,11 @@ Aabb makeBox(double x, double y, double z, double sx, double sy, double sz) {
   return {Vec3(x, y, z), Vec3(x + sx, y + sy, z + sz)};
 }
 
-void furnishRoom(Random& random, const Vec3& at, std::vector<Aabb>& still) {
-  still.push_back(makeBox(at.x(), at.y() - 0.2, at.z(), kRoomX, 0.2, kRoomZ));
-  still.push_back(makeBox(at.x(), at.y(), at.z(), kRoomX, kStorey - 0.2, 0.15));
-  still.push_back(makeBox(at.x(), at.y(), at.z(), 0.15, kStorey - 0.2, 2));
-  still.push_back(makeBox(at.x(), at.y(), at.z() + 3, 0.15, kStorey - 0.2, 2));
+void furnishRoom(Random& random, const Vec3& at, std::vector<Aabb>& staticBoxes) {
+  staticBoxes.push_back(makeBox(at.x(), at.y() - 0.2, at.z(), kRoomX, 0.2, kRoomZ));
+  staticBoxes.push_back(makeBox(at.x(), at.y(), at.z(), kRoomX, kStorey - 0.2, 0.15));
+  staticBoxes.push_back(makeBox(at.x(), at.y(), at.z(), 0.15, kStorey - 0.2, 2));
+  staticBoxes.push_back(makeBox(at.x(), at.y(), at.z() + 3, 0.15, kStorey - 0.2, 2));
   for (int k = 4; k < kObjectsPerRoom; ++k) {
     const bool large = k % 8 == 0;
     const double sx = uniform(random, 0.05, large ? 2.0 : 0.5);
@@ -27,7 +27,7 @@ void furnishRoom(Random& random, const Vec3& at, std::vector<Aabb>& still) {
     const double x = uniform(random, 0.2, kRoomX - sx);
     const double y = uniform(random, 0, k % 3 == 0 ? 2.0 : 0.9);
     const double z = uniform(random, 0.2, kRoomZ - sz);
-    still.push_back(makeBox(at.x() + x, at.y() + y, at.z() + z, sx, sy, sz));
+    staticBoxes.push_back(makeBox(at.x() + x, at.y() + y, at.z() + z, sx, sy, sz));
   }
 }
 
@@ -42,11 +42,11 @@ Building makeBuilding(std::size_t objects) {
   for (int s = 0; s < storeys; ++s) {
     for (int x = 0; x < along; ++x) {
       for (int z = 0; z < along; ++z) {
-        furnishRoom(random, Vec3(x * kRoomX, s * kStorey, z * kRoomZ), building.still);
+        furnishRoom(random, Vec3(x * kRoomX, s * kStorey, z * kRoomZ), building.staticBoxes);
       }
     }
   }
-  std::shuffle(building.still.begin(), building.still.end(), random);
+  std::shuffle(building.staticBoxes.begin(), building.staticBoxes.end(), random);
   building.extent = Vec3(along * kRoomX, storeys * kStorey, along * kRoomZ);
   return building;
 }
@@ -80,10 +80,10 @@ Aabb step(Body& body, const Vec3& extent) {
   return {body.centre - half, body.centre + half};
 }
 
-BuildingMotion::BuildingMotion(const Building& building, std::size_t movers)
-    : extent_(building.extent), boxes_(movers) {
+BuildingMotion::BuildingMotion(const Building& building, std::size_t dynamicBoxes)
+    : extent_(building.extent), boxes_(dynamicBoxes) {
   Random random(2);
-  bodies_ = makeBodies(random, movers, building);
+  bodies_ = makeBodies(random, dynamicBoxes, building);
 }
 
 std::span<const Aabb> BuildingMotion::next() {

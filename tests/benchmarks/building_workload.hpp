@@ -1,6 +1,7 @@
 // The broad-phase workload: a building of storeys and rooms with avatars and rotating bodies.
-// Each room of 6 m x 5 m has 68 static objects in shuffled order. 80 % of the movers are avatars at
-// 1.5 m/s; the others rotate and drift. 60 ticks a second. Equal seeds give equal numbers.
+// Each room of 6 m x 5 m has 68 static objects in shuffled order. 80 % of the dynamic boxes are
+// avatars at 1.5 m/s; the others rotate and drift. 60 ticks a second. Equal seeds give equal
+// numbers.
 #pragma once
 
 #include <cstddef>
@@ -14,7 +15,7 @@ namespace enfilade::benchmarks {
 using collision::Aabb;
 
 struct Building {
-  std::vector<Aabb> still;
+  std::vector<Aabb> staticBoxes;
   Vec3 extent = Vec3::Zero();  ///< metres; the low corner is the origin
 };
 
@@ -32,10 +33,10 @@ std::vector<Body> makeBodies(Random& random, std::size_t count, const Building& 
 /// Advances a body by one tick inside the building's walls, and returns its box.
 Aabb step(Body& body, const Vec3& extent);
 
-/// Generates the boxes of all movers, tick by tick.
+/// Generates all dynamic boxes, tick by tick.
 class BuildingMotion {
  public:
-  BuildingMotion(const Building& building, std::size_t movers);
+  BuildingMotion(const Building& building, std::size_t dynamicBoxes);
   /// Advances by one tick.
   std::span<const Aabb> next();
 

@@ -5,7 +5,7 @@
 // The way of measuring is that of broad_phase_runs.hpp. The expected pairs are those of a sweep of
 // the whole list along x, which shares no code with ours.
 
-#include "tests/benchmarks/approaches/mover_sweep.hpp"
+#include "tests/benchmarks/approaches/dynamic_sweep.hpp"
 #include "tests/benchmarks/broad_phase_method.hpp"
 #include "tests/benchmarks/broad_phase_runs.hpp"
 #include "tests/benchmarks/measurement.hpp"
@@ -26,7 +26,7 @@ constexpr Size kQuickSizes[] = {{1000, 121, 0.3}, {8000, 31, 0.6}};
 /// Records `ticks` frames of several sources of boxes together.
 template <typename... Source>
 RecordedBoxes record(int ticks, Source... sources) {
-  MoverSweep truth;
+  DynamicSweep truth;
   RecordedBoxes recorded;
   for (int tick = 0; tick < ticks; ++tick) {
     std::vector<Aabb>& all = recorded.boxes.emplace_back();
@@ -58,7 +58,7 @@ std::size_t measure(CubeMotion motion, const Size& size, const Arguments& argume
   std::vector<const BroadPhaseMethod*> chosen;
   for (const BroadPhaseMethod& method : methods) {
     if (method.kind != BroadPhaseMethod::Kind::approach && arguments.wants(method.name) &&
-        size.cubes <= method.mostMovers)
+        size.cubes <= method.maxDynamicBoxes)
       chosen.push_back(&method);
   }
   std::size_t wrong = 0;

@@ -1,7 +1,7 @@
 // Benchmark of all broad phases on one motion: ours, other approaches of Lin (1993), peers.
 //
 //   collision_broad_phase [--quick] [--out FILE] [--only PART_OF_A_NAME]
-//   collision_broad_phase --ours OBJECTS MOVERS [TICKS]
+//   collision_broad_phase --ours OBJECTS DYNAMIC [TICKS]
 //      ours alone, unchecked: for callgrind, with valgrind --tool=callgrind --collect-atstart=no
 //      --toggle-collect='*oursTick*'
 //
@@ -23,50 +23,53 @@ using namespace enfilade::benchmarks;
 namespace collision = enfilade::collision;
 
 struct Effort {
-  std::size_t mostObjects;
+  std::size_t maxObjects;
   int ticks;
   double secondsAMethod;  ///< for ticks, per size
   std::size_t slowShare;  ///< methods with an object limit are skipped above limit / slowShare
 };
 
-/// Reference for the pairs of a tick: for each mover all static boxes within a metre of its
+/// Reference for the pairs of a tick: for each dynamic box all static boxes within a metre of its
 /// position at the last gathering. Gathering scans a list sorted on x.
 class PairTruth {
  public:
-  explicit PairTruth(std::span<const Aabb> still) : still_(still) {
-    for (std::uint32_t s = 0; s < still.size(); ++s) byX_.emplace_back(still[s].min.x(), s);
-    for (const Aabb& box : still) widest_ = std::max(widest_, box.size().x());
+  explicit PairTruth(std::span<const Aabb> staticBoxes) : staticBoxes_(staticBoxes) {
+    for (std::uint32_t s = 0; s < staticBoxes.size(); ++s)
+      byX_.emplace_back(staticBoxes[s].min.x(), s);
+    for (const Aabb& box : staticBoxes) widest_ = std::max(widest_, box.size().x());
     std::sort(byX_.begin(), byX_.end());
   }
 
-  PairTally tick(std::span<const Aabb> movers) {
-    reach_.resize(movers.size());
-    candidates_.resize(movers.size());
+  PairTally tick(std::span<const Aabb> dynamicBoxes) {
+    reach_.resize(dynamicBoxes.size());
+    candidates_.resize(dynamicBoxes.size());
     PairTally tally;
-    for (std::uint32_t a = 0; a < movers.size(); ++a) {
-      if (!collision::contains(reach_[a], movers[a])) gather(a, collision::inflated(movers[a], 1));
+    for (std::uint32_t a = 0; a < dynamicBoxes.size(); ++a) {
+      if (!collision::contains(reach_[a], dynamicBoxes[a]))
+        gather(a, collision::inflated(dynamicBoxes[a], 1));
       for (const std::uint32_t s : candidates_[a]) {
-        if (collision::overlaps(movers[a], still_[s])) tally.addStill(a, s);
+        if (collision::overlaps(dynamicBoxes[a], staticBoxes_[s])) tally.addStaticPair(a, s);
       }
-      for (std::uint32_t b = a + 1; b < movers.size(); ++b) {
-        if (collision::overlaps(movers[a], movers[b])) tally.addMovers(a, b);
+      for (std::uint32_t b = a + 1; b < dynamicBoxes.size(); ++b) {
+        if (collision::overlaps(dynamicBoxes[a], dynamicBoxes[b])) tally.addDynamicPair(a, b);
       }
     }
     return tally;
   }
 
  private:
-  void gather(std::uint32_t mover, const Aabb& reach) {
-    reach_[mover] = reach;
-    candidates_[mover].clear();
+  void gather(std::uint32_t dynamicBox, const Aabb& reach) {
+    reach_[dynamicBox] = reach;
+    candidates_[dynamicBox].clear();
     auto at = std::lower_bound(byX_.begin(), byX_.end(),
                                std::pair(reach.min.x() - widest_ - 1, std::uint32_t{0}));
     for (; at != byX_.end() && at->first <= reach.max.x(); ++at) {
-      if (collision::overlaps(reach, still_[at->second])) candidates_[mover].push_back(at->second);
+      if (collision::overlaps(reach, staticBoxes_[at->second]))
+        candidates_[dynamicBox].push_back(at->second);
     }
   }
 
-  std::span<const Aabb> still_;
+  std::span<const Aabb> staticBoxes_;
   std::vector<std::pair<double, std::uint32_t>> byX_;
   double widest_ = 0;
   std::vector<Aabb> reach_;
@@ -74,27 +77,29 @@ class PairTruth {
 };
 
 /// The reference itself is compared with the library's brute force, once a size.
-bool truthHolds(const Building& building, std::span<const Aabb> movers, const PairTally& reported) {
+bool truthHolds(const Building& building, std::span<const Aabb> dynamicBoxes,
+                const PairTally& reported) {
   std::vector<std::pair<collision::ProxyId, Aabb>> live;
-  for (std::uint32_t id = 0; id < movers.size(); ++id) live.emplace_back(id, movers[id]);
+  for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id)
+    live.emplace_back(id, dynamicBoxes[id]);
   PairTally expected;
-  for (const ProxyPair& pair : collision::findPairsBruteForce(building.still, live)) {
-    if (pair.otherIsDynamic) expected.addMovers(pair.proxy, pair.other);
-    if (!pair.otherIsDynamic) expected.addStill(pair.proxy, pair.other);
+  for (const ProxyPair& pair : collision::findPairsBruteForce(building.staticBoxes, live)) {
+    if (pair.otherIsDynamic) expected.addDynamicPair(pair.proxy, pair.other);
+    if (!pair.otherIsDynamic) expected.addStaticPair(pair.proxy, pair.other);
   }
   return expected.sameAs(reported);
 }
 
-RecordedBoxes record(const Building& building, std::size_t movers, int ticks) {
+RecordedBoxes record(const Building& building, std::size_t dynamicBoxes, int ticks) {
   RecordedBoxes motion;
-  BuildingMotion bodies(building, movers);
-  PairTruth truth(building.still);
+  BuildingMotion bodies(building, dynamicBoxes);
+  PairTruth truth(building.staticBoxes);
   for (int tick = 0; tick < ticks; ++tick) {
     const auto boxes = bodies.next();
     motion.boxes.emplace_back(boxes.begin(), boxes.end());
     motion.pairs.push_back(truth.tick(boxes));
   }
-  const std::size_t work = movers * building.still.size();
+  const std::size_t work = dynamicBoxes * building.staticBoxes.size();
   if (work <= 10000000 && !truthHolds(building, motion.boxes[0], motion.pairs[0])) {
     std::fprintf(stderr, "the reference differs from brute force\n");
     std::exit(1);
@@ -102,27 +107,29 @@ RecordedBoxes record(const Building& building, std::size_t movers, int ticks) {
   return motion;
 }
 
-nlohmann::json makeHead(const BroadPhaseMethod& method, std::size_t objects, std::size_t movers) {
+nlohmann::json makeHead(const BroadPhaseMethod& method, std::size_t objects,
+                        std::size_t dynamicBoxes) {
   return {{"bench", "broad"},
           {"method", method.name},
           {"kind", kindName(method.kind)},
           {"objects", objects},
-          {"movers", movers}};
+          {"dynamic_boxes", dynamicBoxes}};
 }
 
-void print(const BroadPhaseRun& run, std::size_t objects, std::size_t movers, double pairs,
+void print(const BroadPhaseRun& run, std::size_t objects, std::size_t dynamicBoxes, double pairs,
            Results& results) {
   std::vector<double> timed = run.microseconds;
   std::erase(timed, 0.0);
   const double median = quantile(timed, 0.5);
   const double p99 = quantile(timed, 0.99);
   std::printf(
-      "%-22s %8zu %6zu | %10.2f %10.2f %8.3f us a mover | build %7.3f s %6.1f B an object"
+      "%-22s %8zu %6zu | %10.2f %10.2f %8.3f us a dynamic box | build %7.3f s %6.1f B an object"
       " | %5zu of %4zu ticks wrong\n",
-      run.method->name.c_str(), objects, movers, median, p99, median / static_cast<double>(movers),
-      run.buildSeconds, run.bytesAnObject, run.wrong, run.tick);
+      run.method->name.c_str(), objects, dynamicBoxes, median, p99,
+      median / static_cast<double>(dynamicBoxes), run.buildSeconds, run.bytesAnObject, run.wrong,
+      run.tick);
   std::fflush(stdout);
-  auto line = makeHead(*run.method, objects, movers);
+  auto line = makeHead(*run.method, objects, dynamicBoxes);
   line.update({{"median_us", median},
                {"p99_us", p99},
                {"build_s", run.buildSeconds},
@@ -133,33 +140,33 @@ void print(const BroadPhaseRun& run, std::size_t objects, std::size_t movers, do
   results.add(line);
 }
 
-void leaveOut(const BroadPhaseMethod& method, std::size_t objects, std::size_t movers,
+void leaveOut(const BroadPhaseMethod& method, std::size_t objects, std::size_t dynamicBoxes,
               Results& results) {
-  std::printf("%-22s %8zu %6zu | left out: %s\n", method.name.c_str(), objects, movers,
+  std::printf("%-22s %8zu %6zu | left out: %s\n", method.name.c_str(), objects, dynamicBoxes,
               method.reason.c_str());
-  auto line = makeHead(method, objects, movers);
+  auto line = makeHead(method, objects, dynamicBoxes);
   line.update({{"left_out", method.reason}});
   results.add(line);
 }
 
-std::size_t measure(const Building& building, std::size_t objects, std::size_t movers,
+std::size_t measure(const Building& building, std::size_t objects, std::size_t dynamicBoxes,
                     const Effort& effort, const Arguments& arguments,
                     const std::vector<BroadPhaseMethod>& methods, Results& results) {
-  const RecordedBoxes motion = record(building, movers, effort.ticks);
+  const RecordedBoxes motion = record(building, dynamicBoxes, effort.ticks);
   std::vector<const BroadPhaseMethod*> chosen;
   for (const BroadPhaseMethod& method : methods) {
     if (!arguments.wants(method.name)) continue;
-    if (objects > method.mostObjects / effort.slowShare) {
-      leaveOut(method, objects, movers, results);
+    if (objects > method.maxObjects / effort.slowShare) {
+      leaveOut(method, objects, dynamicBoxes, results);
     } else {
       chosen.push_back(&method);
     }
   }
   const std::vector<BroadPhaseRun> best =
-      runMethods(chosen, building.still, motion, effort.secondsAMethod);
+      runMethods(chosen, building.staticBoxes, motion, effort.secondsAMethod);
   std::size_t wrong = 0;
   for (const BroadPhaseRun& run : best) {
-    print(run, objects, movers, static_cast<double>(motion.pairs.back().count), results);
+    print(run, objects, dynamicBoxes, static_cast<double>(motion.pairs.back().count), results);
     if (run.method->kind != BroadPhaseMethod::Kind::peer) wrong += run.wrong;
   }
   return wrong;
@@ -176,10 +183,10 @@ std::size_t measure(const Building& building, std::size_t objects, std::size_t m
   return ends;
 }
 
-void oursAlone(std::size_t objects, std::size_t movers, std::size_t ticks) {
+void oursAlone(std::size_t objects, std::size_t dynamicBoxes, std::size_t ticks) {
   const Building building = makeBuilding(objects);
-  collision::SortAndSweep sweep(building.still);
-  BuildingMotion motion(building, movers);
+  collision::SortAndSweep sweep(building.staticBoxes);
+  BuildingMotion motion(building, dynamicBoxes);
   for (const Aabb& box : motion.next()) sweep.insert(box);
   sweep.update();
   std::size_t ends = 0, exchanges = 0, aabbTests = 0, laid = 0;
@@ -193,13 +200,14 @@ void oursAlone(std::size_t objects, std::size_t movers, std::size_t ticks) {
     aabbTests += sweep.counters().aabbTests;
     laid += sweep.counters().windowsBuilt;
   }
-  const double share = 1 / static_cast<double>(movers * ticks);
-  std::printf("%zu objects, %zu movers, %zu ticks: median %.2f us, p99 %.2f us\n",
-              building.still.size(), movers, ticks, quantile(microseconds, 0.5),
+  const double share = 1 / static_cast<double>(dynamicBoxes * ticks);
+  std::printf("%zu objects, %zu dynamic boxes, %zu ticks: median %.2f us, p99 %.2f us\n",
+              building.staticBoxes.size(), dynamicBoxes, ticks, quantile(microseconds, 0.5),
               quantile(microseconds, 0.99));
-  std::printf("a mover and tick: %.2f pairs, %.3f swaps, %.3f box tests, %.4f windows built\n",
-              static_cast<double>(ends) * share, static_cast<double>(exchanges) * share,
-              static_cast<double>(aabbTests) * share, static_cast<double>(laid) * share);
+  std::printf(
+      "a dynamic box and tick: %.2f pairs, %.3f swaps, %.3f box tests, %.4f windows built\n",
+      static_cast<double>(ends) * share, static_cast<double>(exchanges) * share,
+      static_cast<double>(aabbTests) * share, static_cast<double>(laid) * share);
 }
 
 }  // namespace
@@ -216,10 +224,10 @@ int main(int argc, char** argv) {
   Results results(arguments);
   const auto methods = broadPhaseMethods();
   std::size_t wrong = 0;
-  for (std::size_t objects = 1000; objects <= effort.mostObjects; objects *= 10) {
+  for (std::size_t objects = 1000; objects <= effort.maxObjects; objects *= 10) {
     const Building building = makeBuilding(objects);
-    for (const std::size_t movers : {10u, 100u, 1000u}) {
-      wrong += measure(building, objects, movers, effort, arguments, methods, results);
+    for (const std::size_t dynamicBoxes : {10u, 100u, 1000u}) {
+      wrong += measure(building, objects, dynamicBoxes, effort, arguments, methods, results);
     }
   }
   return wrong == 0 ? 0 : 3;

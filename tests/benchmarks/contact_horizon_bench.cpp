@@ -84,21 +84,21 @@ void row(const Method& method, double unit, int ticks) {
 void bench(std::size_t avatars, int ticks, std::size_t objects) {
   assets::BuildingOptions building;
   building.objects = objects;
-  const auto still = std::make_shared<const scene::Scene>(assets::makeBuilding(building));
+  const auto staticScene = std::make_shared<const scene::Scene>(assets::makeBuilding(building));
   scene::WorldSettings settings;
   settings.maxSpeed = 4;
-  scene::World world(still, settings);
+  scene::World world(staticScene, settings);
   std::mt19937_64 random(1);
   spawnAvatars(world, avatars, random);
   ContactHorizons::Options unlimited, everything;
   unlimited.maxWork = everything.maxWork = 1'000'000'000;
   everything.examineAll = true;
   std::vector<Method> methods;
-  methods.push_back({"schedule", ContactHorizons(still, settings, unlimited)});
-  methods.push_back({"schedule, work limit", ContactHorizons(still, settings)});
-  methods.push_back({"all near pairs", ContactHorizons(still, settings, everything)});
+  methods.push_back({"schedule", ContactHorizons(staticScene, settings, unlimited)});
+  methods.push_back({"schedule, work limit", ContactHorizons(staticScene, settings)});
+  methods.push_back({"all near pairs", ContactHorizons(staticScene, settings, everything)});
   for (Method& method : methods) method.horizons.select(std::nullopt);
-  scene::EntityIndex index(still);
+  scene::EntityIndex index(staticScene);
   std::vector<double> allPairs;
   std::size_t pairCount = 0;
   double ahead = 0;
@@ -113,7 +113,7 @@ void bench(std::size_t avatars, int ticks, std::size_t objects) {
       ++horizonCount;
     }
   }
-  std::printf("%zu objects, %zu avatars, %d ticks\n", still->model().objects.size(),
+  std::printf("%zu objects, %zu avatars, %d ticks\n", staticScene->model().objects.size(),
               world.snapshot()->avatars.size(), ticks);
   std::printf(
       "| method               | mean us    | worst us   | ratio     | examined    | by boxes  | "

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import plot
 
-LEAST_ERROR = 1e-17  # where an error of 0 is drawn
+MIN_ERROR = 1e-17  # where an error of 0 is drawn
 
 
 def read(folder, name):
@@ -100,12 +100,12 @@ def ahead(rows, unit, **cell):
     return f"**{min(peers) / ours[median]:.1f}×**" if ours and peers else "–"
 
 
-def broad_table(rows, movers, sizes):
+def broad_table(rows, dynamic, sizes):
     body = []
     for method in names(rows):
-        cells = [time_cell(find(rows, method=method, movers=movers, objects=n), "us") for n in sizes]
+        cells = [time_cell(find(rows, method=method, dynamic_boxes=dynamic, objects=n), "us") for n in sizes]
         body.append([method] + cells)
-    body.append(["best peer : ours"] + [ahead(rows, "us", objects=n, movers=movers) for n in sizes])
+    body.append(["best peer : ours"] + [ahead(rows, "us", objects=n, dynamic_boxes=dynamic) for n in sizes])
     return table(["µs a tick, median (99 %)"] + [f"{n:,} objects" for n in sizes], body)
 
 
@@ -114,13 +114,13 @@ def build_table(rows, sizes):
     for method in names(rows):
         cells = []
         for n in sizes:
-            row = find(rows, method=method, movers=100, objects=n)
+            row = find(rows, method=method, dynamic_boxes=100, objects=n)
             known = row and "build_s" in row
             cells.append(f"{short(row['build_s'])} s, {row['bytes']:.0f} B" if known else "–")
         ticks = [row for row in rows if row["method"] == method and "ticks" in row]
         wrong = f"{sum(r['wrong'] for r in ticks)} of {sum(r['ticks'] for r in ticks)}"
         body.append([method] + cells + [wrong])
-    return table(["build, bytes a still object"] + [f"{n:,}" for n in sizes] + ["wrong ticks"], body)
+    return table(["build, bytes a static object"] + [f"{n:,}" for n in sizes] + ["wrong ticks"], body)
 
 
 def broad(rows, out):
@@ -130,21 +130,21 @@ def broad(rows, out):
     ours = {row["method"] for row in rows if row["kind"] == "ours"}
     parts = ["## Broad phase\n", """\
 A building of storeys and rooms with 68 static objects per room of 30 m², in shuffled order. 80 % of the
-movers are avatars at 1.5 m/s, the others rotate; 60 ticks a second. A tick is timed from the new boxes to
-all reported pairs. Every tick, each method's set of pairs was compared with a reference (number, and sum
-of mixed ids). Methods run in turns of some dozens of ticks; the first tick of a turn has cold caches and
+dynamic boxes belong to avatars at 1.5 m/s, the others rotate; 60 ticks a second. A tick is timed from the
+new boxes to all reported pairs. Every tick, each method's set of pairs was compared with a reference
+(number, and sum of mixed ids). Methods run in turns of some dozens of ticks; the first tick of a turn has cold caches and
 is not timed. A method stops when its time for a size is used up.
 """]
-    for movers in sorted(set(row["movers"] for row in rows)):
+    for dynamic in sorted(set(row["dynamic_boxes"] for row in rows)):
         series = {}
         for method in names(rows):
             series[method] = [(n, row["median_us"]) for n in sizes
-                              if (row := find(rows, method=method, movers=movers, objects=n))
+                              if (row := find(rows, method=method, dynamic_boxes=dynamic, objects=n))
                               and "median_us" in row]
-        plot.lines(out / f"broad_{movers}.svg", f"Broad phase, {movers} movers", "still objects",
+        plot.lines(out / f"broad_{dynamic}.svg", f"Broad phase, {dynamic} dynamic boxes", "static objects",
                    "µs a tick (median)", series, ours)
-        parts += [f"### {movers} movers\n", broad_table(rows, movers, sizes),
-                  picture(out, f"broad_{movers}", f"Cost of a tick by static objects, {movers} movers")]
+        parts += [f"### {dynamic} dynamic boxes\n", broad_table(rows, dynamic, sizes),
+                  picture(out, f"broad_{dynamic}", f"Cost of a tick by static objects, {dynamic} dynamic boxes")]
     parts += ["### Building, memory, and ticks with a wrong set of pairs\n", build_table(rows, sizes),
               "Bytes are what malloc handed out (Embree: its own count), without the given boxes.\n"]
     reasons = {row["method"]: row["left_out"] for row in rows if "left_out" in row}
@@ -248,7 +248,7 @@ def ratio_table(rows, sizes):
 
 
 def drawn_error(values, which):
-    return max(LEAST_ERROR, values[which])
+    return max(MIN_ERROR, values[which])
 
 
 def speed_error_plot(rows, out, name, title, kind, which, time):

@@ -65,11 +65,11 @@ scene::Model loadNamedModel(const std::filesystem::path& file) {
 
 std::shared_ptr<const scene::Scene> load(const std::filesystem::path& file) {
   const auto start = std::chrono::steady_clock::now();
-  auto still = std::make_shared<const scene::Scene>(loadNamedModel(file));
+  auto staticScene = std::make_shared<const scene::Scene>(loadNamedModel(file));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   std::printf("%s: %zu objects loaded in %.2f s, %.0f MB at most\n", file.c_str(),
-              still->model().objects.size(), took.count(), peakMegabytes());
-  return still;
+              staticScene->model().objects.size(), took.count(), peakMegabytes());
+  return staticScene;
 }
 
 /// Runs the ticks, with `before` called before each, and prints their cost.
@@ -113,8 +113,8 @@ void measure(const std::string& title, scene::World& world, int ticks,
 }
 
 void bench(const std::filesystem::path& file, int avatars, int ticks, int threads) {
-  const auto still = load(file);
-  scene::World world(still);
+  const auto staticScene = load(file);
+  scene::World world(staticScene);
   setThreadCount(world, threads);
   std::mt19937_64 random(1);
   spawnAvatars(world, static_cast<std::size_t>(avatars), random);

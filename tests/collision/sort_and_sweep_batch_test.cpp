@@ -66,21 +66,21 @@ TEST_F(BatchedSweep, EqualsBruteForceWithSizesOfManyMagnitudes) {
 
 TEST_F(BatchedSweep, ProxiesThatRestAreLeftOutUntilTheyMove) {
   insertAll();
-  const std::size_t movers = 100;
+  const std::size_t dynamicBoxes = 100;
   for (int tick = 0; tick < 200; ++tick) {
-    for (std::size_t k = 0; k < movers; ++k) shift(ids_[k], 0.4);
+    for (std::size_t k = 0; k < dynamicBoxes; ++k) shift(ids_[k], 0.4);
     if (tick > 100 && tick % 7 == 0) {  // resting ones move a little, two at once, or jump
-      const auto rested = movers + static_cast<std::size_t>(randomInt(random_, 0, 198));
+      const auto rested = dynamicBoxes + static_cast<std::size_t>(randomInt(random_, 0, 198));
       shift(ids_[rested], 0.2);
       shift(ids_[rested + 1], tick % 3 == 0 ? 5 : 0.01);
     }
     updateAndCheck();
     if (HasFatalFailure()) return;
     if (tick == 100) {
-      EXPECT_EQ(batched_, movers);
+      EXPECT_EQ(batched_, dynamicBoxes);
     }
     if (tick == 106) {
-      EXPECT_EQ(batched_, movers + 2);
+      EXPECT_EQ(batched_, dynamicBoxes + 2);
     }
   }
 }

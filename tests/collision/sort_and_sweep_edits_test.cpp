@@ -177,34 +177,34 @@ TEST(BroadPhaseAudit, AcceptsACorrectSweepAndFindsEachInjectedFault) {
   Random random(27);
   std::vector<Aabb> staticBoxes = makeFurnishedHall(random, 300, Vec3(10, 3, 10));
   SortAndSweep sweep(staticBoxes);
-  std::vector<std::pair<ProxyId, Aabb>> movers;
+  std::vector<std::pair<ProxyId, Aabb>> dynamicBoxes;
   for (int k = 0; k < 40; ++k) {
     const Aabb box = boxAt(uniform3(random, Vec3::Zero(), Vec3(10, 1, 10)), Vec3(1.2, 1.75, 1.2));
-    movers.emplace_back(sweep.insert(box), box);
+    dynamicBoxes.emplace_back(sweep.insert(box), box);
   }
   sweep.update();
-  const BroadPhaseAudit untouched = compareWithBruteForce(sweep, staticBoxes, movers);
+  const BroadPhaseAudit untouched = compareWithBruteForce(sweep, staticBoxes, dynamicBoxes);
   EXPECT_GT(untouched.pairs, 0u);
   EXPECT_TRUE(untouched.missed.empty() && untouched.extra.empty());
-  EXPECT_EQ(compareWithBruteForce(sweep, staticBoxes, movers).pairs, sweep.pairCount());
+  EXPECT_EQ(compareWithBruteForce(sweep, staticBoxes, dynamicBoxes).pairs, sweep.pairCount());
 
   // The audit receives boxes that the sweep did not: the state of the sweep is then wrong.
-  ASSERT_FALSE(sweep.getOverlaps(movers[3].first).empty());
-  const Aabb before = movers[3].second;
-  movers[3].second = boxAt(Vec3::Constant(1e6), Vec3::Ones());
-  const BroadPhaseAudit gone = compareWithBruteForce(sweep, staticBoxes, movers);
-  EXPECT_EQ(gone.extra.size(), sweep.getOverlaps(movers[3].first).size());
+  ASSERT_FALSE(sweep.getOverlaps(dynamicBoxes[3].first).empty());
+  const Aabb before = dynamicBoxes[3].second;
+  dynamicBoxes[3].second = boxAt(Vec3::Constant(1e6), Vec3::Ones());
+  const BroadPhaseAudit gone = compareWithBruteForce(sweep, staticBoxes, dynamicBoxes);
+  EXPECT_EQ(gone.extra.size(), sweep.getOverlaps(dynamicBoxes[3].first).size());
   EXPECT_TRUE(gone.missed.empty());
-  movers[3].second = before;
+  dynamicBoxes[3].second = before;
   staticBoxes.push_back(before);
-  const BroadPhaseAudit come = compareWithBruteForce(sweep, staticBoxes, movers);
+  const BroadPhaseAudit come = compareWithBruteForce(sweep, staticBoxes, dynamicBoxes);
   EXPECT_FALSE(come.missed.empty());
   EXPECT_TRUE(come.extra.empty());
 
   // An audit of one proxy reports only the faults of that proxy.
   staticBoxes.pop_back();
-  const std::vector<ProxyId> one{movers[7].first};
-  const BroadPhaseAudit some = compareWithBruteForce(sweep, staticBoxes, movers, one);
+  const std::vector<ProxyId> one{dynamicBoxes[7].first};
+  const BroadPhaseAudit some = compareWithBruteForce(sweep, staticBoxes, dynamicBoxes, one);
   EXPECT_TRUE(some.missed.empty() && some.extra.empty());
   EXPECT_EQ(some.pairs, sweep.getOverlaps(one[0]).size());
 }

@@ -361,16 +361,17 @@ TEST(SortAndSweep, BuildsNoWindowsForStationaryProxies) {
 TEST(SortAndSweep, RemovesAllPairsWhenAllProxiesJump) {
   const Aabb slab = boxAt({-5000, -1, -5000}, {10000, 1, 10000});
   SortAndSweep sweep(std::span(&slab, 1));
-  constexpr int kMovers = 100;
+  constexpr int kDynamicBoxes = 100;
   const auto makeBox = [](int k, double x) { return boxAt({x + 3 * k, 0.5, 0}, {1, 1, 1}); };
-  for (int k = 0; k < kMovers; ++k) sweep.insert(makeBox(k, 0));
+  for (int k = 0; k < kDynamicBoxes; ++k) sweep.insert(makeBox(k, 0));
   sweep.update();
   for (int tick = 1; tick < 5; ++tick) {
-    for (ProxyId k = 0; k < kMovers; ++k)
+    for (ProxyId k = 0; k < kDynamicBoxes; ++k)
       sweep.move(k, makeBox(static_cast<int>(k), 100 + 0.001 * tick));
     sweep.update();
   }
-  EXPECT_LE(sweep.counters().aabbTests, 4U * kMovers);  // those of neighbours, not all of them
+  EXPECT_LE(sweep.counters().aabbTests,
+            4U * kDynamicBoxes);  // those of neighbours, not all of them
 }
 
 TEST(SortAndSweep, ARemovedProxyCannotBeMovedEvenToItsPosition) {
@@ -462,7 +463,7 @@ TEST(SortAndSweep, AStraightWalkRarelyRebuildsTheWindow) {
   EXPECT_GT(swaps, 1000u);
   EXPECT_GT(laid, 50u);
   EXPECT_LT(laid, 300u * 50 / 20) << "a cell lasts for more than 20 ticks";
-  EXPECT_LT(most, 10u) << "few movers have theirs laid in one tick";
+  EXPECT_LT(most, 10u) << "few windows are built in one tick";
 }
 
 TEST(SortAndSweep, UsesFewBytesInAdditionToTheBoxes) {

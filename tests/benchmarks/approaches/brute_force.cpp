@@ -1,4 +1,5 @@
-// Broad phase by brute force: every mover against every static box and every other mover.
+// Broad phase by brute force: every dynamic box against every static box and every other dynamic
+// box.
 #include "tests/benchmarks/broad_phase_method.hpp"
 
 namespace enfilade::benchmarks {
@@ -6,21 +7,21 @@ namespace {
 
 class BruteForce : public BroadPhase {
  public:
-  explicit BruteForce(std::span<const Aabb> still) : still_(still) {}
+  explicit BruteForce(std::span<const Aabb> staticBoxes) : staticBoxes_(staticBoxes) {}
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    for (std::uint32_t a = 0; a < movers.size(); ++a) {
-      for (std::uint32_t s = 0; s < still_.size(); ++s) {
-        if (collision::overlaps(movers[a], still_[s])) tally.addStill(a, s);
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    for (std::uint32_t a = 0; a < dynamicBoxes.size(); ++a) {
+      for (std::uint32_t s = 0; s < staticBoxes_.size(); ++s) {
+        if (collision::overlaps(dynamicBoxes[a], staticBoxes_[s])) tally.addStaticPair(a, s);
       }
-      for (std::uint32_t b = a + 1; b < movers.size(); ++b) {
-        if (collision::overlaps(movers[a], movers[b])) tally.addMovers(a, b);
+      for (std::uint32_t b = a + 1; b < dynamicBoxes.size(); ++b) {
+        if (collision::overlaps(dynamicBoxes[a], dynamicBoxes[b])) tally.addDynamicPair(a, b);
       }
     }
   }
 
  private:
-  std::span<const Aabb> still_;
+  std::span<const Aabb> staticBoxes_;
 };
 
 }  // namespace

@@ -2,9 +2,10 @@
 //
 // A node is split at the median of its boxes' centres, along the axis of their largest spread. A
 // box that crosses the plane goes to both sides, so splitting ends where it no longer separates. A
-// mover descends into the sides it overlaps; a stamp prevents duplicate reports. Pairs of movers
-// come from one sort and sweep (mover_sweep.hpp), since a BSP does not suit moving boxes.
-#include "tests/benchmarks/approaches/mover_sweep.hpp"
+// dynamic box descends into the sides it overlaps; a stamp prevents duplicate reports. Pairs of
+// dynamic boxes come from one sort and sweep (dynamic_sweep.hpp), since a BSP does not suit moving
+// boxes.
+#include "tests/benchmarks/approaches/dynamic_sweep.hpp"
 
 namespace enfilade::benchmarks {
 namespace {
@@ -14,19 +15,20 @@ constexpr int kMaxLevels = 32;
 
 class BspTree : public BroadPhase {
  public:
-  explicit BspTree(std::span<const Aabb> still) : still_(still), stamp_(still.size(), 0) {
-    std::vector<std::uint32_t> all(still.size());
+  explicit BspTree(std::span<const Aabb> staticBoxes)
+      : staticBoxes_(staticBoxes), stamp_(staticBoxes.size(), 0) {
+    std::vector<std::uint32_t> all(staticBoxes.size());
     std::iota(all.begin(), all.end(), 0u);
     nodes_.emplace_back();
     build(0, std::move(all), 0);
   }
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    for (std::uint32_t id = 0; id < movers.size(); ++id) {
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
       ++now_;
-      ask(0, movers[id], id, tally);
+      ask(0, dynamicBoxes[id], id, tally);
     }
-    movers_.reportPairs(movers, tally);
+    dynamicBoxes_.reportPairs(dynamicBoxes, tally);
   }
 
  private:
@@ -45,18 +47,18 @@ class BspTree : public BroadPhase {
 
   bool cut(std::uint32_t node, std::vector<std::uint32_t>& boxes, int level) {
     Aabb centres;
-    for (const std::uint32_t b : boxes) centres.include(still_[b].centre());
+    for (const std::uint32_t b : boxes) centres.include(staticBoxes_[b].centre());
     int axis = 0;
     centres.size().maxCoeff(&axis);
     const auto middle = boxes.begin() + static_cast<std::ptrdiff_t>(boxes.size() / 2);
     std::nth_element(boxes.begin(), middle, boxes.end(), [&](std::uint32_t a, std::uint32_t b) {
-      return still_[a].centre()[axis] < still_[b].centre()[axis];
+      return staticBoxes_[a].centre()[axis] < staticBoxes_[b].centre()[axis];
     });
-    const double at = still_[*middle].centre()[axis];
+    const double at = staticBoxes_[*middle].centre()[axis];
     std::vector<std::uint32_t> low, high;
     for (const std::uint32_t b : boxes) {
-      if (still_[b].min[axis] <= at) low.push_back(b);
-      if (still_[b].max[axis] >= at) high.push_back(b);
+      if (staticBoxes_[b].min[axis] <= at) low.push_back(b);
+      if (staticBoxes_[b].max[axis] >= at) high.push_back(b);
     }
     // Not worth it if most boxes would be on both sides.
     if (4 * std::max(low.size(), high.size()) > 3 * boxes.size()) return false;
@@ -78,24 +80,24 @@ class BspTree : public BroadPhase {
     }
     for (std::uint32_t k = node.low; k < node.high; ++k) {
       const std::uint32_t s = listed_[k];
-      if (stamp_[s] == now_ || !collision::overlaps(box, still_[s])) continue;
+      if (stamp_[s] == now_ || !collision::overlaps(box, staticBoxes_[s])) continue;
       stamp_[s] = now_;
-      tally.addStill(id, s);
+      tally.addStaticPair(id, s);
     }
   }
 
-  std::span<const Aabb> still_;
+  std::span<const Aabb> staticBoxes_;
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> listed_;
   std::vector<std::uint64_t> stamp_;  ///< by static box: the last query that reported it
   std::uint64_t now_ = 0;
-  MoverSweep movers_;
+  DynamicSweep dynamicBoxes_;
 };
 
 }  // namespace
 
 BroadPhaseMethod bspTree() {
-  return {"BSP of the still scene", BroadPhaseMethod::Kind::approach, SIZE_MAX, "",
+  return {"BSP of the static scene", BroadPhaseMethod::Kind::approach, SIZE_MAX, "",
           maker<BspTree>()};
 }
 

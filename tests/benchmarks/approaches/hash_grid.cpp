@@ -1,8 +1,8 @@
 // Uniform spatial subdivision (Lin 1993, section 5.3.2): equal cells, hashed; every box is listed
 // in all cells that it overlaps.
 //
-// Static boxes are listed once, in one array ordered by cell. Movers are listed again every tick.
-// Only the cell with the low corner of the boxes' intersection reports a pair, so that it is
+// Static boxes are listed once, in one array ordered by cell. Dynamic boxes are listed again every
+// tick. Only the cell with the low corner of the boxes' intersection reports a pair, so that it is
 // reported once.
 #include <array>
 #include <cmath>
@@ -84,11 +84,11 @@ class PlaceTable {
 
 class HashGrid : public BroadPhase {
  public:
-  explicit HashGrid(std::span<const Aabb> still) : still_(still) {
+  explicit HashGrid(std::span<const Aabb> staticBoxes) : staticBoxes_(staticBoxes) {
     std::vector<std::uint32_t> counts;
-    for (const Aabb& box : still) {
+    for (const Aabb& box : staticBoxes) {
       forEachPlace(box, [&](const Place& place) {
-        const std::uint32_t cell = stillCells_.findOrAdd(place);
+        const std::uint32_t cell = staticCells_.findOrAdd(place);
         if (cell == counts.size()) counts.push_back(0);
         ++counts[cell];
       });
@@ -96,21 +96,21 @@ class HashGrid : public BroadPhase {
     first_.assign(counts.size() + 1, 0);
     for (std::size_t k = 0; k < counts.size(); ++k) first_[k + 1] = first_[k] + counts[k];
     listed_.resize(first_.back());
-    for (std::uint32_t s = 0; s < still.size(); ++s) {
-      forEachPlace(still[s], [&](const Place& place) {
-        const std::uint32_t cell = stillCells_.find(place);
+    for (std::uint32_t s = 0; s < staticBoxes.size(); ++s) {
+      forEachPlace(staticBoxes[s], [&](const Place& place) {
+        const std::uint32_t cell = staticCells_.find(place);
         listed_[first_[cell + 1] - counts[cell]--] = s;
       });
     }
   }
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    moverCells_.clear();
-    for (auto& list : moverLists_) list.clear();
-    for (std::uint32_t id = 0; id < movers.size(); ++id) {
-      forEachPlace(movers[id], [&](const Place& place) {
-        reportStatic(id, movers[id], place, tally);
-        reportDynamic(id, movers, place, tally);
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    dynamicCells_.clear();
+    for (auto& list : dynamicLists_) list.clear();
+    for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
+      forEachPlace(dynamicBoxes[id], [&](const Place& place) {
+        reportStatic(id, dynamicBoxes[id], place, tally);
+        reportDynamic(id, dynamicBoxes, place, tally);
       });
     }
   }
@@ -121,34 +121,34 @@ class HashGrid : public BroadPhase {
   }
 
   void reportStatic(std::uint32_t id, const Aabb& box, const Place& place, PairTally& tally) {
-    const std::uint32_t cell = stillCells_.find(place);
+    const std::uint32_t cell = staticCells_.find(place);
     if (cell == PlaceTable::kNone) return;
     for (std::uint32_t k = first_[cell]; k < first_[cell + 1]; ++k) {
-      const Aabb& other = still_[listed_[k]];
+      const Aabb& other = staticBoxes_[listed_[k]];
       if (collision::overlaps(box, other) && ownsPair(place, box, other)) {
-        tally.addStill(id, listed_[k]);
+        tally.addStaticPair(id, listed_[k]);
       }
     }
   }
 
-  void reportDynamic(std::uint32_t id, std::span<const Aabb> movers, const Place& place,
+  void reportDynamic(std::uint32_t id, std::span<const Aabb> dynamicBoxes, const Place& place,
                      PairTally& tally) {
-    const std::uint32_t cell = moverCells_.findOrAdd(place);
-    if (cell >= moverLists_.size()) moverLists_.resize(cell + 1);
-    for (const std::uint32_t other : moverLists_[cell]) {
-      if (collision::overlaps(movers[id], movers[other]) &&
-          ownsPair(place, movers[id], movers[other])) {
-        tally.addMovers(id, other);
+    const std::uint32_t cell = dynamicCells_.findOrAdd(place);
+    if (cell >= dynamicLists_.size()) dynamicLists_.resize(cell + 1);
+    for (const std::uint32_t other : dynamicLists_[cell]) {
+      if (collision::overlaps(dynamicBoxes[id], dynamicBoxes[other]) &&
+          ownsPair(place, dynamicBoxes[id], dynamicBoxes[other])) {
+        tally.addDynamicPair(id, other);
       }
     }
-    moverLists_[cell].push_back(id);
+    dynamicLists_[cell].push_back(id);
   }
 
-  std::span<const Aabb> still_;
-  PlaceTable stillCells_, moverCells_;
+  std::span<const Aabb> staticBoxes_;
+  PlaceTable staticCells_, dynamicCells_;
   std::vector<std::uint32_t> first_;   ///< by cell, plus one: offsets into `listed_`
   std::vector<std::uint32_t> listed_;  ///< static boxes by cell
-  std::vector<std::vector<std::uint32_t>> moverLists_;
+  std::vector<std::vector<std::uint32_t>> dynamicLists_;
 };
 
 }  // namespace

@@ -2,9 +2,9 @@
 //
 // A line sweeps along x. At the start of a box, its interval on z is inserted into an interval tree
 // and compared with those in it; at its end it is removed. Overlapping pairs of rectangles are then
-// tested on y. The static end points on x are sorted once and merged with the movers' each tick.
-// Static and dynamic intervals are in two trees, so that no two static boxes are paired. Every tick
-// sweeps over the whole static scene: O(n log n), as in the thesis.
+// tested on y. The static end points on x are sorted once and merged with the dynamic boxes' each
+// tick. Static and dynamic intervals are in two trees, so that no two static boxes are paired.
+// Every tick sweeps over the whole static scene: O(n log n), as in the thesis.
 //
 // Departures: the split values are a sample of at most 4095 static ends, fixed for all ticks; a
 // node's intervals are unordered and tested one by one.
@@ -89,27 +89,30 @@ class IntervalTree {
 
 class IntervalSweep : public BroadPhase {
  public:
-  explicit IntervalSweep(std::span<const Aabb> still)
-      : still_(still), splits_(sampledSplits(still)), stillTree_(splits_, still.size()) {
-    for (std::uint32_t s = 0; s < still.size(); ++s) {
-      addEnds({still[s].min.x(), s, false, false}, still[s].max.x(), stillEnds_);
+  explicit IntervalSweep(std::span<const Aabb> staticBoxes)
+      : staticBoxes_(staticBoxes),
+        splits_(sampledSplits(staticBoxes)),
+        staticTree_(splits_, staticBoxes.size()) {
+    for (std::uint32_t s = 0; s < staticBoxes.size(); ++s) {
+      addEnds({staticBoxes[s].min.x(), s, false, false}, staticBoxes[s].max.x(), staticEnds_);
     }
-    std::sort(stillEnds_.begin(), stillEnds_.end(), before);
+    std::sort(staticEnds_.begin(), staticEnds_.end(), before);
   }
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    if (!moverTree_) moverTree_ = std::make_unique<IntervalTree>(splits_, movers.size());
-    moverEnds_.clear();
-    for (std::uint32_t id = 0; id < movers.size(); ++id) {
-      addEnds({movers[id].min.x(), id, true, false}, movers[id].max.x(), moverEnds_);
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    if (!dynamicTree_) dynamicTree_ = std::make_unique<IntervalTree>(splits_, dynamicBoxes.size());
+    dynamicEnds_.clear();
+    for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
+      addEnds({dynamicBoxes[id].min.x(), id, true, false}, dynamicBoxes[id].max.x(), dynamicEnds_);
     }
-    std::sort(moverEnds_.begin(), moverEnds_.end(), before);
-    auto still = stillEnds_.begin();
-    for (const End& end : moverEnds_) {
-      for (; still != stillEnds_.end() && before(*still, end); ++still) meet(*still, movers, tally);
-      meet(end, movers, tally);
+    std::sort(dynamicEnds_.begin(), dynamicEnds_.end(), before);
+    auto staticBoxes = staticEnds_.begin();
+    for (const End& end : dynamicEnds_) {
+      for (; staticBoxes != staticEnds_.end() && before(*staticBoxes, end); ++staticBoxes)
+        meet(*staticBoxes, dynamicBoxes, tally);
+      meet(end, dynamicBoxes, tally);
     }
-    for (; still != stillEnds_.end(); ++still) meet(*still, movers, tally);
+    for (; staticBoxes != staticEnds_.end(); ++staticBoxes) meet(*staticBoxes, dynamicBoxes, tally);
   }
 
  private:
@@ -127,9 +130,9 @@ class IntervalSweep : public BroadPhase {
     ends.push_back({upperAt, lower.id, lower.moves, true});
   }
 
-  static std::vector<double> sampledSplits(std::span<const Aabb> still) {
+  static std::vector<double> sampledSplits(std::span<const Aabb> staticBoxes) {
     std::vector<double> all;
-    for (const Aabb& box : still) all.insert(all.end(), {box.min.z(), box.max.z()});
+    for (const Aabb& box : staticBoxes) all.insert(all.end(), {box.min.z(), box.max.z()});
     std::sort(all.begin(), all.end());
     std::size_t count = 1;
     while (2 * count + 1 <= std::min(all.size(), kMaxSplits)) count = 2 * count + 1;
@@ -138,38 +141,38 @@ class IntervalSweep : public BroadPhase {
     return splits;
   }
 
-  void meet(const End& end, std::span<const Aabb> movers, PairTally& tally) {
-    const Aabb& box = end.moves ? movers[end.id] : still_[end.id];
-    IntervalTree& own = end.moves ? *moverTree_ : stillTree_;
+  void meet(const End& end, std::span<const Aabb> dynamicBoxes, PairTally& tally) {
+    const Aabb& box = end.moves ? dynamicBoxes[end.id] : staticBoxes_[end.id];
+    IntervalTree& own = end.moves ? *dynamicTree_ : staticTree_;
     if (end.upper) {
       own.remove(end.id);
       return;
     }
-    moverTree_->ask(box.min.z(), box.max.z(), [&](std::uint32_t other) {
-      if (!collision::overlaps(box, movers[other])) return;
-      if (end.moves) tally.addMovers(end.id, other);
-      if (!end.moves) tally.addStill(other, end.id);
+    dynamicTree_->ask(box.min.z(), box.max.z(), [&](std::uint32_t other) {
+      if (!collision::overlaps(box, dynamicBoxes[other])) return;
+      if (end.moves) tally.addDynamicPair(end.id, other);
+      if (!end.moves) tally.addStaticPair(other, end.id);
     });
     if (end.moves) {
-      stillTree_.ask(box.min.z(), box.max.z(), [&](std::uint32_t other) {
-        if (collision::overlaps(box, still_[other])) tally.addStill(end.id, other);
+      staticTree_.ask(box.min.z(), box.max.z(), [&](std::uint32_t other) {
+        if (collision::overlaps(box, staticBoxes_[other])) tally.addStaticPair(end.id, other);
       });
     }
     own.insert(end.id, box.min.z(), box.max.z());
   }
 
-  std::span<const Aabb> still_;
+  std::span<const Aabb> staticBoxes_;
   std::vector<double> splits_;
-  IntervalTree stillTree_;
-  std::unique_ptr<IntervalTree> moverTree_;
-  std::vector<End> stillEnds_, moverEnds_;
+  IntervalTree staticTree_;
+  std::unique_ptr<IntervalTree> dynamicTree_;
+  std::vector<End> staticEnds_, dynamicEnds_;
 };
 
 }  // namespace
 
 BroadPhaseMethod intervalTree() {
   return {"2-D interval tree", BroadPhaseMethod::Kind::approach, 100000,
-          "every tick sweeps over all still boxes", maker<IntervalSweep>()};
+          "every tick sweeps over all static boxes", maker<IntervalSweep>()};
 }
 
 }  // namespace enfilade::benchmarks

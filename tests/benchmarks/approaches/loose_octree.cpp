@@ -2,8 +2,8 @@
 //
 // A node of edge e holds boxes of size at most e with centres in its cube. They stay inside the
 // cube inflated by e/2, so a box is not kept at the root only because it crosses a middle plane.
-// Nodes are created on first use. Movers are inserted again every tick in the same tree; their
-// nodes stay.
+// Nodes are created on first use. Dynamic boxes are inserted again every tick in the same tree;
+// their nodes stay.
 #include <array>
 #include <cmath>
 
@@ -17,33 +17,34 @@ constexpr double kMinEdge = 2;  // metres: about an avatar; smaller nodes only a
 
 class LooseOctree : public BroadPhase {
  public:
-  explicit LooseOctree(std::span<const Aabb> still) : still_(still) {
+  explicit LooseOctree(std::span<const Aabb> staticBoxes) : staticBoxes_(staticBoxes) {
     Aabb whole;
-    for (const Aabb& box : still) whole.include(box);
+    for (const Aabb& box : staticBoxes) whole.include(box);
     rootCentre_ = whole.centre();
     rootEdge_ = whole.size().maxCoeff();
     nodes_.emplace_back();
-    std::vector<std::uint32_t> nodeOfStill(still.size());
-    for (std::uint32_t s = 0; s < still.size(); ++s) nodeOfStill[s] = nodeFor(still[s]);
-    listStill(nodeOfStill);
+    std::vector<std::uint32_t> nodeOfStatic(staticBoxes.size());
+    for (std::uint32_t s = 0; s < staticBoxes.size(); ++s)
+      nodeOfStatic[s] = nodeFor(staticBoxes[s]);
+    listStatic(nodeOfStatic);
   }
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    for (const std::uint32_t node : used_) nodes_[node].movers.clear();
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    for (const std::uint32_t node : used_) nodes_[node].dynamicBoxes.clear();
     used_.clear();
-    for (std::uint32_t id = 0; id < movers.size(); ++id) {
-      ask(0, rootCentre_, rootEdge_, id, movers, tally);
-      const std::uint32_t node = nodeFor(movers[id]);
-      if (nodes_[node].movers.empty()) used_.push_back(node);
-      nodes_[node].movers.push_back(id);
+    for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
+      ask(0, rootCentre_, rootEdge_, id, dynamicBoxes, tally);
+      const std::uint32_t node = nodeFor(dynamicBoxes[id]);
+      if (nodes_[node].dynamicBoxes.empty()) used_.push_back(node);
+      nodes_[node].dynamicBoxes.push_back(id);
     }
   }
 
  private:
   struct Node {
     std::array<std::uint32_t, 8> child{};  ///< 0: no child
-    std::uint32_t firstStill = 0, stillCount = 0;
-    std::vector<std::uint32_t> movers;
+    std::uint32_t firstStatic = 0, staticCount = 0;
+    std::vector<std::uint32_t> dynamicBoxes;
   };
 
   /// Finds or creates the smallest node whose edge is at least the box's size. A box with its
@@ -76,30 +77,30 @@ class LooseOctree : public BroadPhase {
     return {octant & 1 ? 1.0 : -1.0, octant & 2 ? 1.0 : -1.0, octant & 4 ? 1.0 : -1.0};
   }
 
-  void listStill(std::span<const std::uint32_t> nodeOfStill) {
-    for (const std::uint32_t node : nodeOfStill) ++nodes_[node].stillCount;
+  void listStatic(std::span<const std::uint32_t> nodeOfStatic) {
+    for (const std::uint32_t node : nodeOfStatic) ++nodes_[node].staticCount;
     std::uint32_t next = 0;
     for (Node& node : nodes_) {
-      node.firstStill = next;
-      next += node.stillCount;
-      node.stillCount = 0;
+      node.firstStatic = next;
+      next += node.staticCount;
+      node.staticCount = 0;
     }
     listed_.resize(next);
-    for (std::uint32_t s = 0; s < nodeOfStill.size(); ++s) {
-      Node& node = nodes_[nodeOfStill[s]];
-      listed_[node.firstStill + node.stillCount++] = s;
+    for (std::uint32_t s = 0; s < nodeOfStatic.size(); ++s) {
+      Node& node = nodes_[nodeOfStatic[s]];
+      listed_[node.firstStatic + node.staticCount++] = s;
     }
   }
 
   void ask(std::uint32_t index, const Vec3& centre, double edge, std::uint32_t id,
-           std::span<const Aabb> movers, PairTally& tally) const {
+           std::span<const Aabb> dynamicBoxes, PairTally& tally) const {
     const Node& node = nodes_[index];
-    const Aabb& box = movers[id];
-    for (std::uint32_t k = node.firstStill; k < node.firstStill + node.stillCount; ++k) {
-      if (collision::overlaps(box, still_[listed_[k]])) tally.addStill(id, listed_[k]);
+    const Aabb& box = dynamicBoxes[id];
+    for (std::uint32_t k = node.firstStatic; k < node.firstStatic + node.staticCount; ++k) {
+      if (collision::overlaps(box, staticBoxes_[listed_[k]])) tally.addStaticPair(id, listed_[k]);
     }
-    for (const std::uint32_t other : node.movers) {
-      if (collision::overlaps(box, movers[other])) tally.addMovers(id, other);
+    for (const std::uint32_t other : node.dynamicBoxes) {
+      if (collision::overlaps(box, dynamicBoxes[other])) tally.addDynamicPair(id, other);
     }
     for (std::size_t octant = 0; octant < 8; ++octant) {
       if (node.child[octant] == 0) continue;
@@ -108,17 +109,17 @@ class LooseOctree : public BroadPhase {
       // rounding.
       const Vec3 reach = Vec3::Constant(0.5001 * edge);
       if (collision::overlaps(box, {at - reach, at + reach})) {
-        ask(node.child[octant], at, 0.5 * edge, id, movers, tally);
+        ask(node.child[octant], at, 0.5 * edge, id, dynamicBoxes, tally);
       }
     }
   }
 
-  std::span<const Aabb> still_;
+  std::span<const Aabb> staticBoxes_;
   Vec3 rootCentre_;
   double rootEdge_;
   std::vector<Node> nodes_;
   std::vector<std::uint32_t> listed_;  ///< static boxes by node
-  std::vector<std::uint32_t> used_;    ///< nodes that hold movers
+  std::vector<std::uint32_t> used_;    ///< nodes that hold dynamic boxes
 };
 
 }  // namespace

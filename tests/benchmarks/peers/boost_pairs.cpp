@@ -1,5 +1,5 @@
-// Peer: Boost.Geometry, with a packed R-tree of the static boxes and a new one of the movers every
-// tick.
+// Peer: Boost.Geometry, with a packed R-tree of the static boxes and a new one of the dynamic boxes
+// every tick.
 #include <boost/geometry.hpp>
 #include <boost/geometry/index/rtree.hpp>
 
@@ -12,17 +12,18 @@ namespace bgi = boost::geometry::index;
 
 class BoostRtree : public BroadPhase {
  public:
-  explicit BoostRtree(std::span<const Aabb> still) : still_(values(still)) {}
+  explicit BoostRtree(std::span<const Aabb> staticBoxes) : staticBoxes_(values(staticBoxes)) {}
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    const Tree moving(values(movers));
-    for (std::uint32_t id = 0; id < movers.size(); ++id) {
-      const BoostBox box = boostBox(movers[id]);
-      for (auto hit = still_.qbegin(bgi::intersects(box)); hit != still_.qend(); ++hit) {
-        tally.addStill(id, hit->second);
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    const Tree moving(values(dynamicBoxes));
+    for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
+      const BoostBox box = boostBox(dynamicBoxes[id]);
+      for (auto hit = staticBoxes_.qbegin(bgi::intersects(box)); hit != staticBoxes_.qend();
+           ++hit) {
+        tally.addStaticPair(id, hit->second);
       }
       for (auto hit = moving.qbegin(bgi::intersects(box)); hit != moving.qend(); ++hit) {
-        if (id < hit->second) tally.addMovers(id, hit->second);
+        if (id < hit->second) tally.addDynamicPair(id, hit->second);
       }
     }
   }
@@ -43,7 +44,7 @@ class BoostRtree : public BroadPhase {
     return result;
   }
 
-  Tree still_;
+  Tree staticBoxes_;
 };
 
 }  // namespace

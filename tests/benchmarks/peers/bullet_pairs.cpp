@@ -16,7 +16,7 @@ namespace enfilade::benchmarks {
 namespace {
 
 constexpr int kSettlingTicks = 110;
-constexpr int kStillGroup = 1, kMoverGroup = 2;
+constexpr int kStaticGroup = 1, kDynamicGroup = 2;
 
 btVector3 roundDown(const Vec3& v) {
   const auto down = [](double x) {
@@ -32,26 +32,28 @@ btVector3 roundUp(const Vec3& v) {
   return -roundDown(-v);
 }
 
-/// A proxy's user pointer holds an integer: 2 * id, plus 1 for movers.
+/// A proxy's user pointer holds an integer: 2 * id, plus 1 for dynamic boxes.
 std::uintptr_t getTag(const btBroadphaseProxy& proxy) {
   return reinterpret_cast<std::uintptr_t>(proxy.m_clientObject);
 }
 
 class BulletPairs : public BroadPhase {
  public:
-  BulletPairs(std::span<const Aabb> still, bool axisSweep) : still_(still) {
+  BulletPairs(std::span<const Aabb> staticBoxes, bool axisSweep) : staticBoxes_(staticBoxes) {
     Aabb world;
-    for (const Aabb& box : still) world.include(box);
+    for (const Aabb& box : staticBoxes) world.include(box);
     world = collision::inflated(world, 10);
-    const std::size_t mostMovers = still.size() < 100 ? 100'000 : 2'000;  // or everything moves
+    const std::size_t maxDynamicBoxes =
+        staticBoxes.size() < 100 ? 100'000 : 2'000;  // or everything moves
     if (axisSweep) {
       broadphase_ = std::make_unique<bt32BitAxisSweep3>(
           roundDown(world.min), roundUp(world.max),
-          static_cast<unsigned>(still.size() + mostMovers), nullptr, true);
+          static_cast<unsigned>(staticBoxes.size() + maxDynamicBoxes), nullptr, true);
     } else {
       broadphase_ = std::make_unique<btDbvtBroadphase>();
     }
-    for (std::size_t k = 0; k < still.size(); ++k) add(still[k], 2 * k, kStillGroup, kMoverGroup);
+    for (std::size_t k = 0; k < staticBoxes.size(); ++k)
+      add(staticBoxes[k], 2 * k, kStaticGroup, kDynamicGroup);
     for (int k = 0; k < kSettlingTicks; ++k) broadphase_->calculateOverlappingPairs(nullptr);
   }
   ~BulletPairs() override {
@@ -60,19 +62,19 @@ class BulletPairs : public BroadPhase {
   BulletPairs(const BulletPairs&) = delete;
   BulletPairs& operator=(const BulletPairs&) = delete;
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    if (proxies_.size() == still_.size()) {
-      for (std::size_t k = 0; k < movers.size(); ++k) {
-        add(movers[k], 2 * k + 1, kMoverGroup, kStillGroup | kMoverGroup);
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    if (proxies_.size() == staticBoxes_.size()) {
+      for (std::size_t k = 0; k < dynamicBoxes.size(); ++k) {
+        add(dynamicBoxes[k], 2 * k + 1, kDynamicGroup, kStaticGroup | kDynamicGroup);
       }
     } else {
-      for (std::size_t k = 0; k < movers.size(); ++k) {
-        broadphase_->setAabb(proxies_[still_.size() + k], roundDown(movers[k].min),
-                             roundUp(movers[k].max), nullptr);
+      for (std::size_t k = 0; k < dynamicBoxes.size(); ++k) {
+        broadphase_->setAabb(proxies_[staticBoxes_.size() + k], roundDown(dynamicBoxes[k].min),
+                             roundUp(dynamicBoxes[k].max), nullptr);
       }
     }
     broadphase_->calculateOverlappingPairs(nullptr);
-    reportPairs(movers, tally);
+    reportPairs(dynamicBoxes, tally);
   }
 
  private:
@@ -82,25 +84,27 @@ class BulletPairs : public BroadPhase {
                                                 nullptr));
   }
 
-  void reportPairs(std::span<const Aabb> movers, PairTally& tally) const {
+  void reportPairs(std::span<const Aabb> dynamicBoxes, PairTally& tally) const {
     const btBroadphasePairArray& pairs =
         broadphase_->getOverlappingPairCache()->getOverlappingPairArray();
     for (int k = 0; k < pairs.size(); ++k) {
       std::uintptr_t a = getTag(*pairs[k].m_pProxy0);
       std::uintptr_t b = getTag(*pairs[k].m_pProxy1);
       if (a % 2 == 0) std::swap(a, b);
-      const auto mover = static_cast<std::uint32_t>(a / 2);
+      const auto dynamicBox = static_cast<std::uint32_t>(a / 2);
       const auto other = static_cast<std::uint32_t>(b / 2);
       const bool moves = b % 2 == 1;
-      if (!collision::overlaps(movers[mover], moves ? movers[other] : still_[other])) continue;
-      if (moves) tally.addMovers(mover, other);
-      if (!moves) tally.addStill(mover, other);
+      if (!collision::overlaps(dynamicBoxes[dynamicBox],
+                               moves ? dynamicBoxes[other] : staticBoxes_[other]))
+        continue;
+      if (moves) tally.addDynamicPair(dynamicBox, other);
+      if (!moves) tally.addStaticPair(dynamicBox, other);
     }
   }
 
-  std::span<const Aabb> still_;
+  std::span<const Aabb> staticBoxes_;
   std::unique_ptr<btBroadphaseInterface> broadphase_;
-  std::vector<btBroadphaseProxy*> proxies_;  ///< static ones, then movers
+  std::vector<btBroadphaseProxy*> proxies_;  ///< static ones, then dynamic boxes
 };
 
 }  // namespace

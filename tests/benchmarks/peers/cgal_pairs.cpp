@@ -9,17 +9,17 @@ namespace {
 
 class CgalBoxes : public BroadPhase {
  public:
-  explicit CgalBoxes(std::span<const Aabb> still) { fill(still, still_); }
+  explicit CgalBoxes(std::span<const Aabb> staticBoxes) { fill(staticBoxes, staticBoxes_); }
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    movers_.clear();
-    fill(movers, movers_);
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    dynamicBoxes_.clear();
+    fill(dynamicBoxes, dynamicBoxes_);
     CGAL::box_intersection_d(
-        movers_.begin(), movers_.end(), still_.begin(), still_.end(),
-        [&](const Handled& a, const Handled& b) { tally.addStill(a.number, b.number); });
+        dynamicBoxes_.begin(), dynamicBoxes_.end(), staticBoxes_.begin(), staticBoxes_.end(),
+        [&](const Handled& a, const Handled& b) { tally.addStaticPair(a.number, b.number); });
     CGAL::box_self_intersection_d(
-        movers_.begin(), movers_.end(),
-        [&](const Handled& a, const Handled& b) { tally.addMovers(a.number, b.number); });
+        dynamicBoxes_.begin(), dynamicBoxes_.end(),
+        [&](const Handled& a, const Handled& b) { tally.addDynamicPair(a.number, b.number); });
   }
   bool readsGivenBoxes() const override { return false; }
 
@@ -38,14 +38,14 @@ class CgalBoxes : public BroadPhase {
     for (std::uint32_t k = 0; k < boxes.size(); ++k) to.emplace_back(boxes[k], k);
   }
 
-  std::vector<Handled> still_, movers_;
+  std::vector<Handled> staticBoxes_, dynamicBoxes_;
 };
 
 }  // namespace
 
 BroadPhaseMethod cgalBoxes() {
   return {"CGAL box intersection", BroadPhaseMethod::Kind::peer, 100000,
-          "every tick goes over all still boxes", maker<CgalBoxes>()};
+          "every tick goes over all static boxes", maker<CgalBoxes>()};
 }
 
 }  // namespace enfilade::benchmarks

@@ -1,6 +1,6 @@
-// Peer: Embree, with a BVH of the static boxes, a new low-quality one of the movers every tick, and
-// its collision of two trees. Its bounds are floats, rounded outwards here; the callback tests the
-// exact boxes.
+// Peer: Embree, with a BVH of the static boxes, a new low-quality one of the dynamic boxes every
+// tick, and its collision of two trees. Its bounds are floats, rounded outwards here; the callback
+// tests the exact boxes.
 #include <embree3/rtcore.h>
 
 #include <cmath>
@@ -34,32 +34,32 @@ void writeBounds(const RTCBoundsFunctionArguments* args) {
 
 class EmbreeBvh : public BroadPhase {
  public:
-  explicit EmbreeBvh(std::span<const Aabb> still)
-      : device_(rtcNewDevice("threads=1,set_affinity=0")), still_(still) {
+  explicit EmbreeBvh(std::span<const Aabb> staticBoxes)
+      : device_(rtcNewDevice("threads=1,set_affinity=0")), staticBoxes_(staticBoxes) {
     rtcSetDeviceMemoryMonitorFunction(device_, countBytes, this);
-    stillScene_ = makeScene(&still_, RTC_BUILD_QUALITY_MEDIUM, stillGeometry_);
-    rtcCommitScene(stillScene_);
+    staticScene_ = makeScene(&staticBoxes_, RTC_BUILD_QUALITY_MEDIUM, staticGeometry_);
+    rtcCommitScene(staticScene_);
   }
   ~EmbreeBvh() override {
-    rtcReleaseScene(stillScene_);
-    if (moverScene_ != nullptr) rtcReleaseScene(moverScene_);
+    rtcReleaseScene(staticScene_);
+    if (dynamicScene_ != nullptr) rtcReleaseScene(dynamicScene_);
     rtcSetDeviceMemoryMonitorFunction(device_, nullptr, nullptr);
     rtcReleaseDevice(device_);
   }
   EmbreeBvh(const EmbreeBvh&) = delete;
   EmbreeBvh& operator=(const EmbreeBvh&) = delete;
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    movers_ = movers;
-    if (moverScene_ == nullptr) {
-      moverScene_ = makeScene(&movers_, RTC_BUILD_QUALITY_LOW, moverGeometry_);
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    dynamicBoxes_ = dynamicBoxes;
+    if (dynamicScene_ == nullptr) {
+      dynamicScene_ = makeScene(&dynamicBoxes_, RTC_BUILD_QUALITY_LOW, dynamicGeometry_);
     } else {
-      rtcCommitGeometry(moverGeometry_);
+      rtcCommitGeometry(dynamicGeometry_);
     }
-    rtcCommitScene(moverScene_);
+    rtcCommitScene(dynamicScene_);
     tally_ = &tally;
-    rtcCollide(moverScene_, stillScene_, reportStatic, this);
-    rtcCollide(moverScene_, moverScene_, reportDynamic, this);
+    rtcCollide(dynamicScene_, staticScene_, reportStatic, this);
+    rtcCollide(dynamicScene_, dynamicScene_, reportDynamic, this);
   }
   std::size_t hiddenBytes() const override { return static_cast<std::size_t>(bytes_); }
 
@@ -87,8 +87,8 @@ class EmbreeBvh : public BroadPhase {
     const auto& bvh = *static_cast<EmbreeBvh*>(self);
     for (unsigned k = 0; k < count; ++k) {
       const RTCCollision& c = collisions[k];
-      if (collision::overlaps(bvh.movers_[c.primID0], bvh.still_[c.primID1])) {
-        bvh.tally_->addStill(c.primID0, c.primID1);
+      if (collision::overlaps(bvh.dynamicBoxes_[c.primID0], bvh.staticBoxes_[c.primID1])) {
+        bvh.tally_->addStaticPair(c.primID0, c.primID1);
       }
     }
   }
@@ -97,16 +97,16 @@ class EmbreeBvh : public BroadPhase {
     for (unsigned k = 0; k < count; ++k) {
       const RTCCollision& c = collisions[k];
       if (c.primID0 >= c.primID1) continue;  // each pair is found from both sides
-      if (collision::overlaps(bvh.movers_[c.primID0], bvh.movers_[c.primID1])) {
-        bvh.tally_->addMovers(c.primID0, c.primID1);
+      if (collision::overlaps(bvh.dynamicBoxes_[c.primID0], bvh.dynamicBoxes_[c.primID1])) {
+        bvh.tally_->addDynamicPair(c.primID0, c.primID1);
       }
     }
   }
 
   RTCDevice device_;
-  std::span<const Aabb> still_, movers_;
-  RTCScene stillScene_ = nullptr, moverScene_ = nullptr;
-  RTCGeometry stillGeometry_ = nullptr, moverGeometry_ = nullptr;
+  std::span<const Aabb> staticBoxes_, dynamicBoxes_;
+  RTCScene staticScene_ = nullptr, dynamicScene_ = nullptr;
+  RTCGeometry staticGeometry_ = nullptr, dynamicGeometry_ = nullptr;
   PairTally* tally_ = nullptr;
   std::ptrdiff_t bytes_ = 0;
 };

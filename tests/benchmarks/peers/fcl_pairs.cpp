@@ -1,5 +1,5 @@
 // Peer: FCL's dynamic AABB tree and its sweep and prune (SSaP), each with one manager for the
-// static scene and one for the movers, so that a tick does not touch static boxes.
+// static scene and one for the dynamic boxes, so that a tick does not touch static boxes.
 #include <fcl/broadphase/broadphase_SSaP.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/geometry/shape/box.h>
@@ -19,11 +19,11 @@ void setBox(Object& object, const Aabb& box) {
 }
 
 struct PairQuery {
-  std::span<const Aabb> still, movers;
+  std::span<const Aabb> staticBoxes, dynamicBoxes;
   PairTally* tally;
 };
 
-/// An object's user pointer holds an integer: 2 * id, plus 1 for movers.
+/// An object's user pointer holds an integer: 2 * id, plus 1 for dynamic boxes.
 std::uintptr_t getTag(const Object& object) {
   return reinterpret_cast<std::uintptr_t>(object.getUserData());
 }
@@ -33,39 +33,42 @@ bool reportPairs(Object* first, Object* second, void* data) {
   std::uintptr_t a = getTag(*first);
   std::uintptr_t b = getTag(*second);
   if (a % 2 == 0) std::swap(a, b);
-  const auto mover = static_cast<std::uint32_t>(a / 2);
+  const auto dynamicBox = static_cast<std::uint32_t>(a / 2);
   const auto other = static_cast<std::uint32_t>(b / 2);
   const bool moves = b % 2 == 1;
-  if (!collision::overlaps(query.movers[mover], moves ? query.movers[other] : query.still[other])) {
+  if (!collision::overlaps(query.dynamicBoxes[dynamicBox],
+                           moves ? query.dynamicBoxes[other] : query.staticBoxes[other])) {
     return false;
   }
-  if (moves) query.tally->addMovers(mover, other);
-  if (!moves) query.tally->addStill(mover, other);
+  if (moves) query.tally->addDynamicPair(dynamicBox, other);
+  if (!moves) query.tally->addStaticPair(dynamicBox, other);
   return false;  // continue
 }
 
 template <typename Manager>
 class FclPairs : public BroadPhase {
  public:
-  explicit FclPairs(std::span<const Aabb> still)
-      : still_(still), shape_(std::make_shared<fcl::Boxd>(1, 1, 1)) {
-    for (std::size_t k = 0; k < still.size(); ++k) add(still[k], 2 * k, stillObjects_);
-    stillManager_.registerObjects(pointers(stillObjects_));
-    stillManager_.setup();
+  explicit FclPairs(std::span<const Aabb> staticBoxes)
+      : staticBoxes_(staticBoxes), shape_(std::make_shared<fcl::Boxd>(1, 1, 1)) {
+    for (std::size_t k = 0; k < staticBoxes.size(); ++k) add(staticBoxes[k], 2 * k, staticObjects_);
+    staticManager_.registerObjects(pointers(staticObjects_));
+    staticManager_.setup();
   }
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    if (moverObjects_.empty()) {
-      for (std::size_t k = 0; k < movers.size(); ++k) add(movers[k], 2 * k + 1, moverObjects_);
-      moverManager_.registerObjects(pointers(moverObjects_));
-      moverManager_.setup();
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    if (dynamicObjects_.empty()) {
+      for (std::size_t k = 0; k < dynamicBoxes.size(); ++k)
+        add(dynamicBoxes[k], 2 * k + 1, dynamicObjects_);
+      dynamicManager_.registerObjects(pointers(dynamicObjects_));
+      dynamicManager_.setup();
     } else {
-      for (std::size_t k = 0; k < movers.size(); ++k) setBox(*moverObjects_[k], movers[k]);
-      moverManager_.update();
+      for (std::size_t k = 0; k < dynamicBoxes.size(); ++k)
+        setBox(*dynamicObjects_[k], dynamicBoxes[k]);
+      dynamicManager_.update();
     }
-    PairQuery query{still_, movers, &tally};
-    moverManager_.collide(&stillManager_, &query, reportPairs);
-    moverManager_.collide(&query, reportPairs);
+    PairQuery query{staticBoxes_, dynamicBoxes, &tally};
+    dynamicManager_.collide(&staticManager_, &query, reportPairs);
+    dynamicManager_.collide(&query, reportPairs);
   }
 
  private:
@@ -82,10 +85,10 @@ class FclPairs : public BroadPhase {
     return result;
   }
 
-  std::span<const Aabb> still_;
+  std::span<const Aabb> staticBoxes_;
   std::shared_ptr<fcl::Boxd> shape_;
-  Objects stillObjects_, moverObjects_;
-  Manager stillManager_, moverManager_;
+  Objects staticObjects_, dynamicObjects_;
+  Manager staticManager_, dynamicManager_;
 };
 
 }  // namespace
@@ -94,7 +97,7 @@ std::vector<BroadPhaseMethod> fclBroadPhases() {
   return {{"FCL dynamic tree", BroadPhaseMethod::Kind::peer, SIZE_MAX, "",
            maker<FclPairs<fcl::DynamicAABBTreeCollisionManagerd>>()},
           {"FCL SSaP", BroadPhaseMethod::Kind::peer, 10000,
-           "a mover is compared with all that begins near it on one axis",
+           "a dynamic box is compared with all that begins near it on one axis",
            maker<FclPairs<fcl::SSaPCollisionManagerd>>()}};
 }
 

@@ -9,7 +9,7 @@ namespace enfilade::benchmarks {
 namespace {
 
 struct PairQuery {
-  std::span<const Aabb> still, movers;
+  std::span<const Aabb> staticBoxes, dynamicBoxes;
   PairTally* tally;
 };
 
@@ -22,37 +22,38 @@ void reportPairs(void* data, dGeomID first, dGeomID second) {
   std::uintptr_t a = getTag(first);
   std::uintptr_t b = getTag(second);
   if (a % 2 == 0) std::swap(a, b);
-  const auto mover = static_cast<std::uint32_t>(a / 2);
+  const auto dynamicBox = static_cast<std::uint32_t>(a / 2);
   const auto other = static_cast<std::uint32_t>(b / 2);
   const bool moves = b % 2 == 1;
-  if (!collision::overlaps(query.movers[mover], moves ? query.movers[other] : query.still[other])) {
+  if (!collision::overlaps(query.dynamicBoxes[dynamicBox],
+                           moves ? query.dynamicBoxes[other] : query.staticBoxes[other])) {
     return;
   }
-  if (moves) query.tally->addMovers(mover, other);
-  if (!moves) query.tally->addStill(mover, other);
+  if (moves) query.tally->addDynamicPair(dynamicBox, other);
+  if (!moves) query.tally->addStaticPair(dynamicBox, other);
 }
 
 class OdeSpace : public BroadPhase {
  public:
-  OdeSpace(std::span<const Aabb> still, bool hashed) : still_(still) {
+  OdeSpace(std::span<const Aabb> staticBoxes, bool hashed) : staticBoxes_(staticBoxes) {
     static const int started = dInitODE2(0);
     (void)started;
     space_ = hashed ? dHashSpaceCreate(nullptr) : dSweepAndPruneSpaceCreate(nullptr, dSAP_AXES_XZY);
-    for (std::size_t k = 0; k < still.size(); ++k) add(still[k], 2 * k, 1, 2);
+    for (std::size_t k = 0; k < staticBoxes.size(); ++k) add(staticBoxes[k], 2 * k, 1, 2);
   }
   ~OdeSpace() override { dSpaceDestroy(space_); }
   OdeSpace(const OdeSpace&) = delete;
   OdeSpace& operator=(const OdeSpace&) = delete;
 
-  void tick(std::span<const Aabb> movers, PairTally& tally) override {
-    for (std::size_t k = 0; k < movers.size(); ++k) {
-      if (movers_.size() < movers.size()) {
-        movers_.push_back(add(movers[k], 2 * k + 1, 2, 3));
+  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    for (std::size_t k = 0; k < dynamicBoxes.size(); ++k) {
+      if (dynamicBoxes_.size() < dynamicBoxes.size()) {
+        dynamicBoxes_.push_back(add(dynamicBoxes[k], 2 * k + 1, 2, 3));
       } else {
-        place(movers_[k], movers[k]);
+        place(dynamicBoxes_[k], dynamicBoxes[k]);
       }
     }
-    PairQuery query{still_, movers, &tally};
+    PairQuery query{staticBoxes_, dynamicBoxes, &tally};
     dSpaceCollide(space_, &query, reportPairs);
   }
 
@@ -73,15 +74,15 @@ class OdeSpace : public BroadPhase {
     return geom;
   }
 
-  std::span<const Aabb> still_;
+  std::span<const Aabb> staticBoxes_;
   dSpaceID space_;
-  std::vector<dGeomID> movers_;
+  std::vector<dGeomID> dynamicBoxes_;
 };
 
 }  // namespace
 
 std::vector<BroadPhaseMethod> odeSpaces() {
-  const std::string reason = "every tick goes over all still boxes";
+  const std::string reason = "every tick goes over all static boxes";
   return {
       {"ODE sweep and prune", BroadPhaseMethod::Kind::peer, 10000, reason, maker<OdeSpace>(false)},
       {"ODE hash space", BroadPhaseMethod::Kind::peer, 10000, reason, maker<OdeSpace>(true)}};
