@@ -118,8 +118,11 @@ void reportBoxWork(WorldData& world, TickReport& report) {
     report.verticesLookedAt += std::exchange(body.boxes.verticesLookedAt, 0);
     report.partBoxesMade += std::exchange(body.boxes.partBoxesMade, 0);
   }
-  for (Avatar& avatar : world.avatars)
-    report.verticesLookedAt += std::exchange(avatar.chain.verticesLookedAt, 0);
+  for (Avatar& avatar : world.avatars) {
+    const BoxWork work = std::exchange(avatar.boxWork, {});
+    report.verticesLookedAt += work.verticesLookedAt;
+    report.partBoxesMade += work.partBoxesMade;
+  }
 }
 
 void reportQueries(const WorldData& world, QueryCount count, TickReport& report) {

@@ -30,34 +30,74 @@ RigidStep makeJointStep(const Avatar& avatar, std::size_t joint, double delta) {
   return step;
 }
 
-/// Moves one joint by `delta`, or up to the first hit. Returns whether it made progress.
-bool moveJoint(const WorldSettings& settings, Avatar& avatar, std::size_t joint, double delta,
-               QueryCount& count) {
-  ChainLink& link = avatar.chain.links[joint];
-  const RigidStepHit hit =
-      castRigidStep(settings, avatar, makeJointStep(avatar, joint, delta), count);
-  link.blockedBy = hit.entity;
-  recordStepHit(avatar, hit);
-  const double before = link.value;
-  const bool reachesTarget = hit.fraction == 1 && before + delta == link.target;
-  link.value = reachesTarget ? link.target : before + hit.fraction * delta;
-  if (link.value == before) return false;
-  avatar.shape = makeChainShape(avatar.baseParts, avatar.chain);
-  return hit.fraction > kMinProgressFraction;
-}
+/// The motion of a chain within a tick. The shape, with the boxes of the links, follows the joints
+/// only where an obstacle is in reach, and at the end.
+class ChainMotion {
+ public:
+  ChainMotion(const WorldSettings& settings, Avatar& avatar, QueryCount& count)
+      : settings_(settings), avatar_(avatar), count_(count) {}
+
+  /// Moves one joint by `delta`, or up to the first hit. Returns whether it made progress.
+  bool moveJoint(std::size_t joint, double delta) {
+    ChainLink& link = avatar_.chain.links[joint];
+    const RigidStep step = makeJointStep(avatar_, joint, delta);
+    const RigidStepHit hit = castStep(step);
+    link.blockedBy = hit.entity;
+    recordStepHit(avatar_, hit);
+    const double before = link.value;
+    const bool reachesTarget = hit.fraction == 1 && before + delta == link.target;
+    link.value = reachesTarget ? link.target : before + hit.fraction * delta;
+    if (link.value == before) return false;
+    movedLinks_ |= step.movedParts >> avatar_.baseParts.size();
+    displacement_ += step.maxDisplacement;
+    return hit.fraction > kMinProgressFraction;
+  }
+
+  void updateShape() {
+    if (movedLinks_ == 0) return;
+    avatar_.shape = updateChainShape(*avatar_.shape, movedLinks_, avatar_.chain, avatar_.boxWork);
+    movedLinks_ = 0;
+    displacement_ = 0;
+  }
+
+ private:
+  /// One box for all parts that a step moves: their boxes before the motion, and how far they have
+  /// come since. One contact offset is the cast's, another exceeds all rounding.
+  Aabb computeReach(const RigidStep& step) const {
+    Aabb box;
+    for (std::size_t part = 0; part < avatar_.shape->parts.size(); ++part)
+      if ((step.movedParts >> part & 1) != 0) box.include(avatar_.shape->parts[part].box);
+    return inflated(placeBox(box, avatar_.footPosition),
+                    displacement_ + step.maxDisplacement + 2 * settings_.contactOffset);
+  }
+
+  RigidStepHit castStep(const RigidStep& step) {
+    if (!mayHit(avatar_, computeReach(step))) return {};
+    updateShape();
+    return castRigidStep(settings_, avatar_, step, count_);
+  }
+
+  const WorldSettings& settings_;
+  Avatar& avatar_;
+  QueryCount& count_;
+  std::uint64_t movedLinks_ = 0;  ///< since `shape` was made; bit i: link i
+  double displacement_ = 0;       ///< metres: bound for every point of them
+};
 
 }  // namespace
 
 void moveJoints(const WorldData& world, Avatar& avatar, QueryCount& count) {
   Chain& chain = avatar.chain;
   const double maxDelta = chain.speed * world.settings.tickDuration;
+  ChainMotion motion(world.settings, avatar, count);
   bool moved = false;
   for (std::size_t i = 0; i < chain.links.size(); ++i) {
     const double remaining = chain.links[i].target - chain.links[i].value;
     if (remaining == 0) continue;
     const double delta = std::max(-maxDelta, std::min(maxDelta, remaining));
-    if (moveJoint(world.settings, avatar, i, delta, count)) moved = true;
+    if (motion.moveJoint(i, delta)) moved = true;
   }
+  motion.updateShape();
   chain.timeoutLeft =
       moved ? world.settings.stuckTimeout : chain.timeoutLeft - world.settings.tickDuration;
 }

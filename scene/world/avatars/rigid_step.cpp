@@ -98,6 +98,18 @@ struct StepCaster {
 
 }  // namespace
 
+bool mayHit(const Avatar& avatar, const Aabb& reach) {
+  if (avatar.chain.selfContact) return true;
+  for (const Obstacle& obstacle : avatar.obstacles.list)
+    if (overlaps(reach, obstacle.box)) return true;
+  bool found = false;
+  for (const DenseObject& object : avatar.obstacles.dense)
+    descendParts(
+        *object.geometry, reach, [&](const Aabb& box) { return !found && overlaps(reach, box); },
+        [&](std::uint32_t) { found = true; });
+  return found;
+}
+
 RigidStepHit castRigidStep(const WorldSettings& settings, Avatar& avatar, const RigidStep& step,
                            QueryCount& count) {
   StepCaster caster{avatar, step, count, makeContactOffset(settings)};

@@ -28,6 +28,10 @@ struct RigidStepHit {
   collision::SeparationResult separation;
 };
 
+/// True if a cast of a step may hit something: an obstacle, or its own parts if its chain has self
+/// contact. `reach` contains all moved parts during the step and one contact offset around them.
+bool mayHit(const Avatar& avatar, const Aabb& reach);
+
 /// Casts the moved parts against the avatar's obstacles and, if its chain has self contact, against
 /// its parts that do not move. Updates the obstacles' caches.
 RigidStepHit castRigidStep(const WorldSettings& settings, Avatar& avatar, const RigidStep& step,

@@ -178,7 +178,7 @@ void applySpawnShape(const Spawn& order, const WorldSettings& settings, Avatar& 
   if (order.links.empty()) return;
   avatar.baseParts = avatar.shape->parts;
   avatar.chain = makeChain(order, rotation);
-  avatar.shape = makeChainShape(avatar.baseParts, avatar.chain);
+  avatar.shape = makeChainShape(avatar.baseParts, avatar.chain, avatar.boxWork);
 }
 
 void setFacing(Avatar& avatar, double degrees) {
@@ -192,7 +192,7 @@ void setFacing(Avatar& avatar, double degrees) {
   if (hasChain) {
     avatar.baseParts = std::move(base);
     avatar.chain.avatarFromBase = rotation;
-    avatar.shape = makeChainShape(avatar.baseParts, avatar.chain);
+    avatar.shape = makeChainShape(avatar.baseParts, avatar.chain, avatar.boxWork);
   } else {
     avatar.shape = makeAvatarShape(std::move(base));
   }

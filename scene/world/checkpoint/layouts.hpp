@@ -120,7 +120,7 @@ void archiveMembers(A& a, MaybeConst<A, ChainLink>& link) {
 /// The links, `avatarFromBase` and `selfContact` already exist: they follow from the spawn order.
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, Chain>& chain) {
-  auto& [links, avatarFromBase, selfContact, speed, timeoutLeft, verticesLookedAt] = chain;
+  auto& [links, avatarFromBase, selfContact, speed, timeoutLeft] = chain;
   for (auto& link : links) a(link);
   a(speed, timeoutLeft);
 }
@@ -143,12 +143,12 @@ void archiveMembers(A& a, MaybeConst<A, Avatar>& avatar) {
          viewHeld, teleports, driveVelocity, desiredVelocity, walk, waitTimeLeft, stalledInAirTime,
          lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, lastStoppedTick,
          pairsChanged, blockingHit, blockedReported, proxy, motionBounds, cachedBounds, obstacles,
-         work, hasBodyObstacles, contacts] = avatar;
+         work, boxWork, hasBodyObstacles, contacts] = avatar;
   a(name, spawnOrder, spawnHeight, height, radius, facing);
   if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // `shape`, `baseParts`
   a(chain);
   if constexpr (!A::kWrites)
-    if (!chain.links.empty()) shape = makeChainShape(baseParts, chain);
+    if (!chain.links.empty()) shape = makeChainShape(baseParts, chain, boxWork);
   a(id, footPosition, viewDirection, eyeHeight, fallSpeed, grounded, groundEntity, flying, jumping,
     turn, viewHeld, teleports, driveVelocity, walk, waitTimeLeft, stalledInAirTime,
     lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, lastStoppedTick, pairsChanged,

@@ -84,6 +84,7 @@ struct Avatar {
   Aabb cachedBounds;  ///< region in which `obstacles` are complete
   ObstacleSet obstacles;
   QueryCount work;                ///< of its motion and contacts in this tick
+  BoxWork boxWork;                ///< for boxes of its parts and links
   bool hasBodyObstacles = false;  ///< `obstacles` contain parts of bodies
   std::vector<Contact> contacts;  ///< ascending `other`; part of the state, not a cache
 };

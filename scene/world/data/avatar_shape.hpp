@@ -2,6 +2,7 @@
 // are the scene's. An avatar does not rotate; only the links of a chain do.
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <vector>
 
@@ -21,6 +22,12 @@ struct AvatarPart {
   Mat3 rotation = Mat3::Identity();  ///< avatarFromHull
   bool rotated = false;              ///< `rotation` is not the identity
   Aabb box;                          ///< of the placed hull, avatar frame
+};
+
+/// Work for the boxes of an avatar that turns or moves its joints, since the end of the last tick.
+struct BoxWork {
+  std::uint64_t verticesLookedAt = 0;
+  std::uint64_t partBoxesMade = 0;
 };
 
 /// Immutable: an avatar that crouches or moves its joints gets a new shape.

@@ -26,6 +26,13 @@ double computeMaxRadius(const Chain& chain, std::size_t link) {
   return maxRadius;
 }
 
+AvatarPart makeLinkPart(ChainLink& link, const LinkPose& pose, BoxWork& work) {
+  ++work.partBoxesMade;
+  const Aabb box = computeAabb(*link.hull, link.support, pose.rotation, pose.origin,
+                               link.lastExtremes, work.verticesLookedAt);
+  return {link.hull, pose.origin, pose.rotation, !pose.rotation.isIdentity(0), box};
+}
+
 }  // namespace
 
 Chain makeChain(const Spawn& order, const Mat3& avatarFromBase) {
@@ -68,17 +75,22 @@ std::vector<LinkPose> computeLinkPoses(const Chain& chain) {
   return poses;
 }
 
-std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>& base,
-                                                  Chain& chain) {
+std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>& base, Chain& chain,
+                                                  BoxWork& work) {
   std::vector<AvatarPart> parts = base;
   const std::vector<LinkPose> poses = computeLinkPoses(chain);
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    ChainLink& link = chain.links[i];
-    const LinkPose& pose = poses[i];
-    const Aabb box = computeAabb(*link.hull, link.support, pose.rotation, pose.origin,
-                                 link.lastExtremes, chain.verticesLookedAt);
-    parts.push_back({link.hull, pose.origin, pose.rotation, !pose.rotation.isIdentity(0), box});
-  }
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    parts.push_back(makeLinkPart(chain.links[i], poses[i], work));
+  return makeAvatarShape(std::move(parts));
+}
+
+std::shared_ptr<const AvatarShape> updateChainShape(const AvatarShape& before, std::uint64_t moved,
+                                                    Chain& chain, BoxWork& work) {
+  std::vector<AvatarPart> parts = before.parts;
+  const std::vector<LinkPose> poses = computeLinkPoses(chain);
+  const std::size_t base = parts.size() - poses.size();
+  for (std::size_t i = 0; i < poses.size(); ++i)
+    if ((moved >> i & 1) != 0) parts[base + i] = makeLinkPart(chain.links[i], poses[i], work);
   return makeAvatarShape(std::move(parts));
 }
 

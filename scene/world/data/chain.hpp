@@ -29,9 +29,8 @@ struct Chain {
   std::vector<ChainLink> links;
   Mat3 avatarFromBase = Mat3::Identity();  ///< rotation by Spawn::facing
   bool selfContact = false;
-  double speed = 0;                    ///< rad/s or m/s; 0: not driven
-  double timeoutLeft = 0;              ///< seconds
-  std::uint64_t verticesLookedAt = 0;  ///< for boxes of links, since the end of the last tick
+  double speed = 0;        ///< rad/s or m/s; 0: not driven
+  double timeoutLeft = 0;  ///< seconds
 };
 
 /// Pose of a link's frame; `rotation` is avatarFromLink.
@@ -47,10 +46,15 @@ Chain makeChain(const Spawn& order, const Mat3& avatarFromBase);
 /// Forward kinematics: poses of all links for the current joint values.
 std::vector<LinkPose> computeLinkPoses(const Chain& chain);
 
-/// Shape of `base` and the links at their current poses; the parts of the base come first. Updates
-/// only the chain's extremal vertices and counters.
-std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>& base,
-                                                  Chain& chain);
+/// Shape of `base` and the links at their current poses; the parts of the base come first. Of the
+/// chain only the extremal vertices change.
+std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>& base, Chain& chain,
+                                                  BoxWork& work);
+
+/// As makeChainShape(), from the shape before a motion of the links in `moved` (bit i: link i). All
+/// other parts and their boxes stay.
+std::shared_ptr<const AvatarShape> updateChainShape(const AvatarShape& before, std::uint64_t moved,
+                                                    Chain& chain, BoxWork& work);
 
 /// True if joint `joint` moves link `link`: the joint of the link itself or of an ancestor.
 bool doesJointMoveLink(const Chain& chain, std::size_t joint, std::size_t link);

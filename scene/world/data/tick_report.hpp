@@ -109,8 +109,8 @@ struct TickReport {
   std::uint32_t narrowQueries = 0;          ///< by shape casts, contacts and the solver
   std::uint32_t rationalQueries = 0;        ///< of those, decided by exact arithmetic
   std::uint32_t iterationLimitedCasts = 0;  ///< shape casts stopped at their iteration limit
-  std::uint64_t verticesLookedAt = 0;       ///< for the boxes of moving bodies and chain links
-  std::uint64_t partBoxesMade = 0;          ///< of bodies with several parts
+  std::uint64_t verticesLookedAt = 0;       ///< for the boxes of moving bodies and of avatars
+  std::uint64_t partBoxesMade = 0;          ///< of bodies with several parts, and of avatars
   std::uint64_t partsLookedAt = 0;          ///< triangles and hulls in reach of avatars' queries
   std::vector<AvatarWork> avatarWork;       ///< of all avatars, ascending ids
   std::uint32_t activeContacts = 0;
