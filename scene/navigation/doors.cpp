@@ -22,7 +22,7 @@ std::shared_ptr<const AvatarShape> makeSweptShape(const AvatarShape& prism, cons
       points.push_back(vertex + leg);
     }
   auto hull = std::make_shared<const collision::Hull>(collision::buildHull(points));
-  return makeAvatarShape({makeAvatarPart(std::move(hull), Vec3::Zero(), Mat3::Identity())});
+  return makeAvatarShape({makeAvatarPart(std::move(hull))});
 }
 
 }  // namespace

@@ -48,8 +48,7 @@ inline scene::AvatarSnapshot avatarAt(scene::EntityId id, const Vec3& feet) {
   avatar.id = id;
   avatar.footPosition = feet;
   avatar.shape = scene::makeAvatarShape(
-      {scene::makeAvatarPart(std::make_shared<const collision::Hull>(collision::buildHull(points)),
-                             Vec3::Zero(), collision::Mat3::Identity())});
+      {scene::makeAvatarPart(std::make_shared<const collision::Hull>(collision::buildHull(points)))});
   return avatar;
 }
 

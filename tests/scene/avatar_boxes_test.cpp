@@ -1,6 +1,8 @@
-// Boxes of avatars: only links that moved get new ones, once a tick in free space.
+// Boxes of avatars: only links that moved get new ones, once a tick in free space; parts that turn
+// get theirs from the extremal vertices of the last tick.
 #include <gtest/gtest.h>
 
+#include "scene/model/rotation.hpp"
 #include "scene/world/data/avatar_shape.hpp"
 #include "scene/world/data/world_data.hpp"
 #include "tests/scene/world_fixture.hpp"
@@ -87,6 +89,39 @@ TEST(AvatarBoxes, OfAChainAreThoseOfAllLinksMadeAnew) {
     EXPECT_EQ(copy.shape->box.max, anew->box.max);
   }
   EXPECT_TRUE(run.touched("post"));
+}
+
+/// A flying cross of two parts, one of them of many vertices.
+Spawn crossAt(const Vec3& at) {
+  Spawn spawn;
+  spawn.position = at;
+  spawn.flying = true;
+  spawn.parts = {boxPoints({-1, 0, -0.1}, {1, 1, 0.1}), {}};
+  for (int i = 0; i < 100; ++i) {
+    const Vec3 heading = makeHeadingFromDegrees(3.6 * i);
+    for (const double y : {0.2, 0.4}) spawn.parts[1].push_back(0.5 * heading + Vec3(0.2, y, 0));
+  }
+  return spawn;
+}
+
+TEST(AvatarBoxes, OfTurningPartsAreMadeByTheExtremalVerticesOfTheLastTick) {
+  WorldFixture run({floorBox()});
+  run.order("cross", crossAt({0, 3, 0}));
+  run.ticks(3);
+  EXPECT_EQ(run.step().partBoxesMade, 0u) << "at rest";
+  run.order("cross", Turn{90, true, 60});
+  for (int i = 0; i < 20; ++i) {
+    const TickReport report = run.step();
+    EXPECT_EQ(report.partBoxesMade, 2u) << "tick " << i;
+    EXPECT_LT(report.verticesLookedAt, 8u + 100) << "of 208, tick " << i;
+    const AvatarSnapshot cross = run.view("cross");
+    for (const AvatarPart& part : cross.shape->parts) {
+      Aabb exact;
+      for (const Vec3& v : part.hull->vertices) exact.include(part.rotation * v);
+      EXPECT_TRUE(contains(part.box, exact));
+      EXPECT_TRUE(contains(inflated(exact, 1e-13), part.box)) << "larger by the rounding alone";
+    }
+  }
 }
 
 }  // namespace

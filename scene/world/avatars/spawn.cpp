@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <limits>
 
 #include "scene/model/rotation.hpp"
 #include "scene/world/avatars/order_context.hpp"
@@ -154,6 +155,29 @@ Mat3 makeHeadingRotation(const Vec3& heading) {
   return rotation;
 }
 
+/// A tight box: the parts of an avatar at rest do not pay for a larger one.
+TurningHull makeTurningPart(const std::vector<Vec3>& points) {
+  collision::Hull hull = collision::buildHull(points);
+  const collision::AabbMethod method = collision::chooseTightMethod(hull);
+  return makeTurningHull(std::move(hull), method);
+}
+
+/// Parts at the rotation of a facing.
+std::vector<AvatarPart> placeTurningParts(Avatar& avatar, const Mat3& rotation) {
+  std::vector<AvatarPart> parts;
+  for (TurningHull& turning : avatar.turningParts)
+    parts.push_back(placeTurningHull(turning, Vec3::Zero(), rotation, avatar.boxWork));
+  return parts;
+}
+
+/// Height of the highest vertex above the feet. The box may be higher by its rounding.
+double computeTop(const AvatarShape& shape) {
+  double top = -std::numeric_limits<double>::infinity();
+  for (const AvatarPart& part : shape.parts)
+    for (const Vec3& v : part.hull->vertices) top = std::max(top, v.y());
+  return top;
+}
+
 }  // namespace
 
 void applySpawnShape(const Spawn& order, const WorldSettings& settings, Avatar& avatar) {
@@ -163,18 +187,15 @@ void applySpawnShape(const Spawn& order, const WorldSettings& settings, Avatar& 
   avatar.height = avatar.spawnHeight = order.parts.empty() ? order.height : 0;
   avatar.shape = makePrismShape(order.radius, order.height, order.height, settings);
   if (!order.parts.empty()) {
-    std::vector<AvatarPart> parts;
-    for (const std::vector<Vec3>& points : order.parts) {
-      auto hull = std::make_shared<const collision::Hull>(collision::buildHull(points));
-      parts.push_back(makeAvatarPart(std::move(hull), Vec3::Zero(), rotation));
-    }
-    avatar.shape = makeAvatarShape(std::move(parts));
+    for (const std::vector<Vec3>& points : order.parts)
+      avatar.turningParts.push_back(makeTurningPart(points));
+    avatar.shape = makeAvatarShape(placeTurningParts(avatar, rotation));
   }
   if (!order.parts.empty() || !order.links.empty()) {
     avatar.spawnOrder = std::make_shared<const Spawn>(order);
     avatar.facing = order.facing;
   }
-  avatar.eyeHeight = computeEyeHeight(avatar.shape->box.max.y());
+  avatar.eyeHeight = computeEyeHeight(computeTop(*avatar.shape));
   if (order.links.empty()) return;
   avatar.baseParts = avatar.shape->parts;
   avatar.chain = makeChain(order, rotation);
@@ -185,17 +206,14 @@ void setFacing(Avatar& avatar, double degrees) {
   if (!turnsShape(avatar)) return;
   avatar.facing = degrees;
   const Mat3 rotation = makeHeadingRotation(makeHeadingFromDegrees(degrees));
-  const bool hasChain = !avatar.chain.links.empty();
-  std::vector<AvatarPart> base = hasChain ? avatar.baseParts : avatar.shape->parts;
-  if (avatar.spawnHeight == 0)
-    for (AvatarPart& part : base) part = makeAvatarPart(part.hull, part.offset, rotation);
-  if (hasChain) {
-    avatar.baseParts = std::move(base);
-    avatar.chain.avatarFromBase = rotation;
-    avatar.shape = makeChainShape(avatar.baseParts, avatar.chain, avatar.boxWork);
-  } else {
-    avatar.shape = makeAvatarShape(std::move(base));
+  std::vector<AvatarPart> parts = placeTurningParts(avatar, rotation);
+  if (avatar.chain.links.empty()) {
+    avatar.shape = makeAvatarShape(std::move(parts));
+    return;
   }
+  if (!parts.empty()) avatar.baseParts = std::move(parts);
+  avatar.chain.avatarFromBase = rotation;
+  avatar.shape = makeChainShape(avatar.baseParts, avatar.chain, avatar.boxWork);
 }
 
 std::optional<std::string> placeStanding(const WorldData& world, const Vec3& position,

@@ -110,10 +110,10 @@ void archiveMembers(A& a, MaybeConst<A, ObstacleSet>& set) {
   a(list, dense, denseCaches);
 }
 
-/// `parent`, `joint`, `hull` and `maxRadius` follow from the spawn order.
+/// `parent`, `joint`, `turning` and `maxRadius` follow from the spawn order.
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, ChainLink>& link) {
-  auto& [parent, joint, hull, support, lastExtremes, maxRadius, value, target, blockedBy] = link;
+  auto& [parent, joint, turning, maxRadius, value, target, blockedBy] = link;
   a(value, target, blockedBy);
 }
 
@@ -139,13 +139,13 @@ void restoreAvatarShape(const Reader& a, Avatar& avatar);
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, Avatar>& avatar) {
   auto& [name, id, shape, spawnOrder, footPosition, viewDirection, eyeHeight, fallSpeed, grounded,
-         groundEntity, flying, jumping, spawnHeight, height, radius, baseParts, chain, facing, turn,
+         groundEntity, flying, jumping, spawnHeight, height, radius, turningParts, baseParts, chain, facing, turn,
          viewHeld, teleports, driveVelocity, desiredVelocity, walk, waitTimeLeft, stalledInAirTime,
          lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, lastStoppedTick,
          pairsChanged, blockingHit, blockedReported, proxy, motionBounds, cachedBounds, obstacles,
          work, boxWork, hasBodyObstacles, contacts] = avatar;
   a(name, spawnOrder, spawnHeight, height, radius, facing);
-  if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // `shape`, `baseParts`
+  if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // also `turningParts` and `baseParts`
   a(chain);
   if constexpr (!A::kWrites)
     if (!chain.links.empty()) shape = makeChainShape(baseParts, chain, boxWork);

@@ -54,7 +54,8 @@ struct Avatar {
   double spawnHeight = 0;  ///< metres, of the prism at spawn; 0 for a shape made of parts
   double height = 0;       ///< metres, current height of the prism
   double radius = 0;       ///< metres, of the prism
-  std::vector<AvatarPart> baseParts;  ///< parts of `shape` that are no links; empty without a chain
+  std::vector<TurningHull> turningParts;  ///< of the spawn order; empty for a prism
+  std::vector<AvatarPart> baseParts;      ///< parts of `shape` that are no links; empty without a chain
   Chain chain;
   double facing = 0;  ///< degrees, of its parts and links; 0 for a mere prism
   TurnProgress turn;

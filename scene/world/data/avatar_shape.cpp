@@ -45,13 +45,25 @@ collision::Hull buildPrismHull(double radius, double height, double bevel) {
 
 }  // namespace
 
-AvatarPart makeAvatarPart(std::shared_ptr<const collision::Hull> hull, const Vec3& offset,
-                          const Mat3& avatarFromHull) {
-  AvatarPart part{std::move(hull), offset, avatarFromHull, !avatarFromHull.isIdentity(0), {}};
-  for (const Vec3& v : part.hull->vertices) {
-    const Vec3 rotated = part.rotated ? Vec3(avatarFromHull * v) : v;
-    part.box.include(rotated + offset);
-  }
+TurningHull makeTurningHull(collision::Hull hull, collision::AabbMethod method) {
+  TurningHull turning;
+  turning.support = collision::buildSupportTable(hull, method);
+  turning.hull = std::make_shared<const collision::Hull>(std::move(hull));
+  return turning;
+}
+
+AvatarPart placeTurningHull(TurningHull& turning, const Vec3& offset, const Mat3& avatarFromHull,
+                            BoxWork& work) {
+  ++work.partBoxesMade;
+  const Aabb box = computeAabb(*turning.hull, turning.support, avatarFromHull, offset,
+                               turning.lastExtremes, work.verticesLookedAt);
+  return {turning.hull, offset, avatarFromHull, !avatarFromHull.isIdentity(0), box};
+}
+
+AvatarPart makeAvatarPart(std::shared_ptr<const collision::Hull> hull) {
+  AvatarPart part;
+  part.hull = std::move(hull);
+  for (const Vec3& v : part.hull->vertices) part.box.include(v);
   return part;
 }
 
@@ -73,8 +85,8 @@ std::shared_ptr<const AvatarShape> makePrismShape(double radius, double height, 
                                                   const WorldSettings& settings) {
   collision::Hull hull =
       buildPrismHull(radius, height, computeBevelHeight(radius, spawnHeight, settings));
-  return makeAvatarShape({makeAvatarPart(std::make_shared<const collision::Hull>(std::move(hull)),
-                                         Vec3::Zero(), Mat3::Identity())});
+  return makeAvatarShape(
+      {makeAvatarPart(std::make_shared<const collision::Hull>(std::move(hull)))});
 }
 
 double computeEyeHeight(double height) {

@@ -1,11 +1,12 @@
 // The shape of an avatar: convex parts in the avatar's frame. Its origin is at the feet, its axes
-// are the scene's. An avatar does not rotate; only the links of a chain do.
+// are the scene's. A prism does not rotate; other parts and the links of a chain do.
 #pragma once
 
 #include <cstdint>
 #include <memory>
 #include <vector>
 
+#include "collision/bounds/bounding_box.hpp"
 #include "collision/narrow_phase/narrow_phase.hpp"
 #include "collision/shapes/hull.hpp"
 #include "scene/world/data/world_settings.hpp"
@@ -21,7 +22,7 @@ struct AvatarPart {
   Vec3 offset = Vec3::Zero();        ///< metres, of the hull's origin, avatar frame
   Mat3 rotation = Mat3::Identity();  ///< avatarFromHull
   bool rotated = false;              ///< `rotation` is not the identity
-  Aabb box;                          ///< of the placed hull, avatar frame
+  Aabb box;                          ///< contains the placed hull, avatar frame
 };
 
 /// Work for the boxes of an avatar that turns or moves its joints, since the end of the last tick.
@@ -36,9 +37,22 @@ struct AvatarShape {
   Aabb box;                       ///< of all parts
 };
 
-/// Places `hull` in the avatar's frame and computes its box.
-AvatarPart makeAvatarPart(std::shared_ptr<const collision::Hull> hull, const Vec3& offset,
-                          const Mat3& avatarFromHull);
+/// A hull that turns with the avatar or with a joint, and its way to a box.
+struct TurningHull {
+  std::shared_ptr<const collision::Hull> hull;
+  collision::SupportTable support;           ///< of `hull`
+  collision::ExtremalVertices lastExtremes;  ///< cost only
+};
+
+TurningHull makeTurningHull(collision::Hull hull, collision::AabbMethod method);
+
+/// `turning` at a pose. Its box contains the exact one. Of `turning` only the extremal vertices
+/// change.
+AvatarPart placeTurningHull(TurningHull& turning, const Vec3& offset, const Mat3& avatarFromHull,
+                            BoxWork& work);
+
+/// A hull in the avatar's own frame, and its exact box.
+AvatarPart makeAvatarPart(std::shared_ptr<const collision::Hull> hull);
 
 std::shared_ptr<const AvatarShape> makeAvatarShape(std::vector<AvatarPart> parts);
 

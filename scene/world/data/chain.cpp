@@ -10,7 +10,7 @@ namespace {
 
 /// Maximum distance of the link's points from the origin of its frame, metres.
 double computeLinkRadius(const ChainLink& link) {
-  return link.hull->radius;
+  return link.turning.hull->radius;
 }
 
 /// Bound on the distance of any point of `link` and its descendants from the link's origin, metres.
@@ -26,13 +26,6 @@ double computeMaxRadius(const Chain& chain, std::size_t link) {
   return maxRadius;
 }
 
-AvatarPart makeLinkPart(ChainLink& link, const LinkPose& pose, BoxWork& work) {
-  ++work.partBoxesMade;
-  const Aabb box = computeAabb(*link.hull, link.support, pose.rotation, pose.origin,
-                               link.lastExtremes, work.verticesLookedAt);
-  return {link.hull, pose.origin, pose.rotation, !pose.rotation.isIdentity(0), box};
-}
-
 }  // namespace
 
 Chain makeChain(const Spawn& order, const Mat3& avatarFromBase) {
@@ -44,8 +37,9 @@ Chain makeChain(const Spawn& order, const Mat3& avatarFromBase) {
     chainLink.parent = link.parent;
     chainLink.joint = link.joint;
     chainLink.joint.axis = link.joint.axis.normalized();
-    chainLink.hull = std::make_shared<const collision::Hull>(collision::buildHull(link.points));
-    chainLink.support = collision::buildSupportTable(*chainLink.hull);
+    collision::Hull hull = collision::buildHull(link.points);
+    const collision::AabbMethod method = collision::chooseAabbMethod(hull);
+    chainLink.turning = makeTurningHull(std::move(hull), method);
     chainLink.value = chainLink.target = link.value;
     chain.links.push_back(std::move(chainLink));
   }
@@ -80,7 +74,8 @@ std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>&
   std::vector<AvatarPart> parts = base;
   const std::vector<LinkPose> poses = computeLinkPoses(chain);
   for (std::size_t i = 0; i < poses.size(); ++i)
-    parts.push_back(makeLinkPart(chain.links[i], poses[i], work));
+    parts.push_back(
+        placeTurningHull(chain.links[i].turning, poses[i].origin, poses[i].rotation, work));
   return makeAvatarShape(std::move(parts));
 }
 
@@ -90,7 +85,9 @@ std::shared_ptr<const AvatarShape> updateChainShape(const AvatarShape& before, s
   const std::vector<LinkPose> poses = computeLinkPoses(chain);
   const std::size_t base = parts.size() - poses.size();
   for (std::size_t i = 0; i < poses.size(); ++i)
-    if ((moved >> i & 1) != 0) parts[base + i] = makeLinkPart(chain.links[i], poses[i], work);
+    if ((moved >> i & 1) != 0)
+      parts[base + i] =
+          placeTurningHull(chain.links[i].turning, poses[i].origin, poses[i].rotation, work);
   return makeAvatarShape(std::move(parts));
 }
 

@@ -5,7 +5,6 @@
 #include <memory>
 #include <vector>
 
-#include "collision/bounds/bounding_box.hpp"
 #include "scene/world/data/avatar_shape.hpp"
 #include "scene/world/data/orders.hpp"
 #include "scene/world/data/snapshot.hpp"
@@ -15,9 +14,7 @@ namespace enfilade::scene {
 struct ChainLink {
   std::int32_t parent = -1;
   LinkJoint joint;  ///< `axis` has unit length
-  std::shared_ptr<const collision::Hull> hull;
-  collision::SupportTable support;           ///< of `hull`, for its box
-  collision::ExtremalVertices lastExtremes;  ///< cost only
+  TurningHull turning;
   double maxRadius = 0;  ///< metres: bound on the distance of moved points from the joint
 
   double value = 0;   ///< radians or metres
