@@ -17,7 +17,8 @@
 // entry has an error of at most 5e on the diagonal and 2e elsewhere, so a row has less than 6e. The
 // normalised rotation is within 39e of it. With the dot product the sum is less than 49e r, and
 // kRotationError = 64e covers the rounding of r. Adding the translation and the margin costs 2e of
-// the sums, which are below the sum of their terms; kSumError = 4e.
+// the sums, which are below the sum of their terms; kSumError = 4e. The rest, 2e of the sizes, is
+// for a translation that a caller rounds once more (placeBoxOutward() of the scene).
 #include "collision/bounds/bounding_box.hpp"
 
 #include <algorithm>

@@ -47,8 +47,8 @@ inline scene::AvatarSnapshot avatarAt(scene::EntityId id, const Vec3& feet) {
   scene::AvatarSnapshot avatar;
   avatar.id = id;
   avatar.footPosition = feet;
-  avatar.shape = scene::makeAvatarShape(
-      {scene::makeAvatarPart(std::make_shared<const collision::Hull>(collision::buildHull(points)))});
+  avatar.shape = scene::makeAvatarShape({scene::makeAvatarPart(
+      std::make_shared<const collision::Hull>(collision::buildHull(points)))});
   return avatar;
 }
 

@@ -1,8 +1,12 @@
 // Boxes of avatars: only links that moved get new ones, once a tick in free space; parts that turn
-// get theirs from the extremal vertices of the last tick.
+// get theirs from the extremal vertices of the last tick; placed boxes contain the exact part.
+#include <gmpxx.h>
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "scene/model/rotation.hpp"
+#include "scene/world/avatars/spawn.hpp"
 #include "scene/world/data/avatar_shape.hpp"
 #include "scene/world/data/world_data.hpp"
 #include "tests/scene/world_fixture.hpp"
@@ -122,6 +126,47 @@ TEST(AvatarBoxes, OfTurningPartsAreMadeByTheExtremalVerticesOfTheLastTick) {
       EXPECT_TRUE(contains(inflated(exact, 1e-13), part.box)) << "larger by the rounding alone";
     }
   }
+}
+
+/// Whether a placed box contains the part exactly: with its rounded translation, as the narrow
+/// phase sees it, and with the exact sum of foot position and offset.
+bool containsExactly(const Aabb& box, const AvatarPart& part, const Vec3& footPosition) {
+  const collision::PlacedConvex placed = placeAvatarPart(part, footPosition);
+  for (const Vec3& v : part.hull->vertices) {
+    for (int axis = 0; axis < 3; ++axis) {
+      mpq_class at = 0;
+      for (int k = 0; k < 3; ++k) at += mpq_class(part.rotation(axis, k)) * v[k];
+      const mpq_class seen = at + placed.translation[axis];
+      const mpq_class exact = at + mpq_class(footPosition[axis]) + part.offset[axis];
+      if (seen < box.min[axis] || seen > box.max[axis]) return false;
+      if (exact < box.min[axis] || exact > box.max[axis]) return false;
+    }
+  }
+  return true;
+}
+
+TEST(AvatarBoxes, OfPartsAndLinksAreConservativeAKilometreAway) {
+  Spawn order = snakeAt(Vec3::Zero());
+  order.parts = crossAt(Vec3::Zero()).parts;
+  for (Link& link : order.links) link.joint.axis = Vec3(1, 2, 3);
+  order.links[3].points = boxPoints({0.7, 0.1, 0.2}, {0.9, 0.15, 0.3});  // far from its joint
+  Avatar avatar;
+  applySpawnShape(order, {}, avatar);
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> angle(-1, 1), far(1000, 2000);
+  int plainSums = 0;  // that are not conservative
+  for (int i = 0; i < 200; ++i) {
+    for (ChainLink& link : avatar.chain.links) link.value = angle(random);
+    setFacing(avatar, 180 * angle(random));
+    const double x = far(random), y = far(random), z = -far(random);
+    const Vec3 foot(x, y, z);
+    for (const AvatarPart& part : avatar.shape->parts) {
+      EXPECT_TRUE(containsExactly(placeBoxOutward(part.box, foot), part, foot)) << "pose " << i;
+      const Aabb plain = placeBox(part.box, foot);
+      plainSums += containsExactly(plain, part, foot) ? 0 : 1;
+    }
+  }
+  EXPECT_GT(plainSums, 500) << "of 2,000";
 }
 
 }  // namespace

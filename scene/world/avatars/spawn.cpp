@@ -155,7 +155,7 @@ Mat3 makeHeadingRotation(const Vec3& heading) {
   return rotation;
 }
 
-/// A tight box: the parts of an avatar at rest do not pay for a larger one.
+/// Its box is always tight: an avatar rarely turns, and a larger box costs pairs at rest too.
 TurningHull makeTurningPart(const std::vector<Vec3>& points) {
   collision::Hull hull = collision::buildHull(points);
   const collision::AabbMethod method = collision::chooseTightMethod(hull);

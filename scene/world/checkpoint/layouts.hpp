@@ -139,11 +139,11 @@ void restoreAvatarShape(const Reader& a, Avatar& avatar);
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, Avatar>& avatar) {
   auto& [name, id, shape, spawnOrder, footPosition, viewDirection, eyeHeight, fallSpeed, grounded,
-         groundEntity, flying, jumping, spawnHeight, height, radius, turningParts, baseParts, chain, facing, turn,
-         viewHeld, teleports, driveVelocity, desiredVelocity, walk, waitTimeLeft, stalledInAirTime,
-         lastDisplacement, requestedDisplacement, idle, dirty, blockedBy, lastStoppedTick,
-         pairsChanged, blockingHit, blockedReported, proxy, motionBounds, cachedBounds, obstacles,
-         work, boxWork, hasBodyObstacles, contacts] = avatar;
+         groundEntity, flying, jumping, spawnHeight, height, radius, turningParts, baseParts, chain,
+         facing, turn, viewHeld, teleports, driveVelocity, desiredVelocity, walk, waitTimeLeft,
+         stalledInAirTime, lastDisplacement, requestedDisplacement, idle, dirty, blockedBy,
+         lastStoppedTick, pairsChanged, blockingHit, blockedReported, proxy, motionBounds,
+         cachedBounds, obstacles, work, boxWork, hasBodyObstacles, contacts] = avatar;
   a(name, spawnOrder, spawnHeight, height, radius, facing);
   if constexpr (!A::kWrites) restoreAvatarShape(a, avatar);  // also `turningParts` and `baseParts`
   a(chain);

@@ -55,7 +55,7 @@ struct Avatar {
   double height = 0;       ///< metres, current height of the prism
   double radius = 0;       ///< metres, of the prism
   std::vector<TurningHull> turningParts;  ///< of the spawn order; empty for a prism
-  std::vector<AvatarPart> baseParts;      ///< parts of `shape` that are no links; empty without a chain
+  std::vector<AvatarPart> baseParts;  ///< parts of `shape` that are no links; empty without a chain
   Chain chain;
   double facing = 0;  ///< degrees, of its parts and links; 0 for a mere prism
   TurnProgress turn;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "collision/bounds/bounding_box.hpp"
+#include "collision/floating_point.hpp"
 #include "collision/narrow_phase/narrow_phase.hpp"
 #include "collision/shapes/hull.hpp"
 #include "scene/world/data/world_settings.hpp"
@@ -69,9 +70,20 @@ std::shared_ptr<const AvatarShape> makePrismShape(double radius, double height, 
 /// Height of the eyes above the feet for an avatar of this height, metres.
 double computeEyeHeight(double height);
 
-/// `box` of the avatar's frame in the scene's frame, for feet at `footPosition`.
+/// `box` of the avatar's frame in the scene's frame, for feet at `footPosition`; rounded. For
+/// searches with a margin of a contact offset or more, which exceeds the rounding.
 inline Aabb placeBox(const Aabb& box, const Vec3& footPosition) {
   return {box.min + footPosition, box.max + footPosition};
+}
+
+/// The same, rounded outwards: it contains the part as placeAvatarPart() places it. Let e be the
+/// unit roundoff. Each side errs by e |box + foot|, its margin by as much again, and the
+/// translation of the part by e |foot + offset|; computeAabb() has room for e |offset|. 4 e (|box|
+/// + |foot|) covers the rest.
+inline Aabb placeBoxOutward(const Aabb& box, const Vec3& footPosition) {
+  const Vec3 sizes = box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs()) + footPosition.cwiseAbs();
+  const Vec3 margins = 4 * collision::kRoundoff * sizes;
+  return {box.min + footPosition - margins, box.max + footPosition + margins};
 }
 
 /// A part in the scene's frame, for feet at `footPosition`. Points into `part`.

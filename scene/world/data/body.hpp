@@ -118,7 +118,8 @@ collision::PlacedConvex makePlacedPart(const Body& body, std::uint32_t part);
 /// Makes the boxes of all parts, unless they are valid.
 void makePartBoxes(Body& body);
 
-/// The box of one part; it is computed if the boxes of the parts are invalid.
+/// The box of one part; it is computed if the boxes of the parts are invalid. That work is not
+/// counted: several threads may ask for boxes of the same body.
 Aabb getPartBox(const Body& body, std::uint32_t part);
 
 /// World pose of a kinematic body at a joint pose.

@@ -111,7 +111,7 @@ std::uint64_t HorizonState::lastMotion(EntityId entity) const {
 
 Aabb HorizonState::computeBox(EntityId entity) const {
   if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt(), entity))
-    return placeBox(avatar->shape->box, avatar->footPosition);
+    return placeBoxOutward(avatar->shape->box, avatar->footPosition);
   if (const BodySnapshot* body = findBodySnapshot(sceneAt(), entity))
     return bodies_[body->index].box;
   const auto& objects = scene_->solidObjects();
@@ -160,7 +160,7 @@ double HorizonState::boxTime(const Aabb& own, const Aabb& other, double growth,
 
 void HorizonState::findStaticNeighbours(const AvatarSnapshot& avatar, double speed, double seconds,
                                         std::vector<Neighbour>& neighbours) const {
-  const Aabb own = placeBox(avatar.shape->box, avatar.footPosition);
+  const Aabb own = placeBoxOutward(avatar.shape->box, avatar.footPosition);
   const double growth = computeGrowthLimit(avatar);
   const double reach = speed * seconds * kRoundUp + growth +
                        2 * computeContactThreshold(settings_) + computeBoxRounding(own);
@@ -181,7 +181,7 @@ std::vector<HorizonState::Neighbour> HorizonState::findNeighbours(const AvatarSn
   std::vector<Neighbour> neighbours;
   const double speed = avatarSpeed(avatar, seconds);
   findStaticNeighbours(avatar, speed, seconds, neighbours);
-  const Aabb own = placeBox(avatar.shape->box, avatar.footPosition);
+  const Aabb own = placeBoxOutward(avatar.shape->box, avatar.footPosition);
   const auto consider = [&](EntityId id, const Aabb& box, double growth, double otherSpeed) {
     const double earliest =
         boxTime(own, box, computeGrowthLimit(avatar) + growth, speed + otherSpeed);
@@ -192,8 +192,8 @@ std::vector<HorizonState::Neighbour> HorizonState::findNeighbours(const AvatarSn
       consider(body.id, bodies_[body.index].box, 0, bodies_[body.index].speed);
   for (const AvatarSnapshot& other : snapshot_->avatars)
     if (other.id != avatar.id)
-      consider(other.id, placeBox(other.shape->box, other.footPosition), computeGrowthLimit(other),
-               avatarSpeed(other, seconds));
+      consider(other.id, placeBoxOutward(other.shape->box, other.footPosition),
+               computeGrowthLimit(other), avatarSpeed(other, seconds));
   return neighbours;
 }
 
@@ -203,7 +203,7 @@ std::size_t HorizonState::boundedCount() const {
 
 HorizonState::NearestBody HorizonState::findNearestDynamicBody(const AvatarSnapshot& avatar) const {
   NearestBody nearest{0, std::numeric_limits<double>::infinity()};
-  const Aabb own = placeBox(avatar.shape->box, avatar.footPosition);
+  const Aabb own = placeBoxOutward(avatar.shape->box, avatar.footPosition);
   for (const BodySnapshot& body : *snapshot_->bodies) {
     if (!isDynamic(getSpec(*scene_, body).kind)) continue;
     const double gap = computeGap(own, bodies_[body.index].box);

@@ -42,7 +42,7 @@ double computeGrowthLimit(const AvatarSnapshot& avatar) {
 double computeAvatarSpeedWithin(const AvatarSnapshot& avatar, std::span<const AvatarPusher> pushers,
                                 bool onDynamicBody, const WorldSettings& settings, double seconds) {
   const double ownSpeed = computeAvatarSpeedLimit(avatar, settings);
-  const Aabb box = placeBox(avatar.shape->box, avatar.footPosition);
+  const Aabb box = placeBoxOutward(avatar.shape->box, avatar.footPosition);
   // Bodies push and carry within the contact threshold; twice that exceeds the rounding of boxes.
   const double margin = computeGrowthLimit(avatar) + 2 * computeContactThreshold(settings);
   double speed = ownSpeed;

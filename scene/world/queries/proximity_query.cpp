@@ -63,7 +63,7 @@ std::vector<Candidate> findCandidates(const SceneAt& sceneAt, const Aabb& box, d
     if (!isTrigger(sceneAt.scene().model().bodies[body.index].kind))
       consider(body.id, computeBodyAabb(sceneAt, body));
   for (const AvatarSnapshot& avatar : sceneAt.snapshot.avatars)
-    consider(avatar.id, placeBox(avatar.shape->box, avatar.footPosition));
+    consider(avatar.id, placeBoxOutward(avatar.shape->box, avatar.footPosition));
   std::sort(candidates.begin(), candidates.end(), [](const Candidate& x, const Candidate& y) {
     return std::tuple(x.gap, x.id) < std::tuple(y.gap, y.id);
   });

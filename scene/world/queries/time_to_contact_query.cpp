@@ -147,7 +147,7 @@ Motion boundAvatarMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
   motion.immediateGrowth = computeGrowthLimit(avatar);
   const double ownSpeed = computeAvatarSpeedLimit(avatar, settings);
   motion.isotropicSpeed = ownSpeed;
-  const Aabb box = placeBox(avatar.shape->box, avatar.footPosition);
+  const Aabb box = placeBoxOutward(avatar.shape->box, avatar.footPosition);
   const bool onDynamicBody = standsOnDynamicBody(sceneAt, avatar);
   for (const BodySnapshot& snapshot : *sceneAt.snapshot.bodies) {
     const BodyInfo body = makeBodyInfo(sceneAt, snapshot);
