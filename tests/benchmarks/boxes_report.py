@@ -75,6 +75,8 @@ turn about their own axes. The methods take turns in every tick; times are media
 
 - *sphere cube*, *vertex scan* and *hill climb* are the three methods of
   `collision/bounds/bounding_box.hpp`; the scan and the climb give the same box to the last bit.
+- The ratio of the chosen method leaves the *sphere cube* out. It is the cheapest everywhere, but its larger box causes
+  false pairs, and each costs some 200 ns in the narrow phase.
 - *recompute* is what the tick did before: every vertex by a matrix product.
 - *Bullet* turns the box of the body's own frame. *FCL* takes the cube of the bounding sphere. A
   larger box causes more pairs.
