@@ -194,9 +194,10 @@ std::string makeMetricsPage(std::span<const WorldMetrics> worlds) {
       [](const M& m) { return m.narrow_queries(); });
   add("rational_queries_total", "counter", "Pairs decided by exact arithmetic.",
       [](const M& m) { return m.rational_queries(); });
-  add("vertices_looked_at_total", "counter", "Vertices read for boxes of moving bodies and links.",
+  add("vertices_looked_at_total", "counter",
+      "Vertices read for boxes of moving bodies and avatars.",
       [](const M& m) { return m.vertices_looked_at(); });
-  add("part_boxes_made_total", "counter", "Part boxes computed, of bodies with several parts.",
+  add("part_boxes_made_total", "counter", "Part boxes computed, of bodies and of avatars.",
       [](const M& m) { return m.part_boxes_made(); });
   add("parts_looked_at_total", "counter", "Parts in reach of the queries of avatars.",
       [](const M& m) { return m.parts_looked_at(); });

@@ -3,6 +3,7 @@
 #include <gmpxx.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 
 #include "scene/model/rotation.hpp"
@@ -75,7 +76,7 @@ TEST(AvatarBoxes, OfAChainFollowEachJointNextToAnObstacle) {
   }
 }
 
-TEST(AvatarBoxes, OfAChainAreThoseOfAllLinksMadeAnew) {
+TEST(AvatarBoxes, OfAChainAreThoseOfAllLinksMadeTogether) {
   WorldFixture run({floorBox(), {"post", {1.2, 3.6, -0.1}, {1.3, 6, 0.1}}});
   run.order("snake", snakeAt({0, 3, 0}));
   run.ticks(3);
@@ -84,13 +85,13 @@ TEST(AvatarBoxes, OfAChainAreThoseOfAllLinksMadeAnew) {
   for (int i = 0; i < 40; ++i) {
     run.step();
     Avatar copy = run.world.data().avatars[0];
-    const auto anew = makeChainShape(copy.baseParts, copy.chain, copy.boxWork);
-    for (std::size_t part = 0; part < anew->parts.size(); ++part) {
-      EXPECT_EQ(copy.shape->parts[part].offset, anew->parts[part].offset);
-      EXPECT_EQ(copy.shape->parts[part].box.min, anew->parts[part].box.min);
-      EXPECT_EQ(copy.shape->parts[part].box.max, anew->parts[part].box.max);
+    const auto whole = makeChainShape(copy.baseParts, copy.chain, copy.boxWork);
+    for (std::size_t part = 0; part < whole->parts.size(); ++part) {
+      EXPECT_EQ(copy.shape->parts[part].offset, whole->parts[part].offset);
+      EXPECT_EQ(copy.shape->parts[part].box.min, whole->parts[part].box.min);
+      EXPECT_EQ(copy.shape->parts[part].box.max, whole->parts[part].box.max);
     }
-    EXPECT_EQ(copy.shape->box.max, anew->box.max);
+    EXPECT_EQ(copy.shape->box.max, whole->box.max);
   }
   EXPECT_TRUE(run.touched("post"));
 }
@@ -101,9 +102,10 @@ Spawn crossAt(const Vec3& at) {
   spawn.position = at;
   spawn.flying = true;
   spawn.parts = {boxPoints({-1, 0, -0.1}, {1, 1, 0.1}), {}};
-  for (int i = 0; i < 100; ++i) {
-    const Vec3 heading = makeHeadingFromDegrees(3.6 * i);
-    for (const double y : {0.2, 0.4}) spawn.parts[1].push_back(0.5 * heading + Vec3(0.2, y, 0));
+  for (int i = 0; i < 200; ++i) {
+    const double height = (i + 0.5) / 100 - 1;
+    const Vec3 rim = std::sqrt(1 - height * height) * makeHeadingFromDegrees(137.5 * i);
+    spawn.parts[1].emplace_back(0.5 * rim.x(), 0.4 + 0.3 * height, 0.4 * rim.z());
   }
   return spawn;
 }
