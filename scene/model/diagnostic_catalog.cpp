@@ -119,6 +119,8 @@ constexpr std::array kCatalog{
     DiagnosticKind{"storeys_by_elevation", note,
                    "the file places its storeys at one height: their stated elevations are used"},
     DiagnosticKind{"skipped_openings", note, "openings are air"},
+    DiagnosticKind{"broken_map", warning,
+                   "the file's place on a map cannot be used: it keeps its own coordinates"},
     DiagnosticKind{"skipped_spaces", note, "spaces are air"},
     // bodies
     DiagnosticKind{"body_without_area", note, "a body of objects without surface: ignored"},

@@ -147,6 +147,28 @@ TEST(IfcMap, AMapThatIsMissingIsAnErrorOnRequest) {
   }
 }
 
+TEST(IfcMap, NumbersThatCannotBeUsedAreNamed) {
+  const TemporaryFolder folder;
+  const auto expectFault = [&](const std::string& numbers, const std::string& fault) {
+    IfcHouse house;
+    house.more = "#600=IFCMAPCONVERSION(#20,#601," + numbers +
+                 ");\n#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
+                 "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
+    const auto file = folder.write("house.ifc", house.text());
+    ImportOptions options = by(IfcReader::ifcPlusPlus);
+    const Model model = importModel(file, options);
+    EXPECT_EQ(diagnosticText(model, "broken_map"), "IfcMapConversion: " + fault);
+    EXPECT_EQ(countDiagnostics(model, "map_place"), 0u);
+    options.georeference = true;
+    const std::string text = catchFailure(file, options);
+    EXPECT_NE(text.find("--georeference: IfcMapConversion: " + fault), std::string::npos) << text;
+  };
+  expectFault("1.E400,5428000.,110.,0.,1.,$", "its Eastings '1.E400' is not a number");
+  expectFault("456789.,5428000.,110.,0.,0.,$", "its x axis has no direction (0, 0)");
+  expectFault("456789.,5428000.,110.,0.,1.,-1.",
+              "its scale is not a positive number that a map can have");
+}
+
 TEST(IfcMap, AMapOfAnotherScaleIsRefusedOnRequest) {
   const TemporaryFolder folder;
   IfcHouse house;

@@ -424,6 +424,19 @@ TEST(ImportIfc, AnArchiveWithZeroSeveralOrTooLargeModelsIsRefused) {
             std::string::npos);
 }
 
+TEST(ImportIfc, APlacementRelativeToItselfIsReported) {
+  const TemporaryFolder folder;
+  IfcHouse house;
+  std::string loop = house.placement(600, "#702", 0, 5, 0) + house.placement(700, "#602", 0, 5, 0);
+  house.more = loop + house.box(610, 4, 0.3, 3) +
+               "#620=IFCWALL('000000000000000000Loop',$,'Loop',$,$,#602,#615,$,$);\n";
+  const Model model =
+      importModel(folder.write("house.ifc", house.text()), by(IfcReader::ifcPlusPlus));
+  EXPECT_EQ(countDiagnostics(model, "broken_transform_dropped"), 1u);
+  EXPECT_EQ(diagnosticText(model, "broken_transform_dropped"),
+            "000000000000000000Loop (IfcWall): its placement is relative to itself");
+}
+
 TEST(ImportIfc, DamagedFilesEndInModelsOrInErrorsThatNameThem) {
   const TemporaryFolder folder;
   const std::string whole = IfcHouse().text();

@@ -5,6 +5,7 @@
 #include <string_view>
 
 #include "scene/import/ifc/class_names.hpp"
+#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -59,6 +60,20 @@ std::optional<Eigen::Affine3d> readAxisPlacement(const StepFile& file, std::uint
   placement.linear().col(2) = z;
   placement.translation() = *origin * metresPerUnit;
   return placement;
+}
+
+/// The placement that a placement is relative to; nullopt: none.
+std::optional<std::uint32_t> findParentPlacement(const StepFile& file, std::uint32_t placement) {
+  const StepStatement* statement = file.findOfType(placement, "IFCLOCALPLACEMENT");
+  if (statement == nullptr) return std::nullopt;
+  return parseStepReference(getArgument(splitStepArguments(statement->arguments), 0));
+}
+
+bool isEndlessPlacement(const StepFile& file, std::uint32_t placement) {
+  std::optional<std::uint32_t> next = placement;
+  for (int depth = 0; next && depth < kMaxPlacementDepth; ++depth)
+    next = findParentPlacement(file, *next);
+  return next.has_value();
 }
 
 /// TrueNorth of an IfcGeometricRepresentationContext (identifier, type, dimensions, precision,
@@ -232,7 +247,8 @@ class IfcMetadataReader {
     } else {
       metadata_.unitAssumption = "no length unit in IFCUNITASSIGNMENT: metres assumed";
     }
-    metadata_.mapConversion = readIfcMapConversion(file_, metadata_.metresPerUnit);
+    metadata_.mapConversion =
+        readIfcMapConversion(file_, metadata_.metresPerUnit, metadata_.mapFault);
     metadata_.trueNorth = readTrueNorth(file_);
     if (!metadata_.trueNorth && metadata_.mapConversion)
       metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
@@ -261,6 +277,10 @@ class IfcMetadataReader {
     readSpatialElement(statement.type, arguments, product);
     if (const auto placement = parseStepReference(arguments[5])) {
       product.fileFromPlacement = readIfcPlacement(file_, *placement, metadata_.metresPerUnit);
+      if (!product.fileFromPlacement && isEndlessPlacement(file_, *placement))
+        addDiagnostic(
+            metadata_.diagnostics, "broken_transform_dropped",
+            product.globalId + " (" + product.ifcClass + "): its placement is relative to itself");
     }
     if (!metadata_.byId.emplace(product.id, metadata_.products.size()).second) return;
     metadata_.products.push_back(std::move(product));

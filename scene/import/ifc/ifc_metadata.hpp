@@ -42,6 +42,7 @@ struct IfcMetadata {
   std::optional<std::string> unitAssumption;  ///< the reason if the unit is assumed
   bool siUnit = true;                         ///< false: feet and other conversion-based units
   std::optional<IfcMapConversion> mapConversion;
+  std::string mapFault;  ///< the reason if the file states a map that cannot be used
   /// Horizontal direction of north in the file's axes: of its context, otherwise of its map.
   std::optional<Vec3> trueNorth;
   std::string schema;

@@ -66,13 +66,26 @@ struct MapNumbers {
   std::optional<double> unit;  ///< metres per unit of the map; nullopt: not stated
   double east = 0, north = 0, height = 0, xAxisEast = 1, xAxisNorth = 0, scale = 1;
   Eigen::Vector3d axisScale = Eigen::Vector3d::Ones();
+  std::string fault;  ///< of the first number that cannot be read; "" if there is none
 };
 
 using MapArguments = std::vector<std::string_view>;
 
-double readMapNumber(const MapArguments& arguments, std::size_t index, double fallback) {
+/// `fallback` for a value that the file leaves out.
+double parseMapNumber(std::string_view argument, const char* name, double fallback,
+                      MapNumbers& numbers) {
+  if (argument == "$" || argument == "*") return fallback;
+  const auto number = parseStepNumber(argument);
+  if (!number && numbers.fault.empty())
+    numbers.fault = std::string("its ") + name + " '" + std::string(argument.substr(0, 40)) +
+                    "' is not a number";
+  return number.value_or(fallback);
+}
+
+double readMapNumber(const MapArguments& arguments, std::size_t index, const char* name,
+                     double fallback, MapNumbers& numbers) {
   if (index >= arguments.size()) return fallback;
-  return parseStepNumber(arguments[index]).value_or(fallback);
+  return parseMapNumber(arguments[index], name, fallback, numbers);
 }
 
 /// The target of a conversion: an IfcProjectedCRS, whose first argument is the name, the seventh
@@ -96,16 +109,20 @@ std::optional<MapNumbers> readMapConversion(const StepFile& file) {
     const bool scaled = statement.type == "IFCMAPCONVERSIONSCALED";
     if (!scaled && statement.type != "IFCMAPCONVERSION") continue;
     const MapArguments arguments = splitStepArguments(statement.arguments);
-    const auto number = [&](std::size_t index, double fallback) {
-      return readMapNumber(arguments, index, fallback);
-    };
     MapNumbers numbers;
+    const auto number = [&](std::size_t index, const char* name, double fallback) {
+      return readMapNumber(arguments, index, name, fallback, numbers);
+    };
     numbers.source = scaled ? "IfcMapConversionScaled" : "IfcMapConversion";
     if (!readMapSystem(file, arguments, numbers)) return std::nullopt;
-    numbers.east = number(2, 0), numbers.north = number(3, 0), numbers.height = number(4, 0);
-    numbers.xAxisEast = number(5, 1), numbers.xAxisNorth = number(6, 0);
-    numbers.scale = number(7, 1);
-    if (scaled) numbers.axisScale = {number(8, 1), number(9, 1), number(10, 1)};
+    numbers.east = number(2, "Eastings", 0), numbers.north = number(3, "Northings", 0);
+    numbers.height = number(4, "OrthogonalHeight", 0);
+    numbers.xAxisEast = number(5, "XAxisAbscissa", 1);
+    numbers.xAxisNorth = number(6, "XAxisOrdinate", 0);
+    numbers.scale = number(7, "Scale", 1);
+    if (scaled)
+      numbers.axisScale = {number(8, "FactorX", 1), number(9, "FactorY", 1),
+                           number(10, "FactorZ", 1)};
     return numbers;
   }
   return std::nullopt;
@@ -121,9 +138,9 @@ std::optional<MapNumbers> readRigidOperation(const StepFile& file) {
     if (arguments.size() < 4 || arguments[2].starts_with("IFCPLANEANGLEMEASURE") ||
         !readMapSystem(file, arguments, numbers))
       return std::nullopt;
-    numbers.east = readMapNumber(arguments, 2, 0);
-    numbers.north = readMapNumber(arguments, 3, 0);
-    numbers.height = readMapNumber(arguments, 4, 0);
+    numbers.east = readMapNumber(arguments, 2, "FirstCoordinate", 0, numbers);
+    numbers.north = readMapNumber(arguments, 3, "SecondCoordinate", 0, numbers);
+    numbers.height = readMapNumber(arguments, 4, "Height", 0, numbers);
     return numbers;
   }
   return std::nullopt;
@@ -179,16 +196,17 @@ std::optional<double> parseUnitName(const std::string& name) {
 std::optional<MapNumbers> readMapProperties(const StepFile& file) {
   const auto values = readPropertySet(file, "EPSET_MAPCONVERSION");
   if (!values.contains("EASTINGS") || !values.contains("NORTHINGS")) return std::nullopt;
+  MapNumbers numbers;
   const auto number = [&](const char* name, double fallback) {
     const auto value = values.find(name);
-    return value == values.end() ? fallback : parseStepNumber(value->second).value_or(fallback);
+    return value == values.end() ? fallback
+                                 : parseMapNumber(value->second, name, fallback, numbers);
   };
   const auto system = readPropertySet(file, "EPSET_PROJECTEDCRS");
   const auto text = [&](const char* name) {
     const auto value = system.find(name);
     return value == system.end() ? std::string() : parseLabel(value->second);
   };
-  MapNumbers numbers;
   numbers.source = "ePSet_MapConversion";
   numbers.crs = text("NAME");
   if (const auto target = values.find("TARGETCRS"); numbers.crs.empty() && target != values.end())
@@ -199,6 +217,24 @@ std::optional<MapNumbers> readMapProperties(const StepFile& file) {
   numbers.xAxisEast = number("XAXISABSCISSA", 1), numbers.xAxisNorth = number("XAXISORDINATE", 0);
   numbers.scale = number("SCALE", 1);
   return numbers;
+}
+
+constexpr double kMaxMapCoordinate = 1e9;  // metres; larger than any map
+
+/// "" for numbers that place the file on a map; otherwise the first fault, as "its .. is ..".
+std::string findMapFault(const MapNumbers& numbers, const IfcMapConversion& conversion,
+                         double unit) {
+  if (!numbers.fault.empty()) return numbers.fault;
+  const double maxCoordinate = std::max(
+      {std::abs(conversion.east), std::abs(conversion.north), std::abs(conversion.height)});
+  if (!(unit > 0)) return "the unit of its map is not positive";
+  if (!(maxCoordinate <= kMaxMapCoordinate)) return "its origin lies beyond any map";
+  if (numbers.xAxisEast == 0 && numbers.xAxisNorth == 0)
+    return "its x axis has no direction (0, 0)";
+  if (!(conversion.scale > 0 && conversion.scale <= kMaxMapCoordinate))
+    return "its scale is not a positive number that a map can have";
+  const bool isScaled = conversion.axisScale.minCoeff() > 0 && conversion.axisScale.allFinite();
+  return isScaled ? "" : "the factor of an axis is not positive";
 }
 
 }  // namespace
@@ -217,14 +253,15 @@ std::optional<double> readIfcMetresPerUnit(const StepFile& file, bool& siUnit) {
   return std::nullopt;
 }
 
-std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, double metresPerUnit) {
-  constexpr double kMaxCoordinate = 1e9;  // metres; larger than any map
+std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, double metresPerUnit,
+                                                     std::string& fault) {
   std::optional<MapNumbers> numbers = readMapConversion(file);
   if (!numbers) numbers = readRigidOperation(file);
   if (!numbers) numbers = readMapProperties(file);
   if (!numbers) return std::nullopt;
+  const double scale = numbers->scale > 0 ? numbers->scale : 1;  // its sign is a fault
   // Without a unit of its own the map has that of the file, unless the scale leads to metres.
-  const bool inFileUnits = computeMapScale(numbers->scale, 1 / metresPerUnit) == numbers->scale;
+  const bool inFileUnits = computeMapScale(scale, 1 / metresPerUnit) == scale;
   const double unit = numbers->unit.value_or(inFileUnits ? metresPerUnit : 1);
   IfcMapConversion conversion;
   conversion.source = numbers->source;
@@ -240,14 +277,13 @@ std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, doubl
   }
   // A rigid operation keeps lengths; in other units they are the same metres.
   if (numbers->source != "IfcRigidOperation")
-    conversion.scale = computeMapScale(numbers->scale, unit / metresPerUnit);
+    conversion.scale =
+        numbers->scale > 0 ? computeMapScale(scale, unit / metresPerUnit) : numbers->scale;
   conversion.axisScale = numbers->axisScale;
-  const double maxCoordinate = std::max(
-      {std::abs(conversion.east), std::abs(conversion.north), std::abs(conversion.height)});
-  const bool isValid = unit > 0 && maxCoordinate <= kMaxCoordinate && conversion.scale > 0 &&
-                       conversion.scale <= kMaxCoordinate && (xAxisEast != 0 || xAxisNorth != 0) &&
-                       conversion.axisScale.minCoeff() > 0 && conversion.axisScale.allFinite();
-  return isValid ? std::optional(conversion) : std::nullopt;
+  const std::string found = findMapFault(*numbers, conversion, unit);
+  if (found.empty()) return conversion;
+  fault = numbers->source + ": " + found;
+  return std::nullopt;
 }
 
 Eigen::Affine3d computeMapFromFile(const IfcMapConversion& conversion) {
@@ -275,14 +311,22 @@ std::string formatMapConversion(const IfcMapConversion& conversion) {
   return (conversion.crs.empty() ? "unnamed map" : conversion.crs) + ": " + text;
 }
 
-/// Coordinates of another size than a projection's are not what was meant.
-void requireMapScale(const IfcMapConversion& conversion) {
-  const double min = conversion.scale * conversion.axisScale.minCoeff();
-  const double max = conversion.scale * conversion.axisScale.maxCoeff();
-  if (min >= 0.5 && max <= 2) return;
+const IfcMapConversion& requireMap(const std::optional<IfcMapConversion>& conversion,
+                                   const std::string& fault) {
+  if (!fault.empty())
+    throw ImportError("--georeference: " + fault +
+                      "; leave the option out, or correct it in the program that wrote the file");
+  if (!conversion)
+    throw ImportError(
+        "--georeference: the file has no IfcMapConversion, IfcRigidOperation or "
+        "ePSet_MapConversion in metres; leave the option out, or export the file with its map");
+  // Coordinates of another size than a projection's are not what was meant.
+  const double min = conversion->scale * conversion->axisScale.minCoeff();
+  const double max = conversion->scale * conversion->axisScale.maxCoeff();
+  if (min >= 0.5 && max <= 2) return *conversion;
   std::ostringstream scale;
   scale << (max > 2 ? max : min);
-  throw ImportError("--georeference: its " + conversion.source + " scales by " + scale.str() +
+  throw ImportError("--georeference: its " + conversion->source + " scales by " + scale.str() +
                     "; leave the option out, or correct its Scale, which converts from the file's "
                     "length unit to the map's");
 }

@@ -25,10 +25,12 @@ struct IfcMapConversion {
 /// Metres per length unit of the project; nullopt: not stated. Sets `siUnit`.
 std::optional<double> readIfcMetresPerUnit(const StepFile& file, bool& siUnit);
 
-/// The map georeference; nullopt: absent or invalid. Read from IfcMapConversion(Scaled), otherwise
-/// IfcRigidOperation, otherwise the property set ePSet_MapConversion of IFC2x3. Lengths are
-/// converted to metres by the map's unit, or by `metresPerUnit` if the map has no unit.
-std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, double metresPerUnit);
+/// The map georeference; nullopt: absent, or invalid, which sets `fault`. Read from
+/// IfcMapConversion(Scaled), otherwise IfcRigidOperation, otherwise the property set
+/// ePSet_MapConversion of IFC2x3. Lengths are converted to metres by the map's unit, or by
+/// `metresPerUnit` if the map has no unit.
+std::optional<IfcMapConversion> readIfcMapConversion(const StepFile& file, double metresPerUnit,
+                                                     std::string& fault);
 
 /// To the map's axes (x east, y north, z up) from the file's, both in metres.
 Eigen::Affine3d computeMapFromFile(const IfcMapConversion& conversion);
@@ -39,7 +41,9 @@ Eigen::Vector3d computeGridNorth(const IfcMapConversion& conversion);
 /// For people: where the file's origin lies.
 std::string formatMapConversion(const IfcMapConversion& conversion);
 
-/// Throws ImportError unless it scales as a projection does, by less than a percent or so.
-void requireMapScale(const IfcMapConversion& conversion);
+/// The map that --georeference applies. Throws ImportError without one, or unless it scales about
+/// as a projection does. `fault`: of readIfcMapConversion().
+const IfcMapConversion& requireMap(const std::optional<IfcMapConversion>& conversion,
+                                   const std::string& fault);
 
 }  // namespace enfilade::scene

@@ -244,15 +244,12 @@ class IfcImport {
     if (metadata_.unitAssumption && !request_.options.metresPerUnit) {
       addDiagnostic(diagnostics_, "no_unit", *metadata_.unitAssumption);
     }
-    if (request_.options.georeference && !metadata_.mapConversion)
-      throw ImportError(request_.file +
-                        ": --georeference: the file has no IfcMapConversion, IfcRigidOperation "
-                        "or ePSet_MapConversion in metres; leave the option out, or export the "
-                        "file with its map");
-    if (request_.options.georeference) {
-      requireMapScale(*metadata_.mapConversion);
-      metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
-    }
+    for (const Diagnostic& problem : metadata_.diagnostics)
+      addDiagnostic(diagnostics_, problem.kind, problem.example, problem.count);
+    if (request_.options.georeference)
+      metadata_.trueNorth =
+          computeGridNorth(requireMap(metadata_.mapConversion, metadata_.mapFault));
+    if (!metadata_.mapFault.empty()) addDiagnostic(diagnostics_, "broken_map", metadata_.mapFault);
     if (metadata_.mapConversion)
       addDiagnostic(diagnostics_, "map_place", formatMapConversion(*metadata_.mapConversion));
     for (const IfcProduct& product : metadata_.products) {
