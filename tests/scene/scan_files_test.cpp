@@ -242,6 +242,23 @@ TEST(ScanUpAxis, IsThatOfTheFloorOfARoomWithoutACeiling) {
   }
 }
 
+TEST(ScanPly, LinesMayEndInCarriageReturnsAlone) {
+  const TemporaryFolder folder;
+  std::string text = makeTextPly(makeRoom());
+  std::ranges::replace(text, '\n', '\r');
+  // The first byte of the data is a line feed, which belongs to it.
+  BoxMesh room = makeRoom();
+  std::memcpy(room.positions[0].data(), "\n\0\0\0", 4);
+  std::string binary = makeBinaryPly(room, false);
+  const std::size_t header = binary.find("end_header\n") + 11;
+  std::replace(binary.begin(), binary.begin() + static_cast<std::ptrdiff_t>(header), '\n', '\r');
+  for (const std::string& file : {text, binary}) {
+    const Model model = importModel(folder.write("a.ply", file));
+    EXPECT_EQ(model.meshes.at(0).triangleCount(), 12u);
+    EXPECT_LT((Scene(Model(model)).bounds().size() - Vec3(8, 3, 6)).norm(), 1e-9);
+  }
+}
+
 TEST(ScanPly, APointCloudIsRefusedInWords) {
   const TemporaryFolder folder;
   const std::string text = catchFailure(

@@ -70,6 +70,13 @@ PlyProperty parsePlyProperty(TextCursor& words) {
   return property;
 }
 
+/// '\n', also behind '\r'; '\r' alone in files of old programs.
+char findLineEnd(std::string_view text) {
+  const std::size_t first = text.find_first_of("\r\n");
+  const bool alone = first < text.size() && text[first] == '\r' && text.substr(first, 2) != "\r\n";
+  return alone ? '\r' : '\n';
+}
+
 }  // namespace
 
 std::size_t getPlySize(PlyType type) {
@@ -88,11 +95,12 @@ std::size_t PlyElement::computeMinSize(PlyEncoding encoding) const {
 PlyHeader parsePlyHeader(std::string_view bytes) {
   const std::string_view start = bytes.substr(0, kMaxPlyHeader);
   TextCursor lines(start);
-  if (lines.readLine() != "ply") failHeader("the file does not begin with 'ply'");
+  const char lineEnd = findLineEnd(start);
+  if (lines.readLine(lineEnd) != "ply") failHeader("the file does not begin with 'ply'");
   PlyHeader header;
   bool hasFormat = false;
   while (lines.remaining() > 0) {
-    const std::string_view line = lines.readLine();
+    const std::string_view line = lines.readLine(lineEnd);
     TextCursor words(line);
     const std::string_view kind = words.readWord();
     if (kind == "format") {

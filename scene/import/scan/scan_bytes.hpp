@@ -1,6 +1,7 @@
 // Reads numbers from the bytes of a file. Private to the import.
 #pragma once
 
+#include <algorithm>
 #include <charconv>
 #include <cstddef>
 #include <cstdint>
@@ -71,8 +72,8 @@ class TextCursor {
     return word;
   }
   /// The rest of the line, without blanks around it.
-  std::string_view readLine() {
-    const std::size_t end = text_.find('\n') < text_.size() ? text_.find('\n') : text_.size();
+  std::string_view readLine(char lineEnd = '\n') {
+    const std::size_t end = std::min(text_.find(lineEnd), text_.size());
     std::string_view line = text_.substr(0, end);
     text_.remove_prefix(end < text_.size() ? end + 1 : end);
     while (!line.empty() && isBlank(line.front())) line.remove_prefix(1);
