@@ -30,6 +30,7 @@ constexpr std::array kCatalog{
                    "not read: it looks different"},
     DiagnosticKind{"mended_text", note, "the text was repaired in memory; export the file again"},
     DiagnosticKind{"missing_material_file", warning, "put the .mtl file next to the model"},
+    DiagnosticKind{"no_scene", note, "the glTF file has no scene: all its nodes form one"},
     DiagnosticKind{"no_unit", warning, "the file defines no unit; set it with --unit"},
     DiagnosticKind{"other_scenes", note,
                    "scenes of the file that were not read; --gltf-scene chooses one"},

@@ -206,9 +206,28 @@ TEST(GltfUris, AMissingOrShortBufferAndAMissingSceneAreNamed) {
   EXPECT_NE(cut.find("extends beyond its buffer of"), std::string::npos) << cut;
   folder.write("a.bin", file.binary);
   EXPECT_EQ(importModel(model).objects.size(), 1u);
-  file.json.erase("scenes");
+  for (const char* section : {"scenes", "nodes"}) file.json.erase(section);
   const std::string bare = catchFailure(folder.write("b.gltf", file.gltf("a.bin")));
-  EXPECT_NE(bare.find("has no scene; export it with one"), std::string::npos) << bare;
+  EXPECT_NE(bare.find("has neither a scene nor a root node; export it with one"), std::string::npos)
+      << bare;
+}
+
+TEST(GltfUris, TheSchemeOfDataMayBeInCapitalLetters) {
+  const TemporaryFolder folder;
+  const GltfWriter plain = tests::plainTerrace();
+  for (const char* start : {"DATA:;base64,", "Data:;BASE64,", "data:;BASE64,"}) {
+    const std::string uri = start + tests::base64(plain.binary);
+    const Model model = importModel(folder.write("a.gltf", plain.gltf(uri)));
+    expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 0);
+  }
+}
+
+TEST(GltfUris, MessagesCutLongOnes) {
+  const TemporaryFolder folder;
+  const std::string uri = "dota:;base64," + std::string(100'000, 'A');
+  const std::string text = catchFailure(folder.write("a.gltf", tests::plainTerrace().gltf(uri)));
+  EXPECT_NE(text.find("its buffer 'dota:;base64,AAA"), std::string::npos);
+  EXPECT_LT(text.size(), 400u);
 }
 
 // ---- instances ----------------------------------------------------------------------------------
@@ -443,6 +462,62 @@ TEST(GltfTextures, OnesWithoutAnImageThatIsReadAreReportedAsMissing) {
   expectMissing(file, "materials[0]: its baseColorTexture has no image");
   file.json["textures"] = {{{"source", 9}}};
   expectMissing(file, "materials[0]: its baseColorTexture has no image");
+}
+
+TEST(GltfTextures, OnesWhoseCoordinatesThePrimitiveLacksAreReported) {
+  const TemporaryFolder folder;
+  const auto readProblem = [&](const GltfWriter& file) {
+    return diagnosticText(importModel(folder.write("a.glb", file.glb())), "missing_texture");
+  };
+  GltfWriter file = texturedTerrace("EXT_texture_webp", makeWebp(), "image/webp");
+  EXPECT_EQ(readProblem(file), "");
+  Json& texture = file.json["materials"][0]["pbrMetallicRoughness"]["baseColorTexture"];
+  texture["texCoord"] = 3;
+  EXPECT_EQ(readProblem(file), "meshes[0].primitives[0] has no TEXCOORD_3");
+  // A file that assimp would read as it is.
+  texture["texCoord"] = 0;
+  file.json["meshes"][0]["primitives"][0]["attributes"].erase("TEXCOORD_0");
+  file.json["textures"] = {{{"source", 0}}};
+  file.json["images"][0]["mimeType"] = "image/png";
+  for (const char* list : {"extensionsUsed", "extensionsRequired"}) file.json.erase(list);
+  EXPECT_EQ(readProblem(file), "meshes[0].primitives[0] has no TEXCOORD_0");
+}
+
+TEST(GltfLights, BrokenOnesDoNotRefuseTheFile) {
+  constexpr const char* kLights = "KHR_lights_punctual";
+  const TemporaryFolder folder;
+  const std::vector<std::pair<Json, Json>> cases{
+      {{{"light", 0}}, nullptr},                               // none in the file
+      {{{"light", 7}}, {{"lights", {{{"type", "point"}}}}}},   // of another index
+      {Json::object(), {{"lights", {{{"type", "point"}}}}}},   // no index
+      {{{"light", "a"}}, {{"lights", {{{"type", "spot"}}}}}},  // a spot without its cone
+      {{{"light", -1}}, {{"lights", Json::object()}}},         // wrong types
+      {5, {{"lights", {5}}}}};
+  for (const auto& [node, root] : cases) {
+    GltfWriter file = tests::plainTerrace();
+    file.use(kLights, false);
+    file.json["nodes"][0]["extensions"][kLights] = node;
+    if (!root.is_null()) file.json["extensions"][kLights] = root;
+    const Model model = importModel(folder.write("a.glb", file.glb()));
+    SCOPED_TRACE(node.dump());
+    expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 0);
+    EXPECT_TRUE(model.diagnostics.empty()) << model.diagnostics[0].kind;
+  }
+}
+
+TEST(GltfVisibility, IsReportedOnlyWhereItHides) {
+  constexpr const char* kVisibility = "KHR_node_visibility";
+  const TemporaryFolder folder;
+  for (const Json& visible : {Json(true), Json(false), Json()}) {
+    GltfWriter file = tests::plainTerrace();
+    file.use(kVisibility, false);
+    Json& node = file.json["nodes"][0];
+    node["extensions"][kVisibility] = Json::object();
+    if (!visible.is_null()) node["extensions"][kVisibility]["visible"] = visible;
+    node["extras"]["visible"] = false;
+    const Model model = importModel(folder.write("a.glb", file.glb()));
+    EXPECT_EQ(diagnosticText(model, "ignored_extension"), visible == false ? kVisibility : "");
+  }
 }
 
 TEST(GltfTextures, AnEmissiveOneWithoutAnImageIsReportedAndDoesNotGlow) {

@@ -46,6 +46,17 @@ TEST(GltfScenes, TheDefaultIsReadAndTheOthersAreListed) {
   EXPECT_EQ(model.fileScene, 1u);
 }
 
+TEST(GltfScenes, WithoutOneAllRootNodesAreRead) {
+  const TemporaryFolder folder;
+  GltfWriter file = makeThreeScenes();
+  file.json["nodes"][0]["children"] = {2};
+  for (const char* member : {"scenes", "scene"}) file.json.erase(member);
+  const Model model = importModel(folder.write("a.glb", file.glb()));
+  ASSERT_EQ(model.objects.size(), 3u);
+  EXPECT_EQ(countDiagnostics(model, "no_scene"), 1u);
+  EXPECT_EQ(countDiagnostics(model, "unmatched_node"), 0u);
+}
+
 TEST(GltfScenes, OneIsChosenByNameOrNumber) {
   const TemporaryFolder folder;
   const auto file = folder.write("a.glb", makeThreeScenes().glb());
@@ -252,6 +263,26 @@ TEST(GltfMeshes, AnIncompleteLastTriangleIsLeftOutAndReported) {
     EXPECT_EQ(countDiagnostics(model, "broken_triangle_dropped"), 1u);
     EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 0u);
   }
+}
+
+TEST(GltfMeshes, WithoutATriangleTheProblemsAreNamed) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::plainTerrace();
+  const float none = std::numeric_limits<float>::quiet_NaN();
+  for (std::size_t at = 0; at < tests::Terrace().positions.size() * 12; at += sizeof none)
+    std::memcpy(file.binary.data() + at, &none, sizeof none);
+  const std::string broken = catchFailure(folder.write("a.glb", file.glb()));
+  EXPECT_NE(broken.find("contains no usable triangles: " + std::to_string(kTriangles) +
+                        " broken_triangle_dropped ("),
+            std::string::npos)
+      << broken;
+  GltfWriter other = tests::plainTerrace();
+  other.json["nodes"][0]["mesh"] = 7;
+  const std::string missing = catchFailure(folder.write("b.glb", other.glb()));
+  EXPECT_NE(missing.find("contains no usable triangles: 1 missing_mesh (nodes[0] 'terrace': mesh 7 "
+                         "does not exist)"),
+            std::string::npos)
+      << missing;
 }
 
 TEST(GltfMeshes, OneVertexThatIsNoNumberCostsItsOwnTrianglesAlone) {

@@ -9,6 +9,7 @@
 #include "scene/import/file/import_options.hpp"
 #include "scene/model/add_diagnostic.hpp"
 #include "scene/model/box_mesh.hpp"
+#include "scene/model/diagnostic_catalog.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -234,10 +235,17 @@ void reportUnusualTransforms(const std::vector<ImportedNode>& importedNodes,
   }
 }
 
+/// The first problems, which may be the reason.
 std::string explainMissingTriangles(const std::vector<Diagnostic>& diagnostics) {
-  const auto broken = std::ranges::find(diagnostics, "broken_triangle_dropped", &Diagnostic::kind);
-  if (broken == diagnostics.end()) return "";
-  return ": " + std::to_string(broken->count) + " are broken (" + broken->example + ")";
+  constexpr int kMaxNamed = 3;
+  std::string text;
+  int named = 0;
+  for (const Diagnostic& problem : diagnostics) {
+    if (findDiagnosticKind(problem).severity == Severity::note || named++ == kMaxNamed) continue;
+    text += (text.empty() ? ": " : ", ") + std::to_string(problem.count) + " " + problem.kind +
+            (problem.example.empty() ? "" : " (" + problem.example + ")");
+  }
+  return text;
 }
 
 }  // namespace

@@ -101,7 +101,7 @@ class TextureTable {
     const std::optional<fs::path> file = findImage(file_, name, model_.dependencies);
     const auto bytes = file ? readImageFile(*file) : std::nullopt;
     if (!bytes) {
-      addDiagnostic(model_.diagnostics, "missing_texture", name);
+      addDiagnostic(model_.diagnostics, "missing_texture", shortenUri(name));
       return std::nullopt;
     }
     return decode(*bytes, name);
@@ -112,13 +112,13 @@ class TextureTable {
     if (bytes.size() >= kKtx2.size() &&
         std::memcmp(bytes.data(), kKtx2.data(), kKtx2.size()) == 0) {
       addDiagnostic(model_.diagnostics, "missing_texture",
-                    name + ": KTX2 images are not decoded; export PNG, JPEG or WebP");
+                    shortenUri(name) + ": KTX2 images are not decoded; export PNG, JPEG or WebP");
       return std::nullopt;
     }
     auto image = decodeImage(bytes, kMaxTextureSize);
     if (auto* texture = std::get_if<Texture>(&image)) return std::move(*texture);
     addDiagnostic(model_.diagnostics, "unreadable_texture",
-                  name + ": " + std::get<std::string>(image));
+                  shortenUri(name) + ": " + std::get<std::string>(image));
     return std::nullopt;
   }
 

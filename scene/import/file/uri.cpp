@@ -17,4 +17,15 @@ std::string decodePercent(std::string_view uri) {
   return plain;
 }
 
+std::string shortenUri(const std::string& uri) {
+  constexpr std::size_t kMaxShown = 120, kStart = 60, kEnd = 20;  // bytes
+  if (uri.size() <= kMaxShown) return uri;
+  // No character of UTF-8 is cut: its other bytes are 0x80 to 0xBF.
+  const auto isCut = [&](std::size_t at) { return (uri[at] & 0xC0) == 0x80; };
+  std::size_t start = kStart, end = uri.size() - kEnd;
+  while (isCut(start)) --start;
+  while (end < uri.size() && isCut(end)) ++end;
+  return uri.substr(0, start) + "..[" + std::to_string(end - start) + " bytes].." + uri.substr(end);
+}
+
 }  // namespace enfilade::scene

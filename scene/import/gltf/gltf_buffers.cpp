@@ -152,7 +152,7 @@ std::string GltfBuffers::readBuffer(std::size_t index) {
     return format_ == ModelFormat::glb && index == 0 ? readBinaryChunk(file_) : "";
   if (!buffer["uri"].is_string()) fail("a buffer's uri is not a string");
   const std::string uri = buffer["uri"].get<std::string>();
-  if (uri.starts_with("data:")) {
+  if (isDataUri(uri)) {
     std::string fault;
     std::string bytes = decodeDataUri(uri, fault);
     if (!fault.empty()) fail("buffers[" + std::to_string(index) + "]: " + fault);
@@ -167,7 +167,7 @@ std::string GltfBuffers::readBuffer(std::size_t index) {
     loaded_ += bytes.size();
     return bytes;
   }
-  throw UnreadableGltf(file_.string() + ": its buffer '" + uri +
+  throw UnreadableGltf(file_.string() + ": its buffer '" + shortenUri(uri) +
                        "' is missing; put it next to the model, or export the file again");
 }
 

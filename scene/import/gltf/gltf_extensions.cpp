@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 #include <string_view>
+#include <utility>
 
 #include "scene/import/file/import_options.hpp"
 
@@ -11,6 +12,8 @@ namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
+
+constexpr const char* kVisibility = "KHR_node_visibility";
 
 /// Extensions that are read; their names in full.
 constexpr std::array<std::string_view, 10> kReadExtensions{
@@ -98,10 +101,23 @@ void addProblem(const char* kind, const std::set<std::string>& names,
 void ExtensionNames::seeKey(int depth, const std::string& key) {
   while (!open_.empty() && depth <= open_.back()) open_.pop_back();
   if (extras_ && depth <= *extras_) extras_.reset();
+  isVisible_ = false;
   if (extras_) return;
-  if (!open_.empty() && depth == open_.back() + 1) names_.insert(key);
+  if (visibility_ && depth <= *visibility_) visibility_.reset();
+  isVisible_ = visibility_ && depth == *visibility_ + 1 && key == "visible";
+  if (!open_.empty() && depth == open_.back() + 1) {
+    if (key == kVisibility) {
+      visibility_ = depth;
+    } else {
+      names_.insert(key);
+    }
+  }
   if (key == "extensions") open_.push_back(depth);
   if (key == "extras") extras_ = depth;
+}
+
+void ExtensionNames::seeValue(const Json& value) {
+  if (std::exchange(isVisible_, false) && value != true) names_.insert(kVisibility);
 }
 
 std::vector<Diagnostic> checkGltfExtensions(const Json& gltf, const ExtensionNames& inUse,
@@ -117,7 +133,7 @@ std::vector<Diagnostic> checkGltfExtensions(const Json& gltf, const ExtensionNam
   const auto used = gltf.find("extensionsUsed");
   if (used != gltf.end() && used->is_array()) {
     for (const Json& name : *used)
-      if (name.is_string() && !mayBeIgnored(name.get<std::string>()))
+      if (name.is_string() && name != kVisibility && !mayBeIgnored(name.get<std::string>()))
         ignored.insert(name.get<std::string>());
   }
   for (const std::string& name : inUse.names())

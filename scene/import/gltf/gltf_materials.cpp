@@ -54,8 +54,8 @@ bool removeTexture(Json& owner, const char* member, const Json& textures) {
   return true;
 }
 
-void simplifyMaterial(Json& material, const std::string& name, const Json& textures,
-                      std::vector<Diagnostic>& problems) {
+void dropMissingTexturesOf(Json& material, const std::string& name, const Json& textures,
+                           std::vector<Diagnostic>& problems) {
   const auto remove = [&](Json& owner, const char* member) {
     const std::string extensions = listTextureExtensions(findMember(&owner, member), textures);
     if (!removeTexture(owner, member, textures)) return false;
@@ -65,14 +65,18 @@ void simplifyMaterial(Json& material, const std::string& name, const Json& textu
   };
   // Without its texture, the factor would make the whole surface glow.
   if (remove(material, "emissiveTexture")) material["emissiveFactor"] = {0, 0, 0};
+  const auto metallic = material.find("pbrMetallicRoughness");
+  if (metallic != material.end()) remove(*metallic, "baseColorTexture");
+}
+
+void simplifyMaterial(Json& material) {
   for (const char* unread : {"normalTexture", "occlusionTexture", "extensions"})
     material.erase(unread);
   const auto metallic = material.find("pbrMetallicRoughness");
   if (metallic == material.end() || !metallic->is_object()) return;
   metallic->erase("metallicRoughnessTexture");
-  remove(*metallic, "baseColorTexture");
   const auto base = metallic->find("baseColorTexture");
-  if (base == metallic->end()) return;
+  if (base == metallic->end() || !base->is_object()) return;
   for (const char* mapping : {"texCoord", "extensions"}) base->erase(mapping);
 }
 
@@ -106,14 +110,21 @@ void replaceSpecularGlossiness(Json& gltf) {
   }
 }
 
-void simplifyMaterials(Json& gltf, std::vector<Diagnostic>& problems) {
+void dropMissingTextures(Json& gltf, std::vector<Diagnostic>& problems) {
   chooseImages(gltf);
   const auto materials = gltf.find("materials");
   if (materials == gltf.end() || !materials->is_array()) return;
   for (std::size_t m = 0; m < materials->size(); ++m)
     if ((*materials)[m].is_object())
-      simplifyMaterial((*materials)[m], "materials[" + std::to_string(m) + "]",
-                       getArray(gltf, "textures"), problems);
+      dropMissingTexturesOf((*materials)[m], "materials[" + std::to_string(m) + "]",
+                            getArray(gltf, "textures"), problems);
+}
+
+void simplifyMaterials(Json& gltf) {
+  const auto materials = gltf.find("materials");
+  if (materials == gltf.end() || !materials->is_array()) return;
+  for (Json& material : *materials)
+    if (material.is_object()) simplifyMaterial(material);
 }
 
 }  // namespace enfilade::scene

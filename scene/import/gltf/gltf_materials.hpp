@@ -18,8 +18,12 @@ bool hasPlainTextures(const nlohmann::json& gltf);
 void replaceSpecularGlossiness(nlohmann::json& gltf);
 
 /// Gives each texture without a PNG or JPEG image that of EXT_texture_webp, KHR_texture_basisu or
-/// EXT_texture_avif, removes all references to textures without an image, and reports those that
-/// would be drawn. Removes texture mappings, which were applied to the coordinates of primitives.
-void simplifyMaterials(nlohmann::json& gltf, std::vector<Diagnostic>& problems);
+/// EXT_texture_avif, and removes and reports references to textures without an image that would be
+/// drawn. To be called before meshes are rewritten.
+void dropMissingTextures(nlohmann::json& gltf, std::vector<Diagnostic>& problems);
+
+/// Removes what is not drawn, and texture mappings, which were applied to the coordinates of
+/// primitives.
+void simplifyMaterials(nlohmann::json& gltf);
 
 }  // namespace enfilade::scene

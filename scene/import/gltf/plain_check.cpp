@@ -18,7 +18,7 @@ using Json = nlohmann::json;
 
 /// Texts in the JSON of a file that may need rewriting. Exporters sometimes forget to list an
 /// extension in extensionsUsed, so the whole text is searched.
-constexpr std::array<std::string_view, 13> kRewrittenTexts{
+constexpr std::array<std::string_view, 17> kRewrittenTexts{
     "\"skin\"",  // assimp ignores one that does not exist if the file has no skins
     "\"skins\"",
     "\"targets\"",
@@ -31,7 +31,11 @@ constexpr std::array<std::string_view, 13> kRewrittenTexts{
     "\"KHR_texture_transform\"",
     "\"sparse\"",
     "\"EXT_texture_avif\"",
-    "\"KHR_materials_pbrSpecularGlossiness\""};
+    "\"KHR_materials_pbrSpecularGlossiness\"",
+    "\"KHR_lights_punctual\"",  // assimp refuses a file with a broken light
+    "\"DATA:",
+    "\"Data:",
+    ";BASE64,"};
 
 // ---- accessors ----------------------------------------------------------------------------------
 
@@ -99,13 +103,21 @@ bool hasPlainMaterial(const Json& primitive, const Json& sections) {
   return material == nullptr || findEntry(getArray(sections, "materials"), material) != nullptr;
 }
 
+/// Whether a primitive has the coordinates of its texture; its set 0, as usesFirstTexCoords().
+bool hasTexCoords(const Json& primitive, const Json& attributes, const Json& sections) {
+  const std::size_t material = readIndexMember(&primitive, "material").value_or(kNoIndex);
+  return !readTextureMapping(sections, material).isTextured || attributes.contains("TEXCOORD_0");
+}
+
 /// Whether assimp reads a primitive right, without a word of what it left out.
 bool isPlainPrimitive(const Json& primitive, const Json& sections) {
   const std::size_t mode = readWhole(&primitive, "mode", 4).value_or(kNoIndex);
   if (mode > 4) return false;  // strips, fans and modes that glTF does not know
   const Json* attributes = findMember(&primitive, "attributes");
   if (attributes == nullptr || !attributes->is_object()) return false;
-  if (!hasPlainMaterial(primitive, sections) || !hasPlainIndices(primitive, sections)) return false;
+  if (!hasPlainMaterial(primitive, sections) || !hasPlainIndices(primitive, sections) ||
+      !hasTexCoords(primitive, *attributes, sections))
+    return false;
   const Json& accessors = getArray(sections, "accessors");
   const Json* positions = findEntry(accessors, findMember(attributes, "POSITION"));
   if (positions == nullptr) return false;
@@ -141,7 +153,7 @@ bool isPlainBuffer(const Json& buffer, std::size_t index, const std::filesystem:
     return format == ModelFormat::glb && index == 0 && readGlbBinarySize(file) >= *length;
   if (!uri->is_string()) return false;
   const auto& text = uri->get_ref<const std::string&>();
-  if (text.starts_with("data:")) return isPlainDataUri(text, *length);
+  if (isDataUri(text)) return isPlainDataUri(text, *length);
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file.parent_path() / text, error);
   return !error && size >= *length;

@@ -7,6 +7,7 @@
 
 #include "scene/import/assembly/path_names.hpp"
 #include "scene/import/file/import_options.hpp"
+#include "scene/import/gltf/encoding/data_uri.hpp"
 #include "scene/import/gltf/encoding/duplicate_keys.hpp"
 #include "scene/import/gltf/encoding/gltf_binary.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
@@ -39,6 +40,7 @@ Json parseMeshSections(const std::string& text, const std::filesystem::path& fil
   const auto wanted = [&](int depth, Json::parse_event_t event, Json& value) {
     deepest = std::max(deepest, depth);
     duplicates.see(depth, event, value);
+    if (event == Json::parse_event_t::value) extensions.seeValue(value);
     if (event != Json::parse_event_t::key) return true;
     extensions.seeKey(depth, value.get_ref<const std::string&>());
     if (depth != 1) return true;
@@ -205,6 +207,9 @@ void rewriteImages(Json& gltf, GltfBuffers& buffers, GltfBinary& binary) {
   if (images == gltf.end() || !images->is_array()) return;
   for (Json& image : *images) {
     const auto view = readIndexMember(&image, "bufferView");
+    const Json* uri = findMember(&image, "uri");
+    if (uri != nullptr && uri->is_string() && isDataUri(uri->get_ref<const std::string&>()))
+      image["uri"] = lowerDataUri(uri->get<std::string>());
     if (!view) continue;
     std::string_view bytes;
     try {
@@ -242,22 +247,41 @@ void removeReadExtensions(Json& gltf) {
   *used = std::move(kept);
 }
 
+/// A file need not have scenes: all nodes that are no child then form one.
+void addMissingScene(Json& gltf, const std::filesystem::path& file) {
+  if (!getArray(gltf, "scenes").empty()) return;
+  const Json& nodes = getArray(gltf, "nodes");
+  std::vector<bool> isChild(nodes.size());
+  for (const Json& node : nodes)
+    for (const Json& child : getArray(node, "children"))
+      if (findEntry(nodes, &child) != nullptr) isChild[child.get<std::size_t>()] = true;
+  Json roots = Json::array();
+  for (std::size_t i = 0; i < nodes.size(); ++i)
+    if (!isChild[i]) roots.push_back(i);
+  if (roots.empty())
+    throw ImportError(file.string() + ": has neither a scene nor a root node; export it with one");
+  gltf["scenes"] = Json::array({{{"nodes", std::move(roots)}}});
+}
+
 void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGltf& to) {
   const Json original = Json::parse(to.json);
   GltfBuffers buffers(file, format, original);
   GltfBinary binary;
   Json gltf = original;
   gltf["scene"] = to.scene;
+  addMissingScene(gltf, file);
   try {
     dropMissingReferences(gltf, to.problems);
+    dropAllLights(gltf);
     replaceSpecularGlossiness(gltf);
     // Instances are copies of the posed mesh, so all instances of a node share one.
     const auto poses = separatePosedMeshes(gltf, buffers, to.problems);
     expandInstances(gltf, buffers, to.problems);
+    dropMissingTextures(gltf, to.problems);
     rewriteMeshes(gltf, poses, buffers, binary, to.problems);
     rewriteImages(gltf, buffers, binary);
     removeAnimation(gltf);
-    simplifyMaterials(gltf, to.problems);
+    simplifyMaterials(gltf);
     removeReadExtensions(gltf);
     binary.install(gltf);
   } catch (const Json::exception& error) {
@@ -300,7 +324,14 @@ bool chooseScene(const Json& sections, const std::string& choice, const std::fil
     const Json* name = findMember(&scene, "name");
     to.scenes.push_back(name != nullptr && name->is_string() ? name->get<std::string>() : "");
   }
-  if (to.scenes.empty()) throw ImportError(file.string() + ": has no scene; export it with one");
+  if (to.scenes.empty()) {
+    if (!choice.empty() && choice != "0")
+      throw ImportError(file.string() + ": no scene '" + choice +
+                        "'; it has no scenes, and all its nodes are read");
+    to.scenes.emplace_back();
+    to.problems.push_back({"no_scene", 1, "all root nodes were read"});
+    return true;
+  }
   const std::size_t standard = readIndexMember(&sections, "scene").value_or(0);
   if (choice.empty() && standard >= to.scenes.size())
     throw ImportError(file.string() + ": its default scene " + std::to_string(standard) +

@@ -89,7 +89,11 @@ PlainPrimitives::Widths PlainPrimitives::listAttributes(const Json& attributes,
   Widths widths{{"POSITION", 3}};
   if (attributes.contains("NORMAL")) widths["NORMAL"] = 3;
   const std::string uvs = "TEXCOORD_" + std::to_string(mapping.set);
-  if (attributes.contains(uvs)) widths[uvs] = 2;
+  if (attributes.contains(uvs)) {
+    widths[uvs] = 2;
+  } else if (mapping.isTextured) {
+    addDiagnostic(problems_, "missing_texture", name + " has no " + uvs);
+  }
   if (const std::size_t channels = findColourWidth(attributes, name); channels > 0)
     widths[kColours] = channels;
   return widths;

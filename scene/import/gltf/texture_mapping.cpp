@@ -49,6 +49,7 @@ TextureMapping readTextureMapping(const Json& gltf, std::size_t material) {
     return mapping;
   const Json* texture = findBaseColourTexture((*materials)[material]);
   const Json* transform = findMember(findMember(texture, "extensions"), kTextureTransform);
+  mapping.isTextured = texture != nullptr;
   mapping.set = readIndexMember(texture, "texCoord").value_or(0);
   if (transform == nullptr) return mapping;
   mapping.set = readIndexMember(transform, "texCoord").value_or(mapping.set);

@@ -10,6 +10,7 @@ namespace enfilade::scene {
 
 /// The set of coordinates that a base colour texture takes, and its KHR_texture_transform.
 struct TextureMapping {
+  bool isTextured = false;  ///< whether the material has such a texture
   std::size_t set = 0;
   double offset[2] = {0, 0}, scale[2] = {1, 1}, rotation = 0;  // NOLINT: plain data
 

@@ -48,7 +48,18 @@ std::string decodeBase64(std::string_view text, std::string& fault) {
   return bytes;
 }
 
+constexpr std::string_view kScheme = "data:";
+
 }  // namespace
+
+bool isDataUri(std::string_view uri) {
+  return toLowerCase(std::string(uri.substr(0, kScheme.size()))) == kScheme;
+}
+
+std::string lowerDataUri(const std::string& uri) {
+  const std::size_t comma = std::min(uri.find(','), uri.size());
+  return toLowerCase(uri.substr(0, comma)) + uri.substr(comma);
+}
 
 std::string decodeDataUri(std::string_view uri, std::string& fault) {
   const std::size_t comma = uri.find(',');
@@ -60,7 +71,9 @@ std::string decodeDataUri(std::string_view uri, std::string& fault) {
 
 bool isPlainDataUri(std::string_view uri, std::size_t size) {
   const std::size_t comma = uri.find(',');
-  if (comma == std::string_view::npos || !uri.substr(0, comma).ends_with(";base64")) return false;
+  if (!uri.starts_with(kScheme) || comma == std::string_view::npos ||
+      !uri.substr(0, comma).ends_with(";base64"))
+    return false;
   const std::string_view digits = removePadding(uri.substr(comma + 1));
   return digits.size() / 4 * 3 + digits.size() % 4 * 3 / 4 >= size &&
          std::all_of(digits.begin(), digits.end(), [](char letter) {

@@ -60,7 +60,22 @@ void dropMissingNodes(Json& owner, const char* key, const std::string& name, con
   if (kept.size() < getArray(owner, key).size()) owner[key] = std::move(kept);
 }
 
+constexpr const char* kLights = "KHR_lights_punctual";
+
+void dropLights(Json& owner) {
+  const auto extensions = owner.find("extensions");
+  if (extensions != owner.end() && extensions->is_object()) extensions->erase(kLights);
+}
+
 }  // namespace
+
+void dropAllLights(Json& gltf) {
+  dropLights(gltf);
+  const auto nodes = gltf.find("nodes");
+  if (nodes == gltf.end() || !nodes->is_array()) return;
+  for (Json& node : *nodes)
+    if (node.is_object()) dropLights(node);
+}
 
 void dropMissingReferences(Json& gltf, std::vector<Diagnostic>& problems) {
   const Json& nodes = getArray(gltf, "nodes");

@@ -13,4 +13,7 @@ namespace enfilade::scene {
 /// reports each with its node or scene.
 void dropMissingReferences(nlohmann::json& gltf, std::vector<Diagnostic>& problems);
 
+/// Removes the lights of KHR_lights_punctual, broken or not: no light of a file is drawn.
+void dropAllLights(nlohmann::json& gltf);
+
 }  // namespace enfilade::scene
