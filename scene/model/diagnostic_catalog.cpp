@@ -85,6 +85,9 @@ constexpr std::array kCatalog{
     DiagnosticKind{"object_without_area", note, "it has no surface to collide with"},
     DiagnosticKind{"points_and_lines_dropped", note,
                    "points and lines are neither drawn nor solid"},
+    DiagnosticKind{"coplanar_surfaces", note,
+                   "surfaces of two objects in one plane: pictures show either, they flicker; move "
+                   "one by a millimetre"},
     DiagnosticKind{"repeated_object", warning,
                    "the same shape twice in the same place; delete one, they flicker"},
     // appearance
@@ -116,12 +119,12 @@ constexpr std::array kCatalog{
                    "read by the second reader, which may leave openings closed"},
     DiagnosticKind{"uncut_opening", error,
                    "a door or window whose wall is closed behind it: it is impassable"},
+    DiagnosticKind{"broken_map", warning,
+                   "the file's place on a map cannot be used: it keeps its own coordinates"},
     DiagnosticKind{"map_place", note, "where the file's own coordinates lie on a map"},
     DiagnosticKind{"storeys_by_elevation", note,
                    "the file places its storeys at one height: their stated elevations are used"},
     DiagnosticKind{"skipped_openings", note, "openings are air"},
-    DiagnosticKind{"broken_map", warning,
-                   "the file's place on a map cannot be used: it keeps its own coordinates"},
     DiagnosticKind{"skipped_spaces", note, "spaces are air"},
     // bodies
     DiagnosticKind{"body_without_area", note, "a body of objects without surface: ignored"},

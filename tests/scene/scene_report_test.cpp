@@ -69,6 +69,34 @@ TEST(SceneReport, ReportsDiagnosticsWithTheirFirstExample) {
   EXPECT_EQ(findExample(report, "inside_out_solid"), "turned");
 }
 
+/// The coplanar pairs of two boxes, the second of another colour if `coloured`.
+std::size_t countCoplanar(const testing::NamedBox& a, const testing::NamedBox& b, bool coloured) {
+  Model model = testing::boxModel({a, b});
+  model.materials.emplace_back();
+  model.materials[1].baseColour = {1, 0, 0, 1};
+  if (coloured) model.meshes[1].material = 1;
+  // Turned, so that coordinates are rounded.
+  for (Object& object : model.objects)
+    object.worldFromMesh = Eigen::AngleAxisd(0.3, Vec3(1, 2, 3).normalized());
+  const SceneReport report = makeSceneReport(Scene(std::move(model)));
+  if (countDiagnostics(report, "coplanar_surfaces") > 0) {
+    EXPECT_EQ(findExample(report, "coplanar_surfaces"), a.path + " and " + b.path);
+  }
+  return countDiagnostics(report, "coplanar_surfaces");
+}
+
+TEST(SceneReport, SurfacesOfTwoObjectsInOnePlaneAreCountedIfTheyFlicker) {
+  const testing::NamedBox slab{"slab", {0, 0, 0}, {4, 0.3, 4}};
+  const testing::NamedBox rafter{"rafter", {1, 0, 0.5}, {1.2, 0.2, 3.5}};
+  EXPECT_EQ(countCoplanar(slab, rafter, true), 1u);
+  EXPECT_EQ(countCoplanar(slab, rafter, false), 0u) << "of one colour";
+  EXPECT_EQ(countCoplanar(slab, {"deeper", {1, 0.001, 0.5}, {1.2, 0.2, 3.5}}, true), 0u);
+  EXPECT_EQ(countCoplanar(slab, {"below", {1, -1, 0.5}, {2, 0, 3.5}}, true), 0u)
+      << "faces of opposite sides";
+  EXPECT_EQ(countCoplanar(slab, {"beside", {4, 0, 0}, {8, 0.3, 4}}, true), 0u);
+  EXPECT_EQ(findDiagnosticKind({"coplanar_surfaces", 1, ""}).severity, Severity::note);
+}
+
 TEST(SceneReport, SpacesThatAreAirAreNotedAndNothingIsWrongWithThem) {
   EXPECT_EQ(findDiagnosticKind({"skipped_spaces", 3, "hall"}).severity, Severity::note);
   EXPECT_EQ(findDiagnosticKind({"skipped_openings", 1, "door's"}).severity, Severity::note);

@@ -5,6 +5,7 @@
 
 #include "collision/assert.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/coplanar_surfaces.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -72,6 +73,13 @@ void countRepeatedObjects(const Scene& scene, std::vector<Diagnostic>& diagnosti
   }
 }
 
+void countCoplanarSurfaces(const Model& model, std::vector<Diagnostic>& diagnostics) {
+  const CoplanarSurfaces found = findCoplanarSurfaces(model);
+  addDiagnostic(diagnostics, "coplanar_surfaces",
+                found.example + (found.isComplete ? "" : "; not all surfaces were compared"),
+                found.pairs);
+}
+
 }  // namespace
 
 Aabb computeAuthoredAabb(const Scene& scene, std::uint32_t object) {
@@ -117,6 +125,7 @@ SceneReport makeSceneReport(const Scene& scene) {
     report.solidObjects += counts ? 1 : 0;
   }
   countRepeatedObjects(scene, report.diagnostics);
+  countCoplanarSurfaces(model, report.diagnostics);
   return report;
 }
 

@@ -1,0 +1,208 @@
+// Triangles are sorted by their planes, rounded to a grid. Of each plane, those whose boxes within
+// the plane overlap are compared exactly. Planes that are equal but for rounding may fall into two
+// cells of the grid, so that single triangles are missed; surfaces have many.
+#include "scene/model/coplanar_surfaces.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <set>
+#include <utility>
+#include <vector>
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kMinArea = 0.01;        // square metres, of a triangle
+constexpr double kMinOverlap = 1e-3;     // square metres, of two triangles
+constexpr double kMaxGap = 1e-4;         // metres; depth in pictures is coarser from afar
+constexpr double kMinCosine = 1 - 1e-6;  // of the normals
+constexpr double kNormalStep = 1e-3;     // of the grid of planes, of a unit vector's components
+constexpr double kDistanceStep = 1e-3;   // of the grid of planes, metres
+constexpr double kMaxComparedDistance = 1e7;         // metres; farther surfaces are not compared
+constexpr std::size_t kMaxComparisons = 20'000'000;  // of boxes; some tenths of a second
+
+using Triangle = std::array<Vec3, 3>;
+using Point = Eigen::Vector2d;
+
+struct Facet {
+  std::array<std::int64_t, 4> plane{};            ///< normal and distance on the grid
+  Eigen::Vector2f min, max;                       ///< of its box within the plane
+  std::uint32_t object = 0, mesh = 0, first = 0;  ///< `first`: of its three indices
+};
+
+Vec3 computeAreaNormal(const Triangle& t) {
+  return (t[1] - t[0]).cross(t[2] - t[0]) / 2;
+}
+
+/// The two axes along which a plane is drawn: without the largest component of its normal.
+std::array<int, 2> choosePlaneAxes(const std::array<std::int64_t, 4>& plane) {
+  int largest = 0;
+  for (int axis = 1; axis < 3; ++axis)
+    if (std::abs(plane[static_cast<std::size_t>(axis)]) >
+        std::abs(plane[static_cast<std::size_t>(largest)]))
+      largest = axis;
+  return {(largest + 1) % 3, (largest + 2) % 3};
+}
+
+bool isDrawnOpaque(const Material& material) {
+  return material.alpha == Material::Alpha::opaque;
+}
+
+bool lookEqual(const Material& a, const Material& b) {
+  return a.baseColour == b.baseColour && a.emissive == b.emissive && a.metallic == b.metallic &&
+         a.roughness == b.roughness && a.baseColourTexture == b.baseColourTexture;
+}
+
+/// Twice the signed area of a polygon.
+double computeDoubleArea(const std::vector<Point>& polygon) {
+  double area = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Point &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
+    area += a.x() * b.y() - a.y() * b.x();
+  }
+  return area;
+}
+
+/// The part of a convex polygon to the left of the line from a to b.
+std::vector<Point> clip(const std::vector<Point>& polygon, const Point& a, const Point& b) {
+  const auto side = [&](const Point& p) {
+    return (b - a).x() * (p - a).y() - (b - a).y() * (p - a).x();
+  };
+  std::vector<Point> kept;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Point &from = polygon[i], &to = polygon[(i + 1) % polygon.size()];
+    const double before = side(from), after = side(to);
+    if (before >= 0) kept.push_back(from);
+    if ((before < 0) != (after < 0)) kept.push_back(from + (to - from) * before / (before - after));
+  }
+  return kept;
+}
+
+double computeOverlap(const Triangle& a, const Triangle& b, const std::array<int, 2>& axes) {
+  const auto flatten = [&](const Triangle& t) {
+    std::vector<Point> flat;
+    for (const Vec3& p : t) flat.emplace_back(p[axes[0]], p[axes[1]]);
+    if (computeDoubleArea(flat) < 0) std::swap(flat[1], flat[2]);
+    return flat;
+  };
+  std::vector<Point> rest = flatten(a);
+  const std::vector<Point> other = flatten(b);
+  for (std::size_t i = 0; i < 3 && !rest.empty(); ++i)
+    rest = clip(rest, other[i], other[(i + 1) % 3]);
+  return computeDoubleArea(rest) / 2;
+}
+
+/// Whether the plane of `of` contains all corners of `t`.
+bool containsInPlane(const Triangle& of, const Triangle& t) {
+  const Vec3 normal = computeAreaNormal(of).normalized();
+  return std::ranges::all_of(
+      t, [&](const Vec3& p) { return std::abs(normal.dot(p - of[0])) <= kMaxGap; });
+}
+
+class CoplanarSearch {
+ public:
+  explicit CoplanarSearch(const Model& model) : model_(model) {}
+
+  CoplanarSurfaces run() {
+    for (std::uint32_t i = 0; i < model_.objects.size(); ++i) collectFacets(i);
+    std::ranges::sort(facets_, [](const Facet& a, const Facet& b) {
+      return std::pair(a.plane, std::pair(a.min.x(), a.object)) <
+             std::pair(b.plane, std::pair(b.min.x(), b.object));
+    });
+    for (std::size_t i = 0; i < facets_.size() && found_.isComplete; ++i) compareWithNext(i);
+    found_.pairs = pairs_.size();
+    if (!pairs_.empty())
+      found_.example = model_.objects[pairs_.begin()->first].path + " and " +
+                       model_.objects[pairs_.begin()->second].path;
+    return std::move(found_);
+  }
+
+ private:
+  const Material& getMaterial(const Facet& facet) const {
+    return model_.materials[model_.meshes[facet.mesh].material];
+  }
+
+  Triangle getTriangle(const Facet& facet) const {
+    const Mesh& mesh = model_.meshes[facet.mesh];
+    const Eigen::Affine3d& transform = model_.objects[facet.object].worldFromMesh;
+    Triangle t;
+    for (std::size_t k = 0; k < 3; ++k)
+      t[k] = transform * mesh.positions[mesh.indices[facet.first + k]].cast<double>();
+    if (transform.linear().determinant() < 0) std::swap(t[1], t[2]);
+    return t;
+  }
+
+  void collectFacets(std::uint32_t index) {
+    const Object& object = model_.objects[index];
+    if (object.usage == Object::Usage::collisionOnly) return;
+    for (const std::uint32_t mesh : object.meshes) {
+      if (!isDrawnOpaque(model_.materials[model_.meshes[mesh].material])) continue;
+      const std::size_t indices = model_.meshes[mesh].indices.size();
+      for (std::uint32_t first = 0; first + 2 < indices; first += 3) {
+        Facet facet;
+        facet.object = index, facet.mesh = mesh, facet.first = first;
+        if (placeFacet(facet)) facets_.push_back(facet);
+      }
+    }
+  }
+
+  /// Returns false for a facet that is too small or too far away.
+  bool placeFacet(Facet& facet) const {
+    const Triangle t = getTriangle(facet);
+    const Vec3 areaNormal = computeAreaNormal(t);
+    const double area = areaNormal.norm();
+    if (!(area >= kMinArea) || !(t[0].cwiseAbs().maxCoeff() <= kMaxComparedDistance)) return false;
+    const Vec3 normal = areaNormal / area;
+    for (int axis = 0; axis < 3; ++axis)
+      facet.plane[static_cast<std::size_t>(axis)] = std::llround(normal[axis] / kNormalStep);
+    facet.plane[3] = std::llround(normal.dot(t[0]) / kDistanceStep);
+    const std::array<int, 2> axes = choosePlaneAxes(facet.plane);
+    for (int i = 0; i < 2; ++i) {
+      const int axis = axes[static_cast<std::size_t>(i)];
+      const auto [low, high] = std::minmax({t[0][axis], t[1][axis], t[2][axis]});
+      facet.min[i] = static_cast<float>(low), facet.max[i] = static_cast<float>(high);
+    }
+    return true;
+  }
+
+  void compareWithNext(std::size_t at) {
+    const Facet& a = facets_[at];
+    for (std::size_t next = at + 1; next < facets_.size(); ++next) {
+      const Facet& b = facets_[next];
+      if (b.plane != a.plane || b.min.x() >= a.max.x()) return;
+      if (++comparisons_ > kMaxComparisons) {
+        found_.isComplete = false;
+        return;
+      }
+      if (b.object == a.object || b.min.y() >= a.max.y() || a.min.y() >= b.max.y()) continue;
+      if (lookEqual(getMaterial(a), getMaterial(b))) continue;
+      const std::pair pair = std::minmax(a.object, b.object);
+      if (!pairs_.contains(pair) && coincide(a, b)) pairs_.insert(pair);
+    }
+  }
+
+  bool coincide(const Facet& a, const Facet& b) const {
+    const Triangle first = getTriangle(a), second = getTriangle(b);
+    const double cosine =
+        computeAreaNormal(first).normalized().dot(computeAreaNormal(second).normalized());
+    if (cosine < kMinCosine) return false;
+    if (!containsInPlane(first, second) && !containsInPlane(second, first)) return false;
+    return computeOverlap(first, second, choosePlaneAxes(a.plane)) >= kMinOverlap;
+  }
+
+  const Model& model_;
+  std::vector<Facet> facets_;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+  std::size_t comparisons_ = 0;
+  CoplanarSurfaces found_;
+};
+
+}  // namespace
+
+CoplanarSurfaces findCoplanarSurfaces(const Model& model) {
+  return CoplanarSearch(model).run();
+}
+
+}  // namespace enfilade::scene
