@@ -93,7 +93,7 @@ TEST(SceneReport, SurfacesOfTwoObjectsInOnePlaneAreCountedIfTheyFlicker) {
   EXPECT_EQ(countCoplanar(slab, {"deeper", {1, 0.001, 0.5}, {1.2, 0.2, 3.5}}, true), 0u);
   EXPECT_EQ(countCoplanar(slab, {"below", {1, -1, 0.5}, {2, 0, 3.5}}, true), 0u)
       << "faces of opposite sides";
-  EXPECT_EQ(countCoplanar(slab, {"beside", {4, 0, 0}, {8, 0.3, 4}}, true), 0u);
+  EXPECT_EQ(countCoplanar(slab, {"next", {4, 0, 0}, {8, 0.3, 4}}, true), 0u);
   EXPECT_EQ(findDiagnosticKind({"coplanar_surfaces", 1, ""}).severity, Severity::note);
 }
 

@@ -54,8 +54,8 @@ bool removeTexture(Json& owner, const char* member, const Json& textures) {
   return true;
 }
 
-void dropMissingTexturesOf(Json& material, const std::string& name, const Json& textures,
-                           std::vector<Diagnostic>& problems) {
+void dropTexturesWithoutImage(Json& material, const std::string& name, const Json& textures,
+                              std::vector<Diagnostic>& problems) {
   const auto remove = [&](Json& owner, const char* member) {
     const std::string extensions = listTextureExtensions(findMember(&owner, member), textures);
     if (!removeTexture(owner, member, textures)) return false;
@@ -116,8 +116,8 @@ void dropMissingTextures(Json& gltf, std::vector<Diagnostic>& problems) {
   if (materials == gltf.end() || !materials->is_array()) return;
   for (std::size_t m = 0; m < materials->size(); ++m)
     if ((*materials)[m].is_object())
-      dropMissingTexturesOf((*materials)[m], "materials[" + std::to_string(m) + "]",
-                            getArray(gltf, "textures"), problems);
+      dropTexturesWithoutImage((*materials)[m], "materials[" + std::to_string(m) + "]",
+                               getArray(gltf, "textures"), problems);
 }
 
 void simplifyMaterials(Json& gltf) {

@@ -66,7 +66,7 @@ struct MapNumbers {
   std::optional<double> unit;  ///< metres per unit of the map; nullopt: not stated
   double east = 0, north = 0, height = 0, xAxisEast = 1, xAxisNorth = 0, scale = 1;
   Eigen::Vector3d axisScale = Eigen::Vector3d::Ones();
-  std::string fault;  ///< of the first number that cannot be read; "" if there is none
+  std::string fault;  ///< of the first number that cannot be read, or ""
 };
 
 using MapArguments = std::vector<std::string_view>;
