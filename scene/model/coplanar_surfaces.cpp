@@ -20,8 +20,8 @@ constexpr double kMaxGap = 1e-4;         // metres; depth in pictures is coarser
 constexpr double kMinCosine = 1 - 1e-6;  // of the normals
 constexpr double kNormalStep = 1e-3;     // of the grid of planes, of a unit vector's components
 constexpr double kDistanceStep = 1e-3;   // of the grid of planes, metres
-constexpr double kMaxComparedDistance = 1e7;         // metres; farther surfaces are not compared
-constexpr std::size_t kMaxComparisons = 20'000'000;  // of boxes; some tenths of a second
+constexpr double kMaxComparedDistance = 1e7;        // metres; farther surfaces are not compared
+constexpr std::size_t kMaxComparisons = 5'000'000;  // of boxes; a few seconds
 
 using Triangle = std::array<Vec3, 3>;
 using Point = Eigen::Vector2d;
@@ -114,8 +114,8 @@ class CoplanarSearch {
     for (std::size_t i = 0; i < facets_.size() && found_.isComplete; ++i) compareWithNext(i);
     found_.pairs = pairs_.size();
     if (!pairs_.empty())
-      found_.example = model_.objects[pairs_.begin()->first].path + " and " +
-                       model_.objects[pairs_.begin()->second].path;
+      found_.example =
+          model_.objects[largest_.first].path + " and " + model_.objects[largest_.second].path;
     return std::move(found_);
   }
 
@@ -178,23 +178,30 @@ class CoplanarSearch {
       }
       if (b.object == a.object || b.min.y() >= a.max.y() || a.min.y() >= b.max.y()) continue;
       if (lookEqual(getMaterial(a), getMaterial(b))) continue;
-      const std::pair pair = std::minmax(a.object, b.object);
-      if (!pairs_.contains(pair) && coincide(a, b)) pairs_.insert(pair);
+      const std::pair<std::uint32_t, std::uint32_t> pair = std::minmax(a.object, b.object);
+      const double overlap = computeCoplanarOverlap(a, b);
+      if (overlap < kMinOverlap) continue;
+      pairs_.insert(pair);
+      if (overlap > largestOverlap_) largest_ = pair;
+      largestOverlap_ = std::max(overlap, largestOverlap_);
     }
   }
 
-  bool coincide(const Facet& a, const Facet& b) const {
+  /// Square metres; 0 for facets of different planes.
+  double computeCoplanarOverlap(const Facet& a, const Facet& b) const {
     const Triangle first = getTriangle(a), second = getTriangle(b);
     const double cosine =
         computeAreaNormal(first).normalized().dot(computeAreaNormal(second).normalized());
-    if (cosine < kMinCosine) return false;
-    if (!containsInPlane(first, second) && !containsInPlane(second, first)) return false;
-    return computeOverlap(first, second, choosePlaneAxes(a.plane)) >= kMinOverlap;
+    if (cosine < kMinCosine) return 0;
+    if (!containsInPlane(first, second) && !containsInPlane(second, first)) return 0;
+    return computeOverlap(first, second, choosePlaneAxes(a.plane));
   }
 
   const Model& model_;
   std::vector<Facet> facets_;
   std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_;
+  std::pair<std::uint32_t, std::uint32_t> largest_;
+  double largestOverlap_ = 0;  ///< projected, square metres
   std::size_t comparisons_ = 0;
   CoplanarSurfaces found_;
 };

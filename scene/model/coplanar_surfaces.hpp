@@ -11,7 +11,7 @@ namespace enfilade::scene {
 
 struct CoplanarSurfaces {
   std::size_t pairs = 0;   ///< of objects; at least so many if `isComplete` is false
-  std::string example;     ///< the paths of the first pair
+  std::string example;     ///< the paths of the pair whose triangles overlap most
   bool isComplete = true;  ///< false: the scene has too many surfaces in one plane
 };
 
