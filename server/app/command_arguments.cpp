@@ -12,6 +12,7 @@
 #include "server/base/host_port.hpp"
 #include "server/base/parse_number.hpp"
 #include "server/inspection/inspection.hpp"
+#include "server/runs/reported_run.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -132,6 +133,11 @@ void addWalk(CLI::App& verb, CommandArguments& into) {
   verb.add_flag("--strict", into.strict,
                 "Exit with 3 if an order was refused or a walk was "
                 "blocked");
+  into.samples = std::to_string(kCaptureSamples);
+  verb.add_option("--samples", into.samples,
+                  "Samples of the colour in each pixel of captures, which smooth its edges")
+      ->capture_default_str()
+      ->check(makeChoiceValidator({"1", "4", "16"}));
 }
 
 std::string validateTick(const std::string& text) {

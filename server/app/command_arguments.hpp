@@ -26,7 +26,7 @@ struct CommandArguments {
   ModelArguments model;
   std::string script, out, plan, planFormat = "png", listen = "127.0.0.1:7878", connect;
   double planScale = 100, maxMegabytes = 50;
-  std::string from, then, run, world, token;
+  std::string from, then, run, world, token, samples;
   RecordingChoice record;
   std::string recordChannels = "walk", recordFrames;
   bool strict = false, verify = false, json = false, objects = false, stopAtEndOfInput = false;

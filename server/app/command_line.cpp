@@ -96,6 +96,10 @@ void applyPlayback(const CommandArguments& read, ServeCommand& command) {
   }
 }
 
+std::uint32_t parseSamples(const CommandArguments& read) {
+  return parseNumber<std::uint32_t>(read.samples).value_or(kCaptureSamples);
+}
+
 std::uint32_t parseAudit(const CommandArguments& read) {
   return parseNumber<std::uint32_t>(read.auditEvery).value_or(0);
 }
@@ -127,8 +131,8 @@ std::variant<ProgramCommand, ExitCode> makeServeCommand(const CLI::App& serve,
 /// Rejects options that a re-simulation in another model does not support. Empty: valid.
 std::string validateResimulate(const CLI::App& replay) {
   for (const char* option :
-       {"--strict", "--audit", "--step-height", "--epsilon", "--slope", "--speed-limit",
-        "--sliding", "--near-miss", "--record-channels", "--record-frames"})
+       {"--strict", "--audit", "--samples", "--step-height", "--epsilon", "--slope",
+        "--speed-limit", "--sliding", "--near-miss", "--record-channels", "--record-frames"})
     if (replay.count(option) > 0)
       return std::string(option) + " cannot be given: a re-simulation uses the recorded values";
   return "";
@@ -175,6 +179,7 @@ std::variant<ProgramCommand, ExitCode> makeReplayCommand(const CLI::App& replay,
                         makeWorldSettings(read),
                         makeRecordingChoice(read),
                         makeDrawingOptions(read)};
+  command.samples = parseSamples(read);
   if (!read.then.empty()) applyBranch(read, command);
   return command;
 }
@@ -253,8 +258,9 @@ const Verb kVerbs[] = {
      }},
     {"walk", "Run a walk script on a server", addWalkOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
-       return WalkCommand{read.script, read.out,   *parseHostPort(read.connect),
-                          read.world,  read.token, read.strict};
+       return WalkCommand{read.script,       read.out,   *parseHostPort(read.connect),
+                          read.world,        read.token, read.strict,
+                          parseSamples(read)};
      }},
     {"doctor", "Test all graphics devices and report missing components", addDoctorOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand { return read.doctor; }},

@@ -38,10 +38,11 @@ struct ScriptTarget {
   const scene::Scene* localScene = nullptr;  ///< for walls in maps; null: in another process
 };
 
-protocol::CaptureFormat makeCaptureFormat() {
+protocol::CaptureFormat makeCaptureFormat(std::uint32_t samples) {
   protocol::CaptureFormat format;
   format.width = kWidth;
   format.height = kHeight;
+  format.samples = samples;
   return format;
 }
 
@@ -233,7 +234,7 @@ ExitCode replay(const ReplayCommand& command) {
               playback ? std::optional(makeBranchPoint(command, world)) : std::nullopt;
           world.record({command.record, model}, branch ? &*branch : nullptr);
         }
-        InProcessDriver driver(world, renderer.get(), makeCaptureFormat());
+        InProcessDriver driver(world, renderer.get(), makeCaptureFormat(command.samples));
         ScriptTarget target{driver,
                             [&](const v1::FrameRequest& request) { return driver.frame(request); },
                             [&] { return driver.metrics(); },
@@ -258,7 +259,7 @@ ExitCode walk(const WalkCommand& command) {
         options.world = command.world;
         options.token = command.token;
         protocol::Client client(command.connect.host, command.connect.port, options);
-        protocol::SocketDriver driver(client, makeCaptureFormat());
+        protocol::SocketDriver driver(client, makeCaptureFormat(command.samples));
         ScriptTarget target{driver,
                             [&](const v1::FrameRequest& request) { return client.frame(request); },
                             [&] { return client.metrics(); },

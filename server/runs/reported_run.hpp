@@ -17,6 +17,9 @@
 
 namespace enfilade::server {
 
+/// Of the colour in each pixel of a script's captures, which are few and for people.
+constexpr std::uint32_t kCaptureSamples = 4;
+
 struct ReplayCommand {
   ModelOptions model;
   std::filesystem::path script, out;
@@ -30,6 +33,7 @@ struct ReplayCommand {
   std::filesystem::path recording = {};
   std::uint64_t from = 0;
   std::uint32_t run = 1;  ///< number of the run in the recording
+  std::uint32_t samples = kCaptureSamples;
 };
 
 struct WalkCommand {
@@ -38,6 +42,7 @@ struct WalkCommand {
   std::string world;  ///< empty: the main world
   std::string token;  ///< empty: none
   bool strict = false;
+  std::uint32_t samples = kCaptureSamples;
 };
 
 ExitCode replay(const ReplayCommand& command);

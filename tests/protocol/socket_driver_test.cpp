@@ -175,6 +175,7 @@ TEST(SocketDriver, ACaptureIsRequestedInItsFormat) {
   format.height = 200;
   format.channels = {v1::CHANNEL_IDS, v1::CHANNEL_RGB};
   format.rgbEncoding = v1::ENCODING_PNG;
+  format.samples = 4;
   const v1::FrameRequest request = makeCaptureRequest(notice, format);
   EXPECT_EQ(request.eyes().avatar(), "ann");
   EXPECT_EQ(request.tick(), 17u);
@@ -183,6 +184,7 @@ TEST(SocketDriver, ACaptureIsRequestedInItsFormat) {
   EXPECT_EQ(request.channels_size(), 2);
   EXPECT_EQ(request.channels(0), v1::CHANNEL_IDS);
   EXPECT_EQ(request.rgb_encoding(), v1::ENCODING_PNG);
+  EXPECT_EQ(request.samples(), 4u);
 }
 
 }  // namespace

@@ -75,6 +75,7 @@ v1::FrameRequest makeCaptureRequest(const v1::Notice& notice, const CaptureForma
   request.set_height(format.height);
   request.mutable_channels()->Assign(format.channels.begin(), format.channels.end());
   request.set_rgb_encoding(format.rgbEncoding);
+  request.set_samples(format.samples);
   request.set_tick(notice.tick());
   return request;
 }

@@ -15,6 +15,7 @@ struct CaptureFormat {
   std::uint32_t width = 640, height = 480;  ///< pixels
   std::vector<v1::Channel> channels{v1::CHANNEL_RGB};
   v1::Encoding rgbEncoding = v1::ENCODING_RAW;
+  std::uint32_t samples = 1;  ///< of the colour in each pixel
 };
 
 class SocketDriver : public ScriptDriver {
