@@ -370,14 +370,17 @@ void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
       ->needs(strict);
   inspect.add_option("--html", into.html, "Also write the report with floor plans as an HTML page")
       ->check(CLI::Validator(validateFile, "FILE"));
-  inspect.add_option("--plan", into.plan, "Folder for one floor plan per storey")
-      ->check(CLI::Validator(validateFolder, "DIR"));
+  CLI::Option* plan =
+      inspect.add_option("--plan", into.plan, "Folder for one floor plan per storey")
+          ->check(CLI::Validator(validateFolder, "DIR"));
   inspect.add_option("--plan-format", into.planFormat, "Format of the plans")
       ->check(makeChoiceValidator({"png", "svg", "pdf"}))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(plan);
   inspect.add_option("--plan-scale", into.planScale, "Scale of svg and pdf plans: 1:N")
       ->check(makeRangeValidator(1.0, 100000.0, "N"))
-      ->capture_default_str();
+      ->capture_default_str()
+      ->needs(plan);
   inspect.footer(
       "Of the options, --json and --strict apply to a recording.\n"
       "Notes never fail --strict; the kinds of problems are listed by every report.\n"

@@ -314,6 +314,14 @@ std::variant<ProgramCommand, ExitCode> readCommandLine(int argc, const char* con
     constexpr std::array<const char*, 2> kHelp{"enfilade", "--help"};
     return readCommandLine(2, kHelp.data());
   }
+  if (argc == 3 && requestedVerb == "help") {
+    if (std::ranges::find(kVerbs, std::string_view(argv[2]), &Verb::name) == std::end(kVerbs)) {
+      std::cerr << "enfilade: " << describeMissingVerb(argv[2]) << "\n";
+      return ExitCode::usageError;
+    }
+    const std::array<const char*, 3> help{"enfilade", argv[2], "--help"};
+    return readCommandLine(3, help.data());
+  }
   for (const Verb& verb : kVerbs) {
     CLI::App* added = app.add_subcommand(verb.name, verb.description);
     // Only this command's options are built: all of them take half a millisecond.

@@ -175,6 +175,8 @@ TEST_F(Inspect, WrongUsageExitsWithTwoAndUnreadableFilesWithOne) {
       {"inspect", path("room.obj"), "--plan", ""},
       {"inspect", path("room.obj"), "--plan-format", "dxf"},
       {"inspect", path("room.obj"), "--plan-scale", "0"},
+      {"inspect", path("room.obj"), "--plan-format", "svg"},
+      {"inspect", path("room.obj"), "--plan-scale", "50"},
       {"inspect", path("room.obj"), "--strict", "--accept", "no_unti"},
       {"inspect", path("room.obj"), "--accept", "no_unit"},
       {"inspect", path("room.obj"), "--html", ""},

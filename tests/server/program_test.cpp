@@ -61,6 +61,7 @@ TEST_F(Program, UsageMistakesEndWithTwoAndSayHow) {
     EXPECT_EQ(std::count(ended.err.begin(), ended.err.end(), '\n'), 2) << ended.err;
   }
   EXPECT_EQ(run({"--help"}).code, 0);
+  EXPECT_EQ(run({"help", "serve"}).out, run({"serve", "--help"}).out);
 }
 
 TEST_F(Program, UsageMistakesNameTheOptionAndWhatToGive) {
