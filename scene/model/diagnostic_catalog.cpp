@@ -86,7 +86,7 @@ constexpr std::array kCatalog{
     DiagnosticKind{"points_and_lines_dropped", note,
                    "points and lines are neither drawn nor solid"},
     DiagnosticKind{"coplanar_surfaces", note,
-                   "surfaces of two objects in one plane: pictures show either, they flicker; move "
+                   "surfaces of two objects in one plane: where both are seen, they flicker; move "
                    "one by a millimetre"},
     DiagnosticKind{"repeated_object", warning,
                    "the same shape twice in the same place; delete one, they flicker"},
