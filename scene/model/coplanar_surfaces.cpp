@@ -1,6 +1,6 @@
 // Triangles are sorted by their planes, rounded to a grid. Of each plane, those whose boxes within
 // the plane overlap are compared exactly. Planes that are equal but for rounding may fall into two
-// cells of the grid, so that single triangles are missed; surfaces have many.
+// cells of the grid: such surfaces are missed.
 #include "scene/model/coplanar_surfaces.hpp"
 
 #include <algorithm>
@@ -172,11 +172,12 @@ class CoplanarSearch {
     for (std::size_t next = at + 1; next < facets_.size(); ++next) {
       const Facet& b = facets_[next];
       if (b.plane != a.plane || b.min.x() >= a.max.x()) return;
+      if (b.object == a.object) continue;
       if (++comparisons_ > kMaxComparisons) {
         found_.isComplete = false;
         return;
       }
-      if (b.object == a.object || b.min.y() >= a.max.y() || a.min.y() >= b.max.y()) continue;
+      if (b.min.y() >= a.max.y() || a.min.y() >= b.max.y()) continue;
       if (lookEqual(getMaterial(a), getMaterial(b))) continue;
       const std::pair<std::uint32_t, std::uint32_t> pair = std::minmax(a.object, b.object);
       const double overlap = computeCoplanarOverlap(a, b);

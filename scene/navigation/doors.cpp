@@ -153,13 +153,16 @@ double DoorSwing::measureDistance(const Vec3& feet, double jointPosition) {
 
 /// Conservative advancement: the door opens by as much as it can without coming to the agent.
 bool DoorSwing::touches(const Vec3& feet) {
-  constexpr double kRoom = 0.01;  // metres
-  for (double share = 0;;) {
+  constexpr double kRoom = 0.01;     // metres
+  constexpr int kMaxSteps = 10'000;  // a step opens the door by 5 mm or more
+  double share = 0;
+  for (int step = 0; step < kMaxSteps; ++step) {
     const double distance = measureDistance(feet, from_ + share * (to_ - from_));
     if (distance <= kRoom) return true;
     if (share >= 1 || !(distance_ > 0)) return false;
     share = std::min(1.0, share + (distance - 0.5 * kRoom) / distance_);
   }
+  return true;
 }
 
 bool isLastOnLine(const std::vector<DoorOnPath>& doors, std::size_t index) {

@@ -44,6 +44,10 @@ class DoorSwing {
   DoorSwing(EntityIndex& index, const WorldSettings& settings, const Snapshot& snapshot,
             const NavigationAgent& agent, std::uint32_t body);
 
+  DoorSwing(DoorSwing&&) = default;
+  DoorSwing(const DoorSwing&) = delete;  // it would share the door
+  DoorSwing& operator=(const DoorSwing&) = delete;
+
   /// Whether the door comes within 1 cm of an agent at `feet`.
   bool touches(const Vec3& feet);
   const BodySpec& spec() const { return spec_; }

@@ -123,24 +123,31 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
 
 void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
                  const std::function<bool(const Vec3&, const Vec3&)>& isJoined,
-                 const std::function<std::optional<std::uint32_t>(std::uint32_t)>& findExit) {
+                 const FindExit& findExit) {
   std::vector<std::uint32_t> joinedTo(list.islands.size());  // a smaller number, or itself
   std::iota(joinedTo.begin(), joinedTo.end(), 0u);
+  std::vector<double> areas;  // of islands with those that are joined to them
+  for (const Island& island : list.islands) areas.push_back(island.area);
   const auto findFirst = [&](std::uint32_t number) {
     while (joinedTo[number] != number) number = joinedTo[number];
     return number;
   };
-  for (std::uint32_t number = 1; number < joinedTo.size(); ++number) {
+  const auto join = [&](std::uint32_t a, std::uint32_t b) {
+    if (a == b) return;
+    joinedTo[std::max(a, b)] = std::min(a, b);
+    areas[std::min(a, b)] += areas[std::max(a, b)];
+  };
+  for (std::uint32_t number = 1; number < joinedTo.size(); ++number)
     for (const IslandNeighbour& near : findNeighbours(mesh, list, number, reach, heightReach)) {
       const std::uint32_t a = findFirst(number), b = findFirst(near.number);
-      if (a == b || !isJoined(near.from, near.to)) continue;
-      joinedTo[std::max(a, b)] = std::min(a, b);
+      if (a != b && isJoined(near.from, near.to)) join(a, b);
     }
-    if (joinedTo[number] != number || list.islands[number].area > kMaxSmallArea) continue;
-    if (const auto other = findExit(number)) {
-      const std::uint32_t a = findFirst(number), b = findFirst(*other);
-      joinedTo[std::max(a, b)] = std::min(a, b);
-    }
+  for (std::uint32_t number = 1; number < joinedTo.size(); ++number) {
+    const std::uint32_t own = findFirst(number);
+    if (areas[own] > kMaxSmallArea) continue;
+    if (const auto other =
+            findExit(number, [&](std::uint32_t candidate) { return findFirst(candidate) != own; }))
+      join(own, findFirst(*other));
   }
   std::vector<std::uint32_t> order;  // of the islands that remain, the largest first
   for (std::uint32_t number = 0; number < joinedTo.size(); ++number) {
@@ -215,18 +222,19 @@ std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const Isla
       nearby.push_back({(point - place).norm(), point, list.numberOf[polygon]});
   }
   std::ranges::stable_sort(nearby, {}, &Near::distance);
-  const auto standing =
-      nearby.empty() || computeGroundDistance(nearby.front().point, place) <= kOnMesh
-          ? std::nullopt
-          : standAt(walker, place);
-  for (const Near& near : nearby) {
-    if (standing) {
-      walker.returnTo(*standing);
-      if (walker.walkTo(near.point).kind != WalkOutcome::Kind::arrived ||
-          std::abs(walker.footPosition().y() - near.point.y()) > kHeightError)
-        continue;
-    }
+  const auto getNumber = [](const Near& near) {
     return near.number == kNoIsland ? std::nullopt : std::optional(near.number);
+  };
+  if (nearby.empty()) return std::nullopt;
+  if (computeGroundDistance(nearby.front().point, place) <= kOnMesh)
+    return getNumber(nearby.front());
+  const auto standing = standAt(walker, place);
+  if (!standing) return std::nullopt;
+  for (const Near& near : nearby) {
+    walker.returnTo(*standing);
+    if (walker.walkTo(near.point).kind == WalkOutcome::Kind::arrived &&
+        std::abs(walker.footPosition().y() - near.point.y()) <= kHeightError)
+      return getNumber(near);
   }
   return std::nullopt;
 }

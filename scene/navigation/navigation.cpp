@@ -151,7 +151,7 @@ void Navigation::joinIslands() {
   scene::joinIslands(
       *ample_, islands_, kWallAndDoor + 2 * agent_.radius, world_.settings().stepHeight,
       [&](const Vec3& from, const Vec3& to) { return isGapPassable(from, to, scarce); },
-      [&](std::uint32_t number) { return findExit(number); });
+      [&](std::uint32_t number, const auto& isOther) { return findExit(number, isOther); });
 }
 
 /// `scarce`: islands of the mesh with portals that may be too narrow.
@@ -178,20 +178,23 @@ bool Navigation::isGapPassable(const Vec3& from, const Vec3& to,
 
 /// Searches on a grid from a small island, where this comes to an end soon, for a way to another
 /// one and back.
-std::optional<std::uint32_t> Navigation::findExit(std::uint32_t number) {
-  constexpr double kOnMesh = 0.05;  // metres
+std::optional<std::uint32_t> Navigation::findExit(
+    std::uint32_t number, const std::function<bool(std::uint32_t)>& isOther) {
   const Vec3& place = islands_.islands[number].place;
-  const auto numberAt = [&](const Vec3& feet) {
-    const auto nearest = ample_->findNearest(feet, {kOnMesh, kHeightError, kOnMesh});
-    return nearest ? islands_.numberOf[nearest->polygon] : kNoIsland;
+  const auto findOther = [&](const Vec3& feet) -> std::optional<std::uint32_t> {
+    const auto polygon = findPolygonAt(*ample_, feet);
+    const std::uint32_t other = polygon ? islands_.numberOf[*polygon] : kNoIsland;
+    return other != kNoIsland && isOther(other) ? std::optional(other) : std::nullopt;
   };
+  const auto known = std::ranges::find(gaps_, place, &Gap::from);
+  if (known != gaps_.end() && !known->isPassable) return std::nullopt;
+  if (const auto other = known != gaps_.end() ? findOther(known->to) : std::nullopt) return other;
   GridSearch out{0.12, kMaxGapDetour, 300}, back = out;
   const auto way = findGridPathOut(
-      *walker_, place,
-      [&](const Vec3& feet) { return numberAt(feet) != number && numberAt(feet) != kNoIsland; },
-      out);
-  if (!way || !findGridPath(*walker_, way->back(), place, back)) return std::nullopt;
-  return numberAt(way->back());
+      *walker_, place, [&](const Vec3& feet) { return findOther(feet).has_value(); }, out);
+  const bool isPassable = way && findGridPath(*walker_, way->back(), place, back);
+  gaps_.push_back({place, isPassable ? way->back() : place, isPassable});
+  return isPassable ? findOther(way->back()) : std::nullopt;
 }
 
 std::size_t Navigation::update(const Snapshot& snapshot, int threads) {

@@ -129,7 +129,8 @@ class Navigation {
   void assembleMeshes();
   void joinIslands();
   bool isGapPassable(const Vec3& from, const Vec3& to, const std::vector<std::uint32_t>& scarce);
-  std::optional<std::uint32_t> findExit(std::uint32_t island);
+  std::optional<std::uint32_t> findExit(std::uint32_t island,
+                                        const std::function<bool(std::uint32_t)>& isOther);
   NavigationMesh buildUnobstructed(int threads) const;
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;

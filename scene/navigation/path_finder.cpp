@@ -29,10 +29,9 @@ constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is s
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
 constexpr const char* kNotFound = "no way was found within the limits of the search";
-constexpr double kOnMesh = 0.05;      // metres from a polygon of the mesh
 constexpr double kMaxConnection = 3;  // metres between places that are connected without a mesh
-constexpr GridSearch kCoarseConnection{kCoarseSpacing, 1.5, 5000};
-constexpr GridSearch kFineConnection{kFineSpacing, 0.7, 20'000};
+constexpr GridSearch kCoarseConnection{kCoarseSpacing, 1.5, 2000};
+constexpr GridSearch kFineConnection{kFineSpacing, 0.7, 4000};
 constexpr double kSameFloor = 1;  // metres between the heights of a mesh and its floor
 
 double computeLength(const std::vector<Vec3>& points) {
@@ -329,18 +328,14 @@ NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, con
   return best;
 }
 
-/// Whether a mesh has a polygon at the height of a place, and about there.
-bool isOnMesh(const NavigationMesh& mesh, const Vec3& place) {
-  const auto nearest = mesh.findNearest(place, {kOnMesh, kHeightError, kOnMesh});
-  return nearest && std::abs(nearest->point.y() - place.y()) <= kHeightError;
-}
-
 /// Places without a mesh, as narrow ones on furniture, are connected with it by walks on a grid,
 /// and with one another if they are near.
 NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
                                  Proof& proof) {
   Walker& walker = finder.walker;
-  const auto isOn = [&](const Vec3& place) { return isOnMesh(finder.ample, place); };
+  const auto isOn = [&](const Vec3& place) {
+    return findPolygonAt(finder.ample, place).has_value();
+  };
   NavigationPath path;
   if (isOn(start) && isOn(goal)) return path;
   const auto search = [](const auto& find) {
@@ -392,13 +387,17 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
     return none;
   }
   const Vec3 goal = finder.walker.footPosition();
+  Refusals* refusals = finder.refusals;
+  if (refusals && refusals->count >= kMaxRefusals && findPolygonAt(finder.ample, start) &&
+      findPolygonAt(finder.ample, goal))
+    return refusals->last;
   Proof proof(finder.maxRepairWalks);
   NavigationPath best = findPathByMeshes(finder, start, goal, proof);
   if (best.found() || !finder.unobstructed) return best;
-  Refusals* refusals = finder.refusals;
-  if (refusals && refusals->count >= kMaxRefusals) return refusals->last;
   best = findPathOffMeshes(finder, start, goal, proof);
-  if (!best.found()) best = findUnobstructedPath(finder, start, goal, proof);
+  if (best.found()) return best;
+  if (refusals && refusals->count >= kMaxRefusals) return refusals->last;
+  best = findUnobstructedPath(finder, start, goal, proof);
   if (refusals && !best.found()) *refusals = {refusals->count + 1, best};
   return best;
 }

@@ -56,7 +56,7 @@ struct PathFinder {
   NavigationMesh& scarce;
   /// The mesh of Clearance::none; built at the first call. Null: reasons are not sought.
   std::function<const NavigationMesh&()> unobstructed;
-  std::size_t maxRepairWalks = 100'000;  ///< of a path: some tenths of a second
+  std::size_t maxRepairWalks = 15'000;  ///< of a path: some tenths of a second
   /// Of the islands of both ends; null: these are one, or not known.
   Refusals* refusals = nullptr;
 };

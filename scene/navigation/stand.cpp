@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cmath>
+#include <cstdint>
 
 #include "collision/motion/sine_cosine.hpp"
 
@@ -29,6 +30,13 @@ std::optional<Vec3> standNear(Walker& walker, const Vec3& point) {
     }
   }
   return std::nullopt;
+}
+
+std::optional<std::uint32_t> findPolygonAt(const NavigationMesh& mesh, const Vec3& place) {
+  constexpr double kReach = 0.05;  // metres
+  const auto nearest = mesh.findNearest(place, {kReach, kHeightError, kReach});
+  if (!nearest || std::abs(nearest->point.y() - place.y()) > kHeightError) return std::nullopt;
+  return nearest->polygon;
 }
 
 }  // namespace enfilade::scene

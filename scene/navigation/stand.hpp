@@ -1,8 +1,10 @@
 // Places where an agent stands.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
+#include "scene/navigation/mesh/navigation_mesh.hpp"
 #include "scene/navigation/walker.hpp"
 
 namespace enfilade::scene {
@@ -19,5 +21,8 @@ std::optional<Vec3> standAt(Walker& walker, const Vec3& point, double maxDrop = 
 /// A place within 0.4 m of a point of a mesh, at about its height: polygons for scarce clearance
 /// are too close to walls.
 std::optional<Vec3> standNear(Walker& walker, const Vec3& point);
+
+/// The polygon of a mesh at the height of a place and at most 5 cm away; nullopt: none is.
+std::optional<std::uint32_t> findPolygonAt(const NavigationMesh& mesh, const Vec3& place);
 
 }  // namespace enfilade::scene

@@ -37,13 +37,27 @@ std::string dumpJson(const nlohmann::json& value) {
   return value.dump(-1, ' ', false, nlohmann::json::error_handler_t::replace);
 }
 
-/// Makes the cache key. The report depends on the scene hash, on shared meshes, on groups of
-/// objects, and on the problems found by the import.
+/// All that decides how a surface looks.
+std::string formatMaterial(const scene::Material& material) {
+  const auto& m = material;
+  return dumpJson({{m.baseColour.x(), m.baseColour.y(), m.baseColour.z(), m.baseColour.w()},
+                   {m.emissive.x(), m.emissive.y(), m.emissive.z()},
+                   m.metallic,
+                   m.roughness,
+                   static_cast<int>(m.alpha),
+                   m.baseColourTexture});
+}
+
+/// Makes the cache key. The report depends on the scene hash, on shared meshes and their materials,
+/// on groups of objects, and on the problems found by the import.
 std::string makeCacheKey(const scene::Scene& scene) {
   const scene::Model& model = scene.model();
-  std::string key = "report 2 scene " + std::to_string(scene.hash()) + " meshes";
+  std::string key = "report 3 scene " + std::to_string(scene.hash()) + " meshes";
   for (const scene::Mesh& mesh : model.meshes)
-    key += " " + std::to_string(mesh.positions.size()) + "/" + std::to_string(mesh.indices.size());
+    key += " " + std::to_string(mesh.positions.size()) + "/" + std::to_string(mesh.indices.size()) +
+           "/" + std::to_string(mesh.material);
+  key += " materials";
+  for (const scene::Material& material : model.materials) key += " " + formatMaterial(material);
   key += " pieces";
   for (std::size_t i = 0; i < model.objects.size(); ++i)
     if (model.objects[i].partOf) key += " " + std::to_string(i);

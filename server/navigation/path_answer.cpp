@@ -86,24 +86,39 @@ struct PathWriter {
     std::vector<scene::DoorSwing> swings, more = findSwings(doors, start);
     for (int tries = 0; !more.empty(); ++tries) {
       std::ranges::move(more, std::back_inserter(swings));
-      const std::string reason = "the door '" + swings.back().spec().name +
-                                 "' opens over the start, and there is no room to step aside";
-      scene::NavigationPath aside = answer.asTheyAre().findWayOut(start, [&](const Vec3& feet) {
-        return std::ranges::none_of(swings, [&](auto& swing) { return swing.touches(feet); });
-      });
+      scene::NavigationPath aside;
+      if (tries < kMaxTries)
+        aside = answer.asTheyAre().findWayOut(start, [&](const Vec3& feet) {
+          return std::ranges::none_of(swings, [&](auto& swing) { return swing.touches(feet); });
+        });
       if (!aside.reason.empty()) return;  // an agent can be there only when the doors are open
-      path = aside.found() && tries < kMaxTries
-                 ? answer.navigation.findPath(aside.points.back(), to, options)
-                 : scene::NavigationPath();
-      if (!path.found()) {
-        path.reason = reason;
+      scene::NavigationPath onwards =
+          aside.found() ? answer.navigation.findPath(aside.points.back(), to, options)
+                        : scene::NavigationPath();
+      if (!onwards.found()) {
+        path = explainSwing(swings.back(), start, aside.found() ? onwards.reason : "");
         return;
       }
-      const Vec3 end = aside.points.back();
-      path = join(std::move(aside), path);
-      doors = findDoors(answer.navigation, path.points);
-      more = findSwings(doors, end);
+      doors = findDoors(answer.navigation, onwards.points);
+      more = findSwings(doors, aside.points.back());
+      for (scene::DoorOnPath& door : doors) {
+        door.point += aside.points.size() - 1;
+        door.distance += aside.length;
+      }
+      path = join(std::move(aside), onwards);
     }
+  }
+
+  /// A path that is not found because a door sweeps over its start. `reason`: why no path leads on
+  /// from a place aside; "": there is none.
+  scene::NavigationPath explainSwing(const scene::DoorSwing& swing, const Vec3& start,
+                                     const std::string& reason) const {
+    scene::NavigationPath path;
+    path.obstruction = scene::Obstruction{swing.spec().objects.front() + 1, start, 0};
+    path.reason =
+        "the door '" + swing.spec().name + "' opens over the start, and " +
+        (reason.empty() ? "there is no room to step aside" : "from a place aside " + reason);
+    return path;
   }
 
   /// The parts of a walk before, at and after its doors.

@@ -4,6 +4,7 @@
 """
 
 import datetime
+import re
 import sys
 from pathlib import Path
 
@@ -24,5 +25,8 @@ Made by `./dev bench crowd` on {date}: {machine}.
 
 
 output, report = map(Path, sys.argv[1:3])
+hashes = set(re.findall(r"state hash (\w+)", output.read_text()))
+if len(hashes) != 1:
+    sys.exit(f"{output}: the runs ended at different states: {sorted(hashes)}")
 report.write_text(HEAD.format(date=datetime.date.today().isoformat(), machine=machine(),
                               output=output.read_text().rstrip()))

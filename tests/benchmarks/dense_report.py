@@ -32,7 +32,7 @@ def main():
 
 Made by `./dev bench dense{" --quick" if "--quick" in sys.argv else ""}` on \
 {datetime.date.today().isoformat()}: {machine()}.
-Ten avatars walk at 1.5 m/s for {rows[0]["ticks"]} ticks in real scenes, and in those that the benchmark generates:
+Ten avatars walk at 1.5 m/s for {rows[0]["ticks"]} ticks in real scenes, if any are listed, and in those that the benchmark generates:
 
 {scenes}
 

@@ -320,6 +320,7 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   Comparison result;
   std::vector<Disagreement> disagreements;
   std::vector<double> ratios;
+  int unwalkable = 0;
   for (int i = 0; i < 2 * effort.compared && !places.empty() && fill.size() > 0; ++i) {
     const bool isOfFill = i % 2 == 1;
     // Places of the fill are kept in single precision: a little above the floor.
@@ -332,7 +333,9 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
     if (isOfFill || static_cast<int>(ratios.size()) >= effort.lengths) continue;
     const v1::NavigationPath path =
         bench.findPath(from, to, v1::NavigationQuery::DOORS_AS_THEY_ARE);
-    const auto shortest = path.found() ? measureShortest(bench, fill, from, to) : std::nullopt;
+    if (!path.found()) continue;
+    const auto shortest = measureShortest(bench, fill, from, to);
+    if (!shortest) ++unwalkable;
     if (!shortest || *shortest < 1) continue;
     ratios.push_back(path.length() / *shortest);
     if (ratios.back() > 1.02)
@@ -347,6 +350,7 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   row["reach_wrong"] = result.wrong;
   row["islands_wrong"] = result.islandsWrong;
   row["lengths"] = ratios.size();
+  row["lengths_unwalkable"] = unwalkable;
   row["length_median"] = number(quantile(ratios, 0.5));
   row["length_max"] = number(quantile(ratios, 1));
   row["length_above"] = std::ranges::count_if(ratios, [](double ratio) { return ratio > 1.02; });

@@ -21,7 +21,7 @@ def make_walk_row(row):
 
 def make_fill_row(row):
     return [row["scene"], f"{row['fill_places']:,}", row["reach_compared"], row["reach_wrong"],
-            row["reach_near_width"], row["reach_skipped"], row["islands_wrong"], row["lengths"], short(row["length_median"]),
+            row["reach_near_width"], row["reach_skipped"], row["islands_wrong"], f"{row['lengths']} ({row['lengths_unwalkable']})", short(row["length_median"]),
             f"{row['length_max']:.4f}" if row["length_max"] else "–", row["length_above"]]
 
 
@@ -57,7 +57,7 @@ mesh. A pair of places, drawn on all islands or anywhere in the fill, is *wrong*
 does not connect it, or the other way round. *Near*: half a centimetre of radius decides. *Skipped*: an end is
 at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
-shortest way in the fill, pulled straight, where an avatar can walk that.
+shortest way in the fill, pulled straight, where an avatar can walk that; in brackets those where it cannot.
 
 {table(["scene", "places of the fill", "compared", "wrong", "near", "skipped", "islands", "lengths", "median share",
         "largest", "above 1.02"], [make_fill_row(row) for row in rows])}

@@ -93,7 +93,11 @@ Order makeOrder(std::size_t kind, Random& random) {
   const Vec3 there{random.uniform(-9, 9), 0, random.uniform(-9, 9)};
   switch (random.below(9)) {
     case 0:
-      return Walk{{there, Vec3(-there)}, random.uniform(0.5, 3), {"hinged"}, {{1, "lift", 1}}};
+      return Walk{{there, Vec3(-there)},
+                  random.uniform(0.5, 3),
+                  {"hinged"},
+                  {{1, "lift", 1}},
+                  random.below(2)};
     case 1:
       return Jump{random.uniform(0.1, 0.6), {}};
     case 2:

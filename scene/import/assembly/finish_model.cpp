@@ -241,7 +241,8 @@ std::string explainMissingTriangles(const std::vector<Diagnostic>& diagnostics) 
   std::string text;
   int named = 0;
   for (const Diagnostic& problem : diagnostics) {
-    if (findDiagnosticKind(problem).severity == Severity::note || named++ == kMaxNamed) continue;
+    if (findDiagnosticKind(problem).severity == Severity::note) continue;
+    if (named++ == kMaxNamed) break;
     text += (text.empty() ? ": " : ", ") + std::to_string(problem.count) + " " + problem.kind +
             (problem.example.empty() ? "" : " (" + problem.example + ")");
   }

@@ -23,7 +23,7 @@ std::string shortenUri(const std::string& uri) {
   // No character of UTF-8 is cut: its other bytes are 0x80 to 0xBF.
   const auto isCut = [&](std::size_t at) { return (uri[at] & 0xC0) == 0x80; };
   std::size_t start = kStart, end = uri.size() - kEnd;
-  while (isCut(start)) --start;
+  while (start > 0 && isCut(start)) --start;
   while (end < uri.size() && isCut(end)) ++end;
   return uri.substr(0, start) + "..[" + std::to_string(end - start) + " bytes].." + uri.substr(end);
 }

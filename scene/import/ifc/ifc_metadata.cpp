@@ -278,9 +278,9 @@ class IfcMetadataReader {
     if (const auto placement = parseStepReference(arguments[5])) {
       product.fileFromPlacement = readIfcPlacement(file_, *placement, metadata_.metresPerUnit);
       if (!product.fileFromPlacement && isEndlessPlacement(file_, *placement))
-        addDiagnostic(
-            metadata_.diagnostics, "broken_transform_dropped",
-            product.globalId + " (" + product.ifcClass + "): its placement is relative to itself");
+        addDiagnostic(metadata_.diagnostics, "broken_transform_dropped",
+                      product.globalId + " (" + product.ifcClass +
+                          "): its placement is relative to itself, or nested more than 200 deep");
     }
     if (!metadata_.byId.emplace(product.id, metadata_.products.size()).second) return;
     metadata_.products.push_back(std::move(product));

@@ -91,7 +91,7 @@ class Scene::Prefetcher {
 
 namespace {
 
-constexpr std::size_t kManyTriangles = 64;
+constexpr std::size_t kManyTriangles = 64;  // the trees of fewer take some microseconds
 
 std::uint64_t hashMesh(const Mesh& mesh) {
   Hasher hash;
