@@ -1,0 +1,126 @@
+// Walks on a grid: out of the swing of a door, around corners, and onto narrow places without mesh.
+#include "scene/navigation/grid_search.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "scene/navigation/doors.hpp"
+#include "scene/navigation/ghost.hpp"
+#include "scene/navigation/navigation.hpp"
+#include "tests/scene/body_fixture.hpp"
+
+namespace enfilade::scene::testing {
+namespace {
+
+double measureLength(const std::vector<Vec3>& points) {
+  double length = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
+  return length;
+}
+
+/// A wall of 4 m at x = 2, between z = -2 and z = 2, on a floor.
+Model wallModel() {
+  return boxModel({{"floor", {-3, -0.2, -5}, {7, 0, 5}}, {"wall", {1.9, 0, -2}, {2.1, 2.5, 2}}});
+}
+
+TEST(GridSearch, AWayAroundAWallIsPulledTight) {
+  const World world(std::make_shared<const Scene>(wallModel()));
+  Walker walker(world.data(), {});
+  const Vec3 from(0, 0, 0), to(4, 0, 0);
+  GridSearch search{0.12, 3, 100'000};
+  const auto way = findGridPath(walker, from, to, search);
+  ASSERT_TRUE(way);
+  EXPECT_LT(search.maxWalks, 100'000u);
+  std::vector<Vec3> places = shortenPath(walker, *way, Shortcuts::all);
+  const double before = measureLength(places);
+  pullTight(walker, places);
+  EXPECT_LT(measureLength(places), before);
+  // Around corners at 0.3 m from the ends of the wall.
+  const double shortest = 2 * std::hypot(1.9, 2.3) + 0.2;
+  EXPECT_GE(measureLength(places), shortest - 0.4);
+  EXPECT_LT(measureLength(places), 1.03 * shortest);
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    walker.returnTo(places[i - 1]);
+    EXPECT_EQ(walker.walkTo(places[i]).kind, WalkOutcome::Kind::arrived) << i;
+  }
+}
+
+TEST(GridSearch, TheClosestWantedPlaceIsFound) {
+  const World world(std::make_shared<const Scene>(wallModel()));
+  Walker walker(world.data(), {});
+  GridSearch search{0.1, 2, 10'000};
+  const auto way = findGridPathOut(
+      walker, {0, 0, 0}, [](const Vec3& at) { return at.x() < -0.95 || at.z() > 1.45; }, search);
+  ASSERT_TRUE(way);
+  EXPECT_NEAR(way->back().x(), -1, 1e-6);
+  EXPECT_NEAR(measureLength(*way), 1, 1e-6);
+  search.maxWalks = 10'000;
+  EXPECT_FALSE(findGridPathOut(
+      walker, {0, 0, 0}, [](const Vec3& at) { return at.x() > 2; }, search))
+      << "the wall is in between, and its ends are farther than the margin";
+}
+
+TEST(DoorSwing, TouchesWhatTheDoorMeetsAtAnyAngle) {
+  constexpr double kQuarter = 1.5707963267948966;
+  Model model = boxModel(
+      {{"floor", {0, -0.2, -3}, {12, 0, 3}}, {"leaf", {5.98, 0.01, -0.49}, {6.02, 2, 0.49}}});
+  BodySpec door = bodySpec("door", BodyKind::hinged, {1});
+  door.anchor = {6, 0, -0.49};
+  door.high = kQuarter;
+  model.bodies.push_back(door);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  const World world(scene);
+  EntityIndex index(scene);
+  const NavigationAgent agent;
+  const Snapshot closed = *world.snapshot();
+  DoorSwing swing(index, {}, closed, agent, 0);
+  const auto prism = makePrismShape(agent.radius, agent.height, agent.height, {});
+  int touched = 0, clear = 0;
+  for (double x = 4.5; x <= 7.5; x += 0.15) {
+    for (double z = -1.8; z <= 1.5; z += 0.15) {
+      double closest = 1e9;
+      for (int i = 0; i <= 90; ++i) {
+        Snapshot at = closed;
+        auto bodies = std::make_shared<std::vector<BodySnapshot>>(*closed.bodies);
+        const BodySpec& spec = scene->model().bodies[0];
+        (*bodies)[0].jointPosition = kQuarter * i / 90;
+        (*bodies)[0].pose =
+            computeBodyPose(spec, computeJointPose(spec, (*bodies)[0].jointPosition));
+        at.bodies = bodies;
+        const auto separation =
+            computeSeparationFromShape(index, at, prism, {x, 0, z}, (*bodies)[0].id);
+        ASSERT_TRUE(separation);
+        closest = std::min(closest, separation->distance);
+      }
+      const bool isTouched = swing.touches({x, 0, z});
+      if (closest < 0.005) EXPECT_TRUE(isTouched) << x << " " << z;
+      if (closest > 0.03) EXPECT_FALSE(isTouched) << x << " " << z;
+      ++(isTouched ? touched : clear);
+    }
+  }
+  EXPECT_GT(touched, 30);
+  EXPECT_GT(clear, 100);
+}
+
+/// A floor, and a beam of 6 cm beside it that a step reaches: too narrow for a mesh.
+TEST(Navigation, PlacesWithoutAMeshAreConnectedWithIt) {
+  const auto scene =
+      std::make_shared<const Scene>(boxModel({{"floor", {0, -0.2, 0}, {8, 0, 6}},
+                                              {"step", {3.0, 0, 2.0}, {3.06, 0.25, 2.6}},
+                                              {"beam", {3.06, 0, 2.0}, {3.12, 0.5, 2.6}}}));
+  Navigation navigation(scene, WorldSettings(), NavigationAgent());
+  const auto top = navigation.snap({3.09, 0.5, 2.3}, 0.05);
+  ASSERT_TRUE(top);
+  ASSERT_NEAR(top->y(), 0.5, 0.01);
+  const Vec3 floor(6, 0, 4);
+  for (int i = 0; i < 5; ++i) {  // the fifth query finds what the first does
+    const NavigationPath down = navigation.findPath(*top, floor);
+    EXPECT_TRUE(down.found()) << down.reason;
+    const NavigationPath up = navigation.findPath(floor, *top);
+    EXPECT_TRUE(up.found()) << up.reason;
+  }
+}
+
+}  // namespace
+}  // namespace enfilade::scene::testing
