@@ -1,6 +1,7 @@
 #include "scene/import/file_metadata.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -61,6 +62,7 @@ void rejectGlb(const std::filesystem::path& file) {
 // ---- COLLADA ------------------------------------------------------------------------------------
 
 constexpr std::size_t kMaxColladaBytes = std::size_t{2} << 30;  // of the document in an archive
+constexpr std::array<std::string_view, 1> kColladaExtension{".dae"};
 
 bool isZippedCollada(const std::filesystem::path& file) {
   return toLowerCase(file.extension().string()) == ".zae";
@@ -68,7 +70,7 @@ bool isZippedCollada(const std::filesystem::path& file) {
 
 std::string readColladaText(const std::filesystem::path& file, std::size_t limit) {
   if (!isZippedCollada(file)) return readModelFile(file, limit);
-  return readOnlyZipMember(file, ".dae", kMaxColladaBytes).substr(0, limit);
+  return readOnlyZipMember(file, kColladaExtension, kMaxColladaBytes).substr(0, limit);
 }
 
 FileMetadata readColladaMetadata(const std::filesystem::path& file) {

@@ -12,7 +12,6 @@
 #include "scene/import/file/model_format.hpp"
 #include "scene/import/worker/model_stream.hpp"
 #include "scene/import/worker/process.hpp"
-#include "scene/model/ascii.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -46,9 +45,6 @@ void validateReadable(const fs::path& file) {
   if (!fs::is_regular_file(status))
     throw ImportError(name + ": is not a regular file; copy it to one");
   const std::string extension = file.extension().string();
-  if (toLowerCase(extension) == ".ifcxml") {
-    throw ImportError(name + ": IFC in XML is not read; export it as .ifc, the STEP form");
-  }
   if (!detectModelFormat(file)) {
     throw ImportError(name + ": unknown extension '" + extension +
                       "'; supported: " + listExtensions());

@@ -53,7 +53,7 @@ void limitThisProcess(const ImportRequest& request, pid_t parent) {
   setrlimit(RLIMIT_CORE, &none);
   // Only the soft limit: Node.js may be started from here. It reserves tens of gigabytes of address
   // space, so its written data is limited instead. Sanitizers reserve as much.
-  const bool node = request.task == ImportTask::webIfc;
+  const bool node = request.task == ImportTask::webIfc || request.task == ImportTask::ifcXml;
   rlimit memory{};
   getrlimit(RLIMIT_AS, &memory);
   const bool limited = request.options.memoryLimit > 0 && !kSanitized;
@@ -74,6 +74,8 @@ std::string_view faultPrefix(ImportTask task) {
       return "web-ifc:";
     case ImportTask::ifcPlusPlus:
       return "ifcplusplus:";
+    case ImportTask::ifcXml:
+      return "ifcxml:";
   }
   return "";
 }
@@ -256,6 +258,7 @@ void runTask(const ImportRequest& request) {
     case ImportTask::assimp:
       return sendModel(importByAssimp(request));
     case ImportTask::webIfc:
+    case ImportTask::ifcXml:
       return execNode(request);
     case ImportTask::ifcPlusPlus:
       return sendMeshesWithIfcPlusPlus(readDescriptor(kIfcFile));

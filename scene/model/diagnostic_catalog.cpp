@@ -124,6 +124,12 @@ constexpr std::array kCatalog{
     DiagnosticKind{"map_place", note, "where the file's own coordinates lie on a map"},
     DiagnosticKind{"storeys_by_elevation", note,
                    "the file places its storeys at one height: their stated elevations are used"},
+    DiagnosticKind{"xml_not_read", warning,
+                   "elements or attributes of ifcXML that its schema does not have are not read"},
+    DiagnosticKind{"xml_reference_missing", error,
+                   "references to ids that the ifcXML file lacks are left out; export it again"},
+    DiagnosticKind{"xml_value_ignored", error,
+                   "values of ifcXML that are not of their type are left out; export it again"},
     DiagnosticKind{"skipped_openings", note, "openings are air"},
     DiagnosticKind{"skipped_spaces", note, "spaces are air"},
     // bodies

@@ -546,11 +546,5 @@ TEST(ZippedCollada, WithoutADocumentOrDamagedIsAnError) {
   EXPECT_NE(damaged.find("b.zae: cannot be unzipped"), std::string::npos) << damaged;
 }
 
-TEST(IfcInXml, IsRefusedWithTheRemedy) {
-  const TemporaryFolder folder;
-  const std::string text = catchFailure(folder.write("a.ifcXML", "<ifcXML/>"));
-  EXPECT_NE(text.find("export it as .ifc"), std::string::npos) << text;
-}
-
 }  // namespace
 }  // namespace enfilade::scene

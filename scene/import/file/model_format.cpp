@@ -8,13 +8,13 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::array<std::string_view, 10> kExtensions{".gltf", ".glb",    ".obj", ".dae", ".fbx",
-                                                       ".ifc",  ".ifczip", ".zae", ".ply", ".stl"};
+constexpr std::array<std::string_view, 11> kExtensions{
+    ".gltf", ".glb", ".obj", ".dae", ".fbx", ".ifc", ".ifczip", ".ifcxml", ".zae", ".ply", ".stl"};
 /// Formats of kExtensions.
 constexpr std::array<ModelFormat, kExtensions.size()> kFormats{
-    ModelFormat::gltf, ModelFormat::glb, ModelFormat::obj, ModelFormat::collada,
-    ModelFormat::fbx,  ModelFormat::ifc, ModelFormat::ifc, ModelFormat::collada,
-    ModelFormat::ply,  ModelFormat::stl};
+    ModelFormat::gltf,    ModelFormat::glb, ModelFormat::obj, ModelFormat::collada,
+    ModelFormat::fbx,     ModelFormat::ifc, ModelFormat::ifc, ModelFormat::ifc,
+    ModelFormat::collada, ModelFormat::ply, ModelFormat::stl};
 
 }  // namespace
 

@@ -2,6 +2,7 @@
 
 #include <minizip/unzip.h>
 
+#include <algorithm>
 #include <fstream>
 #include <memory>
 #include <type_traits>
@@ -23,10 +24,14 @@ struct CloseArchive {
 };
 using Archive = std::unique_ptr<std::remove_pointer_t<unzFile>, CloseArchive>;
 
-bool isWantedName(std::string name, const std::string& extension) {
+/// The first is the one that messages name.
+using Extensions = std::span<const std::string_view>;
+
+bool isWantedName(std::string name, Extensions extensions) {
   name = toLowerCase(std::move(name));
   // macOS archivers add a metadata file for each file, with the same extension.
-  return name.ends_with(extension) && name.find("__macosx/") == std::string::npos;
+  return name.find("__macosx/") == std::string::npos &&
+         std::ranges::any_of(extensions, [&](std::string_view e) { return name.ends_with(e); });
 }
 
 [[noreturn]] void throwDamaged(const fs::path& file, const std::string& reason) {
@@ -34,8 +39,8 @@ bool isWantedName(std::string name, const std::string& extension) {
                     "; copy or export it again");
 }
 
-[[noreturn]] void throwNoMember(const fs::path& file, const std::string& extension,
-                                std::size_t others) {
+[[noreturn]] void throwNoMember(const fs::path& file, Extensions extensions, std::size_t others) {
+  const std::string extension(extensions.front());
   throw ImportError(file.string() + ": contains no " + extension + " file (" +
                     std::to_string(others) + " others); zip the " + extension + " file itself");
 }
@@ -61,30 +66,26 @@ ArchiveMember readCurrentMember(unzFile archive, const fs::path& file) {
   return member;
 }
 
-/// Makes the archive's only file with this extension its current member.
-void seekToOnlyMember(unzFile archive, const fs::path& file, const std::string& extension) {
+/// Makes the archive's only file with one of these extensions its current member.
+void seekToOnlyMember(unzFile archive, const fs::path& file, Extensions extensions) {
   std::string names;
   std::size_t count = 0, found = 0;
   bool encrypted = false;
-  std::string xml;
   unz64_file_pos place{};
   int code = unzGoToFirstFile(archive);
   for (; code == UNZ_OK; code = unzGoToNextFile(archive), ++count) {
     const ArchiveMember member = readCurrentMember(archive, file);
-    if (extension == ".ifc" && isWantedName(member.name, ".ifcxml")) xml = member.name;
-    if (!isWantedName(member.name, extension)) continue;
+    if (!isWantedName(member.name, extensions)) continue;
     if (++found <= 5) names += (names.empty() ? "" : ", ") + member.name;
     encrypted = member.encrypted;
     if (unzGetFilePos64(archive, &place) != UNZ_OK) throwDamaged(file, kDamagedDirectory);
   }
   if (code != UNZ_END_OF_LIST_OF_FILE) throwDamaged(file, kDamagedDirectory);
-  if (found == 0 && !xml.empty())
-    throw ImportError(file.string() + ": contains " + xml +
-                      ", and IFC in XML is not read; export it as .ifc, the STEP form");
-  if (found == 0) throwNoMember(file, extension, count);
+  if (found == 0) throwNoMember(file, extensions, count);
   if (found > 1) {
-    throw ImportError(file.string() + ": has " + std::to_string(found) + " " + extension +
-                      " files (" + names + "); unzip it and name one of them");
+    throw ImportError(file.string() + ": has " + std::to_string(found) + " " +
+                      std::string(extensions.front()) + " files (" + names +
+                      "); unzip it and name one of them");
   }
   if (encrypted) {
     throw ImportError(file.string() + ": is encrypted; unzip it with its password");
@@ -125,14 +126,13 @@ bool isEmptyArchive(const fs::path& file) {
 
 }  // namespace
 
-std::string readOnlyZipMember(const fs::path& file, const std::string& extension,
-                              std::size_t maxBytes) {
+std::string readOnlyZipMember(const fs::path& file, Extensions extensions, std::size_t maxBytes) {
   // An empty archive starts with its end record; minizip would report it as damaged.
-  if (isEmptyArchive(file)) throwNoMember(file, extension, 0);
+  if (isEmptyArchive(file)) throwNoMember(file, extensions, 0);
   const Archive archive(unzOpen64(file.c_str()));
   if (!archive) throwDamaged(file, "it is not a zip archive, or its end is missing");
-  seekToOnlyMember(archive.get(), file, extension);
-  return unpack(archive.get(), file, extension, maxBytes);
+  seekToOnlyMember(archive.get(), file, extensions);
+  return unpack(archive.get(), file, std::string(extensions.front()), maxBytes);
 }
 
 }  // namespace enfilade::scene

@@ -3,13 +3,16 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <span>
 #include <string>
+#include <string_view>
 
 namespace enfilade::scene {
 
-/// Unzips the archive's only file with this extension (lower case, with the dot; names match in any
-/// case). Throws ImportError: no or several such files, encrypted, damaged, larger than `maxBytes`.
-std::string readOnlyZipMember(const std::filesystem::path& file, const std::string& extension,
-                              std::size_t maxBytes);
+/// Unzips the archive's only file with one of these extensions (at least one, lower case, with the
+/// dot; names match in any case). Throws ImportError, which names the first extension: no or
+/// several such files, encrypted, damaged, larger than `maxBytes`.
+std::string readOnlyZipMember(const std::filesystem::path& file,
+                              std::span<const std::string_view> extensions, std::size_t maxBytes);
 
 }  // namespace enfilade::scene

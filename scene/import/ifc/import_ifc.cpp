@@ -9,10 +9,11 @@
 
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/import/assembly/finish_model.hpp"
+#include "scene/import/file/ifc_file.hpp"
 #include "scene/import/file/ifc_parts.hpp"
 #include "scene/import/ifc/elevators.hpp"
-#include "scene/import/ifc/ifc_file.hpp"
 #include "scene/import/ifc/ifc_readers.hpp"
+#include "scene/import/ifc/ifc_xml.hpp"
 #include "scene/import/ifc/openings.hpp"
 #include "scene/import/ifc/spatial_structure.hpp"
 #include "scene/model/add_diagnostic.hpp"
@@ -180,6 +181,8 @@ class IfcImport {
                                      ? request_.options.memoryLimit / kTextMemoryDivisor
                                      : kMaxTextBytes;
     std::string text = readIfcFile(request_.file, maxBytes);
+    if (isXml(text))
+      text = convertIfcXml(request_, text, {maxBytes, remainingTime()}, progress_, diagnostics_);
     if (text.find("ISO-10303-21") == std::string::npos) {
       throw ImportError(request_.file + ": not an IFC file (it does not begin with " +
                         "ISO-10303-21); export it again as IFC");

@@ -1,5 +1,5 @@
 // Messages from an import worker to its parent, through a pipe: kind, length and that many bytes,
-// little-endian. scene/import/ifc/web_ifc/read_ifc.js writes them as well.
+// little-endian. scene/import/ifc/web_ifc/worker_io.js writes them as well.
 #pragma once
 
 #include <cstddef>
@@ -18,7 +18,10 @@ enum class ImportMessage : std::uint8_t {
   geometry = 'G',
   product = 'O',
   failure = 'F',
-  done = 'D'  ///< no content; the last message
+  done = 'D',  ///< no content; the last message
+  // Of the converter of ifcXML, see ifc/web_ifc/convert_ifcxml.js:
+  stepText = 'X',
+  problem = 'W'
 };
 
 /// Header of a message in the pipe.

@@ -203,7 +203,7 @@ std::array<int, 2> openPipe(const ImportRequest& request) {
 // ---- receiving ----------------------------------------------------------------------------------
 
 bool isMessageKind(std::uint8_t kind) {
-  return std::string_view("PEMTGOFD").find(static_cast<char>(kind)) != std::string_view::npos;
+  return std::string_view("PEMTGOFDXW").find(static_cast<char>(kind)) != std::string_view::npos;
 }
 
 /// Assembles messages from bytes.

@@ -19,6 +19,7 @@ enum class ImportTask : std::uint8_t {
   assimp,       ///< an IFC file by assimp: answers with a model
   webIfc,       ///< becomes Node.js: answers with meshes of IFC products
   ifcPlusPlus,  ///< answers with meshes of IFC products
+  ifcXml,       ///< becomes Node.js: answers with the STEP text of an ifcXML document
 };
 
 /// Arguments of an import worker.
@@ -26,7 +27,7 @@ struct ImportRequest {
   ImportTask task = ImportTask::model;
   std::string file;
   ImportOptions options;                 ///< memoryLimit 0: unlimited
-  std::string program, script;           ///< webIfc: the node program and its script
+  std::string program, script;           ///< webIfc, ifcXml: the node program and its script
   std::uint32_t firstProduct = 0;        ///< webIfc: index into the requested products
   int ifcFile = -1, ifcProductIds = -1;  ///< inherited file descriptors; not owned, -1: unset
 };

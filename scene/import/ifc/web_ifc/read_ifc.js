@@ -4,55 +4,19 @@
 //
 // File descriptor 3 receives the messages, 4 is the IFC file, 5 the list of what to read: the number
 // of ranges of the file (64 bits), the first byte and the size of each (64 bits), and the express
-// ids of the requested products (32 bits). Products before index FIRST are done. A message is a kind
-// (one byte), a length (64 bits) and that many bytes, all little-endian. Their contents are
-// documented in scene/import/ifc/ifc_meshes.hpp.
+// ids of the requested products (32 bits). Products before index FIRST are done. The contents of the
+// messages are documented in scene/import/ifc/ifc_meshes.hpp.
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
 
-const ANSWER = 3;
-const IFC_FILE = 4;
-const WANTED = 5;
+import { IFC_FILE, WANTED, doubles, readAll, sendMessage, sendProgress, words } from './worker_io.js';
+
 const FLOATS_A_VERTEX = 6; // position and normal, as web-ifc delivers them
-
-// Sends small parts in one piece, and large blocks after them without copying them.
-function sendMessage(kind, parts = [], blocks = []) {
-  const header = Buffer.alloc(9);
-  const size = [...parts, ...blocks].reduce((sum, part) => sum + part.length, 0);
-  header.write(kind, 0, 'latin1');
-  header.writeBigUInt64LE(BigInt(size), 1);
-  for (const block of [Buffer.concat([header, ...parts]), ...blocks]) {
-    for (let sent = 0; sent < block.length; ) sent += fs.writeSync(ANSWER, block, sent);
-  }
-}
-
-function doubles(...values) {
-  return Buffer.from(Float64Array.from(values).buffer);
-}
-
-function words(...values) {
-  return Buffer.from(Uint32Array.from(values).buffer);
-}
 
 // Words of 32 bits in the memory of web-ifc, as bytes, without the copy that GetVertexArray makes.
 // Valid until web-ifc allocates.
 function wordsOf(api, address, count) {
   return Buffer.from(api.wasmModule.HEAPF32.buffer, address, 4 * count);
-}
-
-function sendProgress(stage, fraction) {
-  sendMessage('P', [doubles(fraction), Buffer.from(stage)]);
-}
-
-function readAll(descriptor) {
-  const size = fs.fstatSync(descriptor).size;
-  const bytes = new Uint8Array(size);
-  for (let done = 0; done < size; ) {
-    const count = fs.readSync(descriptor, bytes, done, size - done, done);
-    if (count === 0) throw new Error('the file became shorter while it was read');
-    done += count;
-  }
-  return bytes;
 }
 
 function readList() {
