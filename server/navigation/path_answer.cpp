@@ -110,7 +110,7 @@ struct PathWriter {
   }
 
   /// A path that is not found because a door sweeps over its start. `reason`: why no path leads on
-  /// from a place aside; "": there is none.
+  /// from a place aside; "": no such place exists.
   scene::NavigationPath explainSwing(const scene::DoorSwing& swing, const Vec3& start,
                                      const std::string& reason) const {
     scene::NavigationPath path;

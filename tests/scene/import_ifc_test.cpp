@@ -429,7 +429,8 @@ TEST(ImportIfc, APlacementRelativeToItselfIsReported) {
       importModel(folder.write("house.ifc", house.text()), by(IfcReader::ifcPlusPlus));
   EXPECT_EQ(countDiagnostics(model, "broken_transform_dropped"), 1u);
   EXPECT_EQ(diagnosticText(model, "broken_transform_dropped"),
-            "000000000000000000Loop (IfcWall): its placement is relative to itself");
+            "000000000000000000Loop (IfcWall): its placement is relative to itself, or nested "
+            "more than 200 deep");
 }
 
 TEST(ImportIfc, DamagedFilesEndInModelsOrInErrorsThatNameThem) {
