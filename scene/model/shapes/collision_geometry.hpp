@@ -47,8 +47,8 @@ struct CollisionGeometry {
   std::size_t bytes() const;
 };
 
-/// An object of more parts is dense: no query lists its parts. Measured by `tick_bench`: 16 is slower
-/// in houses, 64 among thousands of small objects.
+/// An object of more parts is dense: no query lists its parts. Measured by `tick_bench`: 16 is
+/// slower in houses, 64 among thousands of small objects.
 inline constexpr std::uint32_t kMaxListedParts = 32;
 
 /// Calls visit(part) for each part such that open(box) is true for all branches above it. `box` is
