@@ -387,15 +387,12 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
     return none;
   }
   const Vec3 goal = finder.walker.footPosition();
-  Refusals* refusals = finder.refusals;
-  if (refusals && refusals->count >= kMaxRefusals && findPolygonAt(finder.ample, start) &&
-      findPolygonAt(finder.ample, goal))
-    return refusals->last;
   Proof proof(finder.maxRepairWalks);
   NavigationPath best = findPathByMeshes(finder, start, goal, proof);
   if (best.found() || !finder.unobstructed) return best;
   best = findPathOffMeshes(finder, start, goal, proof);
   if (best.found()) return best;
+  Refusals* refusals = finder.refusals;
   if (refusals && refusals->count >= kMaxRefusals) return refusals->last;
   best = findUnobstructedPath(finder, start, goal, proof);
   if (refusals && !best.found()) *refusals = {refusals->count + 1, best};
