@@ -393,7 +393,10 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
   best = findPathOffMeshes(finder, start, goal, proof);
   if (best.found()) return best;
   Refusals* refusals = finder.refusals;
-  if (refusals && refusals->count >= kMaxRefusals) return refusals->last;
+  // From places off the mesh an agent may get farther than from the islands next to them.
+  if (refusals && refusals->count >= kMaxRefusals && findPolygonAt(finder.ample, start) &&
+      findPolygonAt(finder.ample, goal))
+    return refusals->last;
   best = findUnobstructedPath(finder, start, goal, proof);
   if (refusals && !best.found()) *refusals = {refusals->count + 1, best};
   return best;
