@@ -16,7 +16,7 @@ struct CoplanarSurfaces {
 };
 
 /// Compares drawn triangles of 0.01 m^2 or more. Surfaces of equal materials are left out, because
-/// they flicker only in ids.
+/// without vertex colours they flicker only in ids.
 CoplanarSurfaces findCoplanarSurfaces(const Model& model);
 
 }  // namespace enfilade::scene
