@@ -132,7 +132,6 @@ void reportQueries(const WorldData& world, QueryCount count, TickReport& report)
     report.avatarWork.push_back(
         {avatar.id, avatar.work.narrow, avatar.work.partsLookedAt, avatar.footPosition});
   }
-  std::ranges::sort(report.avatarWork, {}, &AvatarWork::id);  // the avatars are sorted by name
   report.narrowQueries = count.narrow;
   report.rationalQueries = count.rational;
   report.iterationLimitedCasts = count.bounded;

@@ -128,8 +128,11 @@ v1::Metrics TickStatistics::makeMetrics() const {
   metrics.set_parts_looked_at(partsLookedAt_);
   if (costliestAvatar_.id != 0)
     fillAvatarWork(*metrics.mutable_costliest_avatar(), costliestAvatar_, costliestTick_);
-  for (std::size_t i = 0; i < std::min(avatarWork_.size(), kMaxAvatarWork); ++i)
-    fillAvatarWork(*metrics.add_avatar_work(), avatarWork_[i], lastTick_);
+  std::vector<scene::AvatarWork> avatarWork = avatarWork_;
+  std::ranges::sort(avatarWork, {}, &scene::AvatarWork::id);
+  avatarWork.resize(std::min(avatarWork.size(), kMaxAvatarWork));
+  for (const scene::AvatarWork& work : avatarWork)
+    fillAvatarWork(*metrics.add_avatar_work(), work, lastTick_);
   metrics.set_avatars(avatars_);
   if (audit_.ticks > 0) fillAudit(*metrics.mutable_audit(), audit_, auditDurations_);
   return metrics;

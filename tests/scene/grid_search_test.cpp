@@ -6,10 +6,13 @@
 #include <algorithm>
 #include <cmath>
 #include <memory>
+#include <utility>
+#include <vector>
 
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/ghost.hpp"
-#include "scene/navigation/navigation.hpp"
+#include "scene/navigation/mesh/tile_mesh.hpp"
+#include "scene/navigation/path_finder.hpp"
 #include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene::testing {
@@ -105,23 +108,32 @@ TEST(DoorSwing, TouchesWhatTheDoorMeetsAtAnyAngle) {
   EXPECT_GT(clear, 100);
 }
 
-/// A floor, and a beam of 6 cm on it that a step reaches: too narrow for a mesh.
-TEST(Navigation, PlacesWithoutAMeshAreConnectedWithIt) {
-  const auto scene =
-      std::make_shared<const Scene>(boxModel({{"floor", {0, -0.2, 0}, {8, 0, 6}},
-                                              {"step", {3.0, 0, 2.0}, {3.06, 0.25, 2.6}},
-                                              {"beam", {3.06, 0, 2.0}, {3.12, 0.5, 2.6}}}));
-  Navigation navigation(scene, WorldSettings(), NavigationAgent());
-  const auto top = navigation.snap({3.09, 0.5, 2.3}, 0.05);
-  ASSERT_TRUE(top);
-  ASSERT_NEAR(top->y(), 0.5, 0.01);
-  const Vec3 floor(6, 0, 4);
-  for (int i = 0; i < 5; ++i) {  // the fifth query finds what the first does
-    const NavigationPath down = navigation.findPath(*top, floor);
-    EXPECT_TRUE(down.found()) << down.reason;
-    const NavigationPath up = navigation.findPath(floor, *top);
-    EXPECT_TRUE(up.found()) << up.reason;
+/// The mesh ends at x = 3 and the floor at x = 8.
+TEST(PathFinder, PlacesWithoutAMeshAreConnectedWithIt) {
+  const World whole(std::make_shared<const Scene>(boxModel({{"floor", {0, -0.2, 0}, {8, 0, 6}}})));
+  const World part(std::make_shared<const Scene>(boxModel({{"floor", {0, -0.2, 0}, {3, 0, 6}}})));
+  const NavigationAgent agent;
+  const TileGrid grid = makeTileGrid(whole.scene().bounds(), agent);
+  const auto makeMesh = [&](Clearance clearance) {
+    std::vector<TileMesh> tiles;
+    for (int z = 0; z < grid.tilesZ; ++z)
+      for (int x = 0; x < grid.tilesX; ++x)
+        tiles.push_back(std::move(buildTileMeshes(part.data(), agent, grid, x, z, {clearance})[0]));
+    return NavigationMesh(grid, std::move(tiles));
+  };
+  NavigationMesh ample = makeMesh(Clearance::ample), scarce = makeMesh(Clearance::scarce);
+  const NavigationMesh unobstructed = makeMesh(Clearance::none);
+  Walker walker(whole.data(), agent);
+  const PathFinder finder{whole.data(), agent,
+                          walker,       ample,
+                          scarce,       [&]() -> const NavigationMesh& { return unobstructed; }};
+  const Vec3 onMesh(1, 0, 1), offMesh(4, 0, 3);
+  for (const auto& [from, to] : {std::pair(onMesh, offMesh), std::pair(offMesh, onMesh)}) {
+    const NavigationPath path = findPath(finder, from, to);
+    ASSERT_TRUE(path.found()) << path.reason;
+    EXPECT_NEAR(path.length, (to - from).norm(), 0.05);
   }
+  EXPECT_FALSE(findPath(finder, onMesh, {7, 0, 3}).found()) << "it is too far from the mesh";
 }
 
 }  // namespace

@@ -112,7 +112,7 @@ struct TickReport {
   std::uint64_t verticesLookedAt = 0;       ///< for the boxes of moving bodies and of avatars
   std::uint64_t partBoxesMade = 0;          ///< of bodies with several parts, and of avatars
   std::uint64_t partsLookedAt = 0;          ///< triangles and hulls in reach of avatars' queries
-  std::vector<AvatarWork> avatarWork;       ///< of all avatars, ascending ids
+  std::vector<AvatarWork> avatarWork;       ///< of all avatars, by their names
   std::uint32_t activeContacts = 0;
   std::uint32_t crushedBodies = 0;  ///< penetrating pairs of a kinematic and a rigid body
   /// Maximum depth of avatars and rigid bodies, metres, by the exact verdict; 0: no penetration.
