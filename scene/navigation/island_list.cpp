@@ -209,7 +209,8 @@ std::vector<IslandNeighbour> findNeighbours(const NavigationMesh& mesh, const Is
 std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const IslandList& list,
                                           Walker& walker, const Vec3& place) {
   const double reach = 2 * walker.agent().radius;
-  constexpr double kOnMesh = 0.02;  // metres
+  constexpr double kOnMesh = 0.02;      // metres
+  constexpr double kSameHeight = 0.05;  // metres: the walk back comes to the same floor
   struct Near {
     double distance;
     Vec3 point;
@@ -230,11 +231,13 @@ std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const Isla
     return getNumber(nearby.front());
   const auto standing = standAt(walker, place);
   if (!standing) return std::nullopt;
+  const auto walks = [&](const Vec3& to, double heightError) {
+    return walker.walkTo(to).kind == WalkOutcome::Kind::arrived &&
+           std::abs(walker.footPosition().y() - to.y()) <= heightError;
+  };
   for (const Near& near : nearby) {
     walker.returnTo(*standing);
-    if (walker.walkTo(near.point).kind == WalkOutcome::Kind::arrived &&
-        std::abs(walker.footPosition().y() - near.point.y()) <= kHeightError)
-      return getNumber(near);
+    if (walks(near.point, kHeightError) && walks(*standing, kSameHeight)) return getNumber(near);
   }
   return std::nullopt;
 }

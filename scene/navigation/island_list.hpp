@@ -46,7 +46,8 @@ void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, dou
                  const FindExit& findExit);
 
 /// The number of the island on which an agent stands; nullopt: on none. The mesh ends at a distance
-/// from the rim of a floor: a place there has the island of the closest mesh to which it can walk.
+/// from the rim of a floor: a place there has the island of the closest mesh to which an agent
+/// walks, and back.
 std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const IslandList& list,
                                           Walker& walker, const Vec3& place);
 

@@ -132,9 +132,8 @@ void Navigation::assembleMeshes() {
   joinIslands();
   drawn_ = {};
   for (std::uint32_t i = 0; i < ample_->polygonCount(); ++i) {
-    if (islands_.numberOf[i] == kNoIsland || !islands_.islands[islands_.numberOf[i]].isDrawn)
-      continue;
-    drawn_.add(*ample_, i);
+    const std::uint32_t number = islands_.numberOf[i];
+    if (number != kNoIsland && islands_.islands[number].isDrawn) drawn_.add(*ample_, i);
   }
   report_.islandAreas.clear();
   report_.area = 0;
@@ -161,16 +160,18 @@ bool Navigation::isGapPassable(const Vec3& from, const Vec3& to,
   const Vec3 extent(agent_.radius, 0.5, agent_.radius);
   const auto a = scarce_->findNearest(from, extent), b = scarce_->findNearest(to, extent);
   if (!a || !b || scarce[a->polygon] != scarce[b->polygon]) return false;
-  const auto known =
-      std::ranges::find_if(gaps_, [&](const Gap& gap) { return gap.from == from && gap.to == to; });
-  if (known != gaps_.end()) return known->isPassable;
+  for (const Gap& gap : gaps_)
+    if (gap.from == from && gap.to == to) return gap.isPassable;
   const auto start = standNear(*walker_, from), goal = standNear(*walker_, to);
   bool isPassable = false;
   if (start && goal) {
     const PathFinder finder{world_.data(), agent_,  *walker_,       *ample_,
                             *scarce_,      nullptr, kMaxRepairWalks};
-    const NavigationPath path = scene::findPath(finder, *start, *goal);
-    isPassable = path.found() && path.length <= (*goal - *start).norm() + kMaxGapDetour;
+    const auto isNear = [&](const Vec3& here, const Vec3& there) {
+      const NavigationPath path = scene::findPath(finder, here, there);
+      return path.found() && path.length <= (there - here).norm() + kMaxGapDetour;
+    };
+    isPassable = isNear(*start, *goal) && isNear(*goal, *start);
   }
   gaps_.push_back({from, to, isPassable});
   return isPassable;
@@ -183,13 +184,14 @@ std::optional<std::uint32_t> Navigation::findExit(
   const Vec3& place = islands_.islands[number].place;
   const auto findOther = [&](const Vec3& feet) -> std::optional<std::uint32_t> {
     const auto polygon = findPolygonAt(*ample_, feet);
-    const std::uint32_t other = polygon ? islands_.numberOf[*polygon] : kNoIsland;
+    const auto other = polygon ? islands_.numberOf[*polygon] : kNoIsland;
     return other != kNoIsland && isOther(other) ? std::optional(other) : std::nullopt;
   };
   const auto known = std::ranges::find(gaps_, place, &Gap::from);
   if (known != gaps_.end() && !known->isPassable) return std::nullopt;
   if (const auto other = known != gaps_.end() ? findOther(known->to) : std::nullopt) return other;
-  GridSearch out{0.12, kMaxGapDetour, 300}, back = out;
+  const std::size_t walks = std::clamp<std::size_t>(50'000 / islands_.islands.size(), 300, 4000);
+  GridSearch out{0.12, kMaxGapDetour, walks}, back = out;  // few islands: also long narrow ways
   const auto way = findGridPathOut(
       *walker_, place, [&](const Vec3& feet) { return findOther(feet).has_value(); }, out);
   const bool isPassable = way && findGridPath(*walker_, way->back(), place, back);
@@ -303,7 +305,7 @@ std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
   if (const auto place = standAt(*walker_, centre + Vec3(0, kHeightError, 0), 2 * kHeightError)) {
     const auto number = islandAt(*place);
     const bool isWanted = island ? number == island : number && islands_.islands[*number].isDrawn;
-    if (isInside(*place) && isWanted) return place;
+    if (isWanted && isInside(*place)) return place;
   }
   struct Candidate {
     bool isAside;     // on a table, say: places on islands that are drawn come first

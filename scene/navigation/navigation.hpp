@@ -54,8 +54,6 @@ struct RandomPlace {
   std::optional<std::uint32_t> island = {};  ///< number as by findIsland()
 };
 
-/// Thread-safe; queries run one after another. The state of bodies is that of the construction or
-/// of the last update().
 /// Where Navigation::snapTo() looks for a place.
 struct SnapTarget {
   Vec3 extents = Vec3::Zero();          ///< metres: half the box around the point
@@ -63,6 +61,8 @@ struct SnapTarget {
   bool isDrawn = false;  ///< only islands with Island::isDrawn; a place within 2 mm stays
 };
 
+/// Thread-safe; queries run one after another. The state of bodies is that of the construction or
+/// of the last update().
 class Navigation {
  public:
   using Progress = std::function<void(double)>;  ///< share that is done, 0..1

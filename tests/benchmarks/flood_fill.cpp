@@ -23,6 +23,8 @@ constexpr std::array<std::pair<int, int>, 8> kNeighbours{
 constexpr std::size_t kStraightNeighbours = 4;  // the first ones
 constexpr double kEvenFloor = 1e-3;             // metres between the heights of two places
 constexpr double kSameHeight = 0.01;            // metres between feet at one place
+constexpr double kSamePlace = 1e-4;             // metres
+constexpr double kSameFloor = 0.06;             // metres between feet 3 cm apart on a slope
 constexpr double kLift = FloodFill::kLift;
 
 }  // namespace
@@ -30,7 +32,7 @@ constexpr double kLift = FloodFill::kLift;
 FloodFill::FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
                      const std::vector<Vec3>& starts, std::size_t maxPlaces,
                      const std::optional<Vec3>& goal)
-    : stepHeight_(world.settings.stepHeight) {
+    : stepHeight_(world.settings.stepHeight), walks_(goal.has_value()), step_(stepHeight_ + 2e-3) {
   const scene::Aabb bounds = world.scene->bounds();
   corner_ = bounds.min - Vec3(1, 0, 1);
   const Vec3 size = bounds.size() + Vec3(2, 0, 2);
@@ -70,10 +72,10 @@ Vec3 FloodFill::computePosition(std::int32_t place) const {
           corner_.z() + (at.column / width_ + 0.5) * kSpacing};
 }
 
-/// The place of a column that is within a step of `height`, and closest to it; -1: none.
-std::int32_t FloodFill::findPlace(std::int32_t column, double height) const {
+/// The place of a column that is closest to `height`, and at most `reach` metres from it; -1: none.
+std::int32_t FloodFill::findPlace(std::int32_t column, double height, double reach) const {
   std::int32_t best = -1;
-  double least = stepHeight_ + 2e-3;
+  double least = reach;
   for (std::int32_t at = first_[static_cast<std::size_t>(column)]; at >= 0;
        at = places_[static_cast<std::size_t>(at)].next) {
     const double difference = std::abs(places_[static_cast<std::size_t>(at)].height - height);
@@ -87,11 +89,11 @@ std::int32_t FloodFill::findPlace(std::int32_t column, double height) const {
 std::int32_t FloodFill::findNearest(const Vec3& point) const {
   const std::int32_t column = computeColumn(point.x(), point.z());
   if (column < 0) return -1;
-  if (const std::int32_t here = findPlace(column, point.y()); here >= 0) return here;
+  if (const std::int32_t here = findPlace(column, point.y(), kSameFloor); here >= 0) return here;
   std::int32_t best = -1;
   double least = 0.03;
   for (const auto& [dx, dz] : kNeighbours) {
-    const std::int32_t place = findPlace(column + dx + dz * width_, point.y());
+    const std::int32_t place = findPlace(column + dx + dz * width_, point.y(), kSameFloor);
     if (place < 0) continue;
     const Vec3 away = computePosition(place) - point;
     const double distance = std::hypot(away.x(), away.z());
@@ -119,9 +121,11 @@ std::optional<Vec3> FloodFill::stepTo(scene::Walker& walker, const Vec3& from, d
     if (!standing) continue;
     const double climb = std::abs(standing->y() - from.y());
     if (climb > stepHeight_ + 1e-3) continue;
+    // An obstacle may push it aside on its fall.
+    if (std::hypot(standing->x() - x, standing->z() - z) > kSamePlace) continue;
     // It must be a place of its own, not only the end of a fall next to an obstacle.
     if (!scene::standAt(walker, *standing + Vec3(0, kLift, 0), stepHeight_)) continue;
-    if (climb < kEvenFloor) return standing;
+    if (climb < kEvenFloor && !walks_) return standing;
     walker.returnTo(from);
     const bool isWalked = walker.walkTo(*standing).kind == scene::WalkOutcome::Kind::arrived &&
                           std::abs(walker.footPosition().y() - standing->y()) < kSameHeight;
@@ -144,7 +148,7 @@ void FloodFill::fill(scene::Walker& walker, std::int32_t start, std::size_t maxP
       const double x = from.x() + dx * kSpacing, z = from.z() + dz * kSpacing;
       if (computeColumn(x, z) < 0) continue;
       const std::int32_t next = column + dx + dz * width_;
-      if (findPlace(next, from.y()) >= 0) continue;
+      if (findPlace(next, from.y(), step_) >= 0) continue;
       const auto standing = stepTo(walker, from, x, z);
       if (!standing) continue;
       open.push(add(next, standing->y(), component));
@@ -180,8 +184,8 @@ std::vector<std::int32_t> FloodFill::findWay(std::int32_t from, std::int32_t to)
     const double length = known[at].length;
     if (through > length + (goal - here).norm() + 1e-9) continue;  // a longer way to it
     for (const auto& [dx, dz] : kNeighbours) {
-      const std::int32_t next =
-          findPlace(places_[static_cast<std::size_t>(at)].column + dx + dz * width_, here.y());
+      const std::int32_t next = findPlace(
+          places_[static_cast<std::size_t>(at)].column + dx + dz * width_, here.y(), step_);
       if (next < 0) continue;
       const Vec3 there = computePosition(next);
       const double longer = length + (there - here).norm();
@@ -204,7 +208,7 @@ bool FloodFill::isStraight(const Vec3& from, const Vec3& to) const {
   for (int i = 0; i <= count; ++i) {
     const Vec3 at = from + (to - from) * (static_cast<double>(i) / count);
     const std::int32_t column = computeColumn(at.x(), at.z());
-    const std::int32_t place = column < 0 ? -1 : findPlace(column, height);
+    const std::int32_t place = column < 0 ? -1 : findPlace(column, height, step_);
     if (place < 0) return false;
     height = places_[static_cast<std::size_t>(place)].height;
   }

@@ -17,11 +17,18 @@ class FloodFill {
   static constexpr double kLift = 2e-3;  ///< metres above a place: an avatar can be put down there
 
   /// Fills from each of `starts` that is not filled yet, until `maxPlaces` places are found. A
-  /// place that can be left but not reached again is in the component of its start. Ends early when
-  /// it comes to `goal`.
+  /// place that can be left but not reached again is in the component of its start.
   FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
-            const std::vector<scene::Vec3>& starts, std::size_t maxPlaces,
-            const std::optional<scene::Vec3>& goal = std::nullopt);
+            const std::vector<scene::Vec3>& starts, std::size_t maxPlaces)
+      : FloodFill(world, agent, starts, maxPlaces, std::nullopt) {}
+
+  /// Fills from `start` by walks alone, and ends early when it comes to `goal`. On even floor a
+  /// place where an avatar stands may be reached by no walk, if less than a millimetre is missing.
+  static FloodFill fillByWalks(const scene::WorldData& world, const scene::NavigationAgent& agent,
+                               const scene::Vec3& start, std::size_t maxPlaces,
+                               const scene::Vec3& goal) {
+    return {world, agent, {start}, maxPlaces, goal};
+  }
 
   std::size_t size() const { return places_.size(); }
   scene::Vec3 at(std::size_t place) const {
@@ -40,6 +47,11 @@ class FloodFill {
   std::vector<scene::Vec3> findShortest(const scene::Vec3& from, const scene::Vec3& to) const;
 
  private:
+  /// With a goal: by walks alone.
+  FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
+            const std::vector<scene::Vec3>& starts, std::size_t maxPlaces,
+            const std::optional<scene::Vec3>& goal);
+
   struct Place {
     std::int32_t column;  ///< of the grid
     float height;         ///< metres
@@ -49,7 +61,7 @@ class FloodFill {
 
   std::int32_t computeColumn(double x, double z) const;
   scene::Vec3 computePosition(std::int32_t place) const;
-  std::int32_t findPlace(std::int32_t column, double height) const;
+  std::int32_t findPlace(std::int32_t column, double height, double reach) const;
   std::int32_t findNearest(const scene::Vec3& point) const;
   std::int32_t add(std::int32_t column, double height, std::int32_t component);
   std::optional<scene::Vec3> stepTo(scene::Walker& walker, const scene::Vec3& from, double x,
@@ -60,6 +72,8 @@ class FloodFill {
   bool isStraight(const scene::Vec3& from, const scene::Vec3& to) const;
 
   double stepHeight_;
+  bool walks_;   ///< also on even floor
+  double step_;  ///< metres between the heights of neighbours
   scene::Vec3 corner_;
   std::int32_t width_ = 0, depth_ = 0;
   std::vector<std::int32_t> first_;  ///< by column: its first place, or -1

@@ -25,6 +25,7 @@
 
 #include "scene/import/import_worker.hpp"
 #include "scene/navigation/doors.hpp"
+#include "scene/navigation/stand.hpp"
 #include "scene/navigation/walker.hpp"
 #include "scene/world/world.hpp"
 #include "server/base/load_scene.hpp"
@@ -272,23 +273,25 @@ void judge(const Bench& bench, const std::vector<Vec3>& places,
            const std::vector<Disagreement>& disagreements, Comparison& result) {
   std::array<std::optional<FloodFill>, 2> others;  // for thinner avatars, and for wider ones
   for (const auto& [from, to, isFound, reason] : disagreements) {
-    const FloodFill onward(bench.atRest.data(), {}, {from}, kMaxPlaces, to);
+    scene::NavigationAgent agent;
+    agent.radius += isFound ? -kNearWidth : kNearWidth;
+    auto& other = others[isFound ? 0 : 1];
+    if (!other) other.emplace(bench.atRest.data(), agent, places, kMaxPlaces);
+    scene::Walker walker(bench.atRest.data(), agent);
+    const auto stands = [&](const Vec3& place) {
+      return scene::standAt(walker, place, scene::kMaxStandDrop).has_value();
+    };
+    if (isConnected(*other, from, to) != !isFound || (!isFound && !(stands(from) && stands(to)))) {
+      ++result.nearWidth;
+      continue;
+    }
+    const auto onward = FloodFill::fillByWalks(bench.atRest.data(), {}, from, kMaxPlaces, to);
     const bool isReached = onward.findComponent(to).has_value();
     if (!isReached && onward.size() >= kMaxPlaces) {
       --result.compared, ++result.skipped;
       continue;
     }
     if (isReached == isFound) continue;
-    auto& other = others[isFound ? 0 : 1];
-    if (!other) {
-      scene::NavigationAgent agent;
-      agent.radius += isFound ? -kNearWidth : kNearWidth;
-      other.emplace(bench.atRest.data(), agent, places, kMaxPlaces);
-    }
-    if (isConnected(*other, from, to) != !isFound) {
-      ++result.nearWidth;
-      continue;
-    }
     if (++result.wrong <= 5)
       std::printf("  reach: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): path %d: %s\n",
                   from.x(), from.y(), from.z(), to.x(), to.y(), to.z(), isFound, reason.c_str());
@@ -370,9 +373,15 @@ nlohmann::json measure(const std::string& file, const Effort& effort) {
   row["build_seconds"] = islands.build_seconds();
   row["area"] = islands.navigable_area();
   row["islands"] = islands.island_areas_size();
-  measureTimes(bench, effort, row);
-  compareWithFill(bench, effort, row);
-  measureWalks(bench, effort, row);
+  const auto run = [&](const char* name, const auto& part) {
+    const auto start = Clock::now();
+    part(bench, effort, row);
+    std::printf("  %s: %s in %.1f s\n", options.file.filename().c_str(), name, secondsSince(start));
+    std::fflush(stdout);
+  };
+  run("times", measureTimes);
+  run("fill", compareWithFill);
+  run("walks", measureWalks);
   return row;
 }
 
