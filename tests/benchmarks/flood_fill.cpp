@@ -31,10 +31,10 @@ constexpr double kLift = FloodFill::kLift;
 
 FloodFill::FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
                      const std::vector<Vec3>& starts, std::size_t maxPlaces,
-                     const std::optional<Vec3>& goal)
+                     const std::optional<Vec3>& goal, double shift)
     : stepHeight_(world.settings.stepHeight), walks_(goal.has_value()), step_(stepHeight_ + 2e-3) {
   const scene::Aabb bounds = world.scene->bounds();
-  corner_ = bounds.min - Vec3(1, 0, 1);
+  corner_ = bounds.min - Vec3(1 - shift, 0, 1 - shift);
   const Vec3 size = bounds.size() + Vec3(2, 0, 2);
   width_ = static_cast<std::int32_t>(std::ceil(size.x() / kSpacing));
   depth_ = static_cast<std::int32_t>(std::ceil(size.z() / kSpacing));

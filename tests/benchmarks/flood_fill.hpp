@@ -20,14 +20,15 @@ class FloodFill {
   /// place that can be left but not reached again is in the component of its start.
   FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
             const std::vector<scene::Vec3>& starts, std::size_t maxPlaces)
-      : FloodFill(world, agent, starts, maxPlaces, std::nullopt) {}
+      : FloodFill(world, agent, starts, maxPlaces, std::nullopt, 0) {}
 
   /// Fills from `start` by walks alone, and ends early when it comes to `goal`. On even floor a
   /// place where an avatar stands may be reached by no walk, if less than a millimetre is missing.
+  /// `shift`: of the grid, metres.
   static FloodFill fillByWalks(const scene::WorldData& world, const scene::NavigationAgent& agent,
                                const scene::Vec3& start, std::size_t maxPlaces,
-                               const scene::Vec3& goal) {
-    return {world, agent, {start}, maxPlaces, goal};
+                               const scene::Vec3& goal, double shift) {
+    return {world, agent, {start}, maxPlaces, goal, shift};
   }
 
   std::size_t size() const { return places_.size(); }
@@ -50,7 +51,7 @@ class FloodFill {
   /// With a goal: by walks alone.
   FloodFill(const scene::WorldData& world, const scene::NavigationAgent& agent,
             const std::vector<scene::Vec3>& starts, std::size_t maxPlaces,
-            const std::optional<scene::Vec3>& goal);
+            const std::optional<scene::Vec3>& goal, double shift);
 
   struct Place {
     std::int32_t column;  ///< of the grid

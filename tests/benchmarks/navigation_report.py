@@ -21,7 +21,8 @@ def make_walk_row(row):
 
 def make_fill_row(row):
     return [row["scene"], f"{row['fill_places']:,}", row["reach_compared"], row["reach_wrong"],
-            row["reach_near_width"], row["reach_skipped"], row["islands_wrong"], f"{row['lengths']} ({row['lengths_unwalkable']})", short(row["length_median"]),
+            row["reach_near_width"], row["reach_skipped"], row["islands_wrong"],
+            f"{row['lengths']} ({row['lengths_unwalkable']})", short(row["length_median"]),
             f"{row['length_max']:.4f}" if row["length_max"] else "–", row["length_above"]]
 
 
@@ -32,7 +33,10 @@ def make_time_row(row):
 
 def main():
     results, report = Path(sys.argv[1]), Path(sys.argv[2])
-    rows = read(results, "navigation")
+    scenes = {}
+    for row in read(results, "navigation"):
+        scenes.setdefault(row["scene"], {}).update(row)
+    rows = scenes.values()
     report.mkdir(parents=True, exist_ok=True)
     (report / "navigation.md").write_text(f"""# Navigation: paths that are walked
 
@@ -54,7 +58,8 @@ are counted by themselves, too. *Refused*: a closed door stands at the start. *S
 
 A flood fill tries every place of a grid of 2 cm by standing there (`flood_fill.hpp`): it uses no navigation
 mesh. A pair of places, drawn on all islands or anywhere in the fill, is *wrong* if a path is found and the fill
-does not connect it, or the other way round. *Near*: half a centimetre of radius decides. *Skipped*: an end is
+does not connect it, or the other way round; what they find differently is judged by a fill of which each step is
+walked. *Near*: half a centimetre of radius decides, or of the place of the grid. *Skipped*: an end is
 at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight, where an avatar can walk that; in brackets those where it cannot.
