@@ -14,6 +14,7 @@
 #include <queue>
 #include <stdexcept>
 #include <string>
+#include <unordered_set>
 
 namespace enfilade::scene {
 namespace {
@@ -21,6 +22,8 @@ namespace {
 constexpr int kReferenceBits = 22;               // of a tile and a polygon, in a 32-bit dtPolyRef
 constexpr std::size_t kFirstPolygonCount = 256;  // a query with more is repeated
 constexpr int kMaxCorners = 4096;
+constexpr int kWhole = 255;       // of an edge: Detour stores the ends of its parts in 255ths
+constexpr int kRoundedParts = 3;  // that many may be missing
 
 using Float3 = std::array<float, 3>;
 
@@ -79,6 +82,7 @@ NavigationMesh::NavigationMesh(const TileGrid& grid, std::vector<TileMesh> tiles
   if (dtStatusFailed(detour_->query.init(&detour_->mesh, 64)))
     throw std::runtime_error("navigation: Detour cannot start");
   collectPortals();
+  findRim(grid);
 }
 
 NavigationMesh::~NavigationMesh() = default;
@@ -131,6 +135,40 @@ void NavigationMesh::collectPortals() {
   }
   firstPortal_.push_back(static_cast<std::uint32_t>(portals_.size()));
   bytes_ += portals_.size() * sizeof(Portal) + centres_.size() * (sizeof(Vec3) + 16);
+}
+
+/// Decides which ends of portals are on the rim. Vertices lie on the cells of the grid.
+void NavigationMesh::findRim(const TileGrid& grid) {
+  const auto computeKey = [&](const Vec3& point) {
+    const auto x =
+        static_cast<std::uint32_t>(std::lround((point.x() - grid.origin.x()) / grid.cell));
+    const auto z =
+        static_cast<std::uint32_t>(std::lround((point.z() - grid.origin.z()) / grid.cell));
+    return std::uint64_t{x} << 32 | z;
+  };
+  std::unordered_set<std::uint64_t> rim;
+  for (std::uint32_t index = 0; index < polygonCount(); ++index) {
+    const dtPoly* polygon = nullptr;
+    const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
+    std::array<int, DT_VERTS_PER_POLYGON> covered{};  // 255ths of an edge that portals cover
+    for (unsigned link = polygon->firstLink; link != DT_NULL_LINK; link = tile.links[link].next) {
+      const dtLink& to = tile.links[link];
+      covered[to.edge] += to.side == 0xff ? kWhole : to.bmax - to.bmin;
+    }
+    for (std::size_t k = 0; k < polygon->vertCount; ++k) {
+      if (covered[k] >= kWhole - kRoundedParts) continue;
+      for (const std::size_t end : {k, (k + 1) % polygon->vertCount})
+        rim.insert(computeKey(toVec3(&tile.verts[polygon->verts[end] * 3])));
+      // A part of the edge has no neighbour: the portals of the others may end anywhere on it.
+      if (covered[k] > 0)
+        for (std::uint32_t p = firstPortal_[index]; p < firstPortal_[index + 1]; ++p)
+          for (const Vec3& end : {portals_[p].low, portals_[p].high}) rim.insert(computeKey(end));
+    }
+  }
+  for (Portal& portal : portals_) {
+    portal.lowIsRim = rim.contains(computeKey(portal.low));
+    portal.highIsRim = rim.contains(computeKey(portal.high));
+  }
 }
 
 Vec3 NavigationMesh::snapToVertex(std::uint32_t reference, const Vec3& point,
@@ -291,12 +329,31 @@ Vec3 NavigationMesh::portalMiddle(std::uint32_t from, std::uint32_t to) const {
   return centres_[from];
 }
 
+/// Shortest lines may bend at the ends of a closed portal of `polygon`: marks them in the polygons
+/// around.
+void NavigationMesh::addRim(std::uint32_t polygon, const Portal& closed) {
+  const auto isEnd = [low = closed.low, high = closed.high](const Vec3& point) {
+    constexpr double kSame = 1e-3;  // metres
+    return std::hypot(point.x() - low.x(), point.z() - low.z()) < kSame ||
+           std::hypot(point.x() - high.x(), point.z() - high.z()) < kSame;
+  };
+  const auto mark = [&](std::uint32_t around) {
+    for (std::uint32_t p = firstPortal_[around]; p < firstPortal_[around + 1]; ++p) {
+      portals_[p].lowIsRim |= isEnd(portals_[p].low);
+      portals_[p].highIsRim |= isEnd(portals_[p].high);
+    }
+  };
+  mark(polygon);
+  for (const Portal& portal : portals(polygon)) mark(portal.to);
+}
+
 int NavigationMesh::closePortal(std::uint32_t from, std::uint32_t to) {
   int failures = 0;
   for (const auto& [a, b] : {std::pair(from, to), std::pair(to, from)}) {
     for (std::uint32_t p = firstPortal_[a]; p < firstPortal_[a + 1]; ++p) {
       if (portals_[p].to != b) continue;
       portals_[p].closed = true;
+      addRim(a, portals_[p]);
       failures = std::max<int>(failures, ++portals_[p].failures);
     }
   }

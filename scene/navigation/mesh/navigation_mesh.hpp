@@ -31,6 +31,8 @@ struct Portal {
   std::uint32_t to = 0;
   Vec3 low = Vec3::Zero();
   Vec3 high = Vec3::Zero();
+  bool lowIsRim = true;  ///< the end is on the rim of the mesh: shortest lines bend at such places
+  bool highIsRim = true;
   bool closed = false;
   std::uint8_t failures = 0;
 
@@ -106,6 +108,8 @@ class NavigationMesh {
  private:
   struct Detour;
   void collectPortals();
+  void findRim(const TileGrid& grid);
+  void addRim(std::uint32_t polygon, const Portal& closed);
   /// The vertex of a polygon above or below a point, within `distance` metres, or the point. Detour
   /// stores the ends of portals between tiles in 255ths of an edge.
   Vec3 snapToVertex(std::uint32_t reference, const Vec3& point, double distance) const;

@@ -30,7 +30,7 @@ double length(const Vec3& v) {
 /// root the part is seen from `low` to `high`, with a positive cross product.
 struct Interval {
   Vec3 root = Vec3::Zero(), low = Vec3::Zero(), high = Vec3::Zero();
-  bool lowIsCorner = true;  ///< an end of the portal: a line may bend there
+  bool lowIsCorner = true;  ///< an end of the portal on the rim: a line may bend there
   bool highIsCorner = true;
   double toRoot = 0;          ///< metres from the start
   std::uint32_t polygon = 0;  ///< beyond the portal
@@ -65,7 +65,12 @@ class CorridorSearch {
     shortestToRoot_[key(from_.point)] = 0;
     for (const Portal& portal : mesh_.portals(from_.polygon)) {
       if (!portal.closed)
-        push({.root = from_.point, .low = portal.low, .high = portal.high, .polygon = portal.to});
+        push({.root = from_.point,
+              .low = portal.low,
+              .high = portal.high,
+              .lowIsCorner = portal.lowIsRim,
+              .highIsCorner = portal.highIsRim,
+              .polygon = portal.to});
     }
     while (!open_.empty() && nodes_.size() < kMaxNodes) {
       const auto [estimate, index] = open_.top();
@@ -134,21 +139,24 @@ class CorridorSearch {
       if (first < last) {
         next.root = root;
         next.low = at(first), next.high = at(last);
-        next.lowIsCorner = first <= 0, next.highIsCorner = last >= 1;
+        next.lowIsCorner = first <= 0 && portal.lowIsRim;
+        next.highIsCorner = last >= 1 && portal.highIsRim;
         push(next);
       }
       if (first > 0 && interval.lowIsCorner) {
         next.root = interval.low;
         next.toRoot = interval.toRoot + length(toLow);
         next.low = portal.low, next.high = at(first);
-        next.lowIsCorner = true, next.highIsCorner = first >= 1;
+        next.lowIsCorner = portal.lowIsRim;
+        next.highIsCorner = first >= 1 && portal.highIsRim;
         push(next);
       }
       if (last < 1 && interval.highIsCorner) {
         next.root = interval.high;
         next.toRoot = interval.toRoot + length(toHigh);
         next.low = at(last), next.high = portal.high;
-        next.lowIsCorner = last <= 0, next.highIsCorner = true;
+        next.lowIsCorner = last <= 0 && portal.lowIsRim;
+        next.highIsCorner = portal.highIsRim;
         push(next);
       }
     }
