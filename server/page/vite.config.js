@@ -5,27 +5,27 @@ import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import { defineConfig } from "vite";
 
-const path = (relative) => fileURLToPath(new URL(relative, import.meta.url));
+const toPath = (relative) => fileURLToPath(new URL(relative, import.meta.url));
 
 /** Writes the licences of all bundled packages to licenses.txt. A package without one ends the build. */
-function licenses() {
+function collectLicenses() {
   const packages = new Map();
   const remember = (module) => {
     const found = /^(.*\/node_modules\/((?:@[^/]+\/)?[^/]+))\//.exec(module.replaceAll("\\", "/"));
     if (found) packages.set(found[2], found[1]);
   };
-  const textOf = (folder) => {
+  const readLicense = (folder) => {
     const name = readdirSync(folder).find((file) => /^licen[cs]e/i.test(file));
     if (name) return readFileSync(join(folder, name), "utf8").trim();
     const { license } = JSON.parse(readFileSync(join(folder, "package.json"), "utf8"));
     // Packages of the Buf project name Apache-2.0 without the text, which is that of this repository. Sources of other
     // owners have their licence in the file.
     if (!/Apache-2\.0/.test(license)) throw new Error(`${folder} has no licence`);
-    const apache = readFileSync(path("../../LICENSE"), "utf8").trim();
-    return [apache, ...noticesIn(folder)].join("\n\n");
+    const apache = readFileSync(toPath("../../LICENSE"), "utf8").trim();
+    return [apache, ...findNotices(folder)].join("\n\n");
   };
   const modules = new Set();
-  const noticesIn = (folder) => new Set([...modules].filter((module) => module.startsWith(folder)).flatMap((module) => {
+  const findNotices = (folder) => new Set([...modules].filter((module) => module.startsWith(folder)).flatMap((module) => {
     const head = /^(?:\/\/.*\n)+/.exec(readFileSync(module, "utf8"))?.[0] ?? "";
     return head.includes("Redistribution and use") ? [head.replace(/^\/\/ ?/gm, "").trim()] : [];
   }));
@@ -41,7 +41,7 @@ function licenses() {
       }
       const parts = [...packages].sort().map(([name, folder]) => {
         const { version, license } = JSON.parse(readFileSync(join(folder, "package.json"), "utf8"));
-        return `${name} ${version} (${license})\n\n${textOf(folder)}\n`;
+        return `${name} ${version} (${license})\n\n${readLicense(folder)}\n`;
       });
       const line = `\n${"-".repeat(80)}\n\n`;
       this.emitFile({
@@ -53,27 +53,27 @@ function licenses() {
 }
 
 /** The client lies outside this folder: its packages are those of the page. */
-function clientPackages() {
+function resolveClientPackages() {
   return {
     name: "client-packages",
     enforce: "pre",
     resolveId(name, importer) {
       if (importer !== client || !name.startsWith("@bufbuild/")) return null;
-      return this.resolve(name, path("src/client.ts"), { skipSelf: true });
+      return this.resolve(name, toPath("src/client.ts"), { skipSelf: true });
     },
   };
 }
 
-const out = process.env.ENFILADE_PAGE_OUT || path("../../build/page");
-const client = path("../../protocol/clients/javascript/enfilade.js");
-const protobuf = path("node_modules/@bufbuild/protobuf");
-if (!existsSync(protobuf)) throw new Error(`run npm ci in ${dirname(path("package.json"))} first`);
+const out = process.env.ENFILADE_PAGE_OUT || toPath("../../build/page");
+const client = toPath("../../protocol/clients/javascript/enfilade.js");
+const protobuf = toPath("node_modules/@bufbuild/protobuf");
+if (!existsSync(protobuf)) throw new Error(`run npm ci in ${dirname(toPath("package.json"))} first`);
 
 /** The page of a server: hashed files below /page/. */
 const served = {
   outDir: out,
   rollupOptions: {
-    input: { index: path("index.html"), enfilade: path("src/client.ts") },
+    input: { index: toPath("index.html"), enfilade: toPath("src/client.ts") },
     // The client is an interface for other pages: its name is stable, and its exports stay.
     preserveEntrySignatures: "exports-only",
     output: {
@@ -87,7 +87,7 @@ const replay = {
   outDir: join(out, "replay"),
   cssCodeSplit: false,
   rollupOptions: {
-    input: path("src/replay.ts"),
+    input: toPath("src/replay.ts"),
     output: { format: "iife", entryFileNames: "replay.js", assetFileNames: "replay.[ext]", inlineDynamicImports: true },
   },
 };
@@ -106,9 +106,9 @@ export default defineConfig(({ mode }) => ({
     alias: [
       { find: "enfilade-client", replacement: client },
       // Only Node.js uses these two; no browser reaches them.
-      { find: "ws", replacement: path("src/absent.ts") },
-      { find: "node:fs/promises", replacement: path("src/absent.ts") },
+      { find: "ws", replacement: toPath("src/absent.ts") },
+      { find: "node:fs/promises", replacement: toPath("src/absent.ts") },
     ],
   },
-  plugins: [clientPackages(), licenses()],
+  plugins: [resolveClientPackages(), collectLicenses()],
 }));

@@ -155,6 +155,9 @@ bool isHeader(const std::string& path) {
 bool isCode(const std::string& path) {
   return isHeader(path) || endsWith(path, ".cpp");
 }
+bool isScript(const std::string& path) {
+  return endsWith(path, ".ts") || endsWith(path, ".js") || endsWith(path, ".mjs");
+}
 bool isGeneratedMessage(const std::string& path) {
   return endsWith(path, ".pb.h");
 }
@@ -434,10 +437,12 @@ Faults oddWords(const Sources& sources) {
 }
 
 Faults nounFunctions(const Sources& sources) {
-  static const std::regex noun(R"(\b([a-z]\w*Of)(?:<[^<>()]*>)?\()");
+  // JavaScript itself names two methods of strings and arrays so.
+  static const std::regex noun(R"(\b(?!(?:i|lastI)ndexOf\b)([a-z]\w*Of)(?:<[^<>()]*>)?\()");
   Faults faults;
   for (const auto& [path, text] : sources) {
-    if (!isCode(path) || kMayInclude.count(path.substr(0, path.find('/'))) == 0) continue;
+    const bool isProduct = kMayInclude.count(path.substr(0, path.find('/'))) != 0;
+    if (!isScript(path) && !(isCode(path) && isProduct)) continue;
     forEachLine(text, [&, &name = path](int number, const std::string& line) {
       for (std::sregex_iterator it(line.begin(), line.end(), noun), end; it != end; ++it)
         faults.push_back(at(name, number) + ": " + (*it)[1].str() +

@@ -52,8 +52,9 @@ Faults crowdedFolders(const Sources& sources, int maxFiles);
 /// named kMax.. and kMin.., not kMost.., kLeast.. and kLargest...
 Faults oddWords(const Sources& sources);
 
-/// Functions of the product that are named by a noun, as `areaOf()`. The convention is verb + noun:
-/// `getArea()`, `findArea()`, `computeArea()`. Comments count.
+/// Functions of the product, and of all scripts for browsers and Node.js, that are named by a noun,
+/// as `areaOf()`. The convention is verb + noun: `getArea()`, `findArea()`, `computeArea()`.
+/// Comments count.
 Faults nounFunctions(const Sources& sources);
 
 /// Each kind of diagnostic that scene/ reports is in scene/model/diagnostic_catalog.cpp.

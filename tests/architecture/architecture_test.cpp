@@ -204,11 +204,15 @@ TEST(ArchitectureRules, AFunctionNamedByANounIsAFault) {
        "double areaOf(const Box& box);\n/// As bodyOf().\nauto all = box.cornersOf<3>(sizeof(x));\n"
        "int at = entry.partOf, out_of(3), byIndexOfBody(2), TypeOf(1);\n"},
       {"scene/model/a.py", "areaOf(box)\n"},
+      {"server/page/src/a.ts", "text.indexOf(a.lastIndexOf(b));\nthis.#treeOf(mesh);\n"},
+      {"tests/page/a_test.mjs", "const place = async () => placeOf(1);\n"},
       {"tests/scene/a_test.cpp", "areaOf(box);\n"}};
   const std::string remedy = "(); name it by a verb, as get.., find.., compute.. or make..";
-  EXPECT_EQ(nounFunctions(sources),
-            (Faults{"scene/model/a.cpp:1: areaOf" + remedy, "scene/model/a.cpp:2: bodyOf" + remedy,
-                    "scene/model/a.cpp:3: cornersOf" + remedy}));
+  EXPECT_EQ(
+      nounFunctions(sources),
+      (Faults{"scene/model/a.cpp:1: areaOf" + remedy, "scene/model/a.cpp:2: bodyOf" + remedy,
+              "scene/model/a.cpp:3: cornersOf" + remedy, "server/page/src/a.ts:2: treeOf" + remedy,
+              "tests/page/a_test.mjs:1: placeOf" + remedy}));
 }
 
 TEST(ArchitectureRules, ATestsFileUnderASharedNameIsAFault) {

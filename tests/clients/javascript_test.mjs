@@ -10,7 +10,7 @@ import { after, before, test } from "node:test";
 import { connect, ConnectionFailed, pixels, ServerError } from "../../protocol/clients/javascript/enfilade.js";
 
 // A floor, and a wall at x = 5.
-function box(name, [x0, y0, z0], [x1, y1, z1], first) {
+function makeBox(name, [x0, y0, z0], [x1, y1, z1], first) {
   const corners = [];
   for (let i = 0; i < 8; ++i)
     corners.push(`v ${i & 1 ? x1 : x0} ${i & 2 ? y1 : y0} ${i & 4 ? z1 : z0}`);
@@ -24,8 +24,8 @@ let folder, server, port;
 before(async () => {
   folder = mkdtempSync(join(tmpdir(), "enfilade-js-"));
   const scene = join(folder, "room.obj");
-  writeFileSync(scene, box("floor", [-10, -0.5, -10], [10, 0, 10], 1) +
-    box("wall", [5, 0, -4], [5.2, 3, 4], 9));
+  writeFileSync(scene, makeBox("floor", [-10, -0.5, -10], [10, 0, 10], 1) +
+    makeBox("wall", [5, 0, -4], [5.2, 3, 4], 9));
   server = spawn(process.env.ENFILADE, ["serve", scene, "--listen", "127.0.0.1:0",
     "--stop-at-end-of-input"], { stdio: ["pipe", "pipe", "inherit"] });
   const ready = await new Promise((resolve, reject) => {

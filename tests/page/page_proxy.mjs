@@ -21,12 +21,12 @@ export function startProxy(page, scene, serverPort, port = 0) {
     if (pathname === "/") return send(reply, join(page, "index.html"));
     if (pathname === "/scene.glb") return send(reply, scene);
     if (pathname.startsWith("/page/")) return send(reply, join(page, normalize(pathname.slice(5))));
-    const upstream = connect(serverPort, "127.0.0.1", () => upstream.write(headOf(request, serverPort)));
+    const upstream = connect(serverPort, "127.0.0.1", () => upstream.write(makeHead(request, serverPort)));
     upstream.on("error", () => reply.destroy());
     upstream.pipe(reply.socket);
   });
   server.on("upgrade", (request, socket) => {
-    const upstream = connect(serverPort, "127.0.0.1", () => upstream.write(headOf(request, serverPort)));
+    const upstream = connect(serverPort, "127.0.0.1", () => upstream.write(makeHead(request, serverPort)));
     upstream.on("error", () => socket.destroy());
     socket.on("error", () => upstream.destroy());
     upstream.pipe(socket).pipe(upstream);
@@ -35,7 +35,7 @@ export function startProxy(page, scene, serverPort, port = 0) {
 }
 
 /** The request's head for the server, which admits only its own address as host and origin. */
-function headOf(request, port) {
+function makeHead(request, port) {
   const own = `127.0.0.1:${port}`;
   const lines = [`${request.method} ${request.url} HTTP/1.1`];
   for (const [name, value] of Object.entries(request.headers)) {

@@ -49,7 +49,7 @@ async function startServer(what, { port = 0, args = [] } = {}) {
 }
 
 /** The address of the page: the server's own, or a proxy's. */
-async function addressOf(server) {
+async function findAddress(server) {
   const own = `http://127.0.0.1:${server.port}/`;
   const reply = await fetch(own).catch(() => null);
   if (reply?.ok && (await reply.text()).includes("<title>Enfilade")) return own;
@@ -126,14 +126,14 @@ const tests = {
         await new Promise((resolve) => setTimeout(resolve, 400));
         const rays = Array.from({ length: 50 }, () => {
           const [x, y] = [random() * width, random() * height];
-          const { origin, direction } = enfilade.rayThrough(x, y);
+          const { origin, direction } = enfilade.computeRay(x, y);
           return { x, y, origin: { ...origin }, direction: { ...direction } };
         });
         const { hits } = await app.connection.request("rays", { rays: rays.map(({ origin, direction }) => ({ origin, direction })) });
         hits.forEach((hit, index) => {
           const picked = enfilade.pick(rays[index].x, rays[index].y);
           met += hit.met ? 1 : 0;
-          if ((picked?.entity ?? 0) !== hit.entity) differences.push(`${hit.name} at ${hit.distance}, page: ${picked?.entity} ${app.table.nameOf(picked?.entity)}`);
+          if ((picked?.entity ?? 0) !== hit.entity) differences.push(`${hit.name} at ${hit.distance}, page: ${picked?.entity} ${app.table.findName(picked?.entity)}`);
         });
       }
       return { differences, met };
@@ -186,7 +186,7 @@ const tests = {
     await page.mouse.click(canvas.x + canvas.width * 0.6, canvas.y + canvas.height * 0.5);
     await page.waitForFunction(() => enfilade.app.selection > 0);
     const { path, card } = await page.evaluate(() => ({
-      path: enfilade.app.table.nameOf(enfilade.app.selection), card: document.querySelector(".card").innerText,
+      path: enfilade.app.table.findName(enfilade.app.selection), card: document.querySelector(".card").innerText,
     }));
     assert.ok(card.includes(path), `the card names ${path}`);
     await page.waitForFunction(() => /Touches (now|nothing)/.test(document.querySelector(".card h3").textContent));
@@ -255,7 +255,7 @@ const tests = {
         origin: { ...feet, y: feet.y + 1 }, direction: { x: Math.cos(i * Math.PI / 12), y: 0, z: -Math.sin(i * Math.PI / 12) },
       }));
       const { hits } = await app.connection.request("rays", { rays, throughAvatar: walk.name });
-      const distance = ({ met, entity, distance }) => (met && !app.table.bodyOf.has(entity) ? distance : Infinity);
+      const distance = ({ met, entity, distance }) => (met && !app.table.bodyByObject.has(entity) ? distance : Infinity);
       const nearest = hits.indexOf(hits.toSorted((a, b) => distance(a) - distance(b))[0]);
       rig.look(nearest * Math.PI / 12 - rig.yaw, -rig.pitch);
     });
@@ -379,7 +379,7 @@ async function testLive() {
   const record = join(scratch, "walk.mcap");
   const args = ["--near-miss", "0.1", "--record", record];
   const first = await startServer(options.scene, { args });
-  const address = await addressOf(first);
+  const address = await findAddress(first);
   const page = await openPage(address);
   await isReady(page);
   await page.waitForTimeout(1500);
@@ -397,7 +397,7 @@ async function testLive() {
 
 async function testReplay(record) {
   const server = await startServer(record);
-  const page = await openPage(await addressOf(server), { width: 1100, height: 700 });
+  const page = await openPage(await findAddress(server), { width: 1100, height: 700 });
   await isReady(page);
   let marked = 0;
   await run("all events have a mark before the recording plays", async () => {
@@ -420,7 +420,7 @@ async function testReplay(record) {
     assert.deepEqual(once, again);
     const drawn = await page.evaluate(async () => {
       await new Promise((resolve) => setTimeout(resolve, 500));
-      return enfilade.app.state.avatars().map(({ state, feet }) => [state.name, feet.x, feet.y, feet.z]);
+      return enfilade.app.state.getAvatars().map(({ state, feet }) => [state.name, feet.x, feet.y, feet.z]);
     });
     assert.deepEqual(drawn, again);
   });
@@ -463,7 +463,7 @@ async function testSharedScene(name, file, check) {
     return console.log(`skip ${name}: ${path} is missing`);
   }
   const server = await startServer(path);
-  const page = await openPage(await addressOf(server));
+  const page = await openPage(await findAddress(server));
   const start = Date.now();
   await isReady(page);
   const seconds = ((Date.now() - start) / 1000).toFixed(1);
@@ -497,7 +497,7 @@ async function testOpenScan() {
     "element face 2", "property list uchar int vertex_indices", "property uchar red", "property uchar green", "property uchar blue", "end_header",
     ...corners.map((corner) => corner.join(" ")), "4 0 1 2 3 90 90 90", "4 0 4 5 1 20 160 60", ""].join("\n"));
   const server = await startServer(file);
-  const page = await openPage(await addressOf(server));
+  const page = await openPage(await findAddress(server));
   await isReady(page);
   await run("a scan that is open to the sides is in view", async () => {
     const forward = await page.evaluate(() => enfilade.app.view.camera.matrixWorld.elements.slice(8, 11).map((x) => -x));
@@ -514,16 +514,16 @@ async function testTouch() {
   const context = await browser.newContext({ viewport: { width: 1024, height: 768 }, hasTouch: true });
   const page = await context.newPage();
   page.setDefaultTimeout(LONG);
-  await page.goto(await addressOf(server));
+  await page.goto(await findAddress(server));
   await isReady(page);
   await run("touch walks and looks, and a button jumps", async () => {
     await page.getByRole("button", { name: "Walk", exact: true }).tap();
     await page.waitForFunction(() => enfilade.walk.isWalking && enfilade.app.avatarState(enfilade.walk.name)?.grounded);
-    const placeOf = () => page.evaluate(() => {
+    const getPlace = () => page.evaluate(() => {
       const { feet } = enfilade.app.avatarState(enfilade.walk.name);
       return { ...feet, yaw: enfilade.rig.yaw };
     });
-    const before = await placeOf();
+    const before = await getPlace();
     const drag = (from, to, milliseconds) => page.evaluate(async ([[x0, y0], [x1, y1], wait]) => {
       const { canvas } = enfilade.app.view;
       const box = canvas.getBoundingClientRect();
@@ -536,10 +536,10 @@ async function testTouch() {
       send("pointerup", x1, y1);
     }, [from, to, milliseconds]);
     await drag([0.25, 0.6], [0.25, 0.45], 1500);
-    const walked = await placeOf();
+    const walked = await getPlace();
     assert.ok(Math.hypot(walked.x - before.x, walked.z - before.z) > 0.3, `from ${JSON.stringify(before)} to ${JSON.stringify(walked)}`);
     await drag([0.75, 0.5], [0.6, 0.5], 100);
-    const looked = await placeOf();
+    const looked = await getPlace();
     assert.ok(Math.abs(looked.yaw - walked.yaw) > 0.05, `${walked.yaw} to ${looked.yaw}`);
     const jump = page.getByRole("button", { name: "Jump" });
     if (await jump.isVisible()) {
@@ -561,7 +561,7 @@ async function testWithoutWebGl() {
       return kind === "webgl2" ? null : getContext.call(this, kind, ...more);
     };
   });
-  await page.goto(await addressOf(server));
+  await page.goto(await findAddress(server));
   await run("without WebGL 2 the page says so", () => page.getByRole("alert").filter({ hasText: "WebGL 2" }).waitFor());
   await page.close();
   await server.stop();
@@ -571,7 +571,7 @@ async function testToken() {
   const tokens = join(scratch, "tokens");
   writeFileSync(tokens, "observe see-only-0123456789\ndrive may-walk-0123456789\n", { mode: 0o600 });
   const server = await startServer(options.scene, { args: ["--token-file", tokens] });
-  const page = await openPage(await addressOf(server));
+  const page = await openPage(await findAddress(server));
   await run("a token is asked for, and its role is respected", async () => {
     const field = page.getByPlaceholder("Token");
     await field.fill("wrong-token-00000");

@@ -47,7 +47,7 @@ function count(document) {
 const BOX = 12; // triangles
 
 /** Paths of triggers, which are not drawn. All triggers of these scenes are boxes. */
-function triggersOf(inspected) {
+function findTriggers(inspected) {
   return new Set(inspected.bodies.filter(({ kind }) => kind === "trigger").flatMap(({ objects }) => objects));
 }
 
@@ -59,7 +59,7 @@ async function test(scene) {
   assert.deepEqual(issues.messages.filter(({ severity }) => severity === 0), [], "errors of the validator");
   const { ids, triangles } = count(await reader.readBinary(new Uint8Array(bytes)));
   const inspected = run("inspect", scene, "--objects", "--json");
-  const triggers = triggersOf(inspected);
+  const triggers = findTriggers(inspected);
   assert.equal(triangles, inspected.triangles - BOX * triggers.size, "triangles");
   assert.equal(written.triangles, triangles);
   const wanted = inspected.object_list.filter(({ path }) => !triggers.has(path)).map(({ id }) => id);

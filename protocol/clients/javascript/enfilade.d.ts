@@ -40,7 +40,7 @@ export interface ConnectOptions {
 }
 
 export function loadSchemas(): Promise<Schemas>;
-export function schemasOf(registry: object): Schemas;
+export function makeSchemas(registry: object): Schemas;
 export function connect(url: string, options?: ConnectOptions): Promise<Client>;
 export function pixels(frame: any, attachment: Uint8Array): Record<string, ArrayBufferView>;
 

@@ -29,18 +29,18 @@ export async function loadSchemas() {
   const bytes = where.protocol === "file:"
     ? new Uint8Array(await (await import("node:fs/promises")).readFile(where))
     : new Uint8Array(await (await fetch(where)).arrayBuffer());
-  return schemasOf(createFileRegistry(fromBinary(FileDescriptorSetSchema, bytes)));
+  return makeSchemas(createFileRegistry(fromBinary(FileDescriptorSetSchema, bytes)));
 }
 
 /** The same of a registry that a program has already, for example from generated code. */
-export function schemasOf(registry) {
+export function makeSchemas(registry) {
   const prefix = "enfilade.v1.";
   return new Proxy({}, {
     get: (_, name) => registry.getMessage(prefix + name) ?? registry.getEnum(prefix + name),
   });
 }
 
-async function webSocketClass() {
+async function loadWebSocketClass() {
   if (globalThis.WebSocket) return globalThis.WebSocket;
   return (await import("ws")).WebSocket; // Node.js before version 22
 }
@@ -55,7 +55,7 @@ export async function connect(
   url, { name = "enfilade javascript", token = "", world = "main", on = {}, schemas } = {},
 ) {
   schemas ??= await loadSchemas();
-  const Socket = await webSocketClass();
+  const Socket = await loadWebSocketClass();
   const socket = new Socket(url);
   socket.binaryType = "arraybuffer";
   await new Promise((resolve, reject) => {
@@ -182,16 +182,16 @@ export class Client {
       const waiting = this.#waiting.get(message.replyTo);
       this.#waiting.delete(message.replyTo);
       const refused = what === "error" ? value : what === "command" && !value.accepted && value.error;
-      if (refused) waiting?.reject(this.#errorOf(refused));
+      if (refused) waiting?.reject(this.#makeError(refused));
       else waiting?.resolve({ body: value, attachment });
       return;
     }
-    if (what === "error") this.#end(this.#errorOf(value, true));
-    if (what === "bye") this.#end(this.#errorOf({ code: value.code, message: value.reason }, true));
+    if (what === "error") this.#end(this.#makeError(value, true));
+    if (what === "bye") this.#end(this.#makeError({ code: value.code, message: value.reason }, true));
     this.#on[what]?.(value, attachment);
   }
 
-  #errorOf(error, fatal = false) {
+  #makeError(error, fatal = false) {
     const code = this.#schemas.ErrorCode.value[error.code]?.name ?? `ERROR_${error.code}`;
     return new ServerError(code, error.message, error.field, fatal);
   }

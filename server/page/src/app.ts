@@ -134,7 +134,7 @@ export class App {
     const gltf = await parseScene(bytes);
     const table = new EntityTable();
     for (const body of scene.bodies) {
-      for (const object of body.objects) table.bodyOf.set(object, body.id);
+      for (const object of body.objects) table.bodyByObject.set(object, body.id);
     }
     readEntities(gltf, table);
     await table.complete(this.connection, scene.objects);

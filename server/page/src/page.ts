@@ -3,15 +3,15 @@ import { App } from "./app";
 import { Avatars } from "./view/avatars";
 import { CameraRig } from "./view/camera_rig";
 import { Contacts } from "./panels/contacts";
-import { button, element, isTyping, setText } from "./panels/dom";
+import { isTyping, makeButton, makeElement, setText } from "./panels/dom";
 import { Input } from "./walk/input";
 import { MetricsPanel } from "./panels/metrics";
 import { Minimap } from "./panels/minimap";
 import { renderIds } from "./view/offscreen";
 import { makeHelp, makeTabs, makeToasts, makeTroubleDialog, type Tab } from "./panels/panel";
 import { People } from "./panels/people";
-import { Card, pick, rayThrough } from "./panels/pick";
-import { readSharedView, shareLink } from "./panels/share";
+import { Card, computeRay, pick } from "./panels/pick";
+import { makeShareLink, readSharedView } from "./panels/share";
 import type { MakeSource } from "./world/source";
 import { proposeStarts } from "./walk/start_place";
 import "./style.css";
@@ -41,18 +41,18 @@ function begin({ makeSource, rememberToken, furtherTabs }: PageOptions): void {
   const minimap = new Minimap(app, rig, walk);
   const timeline = new Timeline(app, walk);
 
-  const title = element("span", { class: "scene-name" });
-  const walkButton = button("Walk", () => (walk.isWalking ? walk.leave() : void walk.start()), { class: "primary" });
-  const flyButton = button("Fly", () => walk.act("fly"), { title: "Fly (F)" });
-  const crouchButton = button("Crouch", () => walk.act("crouch"), { title: "Crouch (C)" });
+  const title = makeElement("span", { class: "scene-name" });
+  const walkButton = makeButton("Walk", () => (walk.isWalking ? walk.leave() : void walk.start()), { class: "primary" });
+  const flyButton = makeButton("Fly", () => walk.act("fly"), { title: "Fly (F)" });
+  const crouchButton = makeButton("Crouch", () => walk.act("crouch"), { title: "Crouch (C)" });
   // Touch screens have no space bar.
-  const jumpButton = button("Jump", () => walk.act("jump"), { class: "touch-only" });
-  const viewButton = button("Third person", () => toggleView(), { title: "First or third person (V)" });
-  const header = element(
+  const jumpButton = makeButton("Jump", () => walk.act("jump"), { class: "touch-only" });
+  const viewButton = makeButton("Third person", () => toggleView(), { title: "First or third person (V)" });
+  const header = makeElement(
     "header", { class: "top" },
-    element("strong", {}, "Enfilade"), title, element("span", { class: "spacer" }), walkButton, jumpButton, flyButton, crouchButton, viewButton,
-    button("Screenshot", () => void saveScreenshot(), { title: "Save the picture" }),
-    button("Share", () => void share(), { title: "Copy a link to this view", hidden: isFile }),
+    makeElement("strong", {}, "Enfilade"), title, makeElement("span", { class: "spacer" }), walkButton, jumpButton, flyButton, crouchButton, viewButton,
+    makeButton("Screenshot", () => void saveScreenshot(), { title: "Save the picture" }),
+    makeButton("Share", () => void share(), { title: "Copy a link to this view", hidden: isFile }),
   );
   const panel = makeTabs([
     { name: "Objects", content: new Tree(app).root }, { name: "Contacts", content: contacts.root },
@@ -61,14 +61,14 @@ function begin({ makeSource, rememberToken, furtherTabs }: PageOptions): void {
     ...(furtherTabs?.(app, timeline) ?? []),
     { name: "Keys", content: makeHelp(isFile) },
   ]);
-  const fold = button("☰", () => document.body.classList.toggle("folded"), { class: "fold", label: "Show or hide the panel" });
+  const fold = makeButton("☰", () => document.body.classList.toggle("folded"), { class: "fold", label: "Show or hide the panel" });
   header.append(fold);
   const trouble = makeTroubleDialog(app, (token) => {
     rememberToken?.(token);
     app.connection.token = token;
     void app.connection.open();
   });
-  const stage = element("main", { class: "stage" }, view.canvas, contacts.labels, card.root, minimap.root, makeToasts(app), trouble);
+  const stage = makeElement("main", { class: "stage" }, view.canvas, contacts.labels, card.root, minimap.root, makeToasts(app), trouble);
   view.canvas.setAttribute("aria-label", "View of the scene");
   document.body.append(header, stage, panel, timeline.root);
 
@@ -88,13 +88,13 @@ function begin({ makeSource, rememberToken, furtherTabs }: PageOptions): void {
   }
 
   async function saveScreenshot(): Promise<void> {
-    const link = element("a", { href: URL.createObjectURL(await view.screenshot()), download: `enfilade-tick-${app.tick}.png` });
+    const link = makeElement("a", { href: URL.createObjectURL(await view.screenshot()), download: `enfilade-tick-${app.tick}.png` });
     link.click();
     setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
   }
 
   async function share(): Promise<void> {
-    const link = shareLink(rig, app.tick);
+    const link = makeShareLink(rig, app.tick);
     history.replaceState(null, "", link);
     try {
       await navigator.clipboard.writeText(link);
@@ -153,7 +153,7 @@ function begin({ makeSource, rememberToken, furtherTabs }: PageOptions): void {
     enfilade: {
       app, rig, walk, contacts, timeline,
       pick: (x: number, y: number) => pick(app, avatars, x, y),
-      rayThrough: (x: number, y: number) => rayThrough(app, x, y),
+      computeRay: (x: number, y: number) => computeRay(app, x, y),
       ids: (width: number, height: number) => renderIds(view.renderer, app.model!, view.camera, width, height),
     },
   });
@@ -167,6 +167,6 @@ export function startPage(options: PageOptions): void {
     const text = error instanceof NoWebGl
       ? "This browser offers no WebGL 2, which the page needs to draw. Enable hardware acceleration, or use a current Firefox, Chrome, Edge or Safari."
       : `The page could not start: ${(error as Error).message}`;
-    document.body.append(element("p", { class: "trouble", role: "alert" }, text));
+    document.body.append(makeElement("p", { class: "trouble", role: "alert" }, text));
   }
 }

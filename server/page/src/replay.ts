@@ -1,7 +1,7 @@
 // The page of a recording in one file. Its data are blocks in the file: base64, compressed by gzip.
 import type { App } from "./app";
-import { button, element } from "./panels/dom";
-import { clockTime } from "./panels/format";
+import { makeButton, makeElement } from "./panels/dom";
+import { formatTime } from "./panels/format";
 import { startPage } from "./page";
 import type { Tab } from "./panels/panel";
 import { RecordedWorld, splitMessages } from "./world/recorded_world";
@@ -15,52 +15,52 @@ interface Picture {
   data: string; // base64
 }
 
-function textOf(name: string): string {
+function readBlock(name: string): string {
   const block = document.getElementById(`enfilade-${name}`);
   if (!block) throw new Error(`The file is damaged: it has no block '${name}'.`);
   return block.textContent ?? "";
 }
 
 async function unpack(name: string): Promise<ArrayBuffer> {
-  const packed = Uint8Array.from(atob(textOf(name).trim()), (character) => character.charCodeAt(0));
+  const packed = Uint8Array.from(atob(readBlock(name).trim()), (character) => character.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("gzip"));
   return await new Response(stream).arrayBuffer();
 }
 
 function makePictures(pictures: Picture[], timeline: Timeline): Tab {
-  const enlarged = element("img", { class: "picture", alt: "", hidden: true });
-  const list = element("ul", { class: "pictures", label: "Recorded pictures" });
+  const enlarged = makeElement("img", { class: "picture", alt: "", hidden: true });
+  const list = makeElement("ul", { class: "pictures", label: "Recorded pictures" });
   for (const { avatar, tick, time, format, data } of pictures) {
-    const name = `${avatar}, ${clockTime(time)}`;
-    const image = element("img", { src: `data:image/${format};base64,${data}`, alt: name, loading: "lazy" });
+    const name = `${avatar}, ${formatTime(time)}`;
+    const image = makeElement("img", { src: `data:image/${format};base64,${data}`, alt: name, loading: "lazy" });
     const show = () => {
       timeline.goToTick(tick);
       enlarged.src = image.src;
       enlarged.alt = name;
       enlarged.hidden = false;
     };
-    const row = button("", show, { title: `Go to ${clockTime(time)}` });
-    row.append(image, element("span", {}, name));
-    list.append(element("li", {}, row));
+    const row = makeButton("", show, { title: `Go to ${formatTime(time)}` });
+    row.append(image, makeElement("span", {}, name));
+    list.append(makeElement("li", {}, row));
   }
-  return { name: "Pictures", content: element("div", { class: "stack" }, enlarged, list) };
+  return { name: "Pictures", content: makeElement("div", { class: "stack" }, enlarged, list) };
 }
 
 function makeAbout(about: [string, string][]): Tab {
   return {
     name: "About",
-    content: element(
+    content: makeElement(
       "div", { class: "stack" },
-      element("dl", { class: "facts" }, ...about.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)])),
-      element("details", {}, element("summary", {}, "Licences of the packages in this page"), element("pre", { class: "licences" }, textOf("licenses"))),
+      makeElement("dl", { class: "facts" }, ...about.flatMap(([name, value]) => [makeElement("dt", {}, name), makeElement("dd", {}, value)])),
+      makeElement("details", {}, makeElement("summary", {}, "Licences of the packages in this page"), makeElement("pre", { class: "licences" }, readBlock("licenses"))),
     ),
   };
 }
 
 async function begin(): Promise<void> {
   const messages = splitMessages(new Uint8Array(await unpack("messages")));
-  const pictures = JSON.parse(textOf("pictures")) as Picture[];
-  const about = JSON.parse(textOf("about")) as [string, string][];
+  const pictures = JSON.parse(readBlock("pictures")) as Picture[];
+  const about = JSON.parse(readBlock("about")) as [string, string][];
   startPage({
     makeSource: (listener) => new RecordedWorld(listener, messages, () => unpack("scene")),
     furtherTabs: (_app: App, timeline) => [
@@ -70,5 +70,5 @@ async function begin(): Promise<void> {
 }
 
 begin().catch((error: Error) => {
-  document.body.append(element("p", { class: "trouble", role: "alert" }, `The recording cannot be shown: ${error.message}`));
+  document.body.append(makeElement("p", { class: "trouble", role: "alert" }, `The recording cannot be shown: ${error.message}`));
 });

@@ -9,10 +9,10 @@ import { mkdirSync, readFileSync, writeFileSync } from "node:fs";
 import { basename } from "node:path";
 import { fileURLToPath } from "node:url";
 
-const path = (relative) => fileURLToPath(new URL(relative, import.meta.url));
+const toPath = (relative) => fileURLToPath(new URL(relative, import.meta.url));
 const descriptors = fromBinary(
   FileDescriptorSetSchema,
-  readFileSync(path("../../../protocol/clients/python/enfilade/messages.desc")),
+  readFileSync(toPath("../../../protocol/clients/python/enfilade/messages.desc")),
 );
 const source = descriptors.file.find((file) => basename(file.name) === "enfilade.proto");
 if (!source) throw new Error("messages.desc does not contain enfilade.proto");
@@ -21,14 +21,14 @@ source.name = "enfilade.proto";
 const request = toBinary(CodeGeneratorRequestSchema, create(CodeGeneratorRequestSchema, {
   fileToGenerate: [source.name], parameter: "target=ts", protoFile: descriptors.file,
 }));
-const generator = spawnSync(process.execPath, [path("../node_modules/@bufbuild/protoc-gen-es/bin/protoc-gen-es")], {
+const generator = spawnSync(process.execPath, [toPath("../node_modules/@bufbuild/protoc-gen-es/bin/protoc-gen-es")], {
   input: request, maxBuffer: 1 << 26,
 });
 if (generator.status !== 0) throw new Error(`protoc-gen-es failed: ${generator.stderr}`);
 const response = fromBinary(CodeGeneratorResponseSchema, generator.stdout);
 if (response.error) throw new Error(response.error);
 
-mkdirSync(path("../src/generated"), { recursive: true });
+mkdirSync(toPath("../src/generated"), { recursive: true });
 for (const file of response.file) {
-  writeFileSync(path(`../src/generated/${basename(file.name)}`), file.content);
+  writeFileSync(toPath(`../src/generated/${basename(file.name)}`), file.content);
 }

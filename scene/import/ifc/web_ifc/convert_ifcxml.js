@@ -10,7 +10,7 @@ import { createRequire } from 'node:module';
 
 import { IfcSchema } from './ifc_schema.js';
 import { IfcXmlConverter, XmlError } from './ifcxml_converter.js';
-import { IFC_FILE, readBlock, sendMessage, sendProgress, words } from './worker_io.js';
+import { IFC_FILE, packWords, readBlock, sendMessage, sendProgress } from './worker_io.js';
 
 const { SaxesParser } = createRequire(import.meta.url)('saxes');
 
@@ -61,7 +61,7 @@ class ProblemList {
 
   send() {
     for (const [kind, { count, example }] of this.kinds)
-      sendMessage('W', [words(count), Buffer.from(`${kind}\n${example}`)]);
+      sendMessage('W', [packWords(count), Buffer.from(`${kind}\n${example}`)]);
   }
 }
 
@@ -83,8 +83,8 @@ function makeParser(problems) {
     state.converter.open(tag, parser.line);
   });
   parser.on('closetag', () => state.converter.close(parser.line));
-  parser.on('text', (text) => state.converter?.text(text));
-  parser.on('cdata', (text) => state.converter?.text(text));
+  parser.on('text', (text) => state.converter?.addText(text));
+  parser.on('cdata', (text) => state.converter?.addText(text));
   return state;
 }
 

@@ -27,7 +27,7 @@ function readDeclarations(release) {
   return { classes, unions };
 }
 
-function primitiveOf(code, name) {
+function findPrimitive(code, name) {
   if (name === 'IfcBoolean') return 'boolean';
   if (name === 'IfcLogical') return 'logical';
   return { [STRING]: 'string', [REAL]: 'real', [INTEGER]: 'integer', [BINARY]: 'binary' }[code];
@@ -60,7 +60,7 @@ export class IfcSchema {
 
   // {name, attributes: [{name, type} or null where the value is derived], positions, inverses};
   // undefined: no entity has this name.
-  entity(name) {
+  findEntity(name) {
     if (!this.entities.has(name)) this.entities.set(name, this.makeEntity(name));
     return this.entities.get(name);
   }
@@ -76,28 +76,28 @@ export class IfcSchema {
     const attributes = list.trim() === '' ? [] : splitOutermost(list).map((text) => {
       const attribute = /\bi\.(\w+)/.exec(text)?.[1];
       if (attribute === undefined) return null;
-      return { name: attribute, type: this.attributeType(types.get(attribute)) };
+      return { name: attribute, type: this.readAttributeType(types.get(attribute)) };
     });
     const positions = new Map(attributes.map((attribute, i) => [attribute?.name, i]));
     const inverses = new Map();
     for (const [inverse, relation, position] of this.web.InversePropertyDef[this.index][code] ?? [])
-      inverses.set(inverse, { relation: this.nameOf(relation), position });
+      inverses.set(inverse, { relation: this.findName(relation), position });
     return { name, attributes, positions, inverses };
   }
 
-  nameOf(code) {
+  findName(code) {
     this.names ??= new Map(Object.keys(this.types).map((name) => [this.web[name.toUpperCase()], name]));
     return this.names.get(code);
   }
 
   // `name`: as STEP writes it.
-  entityByUpperCase(name) {
-    return this.entity(this.nameOf(this.web[name]));
+  findEntityByUpperCase(name) {
+    return this.findEntity(this.findName(this.web[name]));
   }
 
-  // {depth: of nested lists, simple: of simpleType(), or entity: the only possible one, or neither: a
-  // choice}
-  attributeType(text) {
+  // {depth: of nested lists, simple: of findSimpleType(), or entity: the only possible one, or neither:
+  // a choice}
+  readAttributeType(text) {
     let base = text.replace(/ \| null$/, '');
     let depth = 0;
     for (; base.endsWith('[]'); base = base.slice(0, -2)) ++depth;
@@ -105,29 +105,29 @@ export class IfcSchema {
     if (/^\(Handle<logical>/.test(base)) return { depth, simple: { primitive: 'logical' } };
     const entity = /^\(Handle<(\w+)> \| \w+\)$/.exec(base)?.[1];
     if (entity !== undefined) return { depth, entity };
-    return { depth, simple: this.simpleType(base) };
+    return { depth, simple: this.findSimpleType(base) };
   }
 
   // {name, primitive, list: whether a value has several, words: of an enumeration}; undefined: no
   // simple type has this name.
-  simpleType(name) {
+  findSimpleType(name) {
     if (!this.simpleTypes.has(name)) this.simpleTypes.set(name, this.makeSimpleType(name));
     return this.simpleTypes.get(name);
   }
 
   makeSimpleType(name) {
     const type = Object.hasOwn(this.types, name) ? this.types[name] : undefined;
-    if (typeof type !== 'function' || this.entity(name) !== undefined) return undefined;
+    if (typeof type !== 'function' || this.findEntity(name) !== undefined) return undefined;
     const words = Object.getOwnPropertyNames(type).filter((key) => type[key]?.type === ENUMERATOR);
     if (words.length > 0) return { name, primitive: 'enumeration', words: new Set(words) };
     const declared = this.declarations.classes.get(name) ?? '';
     const list = declared.includes('value: Array<');
     const items = /value: Array<(Ifc\w+)>/.exec(declared)?.[1];
     if (items !== undefined) {
-      const primitive = this.simpleType(items)?.primitive;
+      const primitive = this.findSimpleType(items)?.primitive;
       return primitive && { name, primitive, list };
     }
-    const primitive = primitiveOf(new type('1').type, name);
+    const primitive = findPrimitive(new type('1').type, name);
     return primitive && { name, primitive, list };
   }
 }

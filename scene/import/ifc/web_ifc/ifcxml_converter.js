@@ -90,7 +90,7 @@ export class IfcXmlConverter {
     if (this.frames.length !== before + 1) throw new Error(`no frame for ${tag.name}`);
   }
 
-  text(text) {
+  addText(text) {
     const frame = this.frames.at(-1);
     if (frame === undefined) return;
     if (frame.text !== undefined) frame.text += text;
@@ -136,7 +136,7 @@ export class IfcXmlConverter {
   openTopLevel(tag) {
     if (tag.local === 'header') this.ignore();
     else if (tag.local === 'uos') this.frames.push({ child: (child) => this.openTopLevel(child) });
-    else if (this.schema.entity(tag.local)) this.openEntity(tag.local, tag, () => {});
+    else if (this.schema.findEntity(tag.local)) this.openEntity(tag.local, tag, () => {});
     else this.skip(tag);
   }
 
@@ -144,7 +144,7 @@ export class IfcXmlConverter {
   // attribute that refers to the entity around it.
   openEntity(name, tag, accept, inverse) {
     const attributes = sortAttributes(tag);
-    const entity = this.schema.entity(attributes.type ?? name);
+    const entity = this.schema.findEntity(attributes.type ?? name);
     if (attributes.ref !== undefined) {
       this.openReference(attributes, tag, accept, inverse);
     } else if (entity === undefined) {
@@ -157,7 +157,7 @@ export class IfcXmlConverter {
   }
 
   openReference({ ref, own, position }, tag, accept, inverse) {
-    const number = this.numberOf(ref);
+    const number = this.getNumber(ref);
     if (this.statements[number] === undefined && !this.awaited.has(number))
       this.awaited.set(number, { id: ref, line: this.line });
     accept(`#${number}`, position);
@@ -168,10 +168,10 @@ export class IfcXmlConverter {
   }
 
   openDefinition(entity, { id, own, position }, accept, inverse) {
-    let number = id === undefined ? this.newNumber() : this.numberOf(id);
+    let number = id === undefined ? this.makeNumber() : this.getNumber(id);
     if (this.statements[number] !== undefined) {
       this.report('xml_not_read', this.line, `second element with id '${id}'`);
-      number = this.newNumber();
+      number = this.makeNumber();
     }
     this.statements[number] = '';
     const values = entity.attributes.map((attribute) => (attribute === null ? '*' : '$'));
@@ -259,8 +259,8 @@ export class IfcXmlConverter {
     const frame = { close };
     frame.child = (child) => {
       const isMember = become !== undefined && !frame.used &&
-        (this.schema.entity(entity).positions.has(child.local) ||
-         this.schema.entity(entity).inverses.has(child.local));
+        (this.schema.findEntity(entity).positions.has(child.local) ||
+         this.schema.findEntity(entity).inverses.has(child.local));
       frame.used = true;
       if (!isMember) return openItem(child);
       this.frames.pop();
@@ -274,9 +274,9 @@ export class IfcXmlConverter {
     const accept = (text, position) => items.push({ text, position });
     const list = /^Seq-.*-wrapper$/.test(tag.local);
     const name = tag.local.replace(/-wrapper$/, '');
-    const simple = this.schema.simpleType(name);
+    const simple = this.schema.findSimpleType(name);
     if (list && type.depth > 1) this.openRow(type, tag, items);
-    else if (this.schema.entity(name)) this.openEntity(name, tag, accept);
+    else if (this.schema.findEntity(name)) this.openEntity(name, tag, accept);
     else if (simple) this.openWrapper(simple, tag, accept);
     else this.skip(tag);
   }
@@ -316,7 +316,7 @@ export class IfcXmlConverter {
         if (value === null) this.rejectValue(`${name} of ${entity.name}: '${item.text.slice(0, 40)}'`);
         else items.push({ text: value, position, isList: depth > 0 });
       };
-      if (/-wrapper$/.test(tag.local) || this.schema.simpleType(tag.local)) this.frames.push(item);
+      if (/-wrapper$/.test(tag.local) || this.schema.findSimpleType(tag.local)) this.frames.push(item);
       else this.skip(tag);
     };
     frame.close = () => {
@@ -329,12 +329,12 @@ export class IfcXmlConverter {
 
   // ---- numbers and references -----------------------------------------------------------------
 
-  newNumber() {
+  makeNumber() {
     return this.statements.push(undefined) - 1;
   }
 
-  numberOf(id) {
-    if (!this.numbers.has(id)) this.numbers.set(id, this.newNumber());
+  getNumber(id) {
+    if (!this.numbers.has(id)) this.numbers.set(id, this.makeNumber());
     return this.numbers.get(id);
   }
 
@@ -354,7 +354,7 @@ export class IfcXmlConverter {
   addInverses(relation, positions) {
     const [name, text] = this.splitStatement(this.statements[relation]);
     const values = splitArguments(text);
-    const { attributes } = this.schema.entityByUpperCase(name);
+    const { attributes } = this.schema.findEntityByUpperCase(name);
     for (const [position, parents] of positions) {
       const isList = attributes[position].type.depth > 0;
       const stated = isList ? values[position].replace(/^\(|\)$/g, '').split(',') : [values[position]];

@@ -9,13 +9,13 @@
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
 
-import { IFC_FILE, WANTED, doubles, readAll, sendMessage, sendProgress, words } from './worker_io.js';
+import { IFC_FILE, WANTED, packDoubles, packWords, readAll, sendMessage, sendProgress } from './worker_io.js';
 
 const FLOATS_A_VERTEX = 6; // position and normal, as web-ifc delivers them
 
 // Words of 32 bits in the memory of web-ifc, as bytes, without the copy that GetVertexArray makes.
 // Valid until web-ifc allocates.
-function wordsOf(api, address, count) {
+function viewWords(api, address, count) {
   return Buffer.from(api.wasmModule.HEAPF32.buffer, address, 4 * count);
 }
 
@@ -68,9 +68,9 @@ function sendGeometry(api, model, id, known) {
   if (known.has(id)) return;
   known.add(id);
   const geometry = api.GetGeometry(model, id);
-  const vertices = wordsOf(api, geometry.GetVertexData(), geometry.GetVertexDataSize());
-  const indices = wordsOf(api, geometry.GetIndexData(), geometry.GetIndexDataSize());
-  sendMessage('G', [words(id, vertices.length / 4 / FLOATS_A_VERTEX, indices.length / 4)],
+  const vertices = viewWords(api, geometry.GetVertexData(), geometry.GetVertexDataSize());
+  const indices = viewWords(api, geometry.GetIndexData(), geometry.GetIndexDataSize());
+  sendMessage('G', [packWords(id, vertices.length / 4 / FLOATS_A_VERTEX, indices.length / 4)],
             [vertices, indices]);
   geometry.delete();
 }
@@ -82,9 +82,9 @@ function sendProduct(api, model, mesh, known) {
     const placed = mesh.geometries.get(i);
     sendGeometry(api, model, placed.geometryExpressID, known);
     const { x, y, z, w } = placed.color;
-    parts.push(words(placed.geometryExpressID), doubles(x, y, z, w, ...placed.flatTransformation));
+    parts.push(packWords(placed.geometryExpressID), packDoubles(x, y, z, w, ...placed.flatTransformation));
   }
-  sendMessage('O', [words(mesh.expressID, count), ...parts]);
+  sendMessage('O', [packWords(mesh.expressID, count), ...parts]);
 }
 
 // Whether the heap of web-ifc may be corrupt: a WebAssembly trap corrupts it, web-ifc's own
@@ -93,7 +93,7 @@ function isBroken(error) {
   return error instanceof WebAssembly.RuntimeError || error instanceof RangeError;
 }
 
-function textOf(error) {
+function describeError(error) {
   if (error instanceof WebAssembly.Exception) return 'web-ifc threw an exception';
   return String(error?.message ?? error);
 }
@@ -112,12 +112,12 @@ async function main() {
   }
   const known = new Set();
   for (let i = first; i < wanted.length; ++i) {
-    sendMessage('T', [words(i)]); // identifies the product if this process dies
+    sendMessage('T', [packWords(i)]); // identifies the product if this process dies
     if (i % 64 === 0) sendProgress('shapes (web-ifc)', i / wanted.length);
     try {
       api.StreamMeshes(model, [wanted[i]], (mesh) => sendProduct(api, model, mesh, known));
     } catch (error) {
-      sendMessage('F', [words(wanted[i]), Buffer.from(textOf(error))]);
+      sendMessage('F', [packWords(wanted[i]), Buffer.from(describeError(error))]);
       if (isBroken(error)) return 1; // the importer starts another process for the rest
     }
   }
@@ -128,7 +128,7 @@ async function main() {
 main().then(
   (code) => process.exit(code),
   (error) => {
-    sendMessage('E', [Buffer.from(textOf(error))]);
+    sendMessage('E', [Buffer.from(describeError(error))]);
     process.exit(1);
   },
 );

@@ -17,16 +17,16 @@ export function sendMessage(kind, parts = [], blocks = []) {
   }
 }
 
-export function doubles(...values) {
+export function packDoubles(...values) {
   return Buffer.from(Float64Array.from(values).buffer);
 }
 
-export function words(...values) {
+export function packWords(...values) {
   return Buffer.from(Uint32Array.from(values).buffer);
 }
 
 export function sendProgress(stage, fraction) {
-  sendMessage('P', [doubles(fraction), Buffer.from(stage)]);
+  sendMessage('P', [packDoubles(fraction), Buffer.from(stage)]);
 }
 
 // Reads `size` bytes at `position`.

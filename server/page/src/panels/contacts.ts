@@ -2,13 +2,13 @@
 import { ArrowHelper, Group, Mesh, MeshBasicMaterial, SphereGeometry, Vector3, type Material } from "three";
 import type { App } from "../app";
 import type { CameraRig } from "../view/camera_rig";
-import { button, element, setText } from "./dom";
-import { clockTime, metres, shortName } from "./format";
+import { makeButton, makeElement, setText } from "./dom";
+import { formatLength, formatTime, shortenPath } from "./format";
 import {
   ContactEvent_Kind as Kind, ContactEvent_Phase as Phase, ContactEvent_Reason as Reason, Verdict, type ContactEvent,
   type PairState,
 } from "../generated/enfilade_pb";
-import { vector } from "../world/world_state";
+import { toVector } from "../world/world_state";
 
 const MAX_LISTED = 400;
 const MAX_ROWS = 120;
@@ -32,16 +32,16 @@ interface Marker {
 
 export class Contacts {
   readonly root: HTMLElement;
-  readonly labels = element("div", { class: "labels", "aria-hidden": "true" });
+  readonly labels = makeElement("div", { class: "labels", "aria-hidden": "true" });
   readonly listed: ContactEvent[] = []; // newest first
   #app: App;
   #rig: CameraRig;
   #live = new Map<string, ContactEvent>();
-  #list = element("ol", { class: "events", label: "Contacts, newest first" });
-  #summary = element("p", { class: "quiet", role: "status" });
-  #floors = element("input", { type: "checkbox", id: "floors" });
-  #ends = element("input", { type: "checkbox", id: "ends" });
-  #markersShown = element("input", { type: "checkbox", id: "markers", checked: true });
+  #list = makeElement("ol", { class: "events", label: "Contacts, newest first" });
+  #summary = makeElement("p", { class: "quiet", role: "status" });
+  #floors = makeElement("input", { type: "checkbox", id: "floors" });
+  #ends = makeElement("input", { type: "checkbox", id: "ends" });
+  #markersShown = makeElement("input", { type: "checkbox", id: "markers", checked: true });
   #markers: Marker[] = [];
   #root = new Group();
   #isDirty = true;
@@ -51,11 +51,11 @@ export class Contacts {
   constructor(app: App, rig: CameraRig) {
     this.#app = app;
     this.#rig = rig;
-    const check = (box: HTMLInputElement, text: string) => element("label", { class: "check", for: box.id }, box, text);
-    this.root = element(
+    const check = (box: HTMLInputElement, text: string) => makeElement("label", { class: "check", for: box.id }, box, text);
+    this.root = makeElement(
       "div", { class: "stack" }, this.#summary,
-      element("div", { class: "row" }, check(this.#markersShown, "Markers"), check(this.#floors, "Floors"), check(this.#ends, "Ends"),
-        button("Clear", () => this.#clear())),
+      makeElement("div", { class: "row" }, check(this.#markersShown, "Markers"), check(this.#floors, "Floors"), check(this.#ends, "Ends"),
+        makeButton("Clear", () => this.#clear())),
       this.#list,
     );
     for (const box of [this.#floors, this.#ends]) box.addEventListener("change", () => (this.#isDirty = true));
@@ -80,14 +80,14 @@ export class Contacts {
 
   #reset(live: ContactEvent[]): void {
     this.#live.clear();
-    for (const event of live) this.#live.set(keyOf(event), event);
+    for (const event of live) this.#live.set(makeKey(event), event);
     this.#isDirty = true;
   }
 
   #take(events: ContactEvent[]): void {
     for (const event of events) {
-      if (event.kind === Kind.BEGIN) this.#live.set(keyOf(event), event);
-      if (event.kind === Kind.END) this.#live.delete(keyOf(event));
+      if (event.kind === Kind.BEGIN) this.#live.set(makeKey(event), event);
+      if (event.kind === Kind.END) this.#live.delete(makeKey(event));
       this.listed.unshift(event);
     }
     this.listed.length = Math.min(this.listed.length, MAX_LISTED);
@@ -105,34 +105,34 @@ export class Contacts {
     const floors = [...this.#live.values()].filter(isFloor).length;
     const others = this.#live.size - floors;
     setText(this.#summary, `Now: ${others} ${others === 1 ? "contact" : "contacts"}, and ${floors} with floors`);
-    const rows = this.listed.filter((event) => this.#isListed(event)).slice(0, MAX_ROWS).map((event) => this.#row(event));
-    if (rows.length === 0) rows.push(element("li", { class: "empty" }, "No contact yet. Walk into something."));
+    const rows = this.listed.filter((event) => this.#isListed(event)).slice(0, MAX_ROWS).map((event) => this.#makeRow(event));
+    if (rows.length === 0) rows.push(makeElement("li", { class: "empty" }, "No contact yet. Walk into something."));
     this.#list.replaceChildren(...rows);
   }
 
-  #row(event: ContactEvent): HTMLElement {
-    const row = button("", () => this.#goTo(event), { class: `event ${classOf(event)}`, title: `${event.aName} – ${event.bName}` });
+  #makeRow(event: ContactEvent): HTMLElement {
+    const row = makeButton("", () => this.#goTo(event), { class: `event ${getCssClass(event)}`, title: `${event.aName} – ${event.bName}` });
     row.append(
-      element("time", {}, clockTime(event.time)),
-      element("span", { class: "what" }, wordOf(event)),
-      element("span", { class: "distance" }, distanceOf(event)),
-      element("span", { class: "who" }, this.#pairOf(event)),
+      makeElement("time", {}, formatTime(event.time)),
+      makeElement("span", { class: "what" }, describeEvent(event)),
+      makeElement("span", { class: "distance" }, formatDistance(event)),
+      makeElement("span", { class: "who" }, this.#formatPair(event)),
     );
-    return element("li", {}, row);
+    return makeElement("li", {}, row);
   }
 
   /** Both names; that of the focused avatar is left out. */
-  #pairOf({ aName, bName }: ContactEvent): string {
+  #formatPair({ aName, bName }: ContactEvent): string {
     if (!bName) return aName;
-    return aName === this.#app.focus ? shortName(bName) : `${shortName(aName)} – ${shortName(bName)}`;
+    return aName === this.#app.focus ? shortenPath(bName) : `${shortenPath(aName)} – ${shortenPath(bName)}`;
   }
 
   /** Flies to where the contact can be seen: off its normal, on the side of `a`. */
   #goTo(event: ContactEvent): void {
     if (event.b !== 0) this.#app.select(event.b);
     if (!event.pointB) return;
-    const point = vector(event.pointB);
-    const away = vector(event.normal).negate().add(new Vector3(0, 0.5, 0));
+    const point = toVector(event.pointB);
+    const away = toVector(event.normal).negate().add(new Vector3(0, 0.5, 0));
     const side = new Vector3(-away.z, 0, away.x).multiplyScalar(0.7);
     const direction = away.add(side).normalize();
     const hit = this.#app.model?.raycast(point.clone().addScaledVector(direction, 0.02), direction, 2.6);
@@ -185,7 +185,7 @@ export class Contacts {
       part.renderOrder = 10;
     }
     this.#root.add(group);
-    const label = element("span", { class: "marker" });
+    const label = makeElement("span", { class: "marker" });
     this.labels.append(label);
     this.#markers.push({ group, ball, arrow, label, x: 0, y: 0 });
   }
@@ -193,7 +193,7 @@ export class Contacts {
   #place(marker: Marker, pair: PairState, epsilon: number): void {
     const isContact = pair.verdict !== Verdict.SEPARATED || pair.distance < 2 * epsilon;
     const color = isContact ? TOUCH_COLOR : NEAR_COLOR;
-    const point = vector(pair.pointB);
+    const point = toVector(pair.pointB);
     const { camera, canvas } = this.#app.view;
     const distance = point.distanceTo(camera.position);
     marker.ball.position.copy(point);
@@ -201,7 +201,7 @@ export class Contacts {
     marker.ball.material.color.setHex(color);
     // The normal of the obstacle: towards the avatar.
     marker.arrow.position.copy(point);
-    marker.arrow.setDirection(vector(pair.normal).negate().normalize());
+    marker.arrow.setDirection(toVector(pair.normal).negate().normalize());
     marker.arrow.setColor(color);
     // Seen from nearby, an arrow would cover what it points at.
     const length = Math.min(0.3, 0.2 * distance);
@@ -209,8 +209,8 @@ export class Contacts {
     const screen = point.clone().project(camera);
     marker.label.hidden = screen.z >= 1; // behind the camera
     if (marker.label.hidden) return;
-    const text = isContact ? "contact" : metres(pair.distance);
-    setText(marker.label, `${text} · ${shortName(pair.bName)}`);
+    const text = isContact ? "contact" : formatLength(pair.distance);
+    setText(marker.label, `${text} · ${shortenPath(pair.bName)}`);
     marker.label.classList.toggle("near", !isContact);
     // The label of a point outside the picture stays at its edge: the wall that stops an avatar is often too near to see.
     const inside = (value: number, low: number, high: number) => Math.max(low, Math.min(high, value));
@@ -239,7 +239,7 @@ export class Contacts {
   }
 }
 
-function keyOf({ a, b }: ContactEvent): string {
+function makeKey({ a, b }: ContactEvent): string {
   return `${a} ${b}`;
 }
 
@@ -247,7 +247,7 @@ function isFloor({ kind, normal }: ContactEvent): boolean {
   return kind !== Kind.BLOCKED && (normal?.y ?? 0) < FLOOR_NORMAL;
 }
 
-export function wordOf({ kind, phase, reason }: ContactEvent): string {
+export function describeEvent({ kind, phase, reason }: ContactEvent): string {
   switch (kind) {
     case Kind.BEGIN: return "contact";
     case Kind.END: return reason === Reason.LEFT ? "left" : "parted";
@@ -260,13 +260,13 @@ export function wordOf({ kind, phase, reason }: ContactEvent): string {
   }
 }
 
-export function classOf({ kind }: ContactEvent): string {
+export function getCssClass({ kind }: ContactEvent): string {
   if (kind === Kind.BEGIN || kind === Kind.BLOCKED) return "touching";
   return kind === Kind.NEAR ? "near" : "plain";
 }
 
-function distanceOf(event: ContactEvent): string {
+function formatDistance(event: ContactEvent): string {
   if (event.kind === Kind.END || event.kind === Kind.ENTER || event.kind === Kind.LEAVE || event.b === 0) return "";
   if (event.verdict === Verdict.PENETRATING) return "penetrates";
-  return event.verdict === Verdict.TOUCHING ? "0" : metres(event.distance);
+  return event.verdict === Verdict.TOUCHING ? "0" : formatLength(event.distance);
 }

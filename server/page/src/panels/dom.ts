@@ -14,7 +14,7 @@ interface Attributes {
 }
 
 /** Makes an element; `label` becomes aria-label, functions become listeners, strings become text. */
-export function element<K extends keyof HTMLElementTagNameMap>(
+export function makeElement<K extends keyof HTMLElementTagNameMap>(
   tag: K, attributes: Attributes = {}, ...children: Child[]
 ): HTMLElementTagNameMap[K] {
   const made = document.createElement(tag);
@@ -29,8 +29,8 @@ export function element<K extends keyof HTMLElementTagNameMap>(
   return made;
 }
 
-export function button(text: string, onclick: () => void, attributes: Attributes = {}): HTMLButtonElement {
-  return element("button", { type: "button", onclick: () => onclick(), ...attributes }, text);
+export function makeButton(text: string, onclick: () => void, attributes: Attributes = {}): HTMLButtonElement {
+  return makeElement("button", { type: "button", onclick: () => onclick(), ...attributes }, text);
 }
 
 /** Sets the text only if it differs, so that frequent updates cost no layout. */

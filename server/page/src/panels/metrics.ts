@@ -1,20 +1,20 @@
 // Numbers of the server and of the page.
 import type { App } from "../app";
-import { element } from "./dom";
-import { metres } from "./format";
+import { makeElement } from "./dom";
+import { formatLength } from "./format";
 
 const SECONDS = 1; // between requests while the panel is visible
 
 export class MetricsPanel {
-  readonly root = element("div", { class: "stack" });
-  #facts = element("dl", { class: "facts" });
+  readonly root = makeElement("div", { class: "stack" });
+  #facts = makeElement("dl", { class: "facts" });
   #app: App;
   #frames = 0;
 
   constructor(app: App) {
     this.#app = app;
-    this.root.append(this.#facts, element("p", { class: "quiet" },
-      "The page contains open-source packages: ", element("a", { href: "/page/licenses.txt", target: "_blank" }, "licences"), "."));
+    this.root.append(this.#facts, makeElement("p", { class: "quiet" },
+      "The page contains open-source packages: ", makeElement("a", { href: "/page/licenses.txt", target: "_blank" }, "licences"), "."));
     app.view.updaters.push(() => {
       ++this.#frames;
       return false;
@@ -40,7 +40,7 @@ export class MetricsPanel {
         ["Tick time, 99 %", `${((tick?.p99Us ?? 0) / 1000).toFixed(2)} ms`],
         ["Ticks", `${metrics.ticks} (${Math.round(metrics.ticksPerSecond)} per second of work)`],
         ["Contacts now", String(metrics.liveContacts)],
-        ["Worst penetration", metrics.worstPenetration === 0 ? "0 (never)" : metres(metrics.worstPenetration)],
+        ["Worst penetration", metrics.worstPenetration === 0 ? "0 (never)" : formatLength(metrics.worstPenetration)],
         ["Recording", metrics.recording ? `${metrics.recording.ticks} ticks, ${(Number(metrics.recording.bytes) / 1e6).toFixed(1)} MB` : "none"],
         ["Page", `${frames} frames/s, ${drawn.triangles.toLocaleString("en")} triangles, ${drawn.calls} draw calls`],
         ["Server draws with", welcome.renderer || "nothing"],
@@ -51,6 +51,6 @@ export class MetricsPanel {
   }
 
   #show(facts: [string, string][]): void {
-    this.#facts.replaceChildren(...facts.flatMap(([name, value]) => [element("dt", {}, name), element("dd", {}, value)]));
+    this.#facts.replaceChildren(...facts.flatMap(([name, value]) => [makeElement("dt", {}, name), makeElement("dd", {}, value)]));
   }
 }

@@ -2,12 +2,12 @@
 // dark, because the inner sides of their triangles are visible there. A click walks there.
 import { DoubleSide, OrthographicCamera, ShaderMaterial, Vector3 } from "three";
 import type { App } from "../app";
-import { colorOf } from "../view/avatars";
+import { findCssColor } from "../view/avatars";
 import type { CameraRig } from "../view/camera_rig";
-import { button, element } from "./dom";
+import { makeButton, makeElement } from "./dom";
 import { renderOffscreen } from "../view/offscreen";
 import type { Walk } from "../walk/walk";
-import { vector } from "../world/world_state";
+import { toVector } from "../world/world_state";
 
 const CUT_HEIGHT = 1.2; // metres above the floor
 const CUT_DEPTH = 2.2; // metres below the cut that are drawn
@@ -56,7 +56,7 @@ export class Minimap {
   #app: App;
   #rig: CameraRig;
   #walk: Walk;
-  #canvas = element("canvas", { tabindex: "0", role: "img", label: "Plan of the storey with avatars. A click walks there." });
+  #canvas = makeElement("canvas", { tabindex: "0", role: "img", label: "Plan of the storey with avatars. A click walks there." });
   #plan = document.createElement("canvas");
   #planCenter = new Vector3();
   #planExtent = 0; // metres
@@ -70,10 +70,10 @@ export class Minimap {
     this.#app = app;
     this.#rig = rig;
     this.#walk = walk;
-    this.root = element(
+    this.root = makeElement(
       "section", { class: "minimap", label: "Plan" }, this.#canvas,
-      element("div", { class: "zoom" },
-        button("+", () => this.#zoom(-1), { label: "Enlarge the plan" }), button("−", () => this.#zoom(1), { label: "Reduce the plan" })),
+      makeElement("div", { class: "zoom" },
+        makeButton("+", () => this.#zoom(-1), { label: "Enlarge the plan" }), makeButton("−", () => this.#zoom(1), { label: "Reduce the plan" })),
     );
     this.#canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
@@ -95,7 +95,7 @@ export class Minimap {
 
   #remember(): void {
     for (const { name, feet } of this.#app.state.latest?.avatars ?? []) {
-      const place = vector(feet);
+      const place = toVector(feet);
       const trail = this.#trails.get(name) ?? [];
       this.#trails.set(name, trail);
       const last = trail.at(-1);
@@ -106,8 +106,8 @@ export class Minimap {
   }
 
   /** The place in the middle of the plan: the focused avatar's feet, or the floor below the camera. */
-  #middle(): { at: Vector3; floor: number } | null {
-    const avatar = this.#app.state.avatars().find(({ state }) => state.name === this.#app.focus);
+  #findMiddle(): { at: Vector3; floor: number } | null {
+    const avatar = this.#app.state.getAvatars().find(({ state }) => state.name === this.#app.focus);
     if (avatar) return { at: avatar.feet, floor: avatar.state.grounded || Number.isNaN(this.#floor) ? avatar.feet.y : this.#floor };
     const { position } = this.#rig;
     const hit = this.#app.model?.raycast(position, new Vector3(0, -1, 0), 60);
@@ -116,7 +116,7 @@ export class Minimap {
 
   #draw(): void {
     const { model } = this.#app;
-    const middle = model && this.root.offsetParent !== null && !document.hidden ? this.#middle() : null;
+    const middle = model && this.root.offsetParent !== null && !document.hidden ? this.#findMiddle() : null;
     if (!middle || !model) return;
     const { at, floor } = middle;
     const isFar = Math.max(Math.abs(at.x - this.#planCenter.x), Math.abs(at.z - this.#planCenter.z)) > this.#planExtent / 2 - this.#metresWide / 2;
@@ -184,7 +184,7 @@ export class Minimap {
     for (const [name, trail] of this.#trails) {
       const id = ids.get(name);
       if (id === undefined) continue;
-      context.strokeStyle = colorOf(id);
+      context.strokeStyle = findCssColor(id);
       context.globalAlpha = 0.55;
       context.beginPath();
       let last: Vector3 | null = null;
@@ -200,19 +200,19 @@ export class Minimap {
   }
 
   #paintAvatars(context: CanvasRenderingContext2D, x: (v: Vector3) => number, y: (v: Vector3) => number, ratio: number): void {
-    for (const { state, feet, gaze } of this.#app.state.avatars()) {
+    for (const { state, feet, gaze } of this.#app.state.getAvatars()) {
       const isFocus = state.name === this.#app.focus;
       const direction = isFocus && this.#rig.mode === "first" ? this.#rig.forward : gaze;
-      arrow(context, x(feet), y(feet), Math.atan2(direction.z, direction.x), colorOf(state.id), (isFocus ? 9 : 7) * ratio,
+      drawArrow(context, x(feet), y(feet), Math.atan2(direction.z, direction.x), findCssColor(state.id), (isFocus ? 9 : 7) * ratio,
         Math.abs(feet.y - this.#floor) < 1.5 ? 1 : 0.35);
     }
     if (this.#rig.mode !== "free") return;
     const { position, forward } = this.#rig;
-    arrow(context, x(position), y(position), Math.atan2(forward.z, forward.x), "#38454f", 8 * ratio, 0.8);
+    drawArrow(context, x(position), y(position), Math.atan2(forward.z, forward.x), "#38454f", 8 * ratio, 0.8);
   }
 
   #click(event: MouseEvent): void {
-    const middle = this.#middle();
+    const middle = this.#findMiddle();
     if (!middle) return;
     const scale = this.#canvas.clientWidth / this.#metresWide;
     const place = new Vector3(
@@ -229,7 +229,7 @@ export class Minimap {
   }
 }
 
-function arrow(context: CanvasRenderingContext2D, x: number, y: number, angle: number, color: string, size: number, alpha: number): void {
+function drawArrow(context: CanvasRenderingContext2D, x: number, y: number, angle: number, color: string, size: number, alpha: number): void {
   context.save();
   context.translate(x, y);
   context.rotate(angle);

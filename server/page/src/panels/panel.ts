@@ -1,6 +1,6 @@
 // The frame of the page: header, side panel with tabs, messages, and the dialog for troubles.
 import type { App } from "../app";
-import { button, element, setText } from "./dom";
+import { makeButton, makeElement, setText } from "./dom";
 import type { Trouble } from "../world/source";
 
 const TOAST_SECONDS = 6;
@@ -11,7 +11,7 @@ export interface Tab {
 }
 
 export function makeTabs(tabs: Tab[]): HTMLElement {
-  const bar = element("div", { class: "tabs", role: "tablist", label: "Panels" });
+  const bar = makeElement("div", { class: "tabs", role: "tablist", label: "Panels" });
   const buttons: HTMLButtonElement[] = [];
   const show = (chosen: number) => tabs.forEach(({ content }, index) => {
     content.hidden = index !== chosen;
@@ -21,7 +21,7 @@ export function makeTabs(tabs: Tab[]): HTMLElement {
   tabs.forEach(({ name, content }, index) => {
     content.setAttribute("role", "tabpanel");
     content.setAttribute("aria-label", name);
-    buttons.push(button(name, () => show(index), { role: "tab" }));
+    buttons.push(makeButton(name, () => show(index), { role: "tab" }));
   });
   bar.append(...buttons);
   bar.addEventListener("keydown", (event) => {
@@ -34,14 +34,14 @@ export function makeTabs(tabs: Tab[]): HTMLElement {
     event.preventDefault();
   });
   show(0);
-  return element("aside", { class: "panel", label: "Scene and world" }, bar, ...tabs.map(({ content }) => content));
+  return makeElement("aside", { class: "panel", label: "Scene and world" }, bar, ...tabs.map(({ content }) => content));
 }
 
 /** Sentences that vanish by themselves. */
 export function makeToasts(app: App): HTMLElement {
-  const root = element("div", { class: "toasts", role: "status", "aria-live": "polite" });
+  const root = makeElement("div", { class: "toasts", role: "status", "aria-live": "polite" });
   app.said.listen((text) => {
-    const toast = element("p", {}, text);
+    const toast = makeElement("p", {}, text);
     root.append(toast);
     while (root.children.length > 3) root.firstElementChild!.remove();
     setTimeout(() => toast.remove(), TOAST_SECONDS * 1000);
@@ -51,12 +51,12 @@ export function makeToasts(app: App): HTMLElement {
 
 /** What is wrong, in words, and the token field. */
 export function makeTroubleDialog(app: App, onToken: (token: string) => void): HTMLElement {
-  const text = element("p");
-  const detail = element("p", { class: "quiet" });
-  const token = element("input", { type: "password", autocomplete: "off", label: "Token", placeholder: "Token" });
-  const form = element("form", { hidden: true }, token, element("button", { type: "submit" }, "Connect"));
-  const retry = button("Try now", () => void app.connection.open(), { hidden: true });
-  const root = element("div", { class: "trouble", role: "alert" }, text, detail, form, retry);
+  const text = makeElement("p");
+  const detail = makeElement("p", { class: "quiet" });
+  const token = makeElement("input", { type: "password", autocomplete: "off", label: "Token", placeholder: "Token" });
+  const form = makeElement("form", { hidden: true }, token, makeElement("button", { type: "submit" }, "Connect"));
+  const retry = makeButton("Try now", () => void app.connection.open(), { hidden: true });
+  const root = makeElement("div", { class: "trouble", role: "alert" }, text, detail, form, retry);
   let countdown = 0;
   form.addEventListener("submit", (event) => {
     event.preventDefault();
@@ -108,6 +108,6 @@ export function makeHelp(isFile: boolean): HTMLElement {
     ["Esc", "leave the avatar"], ["Wheel", "distance in third person"],
     ["Touch", "left half walks, right half looks"],
   ];
-  return element("div", { class: "stack" }, element("dl", { class: "facts keys" },
-    ...keys.flatMap(([key, what]) => [element("dt", {}, key), element("dd", {}, what)])));
+  return makeElement("div", { class: "stack" }, makeElement("dl", { class: "facts keys" },
+    ...keys.flatMap(([key, what]) => [makeElement("dt", {}, key), makeElement("dd", {}, what)])));
 }

@@ -1,16 +1,16 @@
 // The list of avatars: follow one, in first or third person.
 import type { App } from "../app";
-import { colorOf, type Avatars } from "../view/avatars";
+import { findCssColor, type Avatars } from "../view/avatars";
 import type { CameraRig } from "../view/camera_rig";
-import { button, element } from "./dom";
+import { makeButton, makeElement } from "./dom";
 import type { AvatarState } from "../generated/enfilade_pb";
 import type { Walk } from "../walk/walk";
 
 const MAX_ROWS = 200;
 
 export class People {
-  readonly root = element("div", { class: "stack" });
-  #list = element("ul", { class: "people", label: "Avatars" });
+  readonly root = makeElement("div", { class: "stack" });
+  #list = makeElement("ul", { class: "people", label: "Avatars" });
   #app: App;
   #rig: CameraRig;
   #walk: Walk;
@@ -20,12 +20,12 @@ export class People {
     this.#app = app;
     this.#rig = rig;
     this.#walk = walk;
-    const shapes = element("input", { type: "checkbox", id: "shapes" });
+    const shapes = makeElement("input", { type: "checkbox", id: "shapes" });
     shapes.addEventListener("change", () => {
       avatars.prismsShown = shapes.checked;
       app.view.invalidate();
     });
-    this.root.append(element("label", { class: "check", for: "shapes" }, shapes, "Shapes that collide"), this.#list);
+    this.root.append(makeElement("label", { class: "check", for: "shapes" }, shapes, "Shapes that collide"), this.#list);
     setInterval(() => this.#render(), 300);
   }
 
@@ -36,29 +36,29 @@ export class People {
     const names = `${all.map(({ id, name }) => `${id} ${name}`).join()} ${this.#app.focus} ${this.#walk.name}`;
     if (names !== this.#shown) {
       this.#shown = names;
-      this.#list.replaceChildren(...(avatars.length > 0 ? avatars.map((avatar) => this.#row(avatar))
-        : [element("li", { class: "empty" }, "No avatar is in the world.")]));
-      if (all.length > MAX_ROWS) this.#list.append(element("li", { class: "empty" }, `and ${all.length - MAX_ROWS} more`));
+      this.#list.replaceChildren(...(avatars.length > 0 ? avatars.map((avatar) => this.#makeRow(avatar))
+        : [makeElement("li", { class: "empty" }, "No avatar is in the world.")]));
+      if (all.length > MAX_ROWS) this.#list.append(makeElement("li", { class: "empty" }, `and ${all.length - MAX_ROWS} more`));
     }
     avatars.forEach((avatar, index) => {
       const doing = this.#list.children[index]?.querySelector(".doing");
-      if (doing) doing.textContent = this.#doing(avatar);
+      if (doing) doing.textContent = this.#describe(avatar);
     });
   }
 
-  #row({ id, name }: AvatarState): HTMLElement {
-    const dot = element("span", { class: "dot" });
-    dot.style.background = colorOf(id);
+  #makeRow({ id, name }: AvatarState): HTMLElement {
+    const dot = makeElement("span", { class: "dot" });
+    dot.style.background = findCssColor(id);
     const isFollowed = this.#app.focus === name;
-    const follow = button(isFollowed ? "Leave view" : "Follow", () => this.#follow(name), { "aria-pressed": String(isFollowed) });
-    return element(
+    const follow = makeButton(isFollowed ? "Leave view" : "Follow", () => this.#follow(name), { "aria-pressed": String(isFollowed) });
+    return makeElement(
       "li", {}, dot,
-      element("span", { class: "who" }, name === this.#walk.name ? `${name} (you)` : name, element("small", { class: "doing" })),
+      makeElement("span", { class: "who" }, name === this.#walk.name ? `${name} (you)` : name, makeElement("small", { class: "doing" })),
       follow,
     );
   }
 
-  #doing({ feet, flying, grounded, move }: AvatarState): string {
+  #describe({ feet, flying, grounded, move }: AvatarState): string {
     const made = move?.made;
     const speed = made ? Math.hypot(made.x, made.y, made.z) / (this.#app.welcome?.policies?.tick ?? 1 / 60) : 0;
     const what = flying ? "flies" : !grounded ? "in the air" : speed > 0.01 ? "walks" : "stands";

@@ -3,8 +3,8 @@ import { Vector2, Vector3 } from "three";
 import type { App } from "../app";
 import type { Avatars } from "../view/avatars";
 import type { CameraRig } from "../view/camera_rig";
-import { button, element, setText } from "./dom";
-import { lastName, metres, shortName } from "./format";
+import { makeButton, makeElement, setText } from "./dom";
+import { formatLength, getLastName, shortenPath } from "./format";
 import { Verdict, type PairState } from "../generated/enfilade_pb";
 import type { Walk } from "../walk/walk";
 
@@ -18,7 +18,7 @@ export interface Picked {
 }
 
 /** The ray through a pixel of the canvas, in the scene's axes. */
-export function rayThrough(app: App, x: number, y: number): { origin: Vector3; direction: Vector3 } {
+export function computeRay(app: App, x: number, y: number): { origin: Vector3; direction: Vector3 } {
   const { camera, canvas } = app.view;
   camera.updateMatrixWorld();
   const point = new Vector2((2 * x) / canvas.clientWidth - 1, 1 - (2 * y) / canvas.clientHeight);
@@ -28,7 +28,7 @@ export function rayThrough(app: App, x: number, y: number): { origin: Vector3; d
 }
 
 export function pick(app: App, avatars: Avatars, x: number, y: number): Picked | null {
-  const { origin, direction } = rayThrough(app, x, y);
+  const { origin, direction } = computeRay(app, x, y);
   const hit = app.model?.raycast(origin, direction) ?? null;
   const person = avatars.raycast(origin, direction);
   if (person && person.distance < (hit?.distance ?? Infinity)) return { ...person, normal: null };
@@ -41,27 +41,27 @@ export class Card {
   #rig: CameraRig;
   #walk: Walk;
   #place: Picked | null = null;
-  #title = element("h2");
-  #path = element("p", { class: "path" });
-  #facts = element("dl");
-  #touching = element("ul", { class: "touching" });
-  #touchTitle = element("h3", {}, "Touches now");
+  #title = makeElement("h2");
+  #path = makeElement("p", { class: "path" });
+  #facts = makeElement("dl");
+  #touching = makeElement("ul", { class: "touching" });
+  #touchTitle = makeElement("h3", {}, "Touches now");
   #walkHere: HTMLButtonElement;
   #hide: HTMLButtonElement;
-  #doors = element("div", { class: "row" });
+  #doors = makeElement("div", { class: "row" });
   #asked = 0;
 
   constructor(app: App, rig: CameraRig, walk: Walk) {
     this.#app = app;
     this.#rig = rig;
     this.#walk = walk;
-    this.#walkHere = button("Walk from here", () => this.#start());
-    this.#hide = button("Hide", () => this.#toggleHidden());
-    this.root = element(
+    this.#walkHere = makeButton("Walk from here", () => this.#start());
+    this.#hide = makeButton("Hide", () => this.#toggleHidden());
+    this.root = makeElement(
       "section", { class: "card", label: "Selected object", hidden: true },
-      element("header", {}, this.#title, button("×", () => app.select(0), { class: "close", label: "Close" })),
+      makeElement("header", {}, this.#title, makeButton("×", () => app.select(0), { class: "close", label: "Close" })),
       this.#path, this.#facts, this.#doors,
-      element("div", { class: "row" }, button("Go to", () => this.#goTo()), this.#hide, this.#walkHere),
+      makeElement("div", { class: "row" }, makeButton("Go to", () => this.#goTo()), this.#hide, this.#walkHere),
       this.#touchTitle, this.#touching,
     );
     app.selected.listen((id) => this.#show(id));
@@ -80,15 +80,15 @@ export class Card {
     if (this.#place?.entity !== id) this.setPlace(null);
     if (id === 0) return;
     const entity = this.#app.table.byId.get(id);
-    setText(this.#title, entity ? lastName(entity.path) : this.#app.table.nameOf(id));
+    setText(this.#title, entity ? getLastName(entity.path) : this.#app.table.findName(id));
     setText(this.#path, entity?.path ?? "avatar");
-    const box = this.#app.model?.boxOf(id);
+    const box = this.#app.model?.findBox(id);
     const size = box?.getSize(new Vector3());
     this.#facts.replaceChildren(...[
       ["Class", entity?.class], ["GlobalId", entity?.globalId], ["Storey", entity?.storey],
       ["Size x, z, y", size && `${size.x.toFixed(2)} × ${size.z.toFixed(2)} × ${size.y.toFixed(2)} m`],
       ["Entity", String(id)],
-    ].flatMap(([name, value]) => (value ? [element("dt", {}, name), element("dd", {}, value)] : [])));
+    ].flatMap(([name, value]) => (value ? [makeElement("dt", {}, name), makeElement("dd", {}, value)] : [])));
     this.#showBody(id);
     this.#touching.replaceChildren();
     setText(this.#touchTitle, "Touches now");
@@ -98,20 +98,20 @@ export class Card {
 
   /** Doors and lifts can be operated. */
   #showBody(id: number): void {
-    const bodyId = this.#app.table.bodyOf.get(id);
+    const bodyId = this.#app.table.bodyByObject.get(id);
     const body = this.#app.welcome?.scene?.bodies.find((one) => one.id === bodyId);
     this.#doors.replaceChildren();
     if (!body) return;
     const order = (action: { case: "open" | "close" | "run" | "stop"; value: object } | { case: "level"; value: number }) =>
       this.#app.attempt(this.#app.connection.request("bodyCommand", { body: body.name, action }));
-    this.#facts.append(element("dt", {}, "Body"), element("dd", {}, body.mass ? `${body.kind}, ${body.mass} kg` : body.kind));
+    this.#facts.append(makeElement("dt", {}, "Body"), makeElement("dd", {}, body.mass ? `${body.kind}, ${body.mass} kg` : body.kind));
     if (this.#app.connection.isFile) return;
     if (body.kind === "hinged" || body.kind === "sliding") {
-      this.#doors.append(button("Open", () => order({ case: "open", value: {} })), button("Close door", () => order({ case: "close", value: {} })));
+      this.#doors.append(makeButton("Open", () => order({ case: "open", value: {} })), makeButton("Close door", () => order({ case: "close", value: {} })));
     } else if (body.kind === "lift") {
-      body.stops.forEach((_, level) => this.#doors.append(button(`Level ${level}`, () => order({ case: "level", value: level }))));
+      body.stops.forEach((_, level) => this.#doors.append(makeButton(`Level ${level}`, () => order({ case: "level", value: level }))));
     } else if (body.kind === "path") {
-      this.#doors.append(button("Run", () => order({ case: "run", value: {} })), button("Stop", () => order({ case: "stop", value: {} })));
+      this.#doors.append(makeButton("Run", () => order({ case: "run", value: {} })), makeButton("Stop", () => order({ case: "stop", value: {} })));
     }
   }
 
@@ -129,7 +129,7 @@ export class Card {
 
   #goTo(): void {
     const { selection, model, table } = this.#app;
-    const box = model?.presentBox(selection);
+    const box = model?.findPresentBox(selection);
     if (box) this.#rig.showBox(box);
     else if (table.avatars.has(selection)) this.#app.setFocus(table.avatars.get(selection)!);
   }
@@ -155,10 +155,10 @@ export class Card {
 
   #showTouching(found: PairState[], leftOut: number): void {
     setText(this.#touchTitle, found.length === 0 ? "Touches nothing now" : `Touches now: ${found.length + leftOut}`);
-    const rows = found.slice(0, MAX_TOUCHING).map(({ b, bName, verdict, distance }) => element(
+    const rows = found.slice(0, MAX_TOUCHING).map(({ b, bName, verdict, distance }) => makeElement(
       "li", {},
-      button(shortName(bName), () => this.#app.select(b), { title: bName, class: "link" }),
-      element("span", {}, verdict === Verdict.PENETRATING ? "penetrates" : verdict === Verdict.TOUCHING ? "touches" : metres(distance)),
+      makeButton(shortenPath(bName), () => this.#app.select(b), { title: bName, class: "link" }),
+      makeElement("span", {}, verdict === Verdict.PENETRATING ? "penetrates" : verdict === Verdict.TOUCHING ? "touches" : formatLength(distance)),
     ));
     // A list that is not replaced keeps the focus of the keyboard.
     if (rows.map((row) => row.textContent).join() !== [...this.#touching.children].map((row) => row.textContent).join()) {

@@ -9,7 +9,7 @@ export interface SharedView {
   tick: number | null;
 }
 
-export function shareLink(rig: CameraRig, tick: number): string {
+export function makeShareLink(rig: CameraRig, tick: number): string {
   const { x, y, z } = rig.position;
   const numbers = [x, y, z].map((v) => v.toFixed(3)).concat([rig.yaw, rig.pitch].map((v) => v.toFixed(4)));
   const link = new URL(location.href);

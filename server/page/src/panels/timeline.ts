@@ -1,8 +1,8 @@
 // Time: play, pause, step, speed; for a recording a scrubber with its events, and take over.
 import type { App } from "../app";
-import { classOf, wordOf } from "./contacts";
-import { button, element, setText } from "./dom";
-import { clockTime, shortName } from "./format";
+import { describeEvent, getCssClass } from "./contacts";
+import { makeButton, makeElement, setText } from "./dom";
+import { formatTime, shortenPath } from "./format";
 import { Clock_Mode, ContactEvent_Kind as Kind, ContactEvent_Phase as Phase, type ContactEvent } from "../generated/enfilade_pb";
 import type { Walk } from "../walk/walk";
 
@@ -14,16 +14,16 @@ export class Timeline {
   readonly root: HTMLElement;
   #app: App;
   #walk: Walk;
-  #play = button("▶", () => this.toggle(), { class: "play", label: "Play or pause" });
-  #step = button("▮▶", () => this.#stepOnce(), { label: "One tick", title: "One tick" });
-  #speed = element("select", { label: "Speed" },
-    ...SPEEDS.map((speed) => element("option", { value: speed }, `${speed}×`)));
-  #slider = element("input", { type: "range", min: "0", max: "1", value: "0", step: "1", label: "Tick of the recording" });
-  #marks = element("div", { class: "marks" });
-  #track = element("div", { class: "track", hidden: true }, this.#slider, this.#marks);
-  #readout = element("output", { class: "readout" });
-  #takeOver = button("Take over", () => this.#take(), { hidden: true, title: "Leave the recording here, and walk on with the followed avatar" });
-  #note = element("span", { class: "quiet" });
+  #play = makeButton("▶", () => this.toggle(), { class: "play", label: "Play or pause" });
+  #step = makeButton("▮▶", () => this.#stepOnce(), { label: "One tick", title: "One tick" });
+  #speed = makeElement("select", { label: "Speed" },
+    ...SPEEDS.map((speed) => makeElement("option", { value: speed }, `${speed}×`)));
+  #slider = makeElement("input", { type: "range", min: "0", max: "1", value: "0", step: "1", label: "Tick of the recording" });
+  #marks = makeElement("div", { class: "marks" });
+  #track = makeElement("div", { class: "track", hidden: true }, this.#slider, this.#marks);
+  #readout = makeElement("output", { class: "readout" });
+  #takeOver = makeButton("Take over", () => this.#take(), { hidden: true, title: "Leave the recording here, and walk on with the followed avatar" });
+  #note = makeElement("span", { class: "quiet" });
   #isScrubbing = false;
   #seeking: number | null = null;
   #wanted: number | null = null;
@@ -35,7 +35,7 @@ export class Timeline {
     this.#app = app;
     this.#walk = walk;
     this.#speed.value = "1";
-    this.root = element(
+    this.root = makeElement(
       "section", { class: "timeline", label: "Time" },
       this.#play, this.#step, this.#speed, this.#track, this.#readout, this.#takeOver, this.#note,
     );
@@ -74,11 +74,11 @@ export class Timeline {
     this.#setClock({ case: "freeRun", value: { speed: Number(this.#speed.value) } });
   }
 
-  #setClock(mode: Parameters<typeof this.request>[0]): void {
-    this.#app.attempt(this.request(mode));
+  #setClock(mode: Parameters<typeof this.requestClock>[0]): void {
+    this.#app.attempt(this.requestClock(mode));
   }
 
-  async request(mode: { case: "pause"; value: object } | { case: "freeRun"; value: { speed: number } } | { case: "lockstep"; value: object }): Promise<void> {
+  async requestClock(mode: { case: "pause"; value: object } | { case: "freeRun"; value: { speed: number } } | { case: "lockstep"; value: object }): Promise<void> {
     const reply = await this.#app.connection.request("setClock", { mode });
     this.#app.setClock(reply.clock, Number(reply.tick));
     this.#app.view.invalidate();
@@ -87,7 +87,7 @@ export class Timeline {
   /** One tick needs lockstep; the clock stays there. */
   #stepOnce(): void {
     const step = async () => {
-      if (this.#app.clock?.mode !== Clock_Mode.LOCKSTEP) await this.request({ case: "lockstep", value: {} });
+      if (this.#app.clock?.mode !== Clock_Mode.LOCKSTEP) await this.requestClock({ case: "lockstep", value: {} });
       await this.#app.connection.request("step", { ticks: 1 });
     };
     this.#app.attempt(step());
@@ -130,7 +130,7 @@ export class Timeline {
     setText(this.#play, isRunning ? "❚❚" : "▶");
     this.#play.setAttribute("aria-label", isRunning ? "Pause" : "Play");
     this.#play.title = isRunning ? "Pause (P)" : "Play (P)";
-    setText(this.#readout, `${clockTime(time)} · tick ${tick}`);
+    setText(this.#readout, `${formatTime(time)} · tick ${tick}`);
     this.#track.hidden = !replay;
     this.root.classList.toggle("replay", replay !== null);
     this.#takeOver.hidden = !this.#app.isPlayback || this.#app.connection.isFile;
@@ -138,13 +138,13 @@ export class Timeline {
       this.#slider.min = String(replay.firstTick);
       this.#slider.max = String(replay.lastTick);
       if (!this.#isScrubbing && this.#seeking === null) this.#slider.value = String(tick);
-      this.#slider.setAttribute("aria-valuetext", `${clockTime(time)}, tick ${tick}`);
+      this.#slider.setAttribute("aria-valuetext", `${formatTime(time)}, tick ${tick}`);
     }
-    setText(this.#note, this.#noteText(isRunning));
+    setText(this.#note, this.#describeNote(isRunning));
     for (const control of [this.#play, this.#step, this.#speed]) control.disabled = !this.#app.mayDrive;
   }
 
-  #noteText(isRunning: boolean): string {
+  #describeNote(isRunning: boolean): string {
     const { clock, replay } = this.#app;
     if (replay?.diverged) return `The replay differs from the recording: ${replay.diverged}`;
     if (replay?.branched) return `left the recording at tick ${replay.branchedAt}`;
@@ -169,17 +169,17 @@ export class Timeline {
       if (!isShown || this.#seen.has(key)) continue;
       this.#seen.add(key);
       const place = Math.round((MARK_PLACES * (Number(event.tick) - first)) / span);
-      const text = `${clockTime(event.time)} ${wordOf(event)}: ${shortName(event.aName)} – ${shortName(event.bName)}`;
-      const shared = this.#marked.get(`${place} ${classOf(event)}`);
+      const text = `${formatTime(event.time)} ${describeEvent(event)}: ${shortenPath(event.aName)} – ${shortenPath(event.bName)}`;
+      const shared = this.#marked.get(`${place} ${getCssClass(event)}`);
       if (shared) {
         shared.others += 1;
         shared.mark.title = `${shared.text}, and ${shared.others} more`;
         continue;
       }
-      const mark = button("", () => this.#seek(Number(event.tick), false), { class: `mark ${classOf(event)}`, tabindex: "-1", title: text });
+      const mark = makeButton("", () => this.#seek(Number(event.tick), false), { class: `mark ${getCssClass(event)}`, tabindex: "-1", title: text });
       mark.style.left = `${(100 * place) / MARK_PLACES}%`;
       this.#marks.append(mark);
-      this.#marked.set(`${place} ${classOf(event)}`, { mark, text, others: 0 });
+      this.#marked.set(`${place} ${getCssClass(event)}`, { mark, text, others: 0 });
     }
   }
 

@@ -1,8 +1,8 @@
 // The objects as a tree, by storey and class or by path, with search, hide, isolate and show all.
 import type { App } from "../app";
-import { button, element, setText } from "./dom";
+import { makeButton, makeElement, setText } from "./dom";
 import type { Entity } from "../world/entities";
-import { lastName, shortName } from "./format";
+import { getLastName, shortenPath } from "./format";
 
 const MAX_ROWS = 300; // children shown at once; more are shown on request
 const MAX_FOUND = 200;
@@ -19,26 +19,26 @@ export class Tree {
   #app: App;
   #hasStoreys = false;
   #grouping: "storey" | "path" = "path";
-  #tree: Group = newGroup("", "");
+  #tree: Group = makeGroup("", "");
   #open = new Set<string>();
-  #list = element("div", { class: "tree", role: "tree", label: "Objects", tabindex: "0" });
-  #search = element("input", { type: "search", placeholder: "Search name, class or GlobalId", label: "Search objects" });
-  #select = element("select", { label: "Group objects by" },
-    element("option", { value: "storey" }, "By storey and class"), element("option", { value: "path" }, "By path"));
-  #count = element("span", { class: "quiet" });
+  #list = makeElement("div", { class: "tree", role: "tree", label: "Objects", tabindex: "0" });
+  #search = makeElement("input", { type: "search", placeholder: "Search name, class or GlobalId", label: "Search objects" });
+  #select = makeElement("select", { label: "Group objects by" },
+    makeElement("option", { value: "storey" }, "By storey and class"), makeElement("option", { value: "path" }, "By path"));
+  #count = makeElement("span", { class: "quiet" });
   #rows: { row: HTMLElement; group: Group | null; entity: Entity | null; level: number }[] = [];
   #lastRow: EventTarget | null = null; // that had the focus: a button takes the focus away
   #more = new Map<string, number>(); // further rows of a group, shown on request
 
   constructor(app: App) {
     this.#app = app;
-    this.root = element(
+    this.root = makeElement(
       "div", { class: "stack" }, this.#search,
-      element("div", { class: "row" }, this.#select, this.#count),
-      element("div", { class: "row" },
-        button("Isolate", () => this.#isolate(), { title: "Show only the selected object or the group with it" }),
-        button("Hide", () => this.#hideSelected()),
-        button("Show all", () => this.#showAll())),
+      makeElement("div", { class: "row" }, this.#select, this.#count),
+      makeElement("div", { class: "row" },
+        makeButton("Isolate", () => this.#isolate(), { title: "Show only the selected object or the group with it" }),
+        makeButton("Hide", () => this.#hideSelected()),
+        makeButton("Show all", () => this.#showAll())),
       this.#list,
     );
     this.#search.addEventListener("input", () => this.#render());
@@ -46,7 +46,7 @@ export class Tree {
       this.#grouping = this.#select.value as "storey" | "path";
       this.#build();
     });
-    this.#list.addEventListener("keydown", (event) => this.#key(event));
+    this.#list.addEventListener("keydown", (event) => this.#handleKey(event));
     this.#list.addEventListener("focusin", (event) => (this.#lastRow = event.target));
     app.sceneLoaded.listen(() => this.#fill());
     app.selected.listen((id) => this.#reveal(id));
@@ -67,15 +67,15 @@ export class Tree {
   }
 
   #build(): void {
-    this.#tree = newGroup("", "");
+    this.#tree = makeGroup("", "");
     this.#open.clear();
     this.#more.clear();
     for (const entity of this.#app.table.byId.values()) {
       let group = this.#tree;
-      for (const name of this.#groupsOf(entity)) {
+      for (const name of this.#findGroups(entity)) {
         const key = `${group.key}/${name}`;
         let next = group.groups.get(name);
-        if (!next) group.groups.set(name, (next = newGroup(name, key)));
+        if (!next) group.groups.set(name, (next = makeGroup(name, key)));
         group = next;
       }
       group.objects.push(entity);
@@ -89,7 +89,7 @@ export class Tree {
     this.#render();
   }
 
-  #groupsOf({ path, storey, class: kind }: Entity): string[] {
+  #findGroups({ path, storey, class: kind }: Entity): string[] {
     if (this.#grouping === "path") return path.split("/").slice(0, -1);
     return [...(this.#hasStoreys ? [storey || "No storey"] : []), kind || "No class"];
   }
@@ -112,7 +112,7 @@ export class Tree {
     for (const entity of this.#app.table.byId.values()) {
       const text = `${entity.path} ${entity.class} ${entity.globalId} ${entity.storey}`.toLowerCase();
       if (!words.every((word) => text.includes(word))) continue;
-      if (++count <= MAX_FOUND) this.#addObject(entity, 1, shortName(entity.path));
+      if (++count <= MAX_FOUND) this.#addObject(entity, 1, shortenPath(entity.path));
     }
     setText(this.#count, count > MAX_FOUND ? `${count} found, ${MAX_FOUND} shown` : `${count} found`);
   }
@@ -129,10 +129,10 @@ export class Tree {
     const shown = MAX_ROWS + (this.#more.get(group.key) ?? 0);
     for (const entity of group.objects.slice(0, shown)) {
       // Without the path above it, a name may name many objects.
-      this.#addObject(entity, level + 1, this.#grouping === "path" ? lastName(entity.path) : shortName(entity.path));
+      this.#addObject(entity, level + 1, this.#grouping === "path" ? getLastName(entity.path) : shortenPath(entity.path));
     }
     if (group.objects.length <= shown) return;
-    const row = element("div", { class: "leaf", role: "presentation" }, button(`${group.objects.length - shown} more`, () => {
+    const row = makeElement("div", { class: "leaf", role: "presentation" }, makeButton(`${group.objects.length - shown} more`, () => {
       this.#more.set(group.key, shown);
       this.#render();
     }, { class: "link" }));
@@ -142,21 +142,21 @@ export class Tree {
 
   #addGroup(group: Group, level: number): void {
     const isOpen = this.#open.has(group.key);
-    const row = element(
+    const row = makeElement(
       "div", { class: "group", role: "treeitem", "aria-level": level, "aria-expanded": String(isOpen), tabindex: "-1" },
-      element("span", { class: "arrow" }, isOpen ? "▾" : "▸"),
-      element("span", { class: "name", title: group.name }, group.name),
-      element("span", { class: "quiet" }, String(countOf(group))),
-      this.#eye(() => objectsOf(group)),
+      makeElement("span", { class: "arrow" }, isOpen ? "▾" : "▸"),
+      makeElement("span", { class: "name", title: group.name }, group.name),
+      makeElement("span", { class: "quiet" }, String(countObjects(group))),
+      this.#makeEye(() => collectObjects(group)),
     );
     row.addEventListener("click", () => this.#toggle(group));
     this.#push(row, group, null, level);
   }
 
   #addObject(entity: Entity, level: number, name: string): void {
-    const row = element(
+    const row = makeElement(
       "div", { class: "leaf", role: "treeitem", "aria-level": level, tabindex: "-1" },
-      element("span", { class: "name", title: entity.path }, name), this.#eye(() => [entity]),
+      makeElement("span", { class: "name", title: entity.path }, name), this.#makeEye(() => [entity]),
     );
     row.addEventListener("click", () => this.#app.select(entity.id));
     this.#push(row, null, entity, level);
@@ -167,8 +167,8 @@ export class Tree {
     this.#rows.push({ row, group, entity, level });
   }
 
-  #eye(objects: () => Entity[]): HTMLElement {
-    const eye = button("", () => {}, { class: "eye", tabindex: "-1", label: "Hide or show" });
+  #makeEye(objects: () => Entity[]): HTMLElement {
+    const eye = makeButton("", () => {}, { class: "eye", tabindex: "-1", label: "Hide or show" });
     eye.addEventListener("click", (event) => {
       event.stopPropagation();
       const list = objects();
@@ -189,7 +189,7 @@ export class Tree {
     const flags = this.#app.model?.flags;
     if (!flags) return;
     for (const { row, group, entity } of this.#rows) {
-      const hidden = entity ? flags.isHidden(entity.id) : group ? objectsOf(group).every(({ id }) => flags.isHidden(id)) : false;
+      const hidden = entity ? flags.isHidden(entity.id) : group ? collectObjects(group).every(({ id }) => flags.isHidden(id)) : false;
       row.classList.toggle("hidden-object", hidden);
       row.classList.toggle("selected", entity !== null && entity.id === this.#app.selection);
       if (entity) row.setAttribute("aria-selected", String(entity.id === this.#app.selection));
@@ -201,14 +201,14 @@ export class Tree {
     const entity = this.#app.table.byId.get(id);
     if (entity && this.#search.value === "" && this.root.offsetParent !== null) {
       let key = "";
-      for (const name of this.#groupsOf(entity)) this.#open.add((key += `/${name}`));
+      for (const name of this.#findGroups(entity)) this.#open.add((key += `/${name}`));
       this.#render();
       this.#rows.find((row) => row.entity === entity)?.row.scrollIntoView({ block: "nearest" });
     }
     this.#updateRows();
   }
 
-  #key(event: KeyboardEvent): void {
+  #handleKey(event: KeyboardEvent): void {
     const at = this.#rows.findIndex(({ row }) => row === document.activeElement);
     const current = this.#rows[at];
     const go = (index: number) => this.#rows[Math.max(0, Math.min(this.#rows.length - 1, index))]?.row.focus();
@@ -233,22 +233,22 @@ export class Tree {
   }
 
   /** The focused group of the tree, else the selected object. */
-  #chosen(): Entity[] {
+  #findChosen(): Entity[] {
     const focused = this.#rows.find(({ row }) => row === this.#lastRow);
-    if (focused?.group) return objectsOf(focused.group);
+    if (focused?.group) return collectObjects(focused.group);
     const entity = this.#app.table.byId.get(this.#app.selection);
     return entity ? [entity] : [];
   }
 
   #isolate(): void {
-    const chosen = new Set(this.#chosen());
+    const chosen = new Set(this.#findChosen());
     if (chosen.size === 0) return this.#app.say("Select an object first.");
     for (const entity of this.#app.table.byId.values()) this.#app.model?.flags.setHidden(entity.id, !chosen.has(entity));
     this.#app.visibilityChanged.emit();
   }
 
   #hideSelected(): void {
-    const chosen = this.#chosen();
+    const chosen = this.#findChosen();
     if (chosen.length === 0) return this.#app.say("Select an object first.");
     this.#setHidden(chosen, true);
   }
@@ -258,14 +258,14 @@ export class Tree {
   }
 }
 
-function newGroup(name: string, key: string): Group {
+function makeGroup(name: string, key: string): Group {
   return { name, key, groups: new Map(), objects: [] };
 }
 
-function objectsOf(group: Group): Entity[] {
-  return [...group.objects, ...[...group.groups.values()].flatMap(objectsOf)];
+function collectObjects(group: Group): Entity[] {
+  return [...group.objects, ...[...group.groups.values()].flatMap(collectObjects)];
 }
 
-function countOf(group: Group): number {
-  return [...group.groups.values()].reduce((sum, child) => sum + countOf(child), group.objects.length);
+function countObjects(group: Group): number {
+  return [...group.groups.values()].reduce((sum, child) => sum + countObjects(child), group.objects.length);
 }

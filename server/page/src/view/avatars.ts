@@ -5,7 +5,7 @@ import {
 } from "three";
 import type { App } from "../app";
 import type { CameraRig } from "./camera_rig";
-import { FIGURE_HEIGHT, figureGeometry, PRISM_RADIUS, prismGeometry } from "./figure";
+import { FIGURE_HEIGHT, makeFigureGeometry, makePrismGeometry, PRISM_RADIUS } from "./figure";
 import type { AvatarPose } from "../world/world_state";
 
 const NEAR_CAMERA = 1.6; // metres
@@ -14,11 +14,11 @@ const LABEL_DISTANCE = 30; // metres
 const UP = new Vector3(0, 1, 0);
 const COLORS = [0x1f6f8b, 0xb5562b, 0x5b7f3a, 0x7a4f9a, 0xa8842c, 0x2f5aa8, 0x9c3d58, 0x3d8a76];
 
-export function colorOf(id: number): string {
-  return `#${colorValue(id).getHexString()}`;
+export function findCssColor(id: number): string {
+  return `#${findColor(id).getHexString()}`;
 }
 
-function colorValue(id: number): Color {
+function findColor(id: number): Color {
   return new Color(COLORS[id % COLORS.length]!);
 }
 
@@ -29,7 +29,7 @@ export class Avatars {
   #figures: InstancedMesh | null = null;
   #prisms: InstancedMesh | null = null;
   // The avatar in focus is drawn alone, because it may become transparent.
-  #own = new Mesh(figureGeometry(), new MeshLambertMaterial());
+  #own = new Mesh(makeFigureGeometry(), new MeshLambertMaterial());
   #labels = new Map<number, Sprite>();
   /** Also draws the shapes that collide. */
   prismsShown = false;
@@ -43,7 +43,7 @@ export class Avatars {
 
   #update(): boolean {
     const { model, state } = this.#app;
-    const poses = state.avatars();
+    const poses = state.getAvatars();
     this.#reserve(poses.length);
     this.#own.visible = false;
     let count = 0;
@@ -55,7 +55,7 @@ export class Avatars {
     }
     this.#prisms!.visible = this.prismsShown;
     this.#placeLabels(poses);
-    model?.applyPoses(state.bodies());
+    model?.applyPoses(state.getBodies());
     return state.isMoving;
   }
 
@@ -64,9 +64,9 @@ export class Avatars {
     this.#figures?.removeFromParent();
     this.#prisms?.removeFromParent();
     const capacity = Math.max(8, 2 * count);
-    this.#figures = new InstancedMesh(figureGeometry(), new MeshLambertMaterial(), capacity);
+    this.#figures = new InstancedMesh(makeFigureGeometry(), new MeshLambertMaterial(), capacity);
     const glass = new MeshBasicMaterial({ transparent: true, opacity: 0.3, depthWrite: false });
-    this.#prisms = new InstancedMesh(prismGeometry(), glass, capacity);
+    this.#prisms = new InstancedMesh(makePrismGeometry(), glass, capacity);
     for (const mesh of [this.#figures, this.#prisms]) {
       mesh.frustumCulled = false;
       mesh.instanceMatrix.setUsage(DynamicDrawUsage);
@@ -83,7 +83,7 @@ export class Avatars {
     const facing = new Quaternion().setFromAxisAngle(UP, Math.atan2(-pose.gaze.z, pose.gaze.x));
     this.#figures!.setMatrixAt(index, new Matrix4().compose(pose.feet, facing, isFocus ? new Vector3(0, 0, 0) : scale));
     this.#prisms!.setMatrixAt(index, new Matrix4().compose(pose.feet, new Quaternion(), scale));
-    for (const mesh of [this.#figures!, this.#prisms!]) mesh.setColorAt(index, colorValue(id));
+    for (const mesh of [this.#figures!, this.#prisms!]) mesh.setColorAt(index, findColor(id));
     if (isFocus) this.#placeOwn(pose, facing, scale);
     return true;
   }
@@ -94,7 +94,7 @@ export class Avatars {
     this.#own.quaternion.copy(facing);
     this.#own.scale.copy(scale);
     const material = this.#own.material as MeshLambertMaterial;
-    material.color = colorValue(pose.state.id);
+    material.color = findColor(pose.state.id);
     // A wall may push the camera so near that the avatar would fill the picture.
     const eyes = pose.feet.clone().setY(pose.feet.y + pose.eyeHeight);
     const isNear = this.#rig.position.distanceTo(eyes) < NEAR_CAMERA;
@@ -120,7 +120,7 @@ export class Avatars {
     for (const { pose } of near) {
       let sprite = this.#labels.get(pose.state.id);
       if (!sprite) {
-        sprite = nameSprite(pose.state.name);
+        sprite = makeNameSprite(pose.state.name);
         this.#labels.set(pose.state.id, sprite);
         this.#app.view.scene.add(sprite);
       }
@@ -131,9 +131,9 @@ export class Avatars {
   /** The nearest avatar on a ray; the avatar whose eyes the page shows is ignored. */
   raycast(origin: Vector3, direction: Vector3): { entity: number; distance: number; point: Vector3 } | null {
     let best: { entity: number; distance: number; point: Vector3 } | null = null;
-    for (const { state, feet } of this.#app.state.avatars()) {
+    for (const { state, feet } of this.#app.state.getAvatars()) {
       if (this.#rig.mode === "first" && state.name === this.#app.focus) continue;
-      const distance = cylinderDistance(origin, direction, feet, PRISM_RADIUS, state.height || FIGURE_HEIGHT);
+      const distance = intersectCylinder(origin, direction, feet, PRISM_RADIUS, state.height || FIGURE_HEIGHT);
       if (distance === null || distance >= (best?.distance ?? Infinity)) continue;
       best = { entity: state.id, distance, point: origin.clone().addScaledVector(direction, distance) };
     }
@@ -141,7 +141,7 @@ export class Avatars {
   }
 }
 
-function nameSprite(name: string): Sprite {
+function makeNameSprite(name: string): Sprite {
   const canvas = document.createElement("canvas");
   canvas.width = 256;
   canvas.height = 48;
@@ -161,7 +161,7 @@ function nameSprite(name: string): Sprite {
   return sprite;
 }
 
-function cylinderDistance(origin: Vector3, d: Vector3, feet: Vector3, radius: number, height: number): number | null {
+function intersectCylinder(origin: Vector3, d: Vector3, feet: Vector3, radius: number, height: number): number | null {
   const x = origin.x - feet.x;
   const z = origin.z - feet.z;
   const a = d.x * d.x + d.z * d.z;

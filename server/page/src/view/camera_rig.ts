@@ -38,7 +38,7 @@ export class CameraRig {
 
   /** Unit vector of the view. */
   get forward(): Vector3 {
-    return directionOf(this.yaw, this.pitch);
+    return computeDirection(this.yaw, this.pitch);
   }
 
   get right(): Vector3 {
@@ -61,7 +61,7 @@ export class CameraRig {
   }
 
   lookAlong(direction: Vector3): void {
-    ({ yaw: this.yaw, pitch: this.pitch } = anglesOf(direction));
+    ({ yaw: this.yaw, pitch: this.pitch } = computeAngles(direction));
     this.#app.view.invalidate();
   }
 
@@ -73,7 +73,7 @@ export class CameraRig {
 
   /** Flies to a place and looks at a target. */
   flyTo(position: Vector3, target: Vector3): void {
-    const to = { position: position.clone(), ...anglesOf(target.clone().sub(position)) };
+    const to = { position: position.clone(), ...computeAngles(target.clone().sub(position)) };
     to.yaw = this.yaw + wrapAngle(to.yaw - this.yaw);
     this.setMode("free");
     this.#app.setFocus("");
@@ -121,19 +121,19 @@ export class CameraRig {
     return true;
   }
 
-  #focused(): AvatarPose | undefined {
-    return this.#app.state.avatars().find(({ state }) => state.name === this.#app.focus);
+  #findFocused(): AvatarPose | undefined {
+    return this.#app.state.getAvatars().find(({ state }) => state.name === this.#app.focus);
   }
 
   #follow(): boolean {
-    const avatar = this.#focused();
+    const avatar = this.#findFocused();
     if (!avatar) return false;
     const eyes = avatar.feet.clone();
     eyes.y += avatar.eyeHeight;
     if (this.mode === "first") {
       this.position.copy(eyes);
       // The eyes of another avatar look where it looks.
-      if (avatar.state.name !== this.#app.own) ({ yaw: this.yaw, pitch: this.pitch } = anglesOf(avatar.gaze));
+      if (avatar.state.name !== this.#app.own) ({ yaw: this.yaw, pitch: this.pitch } = computeAngles(avatar.gaze));
     } else {
       const back = this.forward.negate();
       const hit = this.#app.model?.raycast(eyes, back, this.#behind + MARGIN);
@@ -143,11 +143,11 @@ export class CameraRig {
   }
 }
 
-export function directionOf(yaw: number, pitch: number): Vector3 {
+export function computeDirection(yaw: number, pitch: number): Vector3 {
   return new Vector3(Math.cos(yaw) * Math.cos(pitch), Math.sin(pitch), -Math.sin(yaw) * Math.cos(pitch));
 }
 
-function anglesOf(direction: Vector3): { yaw: number; pitch: number } {
+function computeAngles(direction: Vector3): { yaw: number; pitch: number } {
   const d = direction.clone().normalize();
   return { yaw: Math.atan2(-d.z, d.x), pitch: clampPitch(Math.asin(d.y)) };
 }

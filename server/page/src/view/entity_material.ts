@@ -56,7 +56,7 @@ if (flags.r > 0.5) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
 `;
 
 /** Adds the entity table to a material's shaders. */
-export function withEntityFlags<M extends Material>(material: M, flags: EntityFlags): M {
+export function addEntityFlags<M extends Material>(material: M, flags: EntityFlags): M {
   material.onBeforeCompile = (shader) => {
     shader.uniforms.entityFlags = { value: flags.texture };
     shader.vertexShader = VERTEX_HEAD + shader.vertexShader.replace(
@@ -73,7 +73,7 @@ gl_FragColor.rgb = mix(gl_FragColor.rgb, vec3(0.05, 0.3, 0.75), 0.55 * entityMar
 }
 
 /** A material for one of the file. Lit ones become diffuse: rooms have no environment map that metal could mirror. */
-export function drawnMaterial(source: MeshStandardMaterial | MeshBasicMaterial, flags: EntityFlags, hasColors: boolean): Material {
+export function makeMaterial(source: MeshStandardMaterial | MeshBasicMaterial, flags: EntityFlags, hasColors: boolean): Material {
   const isTransparent = source.transparent || source.opacity < 1;
   const common = {
     color: source.color,
@@ -87,7 +87,7 @@ export function drawnMaterial(source: MeshStandardMaterial | MeshBasicMaterial, 
     name: source.name,
   };
   // Unlit files have their light in the textures.
-  if (source instanceof MeshBasicMaterial) return withEntityFlags(new MeshBasicMaterial(common), flags);
+  if (source instanceof MeshBasicMaterial) return addEntityFlags(new MeshBasicMaterial(common), flags);
   const { emissive, emissiveMap } = source;
-  return withEntityFlags(new MeshLambertMaterial({ ...common, emissive, emissiveMap }), flags);
+  return addEntityFlags(new MeshLambertMaterial({ ...common, emissive, emissiveMap }), flags);
 }

@@ -17,16 +17,16 @@ const BODY: [number, number][] = [
 ];
 
 /** A standing person, the feet at the origin, facing +x. */
-export function figureGeometry(): BufferGeometry {
+export function makeFigureGeometry(): BufferGeometry {
   const body = new LatheGeometry(BODY.map(([y, r]) => new Vector2(r, y)), 20);
   body.applyMatrix4(new Matrix4().makeScale(DEPTH, 1, 1));
   const head = new SphereGeometry(0.105, 18, 14);
   head.applyMatrix4(new Matrix4().makeScale(0.95, 1.2, 0.85).setPosition(0.01, 1.624, 0));
   const parts: BufferGeometry[] = [body, head];
   for (const side of [-1, 1]) {
-    parts.push(limb(0.082, 0.05, [0, 0.86, side * 0.088], [0, 0.06, side * 0.1]));
-    parts.push(limb(0.05, 0.036, [0, 1.41, side * 0.205], [0.02, 1.1, side * 0.262]));
-    parts.push(limb(0.036, 0.03, [0.02, 1.1, side * 0.262], [0.07, 0.82, side * 0.265]));
+    parts.push(makeLimb(0.082, 0.05, [0, 0.86, side * 0.088], [0, 0.06, side * 0.1]));
+    parts.push(makeLimb(0.05, 0.036, [0, 1.41, side * 0.205], [0.02, 1.1, side * 0.262]));
+    parts.push(makeLimb(0.036, 0.03, [0.02, 1.1, side * 0.262], [0.07, 0.82, side * 0.265]));
     const foot = new BoxGeometry(0.24, 0.065, 0.085);
     foot.translate(0.05, 0.0325, side * 0.102);
     parts.push(foot);
@@ -35,7 +35,7 @@ export function figureGeometry(): BufferGeometry {
 }
 
 /** A tapered cylinder between two points, with its radii there. */
-function limb(upper: number, lower: number, from: [number, number, number], to: [number, number, number]): BufferGeometry {
+function makeLimb(upper: number, lower: number, from: [number, number, number], to: [number, number, number]): BufferGeometry {
   const [x, y, z] = from;
   const height = y - to[1];
   const cylinder = new CylinderGeometry(upper, lower, height, 10);
@@ -44,7 +44,7 @@ function limb(upper: number, lower: number, from: [number, number, number], to: 
   return cylinder.applyMatrix4(shear);
 }
 
-export function prismGeometry(): BufferGeometry {
+export function makePrismGeometry(): BufferGeometry {
   const inner = PRISM_RADIUS * (1 - BEVEL_INSET);
   const rings: [number, number][] = [[0, inner], [BEVEL_HEIGHT, PRISM_RADIUS], [FIGURE_HEIGHT - BEVEL_HEIGHT, PRISM_RADIUS], [FIGURE_HEIGHT, inner]];
   const at = (ring: number, side: number) => {

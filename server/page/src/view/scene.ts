@@ -6,10 +6,10 @@ import {
 import type { GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
 import { MeshBVH, type HitPointInfo } from "three-mesh-bvh";
 import type { EntityTable } from "../world/entities";
-import { drawnMaterial, EntityFlags } from "./entity_material";
+import { EntityFlags, makeMaterial } from "./entity_material";
 import type { Body } from "../generated/enfilade_pb";
 import { mergePieces, sortMeshes, type Piece } from "../world/scene_file";
-import { vector, type Pose } from "../world/world_state";
+import { toVector, type Pose } from "../world/world_state";
 
 export interface Hit {
   entity: number;
@@ -44,12 +44,12 @@ export class SceneModel {
   constructor(gltf: GLTF, table: EntityTable, bodies: Body[], maxId: number) {
     this.table = table;
     this.flags = new EntityFlags(maxId);
-    for (const body of bodies) this.#origins.set(body.id, vector(body.origin));
+    for (const body of bodies) this.#origins.set(body.id, toVector(body.origin));
     const file = sortMeshes(gltf, table);
     this.withoutEntity = file.withoutEntity;
     const materials = new Map<string, Material>();
     for (const mesh of [...file.batches, ...file.instances, ...mergePieces(file.loose)]) {
-      mesh.material = this.#materialFor(mesh.material as MeshStandardMaterial, mesh.geometry, materials);
+      mesh.material = this.#getMaterial(mesh.material as MeshStandardMaterial, mesh.geometry, materials);
       this.#addStatic(mesh);
     }
     this.#addMoving(file.moving, materials);
@@ -57,10 +57,10 @@ export class SceneModel {
     this.root.matrixAutoUpdate = false;
   }
 
-  #materialFor(source: MeshStandardMaterial, geometry: BufferGeometry, made: Map<string, Material>): Material {
+  #getMaterial(source: MeshStandardMaterial, geometry: BufferGeometry, made: Map<string, Material>): Material {
     const hasColors = geometry.hasAttribute("color");
     const key = `${source.uuid} ${hasColors}`;
-    const material = made.get(key) ?? drawnMaterial(source, this.flags, hasColors);
+    const material = made.get(key) ?? makeMaterial(source, this.flags, hasColors);
     made.set(key, material);
     return material;
   }
@@ -88,10 +88,10 @@ export class SceneModel {
       if (!geometry.hasAttribute("normal")) geometry.computeVertexNormals();
       const ids = new Float32Array(group.map((piece) => piece.entity));
       geometry.setAttribute("entityId", new InstancedBufferAttribute(ids, 1));
-      const mesh = new InstancedMesh(geometry, this.#materialFor(first.material, geometry, materials), group.length);
+      const mesh = new InstancedMesh(geometry, this.#getMaterial(first.material, geometry, materials), group.length);
       mesh.frustumCulled = false; // bodies leave any box that is computed once
       group.forEach(({ entity, sceneFromMesh }, index) => {
-        const body = this.table.bodyOf.get(entity)!;
+        const body = this.table.bodyByObject.get(entity)!;
         const origin = this.#origins.get(body) ?? new Vector3();
         const bodyFromMesh = new Matrix4().makeTranslation(-origin.x, -origin.y, -origin.z).multiply(sceneFromMesh);
         this.#moving.push({ mesh, index, body, bodyFromMesh });
@@ -103,7 +103,7 @@ export class SceneModel {
     }
   }
 
-  #grow(entity: number): Box3 {
+  #getBox(entity: number): Box3 {
     let box = this.#boxes.get(entity);
     if (!box) this.#boxes.set(entity, (box = new Box3()));
     return box;
@@ -114,7 +114,7 @@ export class SceneModel {
     const ids = mesh.geometry.getAttribute("entityId");
     const v = new Vector3();
     for (let i = 0; i < position.count; ++i) {
-      this.#grow(ids.getX(i)).expandByPoint(v.fromBufferAttribute(position, i).applyMatrix4(mesh.matrixWorld));
+      this.#getBox(ids.getX(i)).expandByPoint(v.fromBufferAttribute(position, i).applyMatrix4(mesh.matrixWorld));
     }
   }
 
@@ -125,26 +125,26 @@ export class SceneModel {
     for (let i = 0; i < mesh.count; ++i) {
       mesh.getMatrixAt(i, matrix);
       const box = mesh.geometry.boundingBox!.clone().applyMatrix4(matrix.premultiply(mesh.matrixWorld));
-      this.#grow(ids.getX(i)).union(box);
+      this.#getBox(ids.getX(i)).union(box);
     }
   }
 
   /** The box of an object at its initial pose; null if the object has no triangles. */
-  boxOf(entity: number): Box3 | null {
+  findBox(entity: number): Box3 | null {
     return this.#boxes.get(entity) ?? null;
   }
 
   /** The box of an object where it is now. */
-  presentBox(entity: number): Box3 | null {
+  findPresentBox(entity: number): Box3 | null {
     const box = this.#boxes.get(entity);
-    const body = this.table.bodyOf.get(entity);
+    const body = this.table.bodyByObject.get(entity);
     const pose = body === undefined ? undefined : this.#poses.get(body);
     const origin = body === undefined ? undefined : this.#origins.get(body);
     if (!box || !pose || !origin) return box ?? null;
     return box.clone().translate(origin.clone().negate()).applyMatrix4(pose);
   }
 
-  boxes(): IterableIterator<[number, Box3]> {
+  getBoxes(): IterableIterator<[number, Box3]> {
     return this.#boxes.entries();
   }
 
@@ -181,13 +181,13 @@ export class SceneModel {
     const next = () => {
       const geometry = waiting.pop();
       if (!geometry) return;
-      this.#treeOf(geometry);
+      this.#getTree(geometry);
       setTimeout(next, 0);
     };
     setTimeout(next, 200);
   }
 
-  #treeOf(geometry: BufferGeometry): MeshBVH {
+  #getTree(geometry: BufferGeometry): MeshBVH {
     let tree = this.#trees.get(geometry);
     // An indirect tree leaves the triangles in their order.
     if (!tree) this.#trees.set(geometry, (tree = new MeshBVH(geometry, { indirect: true })));
@@ -225,7 +225,7 @@ export class SceneModel {
     const sphere = geometry.boundingSphere!.clone().applyMatrix4(sceneFromMesh);
     if (!ray.intersectsSphere(sphere)) return null;
     const local = ray.clone().applyMatrix4(sceneFromMesh.clone().invert());
-    const tree = this.#treeOf(geometry);
+    const tree = this.#getTree(geometry);
     const hits = this.flags.hiddenCount === 0
       ? [tree.raycastFirst(local, DoubleSide)] : tree.raycast(local, DoubleSide);
     let best: Hit | null = null;
@@ -249,7 +249,7 @@ export class SceneModel {
     for (const mesh of this.#meshes) {
       if (mesh instanceof InstancedMesh) continue;
       const local = point.clone().applyMatrix4(mesh.matrixWorld.clone().invert());
-      const hit = this.#treeOf(mesh.geometry).closestPointToPoint(local, target, 0, best);
+      const hit = this.#getTree(mesh.geometry).closestPointToPoint(local, target, 0, best);
       if (hit && hit.distance < best) best = hit.distance;
     }
     return best;

@@ -19,7 +19,7 @@ const MAX_SIGHT = 60; // metres; a direction with nothing within is empty
 
 /** Places in order of preference. `around` is tried first; without it, the best of the largest rooms that the file names. */
 export function proposeStarts(model: SceneModel, around: Vector3 | null): StartPlace[] {
-  const middle = middleOf(model);
+  const middle = findMiddle(model);
   if (!around) {
     const rooms = [...model.table.rooms].sort((a, b) => b.area - a.area).slice(0, MAX_ROOMS);
     const judged = rooms.flatMap(({ floor }) => judge(model, new Vector3(floor.x, floor.y + 1, floor.z), middle) ?? []);
@@ -41,14 +41,14 @@ export function proposeStarts(model: SceneModel, around: Vector3 | null): StartP
 }
 
 /** The middle of most objects, one metre above the lowest floor there. A large site has few objects. */
-function middleOf(model: SceneModel): Vector3 {
+function findMiddle(model: SceneModel): Vector3 {
   const centers: Vector3[] = [];
-  for (const [, box] of model.boxes()) centers.push(box.getCenter(new Vector3()));
+  for (const [, box] of model.getBoxes()) centers.push(box.getCenter(new Vector3()));
   const median = (axis: "x" | "y" | "z") => centers.map((c) => c[axis]).sort((a, b) => a - b)[centers.length >> 1] ?? 0;
   const middle = new Vector3(median("x"), median("y"), median("z"));
   const area = new Box3().setFromCenterAndSize(middle, new Vector3(8, 1e4, 8));
   let floor = Infinity;
-  for (const [, box] of model.boxes()) {
+  for (const [, box] of model.getBoxes()) {
     const isFlat = box.max.y - box.min.y < 0.6 && (box.max.x - box.min.x) * (box.max.z - box.min.z) > 4;
     if (isFlat && box.intersectsBox(area)) floor = Math.min(floor, box.max.y);
   }

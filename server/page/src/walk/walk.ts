@@ -5,7 +5,7 @@ import type { CameraRig } from "../view/camera_rig";
 import { Clock_Mode, Notice_Kind, Role, type Notice } from "../generated/enfilade_pb";
 import type { Action, Input } from "./input";
 import { proposeStarts, type StartPlace } from "./start_place";
-import { plain, vector } from "../world/world_state";
+import { toPlain, toVector } from "../world/world_state";
 
 const WALK_SPEED = 1.4; // metres per second, as the server's default
 const RUN_SPEED = 3.5;
@@ -92,7 +92,7 @@ export class Walk {
     let refusal = "No free place was found in this scene. Click a floor, then choose “Walk from here”.";
     for (const { feet, facing } of places) {
       const degrees = (Math.atan2(-facing.z, facing.x) * 180) / Math.PI;
-      const notice = await this.#order({ case: "spawn", value: { at: plain(feet), facing: degrees } }, SPAWN_SECONDS);
+      const notice = await this.#order({ case: "spawn", value: { at: toPlain(feet), facing: degrees } }, SPAWN_SECONDS);
       if (!notice) throw new Error("No tick runs, so no avatar can enter: start the clock with ▶.");
       if (notice.kind === Notice_Kind.SPAWNED) return this.#entered(facing);
       refusal = `There is no room at that place: ${notice.text}`;
@@ -128,7 +128,7 @@ export class Walk {
 
   #disconnected(): void {
     const state = this.#app.avatarState(this.name);
-    if (this.isWalking && state) this.#resume = { feet: vector(state.feet), facing: this.#rig.forward.setY(0) };
+    if (this.isWalking && state) this.#resume = { feet: toVector(state.feet), facing: this.#rig.forward.setY(0) };
     this.isWalking = false;
     this.#waiting.clear();
     this.#pendingOrders = 0;
@@ -141,7 +141,7 @@ export class Walk {
   act(action: Action): void {
     if (!this.isWalking) return;
     const height = this.#app.avatarState(this.name)?.height ?? 0;
-    if (action === "jump" && !this.isFlying) this.#queue({ case: "jump", value: { velocity: plain(this.#velocity()) } });
+    if (action === "jump" && !this.isFlying) this.#queue({ case: "jump", value: { velocity: toPlain(this.#computeVelocity()) } });
     if (action === "fly") {
       void this.#queue({ case: "fly", value: { on: !this.isFlying } }).then((done) => {
         if (done) this.isFlying = !this.isFlying;
@@ -173,7 +173,7 @@ export class Walk {
 
   /** Orders a path to the closest place where the avatar has room; without one, says so and orders a straight walk. */
   async #goTo(place: Vector3): Promise<Notice | null> {
-    const point = plain(place);
+    const point = toPlain(place);
     try {
       const query = { case: "snap" as const, value: { points: [point], maxDistance: SNAP_DISTANCE } };
       const [spot] = (await this.#app.connection.request("navigation", { query, progress: true })).spots;
@@ -186,7 +186,7 @@ export class Walk {
   }
 
   /** The velocity that the held keys ask for. */
-  #velocity(): Vector3 {
+  #computeVelocity(): Vector3 {
     const { forward, right, up, running } = this.#input.motion;
     const ahead = this.isFlying ? this.#rig.forward : this.#rig.forward.setY(0).normalize();
     const velocity = ahead.multiplyScalar(forward).addScaledVector(this.#rig.right, right);
@@ -198,7 +198,7 @@ export class Walk {
 
   #drive(): void {
     if (!this.isWalking || this.#pendingOrders > 0) return;
-    const velocity = this.#velocity();
+    const velocity = this.#computeVelocity();
     if (velocity.distanceTo(this.#driven) < 0.005) return;
     const now = performance.now() / 1000;
     // A start or a stop is sent at once; turns of the view at most twenty times a second.
@@ -207,7 +207,7 @@ export class Walk {
     this.#drivenAt = now;
     this.#driven.copy(velocity);
     this.#isDriving = true;
-    this.#app.attempt(this.#app.connection.command(this.name, { case: "drive", value: { velocity: plain(velocity) } }));
+    this.#app.attempt(this.#app.connection.command(this.name, { case: "drive", value: { velocity: toPlain(velocity) } }));
   }
 
   /** Gives a short order; the keys wait for its end, because a Drive would drop it. True: it was carried out. */
@@ -258,7 +258,7 @@ export class Walk {
     this.name = avatar;
     const state = this.#app.avatarState(avatar);
     await this.#runClock();
-    this.#entered(state ? vector(state.gaze) : this.#rig.forward);
+    this.#entered(state ? toVector(state.gaze) : this.#rig.forward);
     this.isFlying = state?.flying ?? false;
   }
 

@@ -1,6 +1,6 @@
 // The connection to the server: one world, typed requests, reconnection with back-off.
 import { createRegistry } from "@bufbuild/protobuf";
-import { connect, ConnectionFailed, schemasOf, ServerError, type Client } from "enfilade-client";
+import { connect, ConnectionFailed, makeSchemas, ServerError, type Client } from "enfilade-client";
 import { file_enfilade } from "../generated/enfilade_pb";
 import { fetchScene } from "./scene_file";
 import type { CommandFields, Listener, ReplyOf, RequestFields, RequestName, Trouble, WorldSource } from "./source";
@@ -15,7 +15,7 @@ export class Connection implements WorldSource {
   #listener: Listener;
   #wait = FIRST_WAIT;
   #timer = 0;
-  #schemas = schemasOf(createRegistry(file_enfilade));
+  #schemas = makeSchemas(createRegistry(file_enfilade));
 
   constructor(listener: Listener, token: string, world: string) {
     this.#listener = listener;

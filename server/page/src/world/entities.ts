@@ -26,7 +26,7 @@ export class EntityTable {
   rooms: Room[] = [];
   readonly avatars = new Map<number, string>(); // names, by entity id; a name stays after its avatar left
   /** Every object of a moving body, and the id of that body. */
-  readonly bodyOf = new Map<number, number>();
+  readonly bodyByObject = new Map<number, number>();
 
   add(entity: Entity): void {
     this.byId.set(entity.id, entity);
@@ -34,7 +34,7 @@ export class EntityTable {
   }
 
   /** The name that a person reads: the path of an object, or the name of an avatar. */
-  nameOf(id: number): string {
+  findName(id: number): string {
     return this.byId.get(id)?.path ?? this.avatars.get(id) ?? `entity ${id}`;
   }
 
@@ -42,26 +42,26 @@ export class EntityTable {
   addRecord(record: unknown): Entity | null {
     if (typeof record !== "object" || record === null) return null;
     const fields = record as Record<string, unknown>;
-    const text = (name: string) => (typeof fields[name] === "string" ? (fields[name] as string) : "");
+    const toText = (name: string) => (typeof fields[name] === "string" ? (fields[name] as string) : "");
     const id = Number(fields.entity ?? fields.id);
     if (!Number.isInteger(id) || id <= 0) return null;
-    const path = text("path") || text("name") || `object ${id}`;
-    const entity = { id, path, globalId: text("globalId"), class: text("class"), storey: text("storey") };
+    const path = toText("path") || toText("name") || `object ${id}`;
+    const entity = { id, path, globalId: toText("globalId"), class: toText("class"), storey: toText("storey") };
     this.add(entity);
     return entity;
   }
 
   /** Takes the storeys and spaces of a scene file. Unknown or wrong fields are left out. */
   addStructure(storeys: unknown, spaces: unknown): void {
-    const listOf = (value: unknown) => (Array.isArray(value) ? value : []) as Record<string, unknown>[];
-    const text = (value: unknown) => (typeof value === "string" ? value : "");
+    const toList = (value: unknown) => (Array.isArray(value) ? value : []) as Record<string, unknown>[];
+    const toText = (value: unknown) => (typeof value === "string" ? value : "");
     const isPoint = (value: unknown): value is number[] => Array.isArray(value) && value.length === 3 && value.every(Number.isFinite);
-    this.storeys = listOf(storeys).map((storey) => text(storey?.name));
-    for (const space of listOf(spaces)) {
+    this.storeys = toList(storeys).map((storey) => toText(storey?.name));
+    for (const space of toList(spaces)) {
       const [min, max] = [space?.min, space?.max];
       if (!isPoint(min) || !isPoint(max)) continue;
       const floor = { x: (min[0]! + max[0]!) / 2, y: min[1]!, z: (min[2]! + max[2]!) / 2 };
-      this.rooms.push({ name: text(space.longName) || text(space.name), floor, area: (max[0]! - min[0]!) * (max[2]! - min[2]!) });
+      this.rooms.push({ name: toText(space.longName) || toText(space.name), floor, area: (max[0]! - min[0]!) * (max[2]! - min[2]!) });
     }
   }
 

@@ -92,12 +92,12 @@ export class RecordedWorld implements WorldSource {
     switch (name) {
       case "subscribe":
         queueMicrotask(() => this.#sendState());
-        return create(SubscribeReplySchema, { live: this.#liveAt(this.#tick) });
+        return create(SubscribeReplySchema, { live: this.#findLive(this.#tick) });
       case "describe":
         return create(EntityNamesSchema, {});
       case "setClock":
         this.#setClock((fields as RequestFields<"setClock">).mode!);
-        return create(SetClockReplySchema, { clock: this.#clock(), tick: BigInt(this.#tick) });
+        return create(SetClockReplySchema, { clock: this.#makeClock(), tick: BigInt(this.#tick) });
       case "step":
         this.#advance((fields as RequestFields<"step">).ticks ?? 1);
         return create(StepReplySchema, { tick: BigInt(this.#tick) });
@@ -105,7 +105,7 @@ export class RecordedWorld implements WorldSource {
         this.#seek(Number((fields as RequestFields<"seek">).tick));
         return create(SeekReplySchema, { tick: BigInt(this.#tick) });
       case "touching":
-        return create(TouchingReplySchema, { found: this.#touching(fields as RequestFields<"touching">) });
+        return create(TouchingReplySchema, { found: this.#findTouching(fields as RequestFields<"touching">) });
       default:
         throw new Error("This is a recording in a file: it can only be watched.");
     }
@@ -113,7 +113,7 @@ export class RecordedWorld implements WorldSource {
 
   // ---- the clock -------------------------------------------------------------------------------
 
-  #clock() {
+  #makeClock() {
     return create(ClockSchema, { mode: this.#mode, speed: this.#speed });
   }
 
@@ -151,28 +151,28 @@ export class RecordedWorld implements WorldSource {
   }
 
   #seek(tick: number): void {
-    const ended = this.#liveAt(this.#tick).map((contact) => create(ContactEventSchema, { ...contact, kind: Kind.END, reason: Reason.SEEK }));
+    const ended = this.#findLive(this.#tick).map((contact) => create(ContactEventSchema, { ...contact, kind: Kind.END, reason: Reason.SEEK }));
     this.#tick = Math.max(this.#first, Math.min(this.#last, tick));
     const events = { tick: BigInt(this.#tick), time: 0, sequence: 0n, notices: [], horizons: [] };
-    this.#listener.events({ ...events, contacts: [...ended, ...this.#liveAt(this.#tick)] } as unknown as TickEvents);
+    this.#listener.events({ ...events, contacts: [...ended, ...this.#findLive(this.#tick)] } as unknown as TickEvents);
     this.#sendState();
     this.#sendReplay();
   }
 
   #sendState(): void {
-    this.#listener.state(this.#stateAt(this.#tick));
+    this.#listener.state(this.#findState(this.#tick));
   }
 
   #sendReplay(): void {
     this.#listener.replay(create(ReplaySchema, {
-      ...this.#welcome.replay!, tick: BigInt(this.#tick), atEnd: this.#tick === this.#last, clock: this.#clock(),
+      ...this.#welcome.replay!, tick: BigInt(this.#tick), atEnd: this.#tick === this.#last, clock: this.#makeClock(),
     }));
   }
 
   // ---- the recording ---------------------------------------------------------------------------
 
   /** The state of a tick; the first one, and ticks that the recording lacks, have no avatars. */
-  #stateAt(tick: number): State {
+  #findState(tick: number): State {
     let low = 0;
     let high = this.#states.length;
     while (low < high) {
@@ -189,7 +189,7 @@ export class RecordedWorld implements WorldSource {
   }
 
   /** Contacts that are active after a tick, as begin events. */
-  #liveAt(tick: number): ContactEvent[] {
+  #findLive(tick: number): ContactEvent[] {
     const live = new Map<string, ContactEvent>();
     for (const events of this.#events) {
       if (Number(events.tick) > tick) break;
@@ -202,10 +202,10 @@ export class RecordedWorld implements WorldSource {
   }
 
   /** The recorded contacts of an entity. Distances between recorded events are not known. */
-  #touching(query: RequestFields<"touching">) {
+  #findTouching(query: RequestFields<"touching">) {
     const by = query.entity?.by;
     const id = by?.case === "id" ? by.value : 0;
-    return this.#liveAt(this.#tick).filter(({ a, b }) => a === id || b === id).map((event) => {
+    return this.#findLive(this.#tick).filter(({ a, b }) => a === id || b === id).map((event) => {
       const isFirst = event.a === id;
       const { verdict, distance, pointA, pointB, normal } = event;
       return create(PairStateSchema, {

@@ -69,22 +69,22 @@ export function readEntities(gltf: GLTF, table: EntityTable): void {
 export function sortMeshes(gltf: GLTF, table: EntityTable): SceneFile {
   const found: SceneFile = { batches: [], instances: [], loose: [], moving: [], withoutEntity: 0 };
   gltf.scene.updateMatrixWorld(true);
-  const paths = pathsOf(gltf);
+  const paths = findPaths(gltf);
   gltf.scene.traverse((object) => {
     if (!(object instanceof Mesh)) return;
-    const ids = entityAttribute(object.geometry);
-    if (ids && object instanceof InstancedMesh) found.instances.push(withInstanceIds(object, ids));
-    else if (ids) found.batches.push(withVertexIds(object, ids));
+    const ids = findEntityAttribute(object.geometry);
+    if (ids && object instanceof InstancedMesh) found.instances.push(addInstanceIds(object, ids));
+    else if (ids) found.batches.push(addVertexIds(object, ids));
     else {
-      const entity = entityOf(object, paths, table);
+      const entity = findEntity(object, paths, table);
       if (entity === 0) ++found.withoutEntity;
-      else (table.bodyOf.has(entity) ? found.moving : found.loose).push(...piecesOf(object, entity));
+      else (table.bodyByObject.has(entity) ? found.moving : found.loose).push(...makePieces(object, entity));
     }
   });
   return found;
 }
 
-function entityAttribute(geometry: BufferGeometry): BufferAttribute | null {
+function findEntityAttribute(geometry: BufferGeometry): BufferAttribute | null {
   return (geometry.getAttribute("_entity_id") ?? geometry.getAttribute("_ENTITY_ID") ?? null) as BufferAttribute | null;
 }
 
@@ -95,24 +95,24 @@ function rename(geometry: BufferGeometry, attribute: BufferAttribute): BufferGeo
   return geometry;
 }
 
-function withVertexIds(mesh: Mesh, ids: BufferAttribute): Mesh {
-  rename(mesh.geometry, new BufferAttribute(numbersOf(ids), 1));
+function addVertexIds(mesh: Mesh, ids: BufferAttribute): Mesh {
+  rename(mesh.geometry, new BufferAttribute(readNumbers(ids), 1));
   return mesh;
 }
 
-function withInstanceIds(mesh: InstancedMesh, ids: BufferAttribute): InstancedMesh {
-  rename(mesh.geometry, new InstancedBufferAttribute(numbersOf(ids), 1));
+function addInstanceIds(mesh: InstancedMesh, ids: BufferAttribute): InstancedMesh {
+  rename(mesh.geometry, new InstancedBufferAttribute(readNumbers(ids), 1));
   return mesh;
 }
 
-function numbersOf(attribute: BufferAttribute): Float32Array {
+function readNumbers(attribute: BufferAttribute): Float32Array {
   const numbers = new Float32Array(attribute.count);
   for (let i = 0; i < attribute.count; ++i) numbers[i] = attribute.getX(i);
   return numbers;
 }
 
 /** An object with a mesh of its own; an instanced one has a piece per instance. */
-function piecesOf(mesh: Mesh, entity: number): Piece[] {
+function makePieces(mesh: Mesh, entity: number): Piece[] {
   const material = mesh.material as MeshStandardMaterial;
   const { geometry } = mesh;
   if (!(mesh instanceof InstancedMesh)) {
@@ -126,7 +126,7 @@ function piecesOf(mesh: Mesh, entity: number): Piece[] {
 }
 
 /** The entity of a mesh: the number of its node or of the nearest node above it, else that of its path. */
-function entityOf(mesh: Object3D, paths: Map<Object3D, string>, table: EntityTable): number {
+function findEntity(mesh: Object3D, paths: Map<Object3D, string>, table: EntityTable): number {
   for (let node: Object3D | null = mesh; node; node = node.parent) {
     const { entity } = node.userData as { entity?: unknown };
     if (typeof entity === "number") return entity;
@@ -141,7 +141,7 @@ function entityOf(mesh: Object3D, paths: Map<Object3D, string>, table: EntityTab
 }
 
 /** The paths of all nodes by the names in the file. The loader changes names, so they are read from the JSON. */
-function pathsOf(gltf: GLTF): Map<Object3D, string> {
+function findPaths(gltf: GLTF): Map<Object3D, string> {
   const { nodes = [] } = gltf.parser.json as { nodes?: { name?: string }[] };
   const paths = new Map<Object3D, string>();
   const visit = (object: Object3D, above: string) => {
@@ -166,10 +166,10 @@ export function mergePieces(pieces: Piece[]): Mesh[] {
     if (group) group.push(piece);
     else groups.set(piece.material, [piece]);
   }
-  return [...groups].map(([material, group]) => new Mesh(mergedGeometry(group), material));
+  return [...groups].map(([material, group]) => new Mesh(mergeGeometry(group), material));
 }
 
-function mergedGeometry(pieces: Piece[]): BufferGeometry {
+function mergeGeometry(pieces: Piece[]): BufferGeometry {
   let vertices = 0;
   let corners = 0;
   for (const { geometry } of pieces) {

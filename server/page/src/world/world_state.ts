@@ -52,7 +52,7 @@ export class WorldState {
   }
 
   /** The two states around the displayed time, and the fraction between them. */
-  #around(): { from: State; to: State; fraction: number } | null {
+  #findAround(): { from: State; to: State; fraction: number } | null {
     const count = this.#received.length;
     if (count === 0) return null;
     const shown = performance.now() / 1000 - DELAY;
@@ -66,7 +66,7 @@ export class WorldState {
   }
 
   /** The avatars at the displayed time. Several parts of the page ask in one frame: the reply is kept for it. */
-  avatars(): AvatarPose[] {
+  getAvatars(): AvatarPose[] {
     const now = performance.now();
     if (now - this.#avatarsAt > KEPT_MILLISECONDS) {
       this.#avatars = this.#interpolateAvatars();
@@ -76,32 +76,32 @@ export class WorldState {
   }
 
   #interpolateAvatars(): AvatarPose[] {
-    const around = this.#around();
+    const around = this.#findAround();
     if (!around) return [];
     const before = new Map(around.from.avatars.map((avatar) => [avatar.id, avatar]));
     return around.to.avatars.map((state) => {
       const old = before.get(state.id) ?? state;
-      const feet = vector(state.feet);
-      const start = vector(old.feet);
+      const feet = toVector(state.feet);
+      const start = toVector(old.feet);
       const fraction = start.distanceTo(feet) > FAR_JUMP ? 1 : around.fraction;
       return {
         state,
         feet: start.lerp(feet, fraction),
-        gaze: vector(old.gaze).lerp(vector(state.gaze), fraction).normalize(),
+        gaze: toVector(old.gaze).lerp(toVector(state.gaze), fraction).normalize(),
         eyeHeight: old.eyeHeight + (state.eyeHeight - old.eyeHeight) * fraction,
       };
     });
   }
 
   /** Poses of the bodies that have left their initial pose, by id. */
-  bodies(): Map<number, Pose> {
+  getBodies(): Map<number, Pose> {
     const poses = new Map<number, Pose>();
-    const around = this.#around();
+    const around = this.#findAround();
     if (!around) return poses;
     const before = new Map(around.from.bodies.map((body) => [body.id, body]));
     for (const body of around.to.bodies) {
-      const start = poseOf(before.get(body.id) ?? body);
-      const end = poseOf(body);
+      const start = readPose(before.get(body.id) ?? body);
+      const end = readPose(body);
       const fraction = start.position.distanceTo(end.position) > FAR_JUMP ? 1 : around.fraction;
       start.position.lerp(end.position, fraction);
       start.orientation.slerp(end.orientation, fraction);
@@ -111,18 +111,18 @@ export class WorldState {
   }
 }
 
-export function vector(v: { x: number; y: number; z: number } | undefined): Vector3 {
+export function toVector(v: { x: number; y: number; z: number } | undefined): Vector3 {
   return v ? new Vector3(v.x, v.y, v.z) : new Vector3();
 }
 
-export function plain(v: Vector3): { x: number; y: number; z: number } {
+export function toPlain(v: Vector3): { x: number; y: number; z: number } {
   return { x: v.x, y: v.y, z: v.z };
 }
 
-function poseOf(body: BodyState): Pose {
+function readPose(body: BodyState): Pose {
   const q = body.orientation;
   return {
-    position: vector(body.position),
+    position: toVector(body.position),
     orientation: q ? new Quaternion(q.x, q.y, q.z, q.w) : new Quaternion(),
   };
 }
