@@ -7,7 +7,7 @@ import {
 import { SceneModel } from "./view/scene";
 import { parseScene, readEntities } from "./world/scene_file";
 import { Signal } from "./signal";
-import type { MakeSource, Trouble, WorldSource } from "./world/source";
+import type { MakeSource, RequestFields, Trouble, WorldSource } from "./world/source";
 import { View } from "./view/view";
 import { WorldState } from "./world/world_state";
 
@@ -78,7 +78,7 @@ export class App {
 
   /** Sends a request whose failure the user should read, and nothing else depends on. */
   attempt(request: Promise<unknown>): void {
-    request.catch((error: Error) => this.say(error.message.replace(/^ERROR_\w+: /, "")));
+    request.catch((error: Error) => this.say(describeError(error)));
   }
 
   select(entity: number): void {
@@ -100,6 +100,11 @@ export class App {
 
   avatarState(name: string): AvatarState | undefined {
     return this.state.latest?.avatars.find((avatar) => avatar.name === name);
+  }
+
+  async requestClock(mode: RequestFields<"setClock">["mode"]): Promise<void> {
+    const reply = await this.connection.request("setClock", { mode });
+    this.setClock(reply.clock, Number(reply.tick));
   }
 
   async #begin(welcome: Welcome): Promise<void> {
@@ -177,4 +182,9 @@ export class App {
     if (clock) this.clock = clock;
     this.#setTick(tick, tick * (this.welcome?.policies?.tick ?? 0));
   }
+}
+
+/** The text of an error without the code that the client puts before it. */
+export function describeError(error: Error): string {
+  return error.message.replace(/^ERROR_\w+: /, "");
 }

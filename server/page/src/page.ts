@@ -20,7 +20,7 @@ import { Tree } from "./panels/tree";
 import { NoWebGl } from "./view/view";
 import { Walk } from "./walk/walk";
 
-export interface PageOptions {
+interface PageOptions {
   makeSource: MakeSource;
   /** Keeps the token that the user typed. */
   rememberToken?: (token: string) => void;

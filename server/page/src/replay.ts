@@ -1,6 +1,6 @@
 // The page of a recording in one file. Its data are blocks in the file: base64, compressed by gzip.
 import type { App } from "./app";
-import { makeButton, makeElement } from "./panels/dom";
+import { makeButton, makeElement, makeFacts } from "./panels/dom";
 import { formatTime } from "./panels/format";
 import { startPage } from "./page";
 import type { Tab } from "./panels/panel";
@@ -51,7 +51,7 @@ function makeAbout(about: [string, string][]): Tab {
     name: "About",
     content: makeElement(
       "div", { class: "stack" },
-      makeElement("dl", { class: "facts" }, ...about.flatMap(([name, value]) => [makeElement("dt", {}, name), makeElement("dd", {}, value)])),
+      makeElement("dl", { class: "facts" }, ...makeFacts(about)),
       makeElement("details", {}, makeElement("summary", {}, "Licences of the packages in this page"), makeElement("pre", { class: "licences" }, readBlock("licenses"))),
     ),
   };

@@ -2,7 +2,7 @@
 import { ArrowHelper, Group, Mesh, MeshBasicMaterial, SphereGeometry, Vector3, type Material } from "three";
 import type { App } from "../app";
 import type { CameraRig } from "../view/camera_rig";
-import { makeButton, makeElement, setText } from "./dom";
+import { makeButton, makeCheck, makeElement, setText } from "./dom";
 import { formatLength, formatTime, shortenPath } from "./format";
 import {
   ContactEvent_Kind as Kind, ContactEvent_Phase as Phase, ContactEvent_Reason as Reason, Verdict, type ContactEvent,
@@ -33,7 +33,7 @@ interface Marker {
 export class Contacts {
   readonly root: HTMLElement;
   readonly labels = makeElement("div", { class: "labels", "aria-hidden": "true" });
-  readonly listed: ContactEvent[] = []; // newest first
+  #listed: ContactEvent[] = []; // newest first
   #app: App;
   #rig: CameraRig;
   #live = new Map<string, ContactEvent>();
@@ -51,10 +51,9 @@ export class Contacts {
   constructor(app: App, rig: CameraRig) {
     this.#app = app;
     this.#rig = rig;
-    const check = (box: HTMLInputElement, text: string) => makeElement("label", { class: "check", for: box.id }, box, text);
     this.root = makeElement(
       "div", { class: "stack" }, this.#summary,
-      makeElement("div", { class: "row" }, check(this.#markersShown, "Markers"), check(this.#floors, "Floors"), check(this.#ends, "Ends"),
+      makeElement("div", { class: "row" }, makeCheck(this.#markersShown, "Markers"), makeCheck(this.#floors, "Floors"), makeCheck(this.#ends, "Ends"),
         makeButton("Clear", () => this.#clear())),
       this.#list,
     );
@@ -74,7 +73,7 @@ export class Contacts {
   }
 
   #clear(): void {
-    this.listed.length = 0;
+    this.#listed.length = 0;
     this.#isDirty = true;
   }
 
@@ -88,9 +87,9 @@ export class Contacts {
     for (const event of events) {
       if (event.kind === Kind.BEGIN) this.#live.set(makeKey(event), event);
       if (event.kind === Kind.END) this.#live.delete(makeKey(event));
-      this.listed.unshift(event);
+      this.#listed.unshift(event);
     }
-    this.listed.length = Math.min(this.listed.length, MAX_LISTED);
+    this.#listed.length = Math.min(this.#listed.length, MAX_LISTED);
     this.#isDirty = true;
   }
 
@@ -105,7 +104,7 @@ export class Contacts {
     const floors = [...this.#live.values()].filter(isFloor).length;
     const others = this.#live.size - floors;
     setText(this.#summary, `Now: ${others} ${others === 1 ? "contact" : "contacts"}, and ${floors} with floors`);
-    const rows = this.listed.filter((event) => this.#isListed(event)).slice(0, MAX_ROWS).map((event) => this.#makeRow(event));
+    const rows = this.#listed.filter((event) => this.#isListed(event)).slice(0, MAX_ROWS).map((event) => this.#makeRow(event));
     if (rows.length === 0) rows.push(makeElement("li", { class: "empty" }, "No contact yet. Walk into something."));
     this.#list.replaceChildren(...rows);
   }
@@ -243,7 +242,7 @@ function makeKey({ a, b }: ContactEvent): string {
   return `${a} ${b}`;
 }
 
-function isFloor({ kind, normal }: ContactEvent): boolean {
+export function isFloor({ kind, normal }: ContactEvent): boolean {
   return kind !== Kind.BLOCKED && (normal?.y ?? 0) < FLOOR_NORMAL;
 }
 

@@ -33,6 +33,15 @@ export function makeButton(text: string, onclick: () => void, attributes: Attrib
   return makeElement("button", { type: "button", onclick: () => onclick(), ...attributes }, text);
 }
 
+/** Terms with their descriptions, the children of a `dl`. A fact without a value is left out. */
+export function makeFacts(facts: (readonly [string, string | undefined])[]): HTMLElement[] {
+  return facts.flatMap(([name, value]) => (value ? [makeElement("dt", {}, name), makeElement("dd", {}, value)] : []));
+}
+
+export function makeCheck(box: HTMLInputElement, text: string): HTMLElement {
+  return makeElement("label", { class: "check", for: box.id }, box, text);
+}
+
 /** Sets the text only if it differs, so that frequent updates cost no layout. */
 export function setText(target: Node, text: string): void {
   if (target.textContent !== text) target.textContent = text;

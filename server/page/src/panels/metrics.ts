@@ -1,6 +1,6 @@
 // Numbers of the server and of the page.
 import type { App } from "../app";
-import { makeElement } from "./dom";
+import { makeElement, makeFacts } from "./dom";
 import { formatLength } from "./format";
 
 const SECONDS = 1; // between requests while the panel is visible
@@ -31,7 +31,7 @@ export class MetricsPanel {
       const metrics = await connection.request("metrics", {});
       const { drawn } = this.#app.view;
       const { tick } = metrics;
-      this.#show([
+      this.#facts.replaceChildren(...makeFacts([
         ["Scene", `${welcome.scene?.source ?? ""}, ${welcome.scene?.objects ?? 0} objects`],
         ["World", `${welcome.world}, server ${welcome.serverVersion}`],
         ["Clients", String(metrics.clients)],
@@ -44,13 +44,9 @@ export class MetricsPanel {
         ["Recording", metrics.recording ? `${metrics.recording.ticks} ticks, ${(Number(metrics.recording.bytes) / 1e6).toFixed(1)} MB` : "none"],
         ["Page", `${frames} frames/s, ${drawn.triangles.toLocaleString("en")} triangles, ${drawn.calls} draw calls`],
         ["Server draws with", welcome.renderer || "nothing"],
-      ]);
+      ]));
     } catch {
       // The connection reports its own end.
     }
-  }
-
-  #show(facts: [string, string][]): void {
-    this.#facts.replaceChildren(...facts.flatMap(([name, value]) => [makeElement("dt", {}, name), makeElement("dd", {}, value)]));
   }
 }

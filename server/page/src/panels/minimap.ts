@@ -5,6 +5,7 @@ import type { App } from "../app";
 import { findCssColor } from "../view/avatars";
 import type { CameraRig } from "../view/camera_rig";
 import { makeButton, makeElement } from "./dom";
+import { VERTEX_BODY, VERTEX_HEAD } from "../view/entity_material";
 import { renderOffscreen } from "../view/offscreen";
 import type { Walk } from "../walk/walk";
 import { toVector } from "../world/world_state";
@@ -17,9 +18,7 @@ const MAX_EXTENT = 90; // metres of the rendered plan
 const TRAIL_STEP = 0.15; // metres between points of a path
 const MAX_TRAIL = 4000; // points
 
-const PLAN_VERTEX = `
-attribute float entityId;
-uniform sampler2D entityFlags;
+const PLAN_VERTEX = `${VERTEX_HEAD}
 varying vec3 planNormal;
 varying float planDepth;
 void main() {
@@ -32,9 +31,7 @@ void main() {
   planNormal = mat3(modelMatrix) * n;
   gl_Position = projectionMatrix * modelViewMatrix * p;
   planDepth = 0.5 * gl_Position.z + 0.5;
-  int entity = int(entityId + 0.5);
-  if (texelFetch(entityFlags, ivec2(entity % 1024, entity / 1024), 0).r > 0.5) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
-}
+${VERTEX_BODY}}
 `;
 const PLAN_FRAGMENT = `
 varying vec3 planNormal;
@@ -107,7 +104,7 @@ export class Minimap {
 
   /** The place in the middle of the plan: the focused avatar's feet, or the floor below the camera. */
   #findMiddle(): { at: Vector3; floor: number } | null {
-    const avatar = this.#app.state.getAvatars().find(({ state }) => state.name === this.#app.focus);
+    const avatar = this.#app.state.findAvatar(this.#app.focus);
     if (avatar) return { at: avatar.feet, floor: avatar.state.grounded || Number.isNaN(this.#floor) ? avatar.feet.y : this.#floor };
     const { position } = this.#rig;
     const hit = this.#app.model?.raycast(position, new Vector3(0, -1, 0), 60);

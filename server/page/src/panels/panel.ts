@@ -1,6 +1,6 @@
 // The frame of the page: header, side panel with tabs, messages, and the dialog for troubles.
 import type { App } from "../app";
-import { makeButton, makeElement, setText } from "./dom";
+import { makeButton, makeElement, makeFacts, setText } from "./dom";
 import type { Trouble } from "../world/source";
 
 const TOAST_SECONDS = 6;
@@ -97,17 +97,14 @@ export function makeTroubleDialog(app: App, onToken: (token: string) => void): H
 
 /** `isFile`: the page of a recording, in which no avatar can be driven. */
 export function makeHelp(isFile: boolean): HTMLElement {
-  const looking: [string, string][] = [
-    ["W A S D, arrows", "fly the camera"], ["Mouse drag", "look around; M captures the mouse"], ["Click", "name the object"],
+  const keys: [string, string][] = [
+    ["W A S D, arrows", isFile ? "fly the camera" : "walk (without an avatar: fly the camera)"],
+    ["Mouse drag", "look around; M captures the mouse"], ["Click", "name the object"],
     ["V", "first or third person of the followed avatar"], ["P", "pause or play"], ["Wheel", "distance in third person"],
   ];
-  const keys: [string, string][] = isFile ? looking : [
-    ["W A S D, arrows", "walk (without an avatar: fly the camera)"], ["Mouse drag", "look around; M captures the mouse"],
-    ["Click", "name the object"], ["Enter", "enter the world with an avatar"], ["Shift", "run"], ["Space", "jump"],
-    ["C", "crouch"], ["F", "fly; E and Q up and down"], ["V", "first or third person"], ["P", "pause or play"],
-    ["Esc", "leave the avatar"], ["Wheel", "distance in third person"],
-    ["Touch", "left half walks, right half looks"],
-  ];
-  return makeElement("div", { class: "stack" }, makeElement("dl", { class: "facts keys" },
-    ...keys.flatMap(([key, what]) => [makeElement("dt", {}, key), makeElement("dd", {}, what)])));
+  if (!isFile) {
+    keys.push(["Enter", "enter the world with an avatar"], ["Shift", "run"], ["Space", "jump"], ["C", "crouch"],
+      ["F", "fly; E and Q up and down"], ["Esc", "leave the avatar"], ["Touch", "left half walks, right half looks"]);
+  }
+  return makeElement("div", { class: "stack" }, makeElement("dl", { class: "facts" }, ...makeFacts(keys)));
 }

@@ -2,7 +2,8 @@
 import type { App } from "../app";
 import { findCssColor, type Avatars } from "../view/avatars";
 import type { CameraRig } from "../view/camera_rig";
-import { makeButton, makeElement } from "./dom";
+import { makeButton, makeCheck, makeElement } from "./dom";
+import { getLastName } from "./format";
 import type { AvatarState } from "../generated/enfilade_pb";
 import type { Walk } from "../walk/walk";
 
@@ -25,7 +26,7 @@ export class People {
       avatars.prismsShown = shapes.checked;
       app.view.invalidate();
     });
-    this.root.append(makeElement("label", { class: "check", for: "shapes" }, shapes, "Shapes that collide"), this.#list);
+    this.root.append(makeCheck(shapes, "Shapes that collide"), this.#list);
     setInterval(() => this.#render(), 300);
   }
 
@@ -62,7 +63,7 @@ export class People {
     const made = move?.made;
     const speed = made ? Math.hypot(made.x, made.y, made.z) / (this.#app.welcome?.policies?.tick ?? 1 / 60) : 0;
     const what = flying ? "flies" : !grounded ? "in the air" : speed > 0.01 ? "walks" : "stands";
-    const stopped = move?.stoppedByName ? `, stopped by ${move.stoppedByName.split("/").at(-1)}` : "";
+    const stopped = move?.stoppedByName ? `, stopped by ${getLastName(move.stoppedByName)}` : "";
     return `${what}, ${speed.toFixed(1)} m/s, height ${(feet?.y ?? 0).toFixed(2)} m${stopped}`;
   }
 

@@ -1,9 +1,9 @@
 // Picking: the object or avatar under a pixel, and the card that describes it.
 import { Vector2, Vector3 } from "three";
-import type { App } from "../app";
+import { describeError, type App } from "../app";
 import type { Avatars } from "../view/avatars";
 import type { CameraRig } from "../view/camera_rig";
-import { makeButton, makeElement, setText } from "./dom";
+import { makeButton, makeElement, makeFacts, setText } from "./dom";
 import { formatLength, getLastName, shortenPath } from "./format";
 import { Verdict, type PairState } from "../generated/enfilade_pb";
 import type { Walk } from "../walk/walk";
@@ -11,7 +11,7 @@ import type { Walk } from "../walk/walk";
 const TOUCH_SECONDS = 1; // between questions for what touches the selected object
 const MAX_TOUCHING = 12;
 
-export interface Picked {
+interface Picked {
   entity: number;
   point: Vector3;
   normal: Vector3 | null;
@@ -84,11 +84,11 @@ export class Card {
     setText(this.#path, entity?.path ?? "avatar");
     const box = this.#app.model?.findBox(id);
     const size = box?.getSize(new Vector3());
-    this.#facts.replaceChildren(...[
+    this.#facts.replaceChildren(...makeFacts([
       ["Class", entity?.class], ["GlobalId", entity?.globalId], ["Storey", entity?.storey],
       ["Size x, z, y", size && `${size.x.toFixed(2)} × ${size.z.toFixed(2)} × ${size.y.toFixed(2)} m`],
       ["Entity", String(id)],
-    ].flatMap(([name, value]) => (value ? [makeElement("dt", {}, name), makeElement("dd", {}, value)] : [])));
+    ]));
     this.#showBody(id);
     this.#touching.replaceChildren();
     setText(this.#touchTitle, "Touches now");
@@ -104,7 +104,7 @@ export class Card {
     if (!body) return;
     const order = (action: { case: "open" | "close" | "run" | "stop"; value: object } | { case: "level"; value: number }) =>
       this.#app.attempt(this.#app.connection.request("bodyCommand", { body: body.name, action }));
-    this.#facts.append(makeElement("dt", {}, "Body"), makeElement("dd", {}, body.mass ? `${body.kind}, ${body.mass} kg` : body.kind));
+    this.#facts.append(...makeFacts([["Body", body.mass ? `${body.kind}, ${body.mass} kg` : body.kind]]));
     if (this.#app.connection.isFile) return;
     if (body.kind === "hinged" || body.kind === "sliding") {
       this.#doors.append(makeButton("Open", () => order({ case: "open", value: {} })), makeButton("Close door", () => order({ case: "close", value: {} })));
@@ -149,7 +149,7 @@ export class Card {
       });
       if (asked === this.#asked && id === this.#app.selection) this.#showTouching(found, leftOut);
     } catch (error) {
-      setText(this.#touchTitle, (error as Error).message.replace(/^ERROR_\w+: /, ""));
+      setText(this.#touchTitle, describeError(error as Error));
     }
   }
 

@@ -2,7 +2,7 @@
 import { Vector3 } from "three";
 import type { CameraRig } from "../view/camera_rig";
 
-export interface SharedView {
+interface SharedView {
   position: Vector3;
   yaw: number;
   pitch: number;

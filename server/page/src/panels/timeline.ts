@@ -1,6 +1,6 @@
 // Time: play, pause, step, speed; for a recording a scrubber with its events, and take over.
 import type { App } from "../app";
-import { describeEvent, getCssClass } from "./contacts";
+import { describeEvent, getCssClass, isFloor } from "./contacts";
 import { makeButton, makeElement, setText } from "./dom";
 import { formatTime, shortenPath } from "./format";
 import { Clock_Mode, ContactEvent_Kind as Kind, ContactEvent_Phase as Phase, type ContactEvent } from "../generated/enfilade_pb";
@@ -65,29 +65,19 @@ export class Timeline {
 
   toggle(): void {
     const { clock, replay } = this.#app;
-    if (clock?.mode === Clock_Mode.FREE_RUN) this.#setClock({ case: "pause", value: {} });
+    if (clock?.mode === Clock_Mode.FREE_RUN) this.#app.attempt(this.#app.requestClock({ case: "pause", value: {} }));
     else if (replay?.atEnd && !replay.branched) this.#seek(Number(replay.firstTick), true);
     else this.#run();
   }
 
   #run(): void {
-    this.#setClock({ case: "freeRun", value: { speed: Number(this.#speed.value) } });
-  }
-
-  #setClock(mode: Parameters<typeof this.requestClock>[0]): void {
-    this.#app.attempt(this.requestClock(mode));
-  }
-
-  async requestClock(mode: { case: "pause"; value: object } | { case: "freeRun"; value: { speed: number } } | { case: "lockstep"; value: object }): Promise<void> {
-    const reply = await this.#app.connection.request("setClock", { mode });
-    this.#app.setClock(reply.clock, Number(reply.tick));
-    this.#app.view.invalidate();
+    this.#app.attempt(this.#app.requestClock({ case: "freeRun", value: { speed: Number(this.#speed.value) } }));
   }
 
   /** One tick needs lockstep; the clock stays there. */
   #stepOnce(): void {
     const step = async () => {
-      if (this.#app.clock?.mode !== Clock_Mode.LOCKSTEP) await this.requestClock({ case: "lockstep", value: {} });
+      if (this.#app.clock?.mode !== Clock_Mode.LOCKSTEP) await this.#app.requestClock({ case: "lockstep", value: {} });
       await this.#app.connection.request("step", { ticks: 1 });
     };
     this.#app.attempt(step());
@@ -132,7 +122,6 @@ export class Timeline {
     this.#play.title = isRunning ? "Pause (P)" : "Play (P)";
     setText(this.#readout, `${formatTime(time)} · tick ${tick}`);
     this.#track.hidden = !replay;
-    this.root.classList.toggle("replay", replay !== null);
     this.#takeOver.hidden = !this.#app.isPlayback || this.#app.connection.isFile;
     if (replay) {
       this.#slider.min = String(replay.firstTick);
@@ -164,7 +153,7 @@ export class Timeline {
     const first = Number(replay.firstTick);
     const span = Math.max(1, Number(replay.lastTick) - first);
     for (const event of events) {
-      const isShown = event.kind === Kind.BEGIN && (event.normal?.y ?? 0) > -0.7 || event.kind === Kind.BLOCKED || (event.kind === Kind.NEAR && event.phase === Phase.MIN) || event.kind === Kind.ENTER;
+      const isShown = event.kind === Kind.BEGIN && !isFloor(event) || event.kind === Kind.BLOCKED || (event.kind === Kind.NEAR && event.phase === Phase.MIN) || event.kind === Kind.ENTER;
       const key = `${event.tick} ${event.kind} ${event.phase} ${event.a} ${event.b}`;
       if (!isShown || this.#seen.has(key)) continue;
       this.#seen.add(key);

@@ -146,7 +146,7 @@ export class Tree {
       "div", { class: "group", role: "treeitem", "aria-level": level, "aria-expanded": String(isOpen), tabindex: "-1" },
       makeElement("span", { class: "arrow" }, isOpen ? "▾" : "▸"),
       makeElement("span", { class: "name", title: group.name }, group.name),
-      makeElement("span", { class: "quiet" }, String(countObjects(group))),
+      makeElement("span", { class: "quiet" }, String(collectObjects(group).length)),
       this.#makeEye(() => collectObjects(group)),
     );
     row.addEventListener("click", () => this.#toggle(group));
@@ -264,8 +264,4 @@ function makeGroup(name: string, key: string): Group {
 
 function collectObjects(group: Group): Entity[] {
   return [...group.objects, ...[...group.groups.values()].flatMap(collectObjects)];
-}
-
-function countObjects(group: Group): number {
-  return [...group.groups.values()].reduce((sum, child) => sum + countObjects(child), group.objects.length);
 }

@@ -2,9 +2,8 @@
 import { Euler, Vector3, type Box3 } from "three";
 import type { App } from "../app";
 import type { Input } from "../walk/input";
-import type { AvatarPose } from "../world/world_state";
 
-export type ViewMode = "free" | "first" | "third";
+type ViewMode = "free" | "first" | "third";
 
 const MAX_PITCH = 1.54; // radians: short of straight up
 const FLIGHT_SPEED = 4; // metres per second
@@ -38,7 +37,8 @@ export class CameraRig {
 
   /** Unit vector of the view. */
   get forward(): Vector3 {
-    return computeDirection(this.yaw, this.pitch);
+    const level = Math.cos(this.pitch);
+    return new Vector3(Math.cos(this.yaw) * level, Math.sin(this.pitch), -Math.sin(this.yaw) * level);
   }
 
   get right(): Vector3 {
@@ -121,12 +121,8 @@ export class CameraRig {
     return true;
   }
 
-  #findFocused(): AvatarPose | undefined {
-    return this.#app.state.getAvatars().find(({ state }) => state.name === this.#app.focus);
-  }
-
   #follow(): boolean {
-    const avatar = this.#findFocused();
+    const avatar = this.#app.state.findAvatar(this.#app.focus);
     if (!avatar) return false;
     const eyes = avatar.feet.clone();
     eyes.y += avatar.eyeHeight;
@@ -143,10 +139,6 @@ export class CameraRig {
   }
 }
 
-export function computeDirection(yaw: number, pitch: number): Vector3 {
-  return new Vector3(Math.cos(yaw) * Math.cos(pitch), Math.sin(pitch), -Math.sin(yaw) * Math.cos(pitch));
-}
-
 function computeAngles(direction: Vector3): { yaw: number; pitch: number } {
   const d = direction.clone().normalize();
   return { yaw: Math.atan2(-d.z, d.x), pitch: clampPitch(Math.asin(d.y)) };
@@ -156,6 +148,6 @@ function clampPitch(pitch: number): number {
   return Math.max(-MAX_PITCH, Math.min(MAX_PITCH, pitch));
 }
 
-export function wrapAngle(angle: number): number {
+function wrapAngle(angle: number): number {
   return angle - 2 * Math.PI * Math.round(angle / (2 * Math.PI));
 }

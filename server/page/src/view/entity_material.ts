@@ -41,13 +41,14 @@ export class EntityFlags {
   }
 }
 
-const VERTEX_HEAD = `
+/** Parts of a vertex shader that hides and marks entities; `VERTEX_BODY` follows gl_Position. */
+export const VERTEX_HEAD = `
 attribute float entityId;
 uniform sampler2D entityFlags;
 varying float entityMark;
 `;
 
-const VERTEX_BODY = `
+export const VERTEX_BODY = `
 int entity = int(entityId + 0.5);
 vec4 flags = texelFetch(entityFlags, ivec2(entity % ${WIDTH}, entity / ${WIDTH}), 0);
 entityMark = flags.g;
@@ -56,7 +57,7 @@ if (flags.r > 0.5) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
 `;
 
 /** Adds the entity table to a material's shaders. */
-export function addEntityFlags<M extends Material>(material: M, flags: EntityFlags): M {
+function addEntityFlags<M extends Material>(material: M, flags: EntityFlags): M {
   material.onBeforeCompile = (shader) => {
     shader.uniforms.entityFlags = { value: flags.texture };
     shader.vertexShader = VERTEX_HEAD + shader.vertexShader.replace(

@@ -4,14 +4,14 @@ import {
   type BufferGeometry, type Material, type MeshStandardMaterial,
 } from "three";
 import type { GLTF } from "three/examples/jsm/loaders/GLTFLoader.js";
-import { MeshBVH, type HitPointInfo } from "three-mesh-bvh";
+import { MeshBVH } from "three-mesh-bvh";
 import type { EntityTable } from "../world/entities";
 import { EntityFlags, makeMaterial } from "./entity_material";
 import type { Body } from "../generated/enfilade_pb";
 import { mergePieces, sortMeshes, type Piece } from "../world/scene_file";
 import { toVector, type Pose } from "../world/world_state";
 
-export interface Hit {
+interface Hit {
   entity: number;
   distance: number; // metres
   point: Vector3;
@@ -149,7 +149,7 @@ export class SceneModel {
   }
 
   /** Moves the bodies to the given poses; all others return to their initial pose. */
-  applyPoses(poses: Map<number, Pose>): boolean {
+  applyPoses(poses: Map<number, Pose>): void {
     let changed = false;
     const matrix = new Matrix4();
     const identity = new Quaternion();
@@ -165,14 +165,13 @@ export class SceneModel {
       else this.#displaced.delete(id);
       changed = true;
     }
-    if (!changed) return false;
+    if (!changed) return;
     for (const { mesh, index, body, bodyFromMesh } of this.#moving) {
       const pose = this.#poses.get(body);
       if (!pose) continue;
       mesh.setMatrixAt(index, matrix.multiplyMatrices(pose, bodyFromMesh));
       mesh.instanceMatrix.needsUpdate = true;
     }
-    return true;
   }
 
   /** Builds the trees for rays in small pieces of time, so that the page stays responsive. */
@@ -238,19 +237,6 @@ export class SceneModel {
       const normal = hit.face.normal.clone().transformDirection(sceneFromMesh);
       if (normal.dot(ray.direction) > 0) normal.negate();
       best = { entity, distance, point, normal };
-    }
-    return best;
-  }
-
-  /** Distance from a point to the nearest static surface, at most `within`; for free places. */
-  clearance(point: Vector3, within: number): number {
-    let best = within;
-    const target = {} as HitPointInfo;
-    for (const mesh of this.#meshes) {
-      if (mesh instanceof InstancedMesh) continue;
-      const local = point.clone().applyMatrix4(mesh.matrixWorld.clone().invert());
-      const hit = this.#getTree(mesh.geometry).closestPointToPoint(local, target, 0, best);
-      if (hit && hit.distance < best) best = hit.distance;
     }
     return best;
   }

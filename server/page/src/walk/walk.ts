@@ -2,7 +2,7 @@
 import { Vector3 } from "three";
 import type { App } from "../app";
 import type { CameraRig } from "../view/camera_rig";
-import { Clock_Mode, Notice_Kind, Role, type Notice } from "../generated/enfilade_pb";
+import { Clock_Mode, Notice_Kind, type Notice } from "../generated/enfilade_pb";
 import type { Action, Input } from "./input";
 import { proposeStarts, type StartPlace } from "./start_place";
 import { toPlain, toVector } from "../world/world_state";
@@ -82,10 +82,9 @@ export class Walk {
 
   /** An avatar moves only while ticks run. A clock without a driver is set going. */
   async #runClock(): Promise<void> {
-    const { clock, connection } = this.#app;
+    const { clock } = this.#app;
     if (!clock || clock.hasDriver || clock.mode === Clock_Mode.FREE_RUN) return;
-    const reply = await connection.request("setClock", { mode: { case: "freeRun", value: { speed: 1 } } });
-    this.#app.setClock(reply.clock, Number(reply.tick));
+    await this.#app.requestClock({ case: "freeRun", value: { speed: 1 } });
   }
 
   async #spawnAtOne(places: StartPlace[]): Promise<void> {
@@ -263,6 +262,6 @@ export class Walk {
   }
 
   get canWalk(): boolean {
-    return (this.#app.welcome?.role ?? 0) >= Role.DRIVE && !this.#app.isPlayback;
+    return this.#app.mayDrive && !this.#app.isPlayback;
   }
 }

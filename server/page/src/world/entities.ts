@@ -13,8 +13,7 @@ export interface Entity {
 const IDS_PER_REQUEST = 20_000; // replies then stay far below 8 MiB
 
 /** A room of the file: the middle of its floor, and its area. */
-export interface Room {
-  name: string;
+interface Room {
   floor: { x: number; y: number; z: number };
   area: number; // square metres of its box
 }
@@ -39,29 +38,25 @@ export class EntityTable {
   }
 
   /** Takes a record of a scene file. Unknown or wrong fields are left out. */
-  addRecord(record: unknown): Entity | null {
-    if (typeof record !== "object" || record === null) return null;
+  addRecord(record: unknown): void {
+    if (typeof record !== "object" || record === null) return;
     const fields = record as Record<string, unknown>;
-    const toText = (name: string) => (typeof fields[name] === "string" ? (fields[name] as string) : "");
     const id = Number(fields.entity ?? fields.id);
-    if (!Number.isInteger(id) || id <= 0) return null;
-    const path = toText("path") || toText("name") || `object ${id}`;
-    const entity = { id, path, globalId: toText("globalId"), class: toText("class"), storey: toText("storey") };
-    this.add(entity);
-    return entity;
+    if (!Number.isInteger(id) || id <= 0) return;
+    const path = toText(fields.path) || toText(fields.name) || `object ${id}`;
+    this.add({ id, path, globalId: toText(fields.globalId), class: toText(fields.class), storey: toText(fields.storey) });
   }
 
   /** Takes the storeys and spaces of a scene file. Unknown or wrong fields are left out. */
   addStructure(storeys: unknown, spaces: unknown): void {
     const toList = (value: unknown) => (Array.isArray(value) ? value : []) as Record<string, unknown>[];
-    const toText = (value: unknown) => (typeof value === "string" ? value : "");
     const isPoint = (value: unknown): value is number[] => Array.isArray(value) && value.length === 3 && value.every(Number.isFinite);
     this.storeys = toList(storeys).map((storey) => toText(storey?.name));
     for (const space of toList(spaces)) {
       const [min, max] = [space?.min, space?.max];
       if (!isPoint(min) || !isPoint(max)) continue;
       const floor = { x: (min[0]! + max[0]!) / 2, y: min[1]!, z: (min[2]! + max[2]!) / 2 };
-      this.rooms.push({ name: toText(space.longName) || toText(space.name), floor, area: (max[0]! - min[0]!) * (max[2]! - min[2]!) });
+      this.rooms.push({ floor, area: (max[0]! - min[0]!) * (max[2]! - min[2]!) });
     }
   }
 
@@ -77,4 +72,8 @@ export class EntityTable {
       }
     }
   }
+}
+
+function toText(value: unknown): string {
+  return typeof value === "string" ? value : "";
 }

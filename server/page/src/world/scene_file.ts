@@ -15,7 +15,7 @@ export interface Piece {
   entity: number;
 }
 
-export interface SceneFile {
+interface SceneFile {
   batches: Mesh[]; // with a per-vertex attribute entityId
   instances: InstancedMesh[]; // with a per-instance attribute entityId
   loose: Piece[]; // static objects with meshes of their own
@@ -23,14 +23,12 @@ export interface SceneFile {
   withoutEntity: number; // meshes that belong to no entity; they are not drawn
 }
 
-export class SceneUnavailable extends Error {}
-
 /** Fetches the file and reports the received bytes. */
 export async function fetchScene(url: string, token: string, progress: (bytes: number) => void): Promise<ArrayBuffer> {
   const headers: HeadersInit = token ? { Authorization: `Bearer ${token}` } : {};
   const reply = await fetch(url, { headers, cache: "no-cache" });
   if (!reply.ok || !reply.body) {
-    throw new SceneUnavailable(`The server does not send the scene (${reply.status} ${reply.statusText}).`);
+    throw new Error(`The server does not send the scene (${reply.status} ${reply.statusText}).`);
   }
   const chunks: Uint8Array[] = [];
   let bytes = 0;
@@ -73,9 +71,11 @@ export function sortMeshes(gltf: GLTF, table: EntityTable): SceneFile {
   gltf.scene.traverse((object) => {
     if (!(object instanceof Mesh)) return;
     const ids = findEntityAttribute(object.geometry);
-    if (ids && object instanceof InstancedMesh) found.instances.push(addInstanceIds(object, ids));
-    else if (ids) found.batches.push(addVertexIds(object, ids));
-    else {
+    if (ids) {
+      addIds(object, ids);
+      if (object instanceof InstancedMesh) found.instances.push(object);
+      else found.batches.push(object);
+    } else {
       const entity = findEntity(object, paths, table);
       if (entity === 0) ++found.withoutEntity;
       else (table.bodyByObject.has(entity) ? found.moving : found.loose).push(...makePieces(object, entity));
@@ -88,27 +88,14 @@ function findEntityAttribute(geometry: BufferGeometry): BufferAttribute | null {
   return (geometry.getAttribute("_entity_id") ?? geometry.getAttribute("_ENTITY_ID") ?? null) as BufferAttribute | null;
 }
 
-function rename(geometry: BufferGeometry, attribute: BufferAttribute): BufferGeometry {
+/** Renames the ids of the file, and makes them numbers that a shader can read. */
+function addIds(mesh: Mesh, ids: BufferAttribute): void {
+  const numbers = Float32Array.from({ length: ids.count }, (_, i) => ids.getX(i));
+  const { geometry } = mesh;
   geometry.deleteAttribute("_entity_id");
   geometry.deleteAttribute("_ENTITY_ID");
-  geometry.setAttribute("entityId", attribute);
-  return geometry;
-}
-
-function addVertexIds(mesh: Mesh, ids: BufferAttribute): Mesh {
-  rename(mesh.geometry, new BufferAttribute(readNumbers(ids), 1));
-  return mesh;
-}
-
-function addInstanceIds(mesh: InstancedMesh, ids: BufferAttribute): InstancedMesh {
-  rename(mesh.geometry, new InstancedBufferAttribute(readNumbers(ids), 1));
-  return mesh;
-}
-
-function readNumbers(attribute: BufferAttribute): Float32Array {
-  const numbers = new Float32Array(attribute.count);
-  for (let i = 0; i < attribute.count; ++i) numbers[i] = attribute.getX(i);
-  return numbers;
+  const Attribute = mesh instanceof InstancedMesh ? InstancedBufferAttribute : BufferAttribute;
+  geometry.setAttribute("entityId", new Attribute(numbers, 1));
 }
 
 /** An object with a mesh of its own; an instanced one has a piece per instance. */

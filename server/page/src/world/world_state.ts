@@ -75,6 +75,10 @@ export class WorldState {
     return this.#avatars;
   }
 
+  findAvatar(name: string): AvatarPose | undefined {
+    return this.getAvatars().find(({ state }) => state.name === name);
+  }
+
   #interpolateAvatars(): AvatarPose[] {
     const around = this.#findAround();
     if (!around) return [];
