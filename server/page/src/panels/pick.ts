@@ -7,9 +7,20 @@ import { makeButton, makeElement, makeFacts, setText } from "./dom";
 import { formatLength, getLastName, shortenPath } from "./format";
 import { Verdict, type PairState } from "../generated/enfilade_pb";
 import type { Walk } from "../walk/walk";
+import type { RequestFields } from "../world/source";
 
 const TOUCH_SECONDS = 1; // between questions for what touches the selected object
 const MAX_TOUCHING = 12;
+
+type BodyAction = NonNullable<RequestFields<"bodyCommand">["action"]>;
+
+const DOOR_ACTIONS: [string, BodyAction][] = [["Open", { case: "open", value: {} }], ["Close door", { case: "close", value: {} }]];
+/** The commands of a kind of body, with the texts of their buttons. Levels come from the stops of the body itself. */
+const ACTIONS: Record<string, [string, BodyAction][]> = {
+  hinged: DOOR_ACTIONS,
+  sliding: DOOR_ACTIONS,
+  path: [["Run", { case: "run", value: {} }], ["Stop", { case: "stop", value: {} }]],
+};
 
 interface Picked {
   entity: number;
@@ -96,22 +107,18 @@ export class Card {
     void this.#askTouching();
   }
 
-  /** Doors and lifts can be operated. */
+  /** Bodies that take commands have a button for each. */
   #showBody(id: number): void {
     const bodyId = this.#app.table.bodyByObject.get(id);
     const body = this.#app.welcome?.scene?.bodies.find((one) => one.id === bodyId);
     this.#doors.replaceChildren();
     if (!body) return;
-    const order = (action: { case: "open" | "close" | "run" | "stop"; value: object } | { case: "level"; value: number }) =>
-      this.#app.attempt(this.#app.connection.request("bodyCommand", { body: body.name, action }));
     this.#facts.append(...makeFacts([["Body", body.mass ? `${body.kind}, ${body.mass} kg` : body.kind]]));
     if (this.#app.connection.isFile) return;
-    if (body.kind === "hinged" || body.kind === "sliding") {
-      this.#doors.append(makeButton("Open", () => order({ case: "open", value: {} })), makeButton("Close door", () => order({ case: "close", value: {} })));
-    } else if (body.kind === "lift") {
-      body.stops.forEach((_, level) => this.#doors.append(makeButton(`Level ${level}`, () => order({ case: "level", value: level }))));
-    } else if (body.kind === "path") {
-      this.#doors.append(makeButton("Run", () => order({ case: "run", value: {} })), makeButton("Stop", () => order({ case: "stop", value: {} })));
+    const levels = body.stops.map((_, level): [string, BodyAction] => [`Level ${level}`, { case: "level", value: level }]);
+    for (const [text, action] of [...(ACTIONS[body.kind] ?? []), ...levels]) {
+      this.#doors.append(makeButton(text, () =>
+        this.#app.attempt(this.#app.connection.request("bodyCommand", { body: body.name, action }))));
     }
   }
 
