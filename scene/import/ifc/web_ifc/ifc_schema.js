@@ -3,6 +3,8 @@
 import fs from 'node:fs';
 import { createRequire } from 'node:module';
 
+import { splitArguments } from './step_text.js';
+
 const require = createRequire(import.meta.url);
 // web-ifc's codes of primitive types
 const STRING = 1;
@@ -33,19 +35,6 @@ function findPrimitive(code, name) {
   return { [STRING]: 'string', [REAL]: 'real', [INTEGER]: 'integer', [BINARY]: 'binary' }[code];
 }
 
-// Splits at the commas outside of any bracket.
-function splitOutermost(text) {
-  const parts = [''];
-  let depth = 0;
-  for (const c of text) {
-    if ('([{'.includes(c)) ++depth;
-    if (')]}'.includes(c)) --depth;
-    if (c === ',' && depth === 0) parts.push('');
-    else parts[parts.length - 1] += c;
-  }
-  return parts;
-}
-
 export class IfcSchema {
   // `release`: IFC4 or IFC4X3.
   constructor(release) {
@@ -73,7 +62,7 @@ export class IfcSchema {
     for (const [, key, text] of this.declarations.classes.get(name).matchAll(/^        (\w+): (.*);$/gm))
       types.set(key, text);
     const list = order.toString().replace(/^[^[]*\[|\][^\]]*$/g, '');
-    const attributes = list.trim() === '' ? [] : splitOutermost(list).map((text) => {
+    const attributes = list.trim() === '' ? [] : splitArguments(list).map((text) => {
       const attribute = /\bi\.(\w+)/.exec(text)?.[1];
       if (attribute === undefined) return null;
       return { name: attribute, type: this.readAttributeType(types.get(attribute)) };

@@ -6,10 +6,11 @@
 // of ranges of the file (64 bits), the first byte and the size of each (64 bits), and the express
 // ids of the requested products (32 bits). Products before index FIRST are done. The contents of the
 // messages are documented in scene/import/ifc/ifc_meshes.hpp.
-import fs from 'node:fs';
 import { createRequire } from 'node:module';
 
-import { IFC_FILE, WANTED, packDoubles, packWords, readAll, sendMessage, sendProgress } from './worker_io.js';
+import {
+  IFC_FILE, WANTED, packDoubles, packWords, readAll, readInto, sendMessage, sendProgress,
+} from './worker_io.js';
 
 const FLOATS_A_VERTEX = 6; // position and normal, as web-ifc delivers them
 
@@ -49,12 +50,8 @@ function makeReader(ranges) {
       if (start + length <= offset + done) continue;
       const from = offset + done - start;
       const wanted = Math.min(size - done, length - from);
-      for (let read = 0; read < wanted; ) {
-        const count = fs.readSync(IFC_FILE, buffer, done, wanted - read, first + from + read);
-        if (count === 0) throw new Error('the file became shorter while it was read');
-        read += count;
-        done += count;
-      }
+      readInto(IFC_FILE, buffer.subarray(done, done + wanted), first + from);
+      done += wanted;
       if (done === size) break;
     }
     const block = buffer.subarray(0, done);

@@ -70,7 +70,7 @@ export function writeSimple(type, depth, text, width) {
   return `(${rows})`;
 }
 
-// Splits `arguments` at the commas of the outermost level.
+// Splits at the commas outside of any bracket and string.
 export function splitArguments(text) {
   const parts = [];
   let start = 0;
@@ -78,8 +78,8 @@ export function splitArguments(text) {
   for (let i = 0; i < text.length; ++i) {
     const c = text[i];
     if (c === "'") i = text.indexOf("'", i + 1); // a doubled quote begins the next string
-    else if (c === '(') ++depth;
-    else if (c === ')') --depth;
+    else if (c === '(' || c === '[' || c === '{') ++depth;
+    else if (c === ')' || c === ']' || c === '}') --depth;
     else if (c === ',' && depth === 0) {
       parts.push(text.slice(start, i));
       start = i + 1;

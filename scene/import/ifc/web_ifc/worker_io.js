@@ -29,15 +29,18 @@ export function sendProgress(stage, fraction) {
   sendMessage('P', [packDoubles(fraction), Buffer.from(stage)]);
 }
 
-// Reads `size` bytes at `position`.
-export function readBlock(descriptor, position, size) {
-  const bytes = new Uint8Array(size);
-  for (let done = 0; done < size; ) {
-    const count = fs.readSync(descriptor, bytes, done, size - done, position + done);
+// Fills `bytes` from `position` of the file on.
+export function readInto(descriptor, bytes, position) {
+  for (let done = 0; done < bytes.length; ) {
+    const count = fs.readSync(descriptor, bytes, done, bytes.length - done, position + done);
     if (count === 0) throw new Error('the file became shorter while it was read');
     done += count;
   }
   return bytes;
+}
+
+export function readBlock(descriptor, position, size) {
+  return readInto(descriptor, new Uint8Array(size), position);
 }
 
 export function readAll(descriptor) {
