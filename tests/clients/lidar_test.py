@@ -6,7 +6,7 @@ import unittest
 import numpy as np
 
 import enfilade
-from room import COLUMN, FLOOR, WALL, RoomCase
+from room import FLOOR, WALL, RoomCase
 
 
 class LidarTest(RoomCase):

@@ -13,7 +13,7 @@ import { ALL_EXTENSIONS } from "@gltf-transform/extensions";
 import { draco, instance, meshopt, quantize, sparse } from "@gltf-transform/functions";
 import draco3d from "draco3dgltf";
 import { MeshoptDecoder, MeshoptEncoder } from "meshoptimizer";
-import { runTests } from "./harness.mjs";
+import { listScenes, runTests } from "./harness.mjs";
 
 const { values: options } = parseArgs({
   options: { server: { type: "string" }, scenes: { type: "string", default: "../shared/scenes" } },
@@ -23,10 +23,7 @@ const SHARED = [
   "aws-small-house/small_house.gltf", "duplex/duplex_utm32.glb", "schependomlaan/schependomlaan_block.glb",
   "schependomlaan/schependomlaan_estate.glb", "single-rooms/spheres-room.glb", "single-rooms/vr-gallery.glb",
 ];
-const scenes = ["build/assets/building.glb"];
-if (existsSync(options.scenes)) scenes.push(...SHARED.map((name) => join(options.scenes, name)));
-else if (process.env.CI) throw new Error(`${options.scenes} is missing`);
-else console.log(`skipped  ${options.scenes} is missing: our own scene only`);
+const scenes = listScenes(["build/assets/building.glb"], options.scenes, SHARED);
 
 const BITS = 16; // of a quantized position
 const PIXEL = Buffer.from("iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mP8z8BQDwAEhQGAhKmMIQAAAABJRU5ErkJggg==", "base64");

@@ -7,9 +7,8 @@ import { existsSync, mkdirSync, mkdtempSync, rmSync, writeFileSync } from "node:
 import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { parseArgs } from "node:util";
-import { chromium } from "playwright-core";
 import { startProxy } from "./page_proxy.mjs";
-import { awaitReady } from "./harness.mjs";
+import { awaitReady, launchBrowser, LONG } from "./harness.mjs";
 
 const { values: options } = parseArgs({
   options: {
@@ -22,14 +21,10 @@ const { values: options } = parseArgs({
 assert.ok(options.server, "--server names the program");
 mkdirSync(options.out, { recursive: true });
 const scratch = mkdtempSync(join(tmpdir(), "enfilade-page-"));
-const LONG = 40_000; // milliseconds: software rendering on a busy machine is slow
 const WALK_SPEED = 1.4; // metres per second, of the page
 const TICK = 1 / 60;
 
-const browser = await chromium.launch({
-  executablePath: options.chromium,
-  args: ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox"],
-});
+const browser = await launchBrowser(options.chromium);
 const cleanups = [() => browser.close(), () => rmSync(scratch, { recursive: true })];
 
 async function startServer(what, { port = 0, args = [] } = {}) {

@@ -7,8 +7,7 @@ import { tmpdir } from "node:os";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { parseArgs } from "node:util";
-import { chromium } from "playwright-core";
-import { runTests } from "./harness.mjs";
+import { launchBrowser, LONG, runTests } from "./harness.mjs";
 
 const { values: options } = parseArgs({
   options: {
@@ -22,7 +21,6 @@ mkdirSync(options.out, { recursive: true });
 const scratch = mkdtempSync(join(tmpdir(), "enfilade-replay-"));
 const recording = join(scratch, "tour.mcap");
 const file = join(scratch, "tour.html");
-const LONG = 40_000; // milliseconds: software rendering on a busy machine is slow
 const run = (...args) => execFileSync(options.server, args, { stdio: ["ignore", "pipe", "ignore"] }).toString();
 
 run("replay", options.scene, options.walk, "--out", join(scratch, "out"), "--record", recording, "--record-channels", "foxglove", "--record-frames", "0");
@@ -31,10 +29,7 @@ const report = JSON.parse(run("export", recording, "--html", file));
 const lines = (name) => readFileSync(join(scratch, "texts", name), "utf8").trim().split("\n");
 const contacts = lines("contacts.jsonl").map((line) => JSON.parse(line));
 
-const browser = await chromium.launch({
-  executablePath: options.chromium,
-  args: ["--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist", "--no-sandbox"],
-});
+const browser = await launchBrowser(options.chromium);
 const page = await browser.newPage({ viewport: { width: 1200, height: 760 } });
 page.setDefaultTimeout(LONG);
 const problems = [];

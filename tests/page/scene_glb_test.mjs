@@ -3,14 +3,14 @@
 // Without the shared scenes only our own are tested; under CI that is a failure.
 import assert from "node:assert/strict";
 import { execFileSync } from "node:child_process";
-import { existsSync, mkdtempSync, readFileSync, rmSync } from "node:fs";
+import { mkdtempSync, readFileSync, rmSync } from "node:fs";
 import { tmpdir } from "node:os";
 import { basename, join } from "node:path";
 import { parseArgs } from "node:util";
 import { NodeIO } from "@gltf-transform/core";
 import { EXTMeshGPUInstancing } from "@gltf-transform/extensions";
 import validator from "gltf-validator";
-import { runTests } from "./harness.mjs";
+import { listScenes, runTests } from "./harness.mjs";
 
 const { values: options } = parseArgs({
   options: { server: { type: "string" }, scenes: { type: "string", default: "../shared/scenes" } },
@@ -22,10 +22,7 @@ const SHARED = [
   "schependomlaan/LINDEN_-_Kozijnen.ifc", "schependomlaan/schependomlaan_block.glb", "schependomlaan/schependomlaan_estate.glb",
   "single-rooms/spheres-room.glb", "single-rooms/vr-gallery.glb", "willow-garage/meshes/willowgarage_visual.dae",
 ];
-const scenes = ["build/assets/building.glb", "build/assets/feeder.glb"];
-if (existsSync(options.scenes)) scenes.push(...SHARED.map((name) => join(options.scenes, name)));
-else if (process.env.CI) throw new Error(`${options.scenes} is missing`);
-else console.log(`skipped  ${options.scenes} is missing: our own scenes only`);
+const scenes = listScenes(["build/assets/building.glb", "build/assets/feeder.glb"], options.scenes, SHARED);
 
 const scratch = mkdtempSync(join(tmpdir(), "enfilade-glb-"));
 const reader = new NodeIO().registerExtensions([EXTMeshGPUInstancing]);
