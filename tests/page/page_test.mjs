@@ -345,6 +345,24 @@ const tests = {
     await shoot(page, "7-plan");
   },
 
+  async "the card of a body has its commands, and a door moves"({ page }) {
+    const bodies = await page.evaluate(() => enfilade.app.welcome.scene.bodies.map(
+      ({ id, kind, objects, stops, closed }) => ({ id, kind, object: objects[0], levels: [...stops.keys()], closed })));
+    const byKind = new Map(bodies.map((body) => [body.kind, body]));
+    const buttons = page.locator(".card > .row").first().getByRole("button", { includeHidden: true });
+    const DOOR = ["Open", "Close door"];
+    for (const { kind, object, levels } of byKind.values()) {
+      await page.evaluate((id) => enfilade.app.select(id), object);
+      const wanted = { hinged: DOOR, sliding: DOOR, path: ["Run", "Stop"] }[kind] ?? levels.map((level) => `Level ${level}`);
+      assert.deepEqual(await buttons.allTextContents(), wanted, kind);
+    }
+    const door = byKind.get("hinged");
+    await page.evaluate((id) => enfilade.app.select(id), door.object);
+    await page.getByRole("button", { name: DOOR[door.closed === 0 ? 0 : 1], exact: true }).click(); // it stands at 0
+    await page.waitForFunction((id) => enfilade.app.state.latest.bodies.some((body) => body.id === id), door.id);
+    await page.evaluate(() => enfilade.app.select(0));
+  },
+
   async "pause, step and play"({ page }) {
     await page.getByRole("button", { name: "Pause" }).click();
     await page.getByRole("button", { name: "Play" }).waitFor();
