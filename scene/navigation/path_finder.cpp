@@ -25,6 +25,8 @@ constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the ob
 constexpr int kRefutations = 4;
 constexpr int kMaxRefusals = 3;  // searches for the reason; afterwards it is that of the last one
 constexpr int kMaxRepairs = 12;  // of a leg
+constexpr std::size_t kQuickWalks = 300;  // of a repair; those that succeed rarely need more
+constexpr int kQuickProposals = 4;
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
@@ -46,8 +48,10 @@ struct Proof {
       : coarse{kCoarseSpacing, 1.5, maxRepairWalks}, fine{kFineSpacing, 0.7, maxRepairWalks} {}
 
   GridSearch coarse, fine;
-  bool isRepaired = false;       ///< the present proposal
-  Vec3 failedAt = Vec3::Zero();  ///< where the last proof failed
+  bool isQuick = false;  ///< what a short search does not repair is left out: proves nothing
+  double shortestLine = std::numeric_limits<double>::infinity();  ///< metres, of first proposals
+  bool isRepaired = false;                                        ///< the present proposal
+  Vec3 failedAt = Vec3::Zero();                                   ///< where the last proof failed
   std::vector<Obstruction> met;
 };
 
@@ -76,7 +80,10 @@ bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& cor
       targets.push_back(*place);
   }
   targets.push_back(corner);
-  for (GridSearch* search : {&proof.coarse, &proof.fine}) {
+  GridSearch quick{kCoarseSpacing, proof.coarse.margin, kQuickWalks};
+  const auto searches =
+      proof.isQuick ? std::vector{&quick} : std::vector{&proof.coarse, &proof.fine};
+  for (GridSearch* search : searches) {
     for (const Vec3& target : targets) {
       auto places = findGridPath(finder.walker, from, target, *search);
       if (!places) continue;
@@ -124,10 +131,10 @@ bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance cl
 }
 
 /// Closes portals of a mesh during a search. Those that failed often, and never led to a proved
-/// path meanwhile, stay closed: they are refuted.
+/// path meanwhile, stay closed: they are refuted. A quick search refutes nothing.
 class PortalClosures {
  public:
-  explicit PortalClosures(NavigationMesh& mesh) : mesh_(mesh) {}
+  PortalClosures(NavigationMesh& mesh, bool isQuick) : mesh_(mesh), isQuick_(isQuick) {}
   ~PortalClosures() {
     for (const auto& [from, to] : closed_) mesh_.openPortal(from, to);
   }
@@ -145,13 +152,15 @@ class PortalClosures {
           (mesh_.portalMiddle(polygons[i], polygons[i + 1]) - failure).squaredNorm();
       if (distance < least) least = distance, at = i;
     }
-    if (mesh_.closePortal(polygons[at], polygons[at + 1]) < kRefutations)
+    mesh_.closePortal(polygons[at], polygons[at + 1]);
+    if (isQuick_ || mesh_.countFailure(polygons[at], polygons[at + 1]) < kRefutations)
       closed_.emplace_back(polygons[at], polygons[at + 1]);
     return true;
   }
 
  private:
   NavigationMesh& mesh_;
+  const bool isQuick_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_;
 };
 
@@ -195,11 +204,13 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
   const auto start = mesh.findNearest(from, extent), goal = mesh.findNearest(to, extent);
   NavigationPath path;
   if (!start || !goal) return path;
-  PortalClosures closures(mesh);
-  for (int proposal = 0; proposal < kMaxProposals; ++proposal) {
+  PortalClosures closures(mesh, proof.isQuick);
+  const int maxProposals = proof.isQuick ? kQuickProposals : kMaxProposals;
+  for (int proposal = 0; proposal < maxProposals; ++proposal) {
     const auto corridor = findCorridor(mesh, *start, *goal);
     if (!corridor) return path;
     std::vector<Vec3> corners = mesh.straighten(*corridor, start->point, goal->point);
+    proof.shortestLine = std::min(proof.shortestLine, computeLength(corners));
     if (corners.size() > 1) corners.erase(corners.begin(), corners.begin() + 1);
     if (!corners.empty()) corners.pop_back();
     corners.push_back(to);
@@ -310,8 +321,8 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
   return path;
 }
 
-NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
-                                Proof& proof) {
+NavigationPath findPathByProposals(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                   Proof& proof) {
   NavigationPath best = findPathOn(finder, finder.ample, Clearance::ample, start, goal, proof);
   const Vec3 extent(finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
                     finder.agent.radius);
@@ -326,6 +337,18 @@ NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, con
     if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
   }
   return best;
+}
+
+/// A repair that fails takes long, and the next proposal may be as short: first all are tried with
+/// quick repairs.
+NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                Proof& proof) {
+  proof.isQuick = true;
+  NavigationPath quick = findPathByProposals(finder, start, goal, proof);
+  proof.isQuick = false;
+  if (quick.found() && quick.length <= kWorthTrying * proof.shortestLine) return quick;
+  NavigationPath best = findPathByProposals(finder, start, goal, proof);
+  return quick.found() && (!best.found() || quick.length < best.length) ? quick : best;
 }
 
 /// Places without a mesh, as narrow ones on furniture, are connected with it by walks on a grid,

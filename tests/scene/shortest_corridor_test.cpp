@@ -143,6 +143,7 @@ TEST(ShortestCorridor, AClosedPortalIsNotPassed) {
       break;
     }
     EXPECT_GE(corridor->cost, before - 1e-9);
+    EXPECT_LE(corridor->cost, measureShortestSampled(mesh, *from, *to) + 1e-9) << closed;
     before = corridor->cost;
     const auto& polygons = corridor->polygons;
     for (std::size_t i = 1; i < polygons.size(); ++i) {
@@ -150,11 +151,31 @@ TEST(ShortestCorridor, AClosedPortalIsNotPassed) {
         EXPECT_FALSE(portal.closed && portal.to == polygons[i]);
     }
     const std::size_t middle = polygons.size() / 2;
-    EXPECT_EQ(mesh.closePortal(polygons[middle - 1], polygons[middle]), 1);
-    EXPECT_EQ(mesh.closePortal(polygons[middle - 1], polygons[middle]), 2);
+    mesh.closePortal(polygons[middle - 1], polygons[middle]);
+    EXPECT_EQ(mesh.countFailure(polygons[middle - 1], polygons[middle]), 1);
+    EXPECT_EQ(mesh.countFailure(polygons[middle], polygons[middle - 1]), 2);
     mesh.forgetFailures(polygons[middle - 1], polygons[middle]);
-    EXPECT_EQ(mesh.closePortal(polygons[middle - 1], polygons[middle]), 1);
+    EXPECT_EQ(mesh.countFailure(polygons[middle - 1], polygons[middle]), 1);
   }
+}
+
+TEST(ShortestCorridor, PortalsAcrossAnOpenFloorEndOnItsRimAlone) {
+  NavigationMesh mesh = makeMesh(World(boxScene({{"floor", {0, -0.2, 0}, {12, 0, 12}}})), {});
+  const auto isAtRim = [](const Vec3& end) {
+    return std::min({end.x(), end.z(), 12 - end.x(), 12 - end.z()}) < 0.5;
+  };
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> within;
+  for (std::uint32_t polygon = 0; polygon < mesh.polygonCount(); ++polygon)
+    for (const Portal& portal : mesh.portals(polygon)) {
+      EXPECT_EQ(portal.lowIsRim, isAtRim(portal.low)) << portal.low.transpose();
+      EXPECT_EQ(portal.highIsRim, isAtRim(portal.high)) << portal.high.transpose();
+      if (!portal.lowIsRim) within.emplace_back(polygon, portal.to);
+    }
+  ASSERT_FALSE(within.empty()) << "the floor has several tiles";
+  const auto [from, to] = within.front();
+  mesh.closePortal(from, to);
+  for (const Portal& portal : mesh.portals(from))
+    EXPECT_TRUE(portal.to != to || (portal.lowIsRim && portal.highIsRim));
 }
 
 TEST(ShortestCorridor, AProvedPathForgetsTheFailuresOfItsPortals) {
@@ -169,17 +190,16 @@ TEST(ShortestCorridor, AProvedPathForgetsTheFailuresOfItsPortals) {
       findShortestCorridor(mesh, *start, *goal, std::numeric_limits<double>::infinity());
   ASSERT_TRUE(corridor && corridor->polygons.size() > 2);
   const auto& polygons = corridor->polygons;
-  for (std::size_t i = 1; i < polygons.size(); ++i) {
-    for (int failures = 1; failures < 4; ++failures) mesh.closePortal(polygons[i - 1], polygons[i]);
-    mesh.openPortal(polygons[i - 1], polygons[i]);
-  }
+  for (std::size_t i = 1; i < polygons.size(); ++i)
+    for (int failures = 1; failures < 4; ++failures)
+      mesh.countFailure(polygons[i - 1], polygons[i]);
   Walker walker(world.data(), agent);
   const PathFinder finder{world.data(), agent,  walker,
                           mesh,         scarce, [&]() -> const NavigationMesh& { return mesh; }};
   ASSERT_TRUE(findPath(finder, from, to).found());
   int forgotten = 0;
   for (std::size_t i = 1; i < polygons.size(); ++i)
-    forgotten += mesh.closePortal(polygons[i - 1], polygons[i]) == 1;
+    forgotten += mesh.countFailure(polygons[i - 1], polygons[i]) == 1;
   EXPECT_GT(forgotten, 0);
 }
 

@@ -347,29 +347,36 @@ void NavigationMesh::addRim(std::uint32_t polygon, const Portal& closed) {
   for (const Portal& portal : portals(polygon)) mark(portal.to);
 }
 
-int NavigationMesh::closePortal(std::uint32_t from, std::uint32_t to) {
-  int failures = 0;
-  for (const auto& [a, b] : {std::pair(from, to), std::pair(to, from)}) {
-    for (std::uint32_t p = firstPortal_[a]; p < firstPortal_[a + 1]; ++p) {
-      if (portals_[p].to != b) continue;
-      portals_[p].closed = true;
-      addRim(a, portals_[p]);
-      failures = std::max<int>(failures, ++portals_[p].failures);
-    }
+/// The portals between two polygons, in both directions.
+std::vector<Portal*> NavigationMesh::findPortals(std::uint32_t a, std::uint32_t b) {
+  std::vector<Portal*> found;
+  for (const auto& [from, to] : {std::pair(a, b), std::pair(b, a)})
+    for (std::uint32_t p = firstPortal_[from]; p < firstPortal_[from + 1]; ++p)
+      if (portals_[p].to == to) found.push_back(&portals_[p]);
+  return found;
+}
+
+void NavigationMesh::closePortal(std::uint32_t from, std::uint32_t to) {
+  for (Portal* portal : findPortals(from, to)) {
+    portal->closed = true;
+    addRim(from, *portal);
+    addRim(to, *portal);
   }
-  return failures;
 }
 
 void NavigationMesh::openPortal(std::uint32_t from, std::uint32_t to) {
-  for (const auto& [a, b] : {std::pair(from, to), std::pair(to, from)})
-    for (std::uint32_t p = firstPortal_[a]; p < firstPortal_[a + 1]; ++p)
-      if (portals_[p].to == b) portals_[p].closed = false;
+  for (Portal* portal : findPortals(from, to)) portal->closed = false;
+}
+
+int NavigationMesh::countFailure(std::uint32_t from, std::uint32_t to) {
+  int failures = 0;
+  for (Portal* portal : findPortals(from, to))
+    failures = std::max<int>(failures, ++portal->failures);
+  return failures;
 }
 
 void NavigationMesh::forgetFailures(std::uint32_t from, std::uint32_t to) {
-  for (const auto& [a, b] : {std::pair(from, to), std::pair(to, from)})
-    for (std::uint32_t p = firstPortal_[a]; p < firstPortal_[a + 1]; ++p)
-      if (portals_[p].to == b) portals_[p].failures = 0;
+  for (Portal* portal : findPortals(from, to)) portal->failures = 0;
 }
 
 Vec3 NavigationMesh::pointInPolygon(std::uint32_t index, double s, double t) const {

@@ -87,10 +87,11 @@ class NavigationMesh {
   std::vector<Vec3> straighten(const Corridor& corridor, const Vec3& from, const Vec3& to) const;
   /// The middle of the portal between two neighbours, scene frame, metres.
   Vec3 portalMiddle(std::uint32_t from, std::uint32_t to) const;
-  /// Closes the portals between two polygons, in both directions, and counts a failure. Returns
-  /// their failures.
-  int closePortal(std::uint32_t from, std::uint32_t to);
+  /// Closes the portals between two polygons, in both directions.
+  void closePortal(std::uint32_t from, std::uint32_t to);
   void openPortal(std::uint32_t from, std::uint32_t to);
+  /// Counts a failure of the portals between two polygons. Returns their failures.
+  int countFailure(std::uint32_t from, std::uint32_t to);
   /// Forgets the failures of the portals between two polygons: a proved path leads through them.
   void forgetFailures(std::uint32_t from, std::uint32_t to);
   /// A point of a polygon for two numbers of 0..1, uniform in area.
@@ -110,6 +111,7 @@ class NavigationMesh {
   void collectPortals();
   void findRim(const TileGrid& grid);
   void addRim(std::uint32_t polygon, const Portal& closed);
+  std::vector<Portal*> findPortals(std::uint32_t a, std::uint32_t b);
   /// The vertex of a polygon above or below a point, within `distance` metres, or the point. Detour
   /// stores the ends of portals between tiles in 255ths of an edge.
   Vec3 snapToVertex(std::uint32_t reference, const Vec3& point, double distance) const;
