@@ -143,7 +143,8 @@ bool isGltf(ModelFormat format) {
 /// Passes a glTF file through the pre-pass. `rewrite`: also if it seems plain. assimp recognises
 /// GLB files by their extension.
 std::vector<std::string> prepareGltf(ConvertInput& input, AssimpInput& file, bool rewrite) {
-  PlainGltf plain = makePlainGltf(input.file, input.format, {input.options.gltfScene, rewrite});
+  PlainGltf plain = makePlainGltf(
+      input.file, input.format, {input.options.gltfScene, rewrite, input.options.ignoreAppearance});
   input.metadata.triangles = plain.triangles;
   input.metadata.scenes = std::move(plain.scenes);
   input.metadata.scene = plain.scene;

@@ -37,9 +37,9 @@ void applyBranch(const CommandArguments& read, ReplayCommand& command) {
 
 /// Rejects options whose values come from the recording. Empty: none was given.
 std::string validateRecordedOptions(const CLI::App& verb) {
-  for (const char* option :
-       {"--step-height", "--epsilon", "--slope", "--speed-limit", "--sliding", "--near-miss",
-        "--unit", "--up", "--ifc-reader", "--ifc-doors", "--georeference", "--gltf-scene"})
+  for (const char* option : {"--step-height", "--epsilon", "--slope", "--speed-limit", "--sliding",
+                             "--near-miss", "--unit", "--up", "--ifc-reader", "--ifc-doors",
+                             "--georeference", "--gltf-scene", "--ignore-appearance"})
     if (verb.count(option) > 0)
       return std::string(option) +
              " cannot be given: the recording "
@@ -198,7 +198,7 @@ std::variant<ProgramCommand, ExitCode> makeExportReplayCommand(const CLI::App& v
     return reportMisuse("export", files.recording.string() + ": not a recording; --html needs one");
   const std::string option =
       findModelOption(verb, {"--unit", "--up", "--offset", "--ifc-reader", "--ifc-doors",
-                             "--georeference", "--gltf-scene"});
+                             "--georeference", "--gltf-scene", "--ignore-appearance"});
   if (!option.empty())
     return reportMisuse("export", option + " cannot be given: the recording sets it");
   return ExportReplayCommand{files.recording,       read.html,         files.scene,
@@ -221,9 +221,9 @@ std::variant<ProgramCommand, ExitCode> makeExportCommand(const CLI::App& verb,
     return reportMisuse(
         "export", read.model.file + ": a recording: give --out DIR, or a model file for --glb");
   if (writesScene) return ExportSceneCommand{makeModelOptions(read.model), read.glb};
-  const std::string option =
-      findModelOption(verb, {"--unit", "--up", "--offset", "--no-cache", "--ifc-reader",
-                             "--ifc-doors", "--georeference", "--gltf-scene"});
+  const std::string option = findModelOption(
+      verb, {"--unit", "--up", "--offset", "--no-cache", "--ifc-reader", "--ifc-doors",
+             "--georeference", "--gltf-scene", "--ignore-appearance"});
   if (!option.empty()) return reportMisuse("export", option + " needs a model and --glb");
   return ExportCommand{read.model.file, read.out};
 }

@@ -51,6 +51,9 @@ void addModel(CLI::App& verb, ModelArguments& into) {
   verb.add_option("--gltf-scene", into.gltfScene,
                   "glTF: scene to read, by name or by number from 0. Default: the file's default")
       ->type_name("NAME|N");
+  verb.add_flag("--ignore-appearance", into.ignoreAppearance,
+                "glTF: load files that require extensions that change the appearance alone and are "
+                "not read");
 }
 
 ModelOptions makeModelOptions(const ModelArguments& read) {
@@ -66,6 +69,7 @@ ModelOptions makeModelOptions(const ModelArguments& read) {
   options.doors = scene::parseIfcDoors(read.ifcDoors);
   options.import.georeference = read.georeference;
   options.import.gltfScene = read.gltfScene;
+  options.import.ignoreAppearance = read.ignoreAppearance;
   return options;
 }
 

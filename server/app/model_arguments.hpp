@@ -15,7 +15,7 @@ namespace enfilade::server {
 struct ModelArguments {
   std::string file, unit, up, ifcReader = "auto", ifcDoors = "move", gltfScene;
   std::vector<double> offset;
-  bool noCache = false, georeference = false;
+  bool noCache = false, georeference = false, ignoreAppearance = false;
 };
 
 /// Lists the options that follow under this heading of --help.

@@ -258,6 +258,7 @@ v1::ModelChoices toProto(const ModelOptions& model) {
   message.set_ifc_doors(toString(model.doors));
   message.set_georeference(model.import.georeference);
   message.set_gltf_scene(model.import.gltfScene);
+  message.set_ignore_appearance(model.import.ignoreAppearance);
   return message;
 }
 
@@ -271,6 +272,7 @@ ModelOptions modelOptionsFromProto(const v1::ModelChoices& message) {
   model.doors = scene::parseIfcDoors(message.ifc_doors());
   model.import.georeference = message.georeference();
   model.import.gltfScene = message.gltf_scene();
+  model.import.ignoreAppearance = !message.has_ignore_appearance() || message.ignore_appearance();
   return model;
 }
 

@@ -38,8 +38,9 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
   const MemoryFile file(bytes);
   const bool text = !bytes.empty() && bytes[0] == '{';
   try {
-    const scene::PlainGltf plain = scene::makePlainGltf(
-        file.path(), text ? scene::ModelFormat::gltf : scene::ModelFormat::glb);
+    const scene::PlainGltf plain =
+        scene::makePlainGltf(file.path(), text ? scene::ModelFormat::gltf : scene::ModelFormat::glb,
+                             {.ignoreAppearance = true});
     if (!plain.glb.empty()) requirePlainFile(plain);
   } catch (const scene::ImportError& error) {
     require(error.what()[0] != '\0', "an error has a message");

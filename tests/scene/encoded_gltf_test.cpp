@@ -332,25 +332,59 @@ TEST(GltfExtensions, UnlistedOnesAreReportedUnlessTheyChangeNoShape) {
   EXPECT_EQ(diagnosticText(model, "ignored_extension"), "KHR_node_visibility");
 }
 
-TEST(GltfExtensions, ThoseThatAreRequiredAndNotReadAreRefusedUnlessTheyChangeLooksAlone) {
+TEST(GltfExtensions, ThoseThatAreRequiredAndNotReadAreRefused) {
   const TemporaryFolder folder;
+  ImportOptions ignoring;
+  ignoring.ignoreAppearance = true;
   for (const char* name :
        {"OMI_physics_shape", "MSFT_lod", "VRM", "AGI_articulations", "EXT_structural_metadata"}) {
     GltfWriter file = tests::plainTerrace();
+    file.use("KHR_materials_unlit", true);
     file.use(name, true);
-    const std::string text = catchFailure(folder.write("a.glb", file.glb()));
+    const std::string text = catchFailure(folder.write("a.glb", file.glb()), ignoring);
     EXPECT_NE(text.find(std::string("requires the glTF extension ") + name), std::string::npos)
         << text;
   }
-  for (const auto& [name, count] :
-       {std::pair{"KHR_texture_basisu", 1u}, std::pair{"MSFT_texture_dds", 1u},
-        std::pair{"KHR_lights_punctual", 1u}, std::pair{"KHR_texture_transform", 0u}}) {
+}
+
+TEST(GltfExtensions, ThoseThatChangeTheAppearanceAloneAreRefusedUnlessTheUserIgnoresThem) {
+  const TemporaryFolder folder;
+  ImportOptions ignoring;
+  ignoring.ignoreAppearance = true;
+  for (const char* name : {"KHR_materials_unlit", "KHR_texture_basisu", "MSFT_texture_dds",
+                           "KHR_lights_punctual", "KHR_materials_emissive_strength"}) {
     GltfWriter file = tests::plainTerrace();
     file.use(name, true);
-    const Model model = importModel(folder.write("a.glb", file.glb()));
-    EXPECT_EQ(countDiagnostics(model, "ignored_appearance"), count) << name;
+    const auto path = folder.write("a.glb", file.glb());
+    EXPECT_EQ(catchFailure(path),
+              path.string() +
+                  ": requires glTF extensions that are not supported and change the appearance "
+                  "alone: " +
+                  name + "; --ignore-appearance loads the file without them");
+    const Model model = importModel(path, ignoring);
+    expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 0);
+    EXPECT_EQ(countDiagnostics(model, "ignored_appearance"), 1u) << name;
+    EXPECT_EQ(diagnosticText(model, "ignored_appearance"), name);
     EXPECT_EQ(countDiagnostics(model, "ignored_extension"), 0u) << name;
   }
+  GltfWriter several = tests::plainTerrace();
+  several.use("KHR_materials_unlit", true);
+  several.use("KHR_lights_punctual", true);
+  const std::string text = catchFailure(folder.write("several.glb", several.glb()));
+  EXPECT_NE(text.find(": KHR_lights_punctual, KHR_materials_unlit;"), std::string::npos) << text;
+}
+
+TEST(GltfExtensions, RequiredOnesOfTheAppearanceThatAreReadNeedNoOption) {
+  const TemporaryFolder folder;
+  for (const char* name :
+       {"KHR_texture_transform", "EXT_texture_webp", "KHR_materials_pbrSpecularGlossiness"}) {
+    GltfWriter file = tests::plainTerrace();
+    file.use(name, true);
+    EXPECT_TRUE(importModel(folder.write("a.glb", file.glb())).diagnostics.empty()) << name;
+  }
+  GltfWriter optional = tests::plainTerrace();
+  optional.use("KHR_materials_unlit", false);
+  EXPECT_TRUE(importModel(folder.write("b.glb", optional.glb())).diagnostics.empty());
 }
 
 TEST(GltfExtensions, GltfOneIsRefusedInWords) {

@@ -287,20 +287,6 @@ TEST(MalformedFiles, IndicesOfVerticesThatAreNotThereLeaveTheirTrianglesOut) {
   EXPECT_GE(reported, 1u) << "omitted without a diagnostic";
 }
 
-TEST(MalformedFiles, RequiredExtensionsOfLooksAloneAreNoHindrance) {
-  const TemporaryFolder folder;
-  const auto requiring = [&](const std::string& extension) {
-    return folder.write("a.gltf",
-                        replaced(boxGltf(), R"({"asset")",
-                                 R"({"extensionsRequired":[")" + extension + R"("],"asset")"));
-  };
-  const Model unlit = importModel(requiring("KHR_materials_unlit"));
-  expectSize(unlit, {1, 2, 3});
-  EXPECT_EQ(countDiagnostics(unlit, "ignored_appearance"), 1u);
-  EXPECT_NE(catchFailure(requiring("ACME_bent_meshes")).find("export without it"),
-            std::string::npos);
-}
-
 TEST(MalformedFiles, IfcInFeetFarFromTheOriginIsInMetresAndNearIt) {
   const TemporaryFolder folder;
   tests::IfcHouse house;

@@ -96,6 +96,18 @@ TEST_F(CachedModel, AChangeOfTheFileOrOfTheOptionsIsAnotherEntry) {
   EXPECT_EQ(renamed.model.objects[0].path, "cox");
 }
 
+TEST_F(CachedModel, AModelWithoutItsRequiredAppearanceIsNotFoundByALoadThatRefusesIt) {
+  std::string text = readContent(file_);
+  text.replace(text.find("{\"asset\""), 1, R"({"extensionsRequired":["KHR_materials_unlit"],)");
+  overwrite(file_, text);
+  ImportOptions ignoring;
+  ignoring.ignoreAppearance = true;
+  EXPECT_THROW(load(), ImportError);
+  EXPECT_FALSE(load(ignoring).fromCache);
+  EXPECT_TRUE(load(ignoring).fromCache);
+  EXPECT_THROW(load(), ImportError);
+}
+
 TEST_F(CachedModel, AChangeOfADependencyIsNoticed) {
   load();
   overwrite(folder_.path() / "box.bin", BoxMesh({4, 2, 3}).bytes());

@@ -7,6 +7,7 @@
 #include <map>
 
 #include "render/image/image.hpp"
+#include "tests/scene/hand_made_files.hpp"
 
 namespace enfilade::server::testing {
 namespace {
@@ -210,6 +211,25 @@ TEST_F(Program, AFileBeyondTheLimitIsAnErrorNotADeath) {
   EXPECT_EQ(awaitExitCode(child), 1);
   EXPECT_NE(readText(path("stderr")).find("File too large"), std::string::npos)
       << readText(path("stderr"));
+}
+
+TEST_F(Program, ARecordingKeepsThatTheRequiredAppearanceIsIgnored) {
+  std::string text = tests::gltf(tests::BoxMesh({1, 2, 3}), "0", tests::kOneNode);
+  text.replace(0, 1, R"({"extensionsRequired":["KHR_materials_unlit"],)");
+  write(folder_ / "unlit.gltf", text);
+  const Ended refused = run({"inspect", path("unlit.gltf")});
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_NE(refused.err.find("KHR_materials_unlit; --ignore-appearance"), std::string::npos)
+      << refused.err;
+  write(folder_ / "wait.jsonl", "{\"wait\":0.1}\n");
+  EXPECT_EQ(run({"replay", path("unlit.gltf"), path("wait.jsonl"), "--ignore-appearance", "--out",
+                 path("out"), "--record", path("unlit.mcap")})
+                .code,
+            0);
+  EXPECT_EQ(run({"replay", path("unlit.mcap"), "--verify"}).code, 0);
+  EXPECT_EQ(run({"replay", path("unlit.mcap"), "--verify", "--ignore-appearance"}).code, 2);
+  EXPECT_EQ(run({"replay", path("unlit.gltf"), path("unlit.mcap"), "--out", path("again")}).code, 0)
+      << "the later version of the model";
 }
 
 TEST_F(Program, ServingAPublicAddressExitsWithOne) {

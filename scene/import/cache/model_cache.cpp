@@ -60,6 +60,7 @@ std::string formatOptions(const ImportOptions& options) {
                 : "-";
   text += " ifc reader " + std::to_string(static_cast<int>(options.ifcReader));
   if (options.georeference) text += " on the map";
+  if (options.ignoreAppearance) text += " without required appearance";
   if (!options.gltfScene.empty()) text += " scene " + options.gltfScene;
   return text;
 }

@@ -31,6 +31,8 @@ struct ImportOptions {
   bool georeference = false;
   /// glTF: the scene to read, by its name or its number from 0; empty: the file's default.
   std::string gltfScene;
+  /// glTF: reads files that require extensions that change the appearance alone and are not read.
+  bool ignoreAppearance = false;
   double timeLimit = 120;                          ///< seconds of wall-clock time
   std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes, of each reading process
 };

@@ -91,6 +91,16 @@ std::set<std::string> readRequired(const Json& gltf, const std::filesystem::path
   return names;
 }
 
+[[noreturn]] void throwUnreadAppearance(const std::set<std::string>& names,
+                                        const std::filesystem::path& file) {
+  std::string list;
+  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
+  throw ImportError(file.string() +
+                    ": requires glTF extensions that are not supported and change the appearance "
+                    "alone: " +
+                    list + "; --ignore-appearance loads the file without them");
+}
+
 void addProblem(const char* kind, const std::set<std::string>& names,
                 std::vector<Diagnostic>& problems) {
   if (!names.empty()) problems.push_back({kind, names.size(), *names.begin()});
@@ -121,7 +131,8 @@ void ExtensionNames::seeValue(const Json& value) {
 }
 
 std::vector<Diagnostic> checkGltfExtensions(const Json& gltf, const ExtensionNames& inUse,
-                                            const std::filesystem::path& file) {
+                                            const std::filesystem::path& file,
+                                            bool ignoreAppearance) {
   std::set<std::string> appearance, ignored;
   for (const std::string& name : readRequired(gltf, file)) {
     if (isRead(name)) continue;
@@ -130,6 +141,7 @@ std::vector<Diagnostic> checkGltfExtensions(const Json& gltf, const ExtensionNam
                         ", which is not supported; export without it");
     appearance.insert(name);
   }
+  if (!appearance.empty() && !ignoreAppearance) throwUnreadAppearance(appearance, file);
   const auto used = gltf.find("extensionsUsed");
   if (used != gltf.end() && used->is_array()) {
     for (const Json& name : *used)

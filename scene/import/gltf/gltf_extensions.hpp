@@ -32,10 +32,11 @@ class ExtensionNames {
   std::set<std::string> names_;
 };
 
-/// Throws ImportError for a required extension that is not read, unless it changes the appearance
-/// alone: that is reported (`ignored_appearance`). Optional ones, listed or not, are reported if
-/// they could change shapes (`ignored_extension`).
+/// Throws ImportError for a required extension that is not read. One that changes the appearance
+/// alone is reported (`ignored_appearance`) if `ignoreAppearance`. Optional ones, listed or not,
+/// are reported if they could change shapes (`ignored_extension`).
 std::vector<Diagnostic> checkGltfExtensions(const nlohmann::json& gltf, const ExtensionNames& inUse,
-                                            const std::filesystem::path& file);
+                                            const std::filesystem::path& file,
+                                            bool ignoreAppearance);
 
 }  // namespace enfilade::scene

@@ -359,7 +359,7 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   Json sections = parseMeshSections(plain.json, file, extensions, duplicates);
   addDiagnostic(problems, "duplicate_key", duplicates.firstPath(), duplicates.count());
   requireVersion2(sections, file);
-  plain.problems = checkGltfExtensions(sections, extensions, file);
+  plain.problems = checkGltfExtensions(sections, extensions, file, choice.ignoreAppearance);
   plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());
   const bool other = chooseScene(sections, choice.scene, file, plain);
   // Rewriting leaves one value of a duplicate key, so that assimp reads the one checked here.

@@ -30,6 +30,8 @@ struct PlainGltf {
 struct GltfChoice {
   std::string scene = {};  ///< name or number; empty: the file's default
   bool rewrite = false;    ///< rewrite the file also if assimp should read it right
+  /// Reads files that require extensions that change the appearance alone and are not read.
+  bool ignoreAppearance = false;
 };
 
 /// Throws ImportError for damaged JSON, for missing buffers, for glTF 1.0, for required extensions

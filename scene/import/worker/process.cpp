@@ -106,7 +106,7 @@ struct SpawnSettings {
 
 // ---- starting -----------------------------------------------------------------------------------
 
-constexpr std::size_t kArgumentCount = 16;
+constexpr std::size_t kArgumentCount = 17;
 
 /// Formats as "x,y,z".
 std::string formatVec3(const Vec3& v) {
@@ -126,6 +126,7 @@ std::array<std::string, kArgumentCount> makeArguments(const ImportRequest& reque
           std::to_string(static_cast<int>(request.options.ifcReader)),
           request.options.georeference ? "map" : "-",
           request.options.gltfScene,
+          request.options.ignoreAppearance ? "ignore" : "-",
           std::to_string(request.firstProduct),
           request.program,
           request.script,
@@ -281,10 +282,11 @@ std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& pare
   request.options.ifcReader = static_cast<IfcReader>(parseArgument<int>(argv[9]));
   request.options.georeference = std::string_view(argv[10]) == "map";
   request.options.gltfScene = argv[11];
-  request.firstProduct = parseArgument<std::uint32_t>(argv[12]);
-  request.program = argv[13];
-  request.script = argv[14];
-  request.file = argv[15];
+  request.options.ignoreAppearance = std::string_view(argv[12]) == "ignore";
+  request.firstProduct = parseArgument<std::uint32_t>(argv[13]);
+  request.program = argv[14];
+  request.script = argv[15];
+  request.file = argv[16];
   return request;
 }
 
