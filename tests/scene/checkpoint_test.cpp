@@ -1,5 +1,8 @@
 #include "scene/world/checkpoint/checkpoint.hpp"
 
+#include <functional>
+#include <iterator>
+
 #include "tests/scene/body_fixture.hpp"
 #include "tests/scene/checkpoint_fixture.hpp"
 #include "tests/scene/world_fixture.hpp"
@@ -264,6 +267,52 @@ TEST(Checkpoint, UnsortedEntriesAreRefused) {
   std::swap(stage.physicsBodyByPart.at({entity(0), 0}), stage.physicsBodyByPart.at({entity(1), 0}));
   EXPECT_NE(refusal(scene, makeCheckpoint(solids)).find("the first physics bodies"),
             std::string::npos);
+}
+
+/// A change of a lively world to one with an index or an id out of range.
+struct Forgery {
+  const char* name;
+  std::function<void(WorldData&)> forge;
+  const char* reason;
+};
+
+TEST(Checkpoint, IndicesOutOfRangeAreRefused) {
+  const auto addPhysicsBody = [](DynamicBodies& stage) -> std::uint32_t {
+    stage.physicsWorld.bodies.push_back(stage.physicsWorld.bodies.front());
+    return static_cast<std::uint32_t>(stage.physicsWorld.bodies.size() - 1);
+  };
+  const std::vector<Forgery> forgeries{
+      {"physics body",
+       [&](WorldData& world) {
+         // One more body, so that the forged index can be written.
+         auto& stage = world.dynamicBodies;
+         std::prev(stage.physicsBodyByPart.end())->second = addPhysicsBody(stage);
+       },
+       "two physics bodies share an index"},
+      {"free slot",
+       [](WorldData& world) {
+         auto& stage = world.dynamicBodies;
+         stage.freeSlots.push_back(static_cast<std::uint32_t>(stage.physicsWorld.bodies.size()) +
+                                   1);
+       },
+       "two physics bodies share an index"},
+      {"pair",
+       [](WorldData& world) {
+         auto& [bodies, pairs] = world.dynamicBodies.physicsWorld;
+         pairs.back().key.b = static_cast<std::uint32_t>(bodies.size());
+       },
+       "a pair has an unknown physics body"},
+      {"contact of a body",
+       [](WorldData& world) { world.bodyContacts.back().first.first = world.firstAvatarId(); },
+       "a body touches an unknown entity"},
+  };
+  const auto scene = busyRoom();
+  for (const Forgery& forgery : forgeries) {
+    World world = livelyWorld();
+    forgery.forge(world.data());
+    const std::string reason = refusal(scene, makeCheckpoint(world));
+    EXPECT_NE(reason.find(forgery.reason), std::string::npos) << forgery.name << ": " << reason;
+  }
 }
 
 TEST(Checkpoint, OfAnotherSceneOrVersionIsRefusedWithBothNamed) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "scene/model/coplanar_surfaces.hpp"
 #include "scene/model/diagnostic_catalog.hpp"
 #include "tests/scene/box_scene.hpp"
 
@@ -95,6 +96,50 @@ TEST(SceneReport, SurfacesOfTwoObjectsInOnePlaneAreCountedIfTheyFlicker) {
       << "faces of opposite sides";
   EXPECT_EQ(countCoplanar(slab, {"next", {4, 0, 0}, {8, 0.3, 4}}, true), 0u);
   EXPECT_EQ(findDiagnosticKind({"coplanar_surfaces", 1, ""}).severity, Severity::note);
+}
+
+/// A model of boxes of two colours: the second colour is that of the boxes from `firstRed` on.
+Model twoColoured(const std::vector<testing::NamedBox>& boxes, std::size_t firstRed) {
+  Model model = testing::boxModel(boxes);
+  model.materials.emplace_back();
+  model.materials[1].baseColour = {1, 0, 0, 1};
+  for (std::size_t i = firstRed; i < boxes.size(); ++i) model.meshes[i].material = 1;
+  return model;
+}
+
+TEST(SceneReport, CoplanarPairsAreCountedOnceEachAndTheLargestIsTheExample) {
+  // The wide rafter shares three planes with the slab, the others one.
+  const CoplanarSurfaces found =
+      findCoplanarSurfaces(twoColoured({{"slab", {0, 0, 0}, {4, 0.3, 4}},
+                                        {"far", {20, 0, 0}, {24, 0.3, 4}},
+                                        {"narrow", {0.5, 0, 0.5}, {0.7, 0.2, 3.5}},
+                                        {"wide", {1, 0, 0}, {3, 0.2, 4}},
+                                        {"short", {3.2, 0, 0.5}, {3.6, 0.2, 1.5}},
+                                        {"on far", {21, 0, 1}, {22, 0.2, 2}}},
+                                       2));
+  EXPECT_EQ(found.pairs, 4u);
+  EXPECT_EQ(found.example, "slab and wide");
+  EXPECT_TRUE(found.isComplete);
+}
+
+TEST(SceneReport, CoplanarSurfacesOfTooManyObjectsAreReportedAsNotAllCompared) {
+  const auto report = [](std::size_t tiles) {
+    std::vector<testing::NamedBox> boxes{{"slab", {-1, 0, 0}, {4, 0.3, 4}}};
+    for (std::size_t i = 0; i < tiles; ++i) {
+      const double z = 5 + static_cast<double>(i);
+      boxes.push_back({"tile", {0, 0, z}, {0.5, 0.3, z + 0.5}});
+    }
+    boxes.push_back({"rafter", {0, 0, 1}, {0.5, 0.2, 2}});
+    const std::size_t last = boxes.size() - 1;
+    return makeSceneReport(Scene(twoColoured(boxes, last)));
+  };
+  // n tiles have 2 n triangles in each of the two planes of their ends: 4 n^2 comparisons.
+  const SceneReport few = report(100), many = report(1500);
+  EXPECT_EQ(countDiagnostics(few, "coplanar_surfaces"), 1u);
+  EXPECT_EQ(findExample(few, "coplanar_surfaces"), "slab and rafter");
+  EXPECT_EQ(countDiagnostics(many, "coplanar_surfaces"), 1u);
+  EXPECT_EQ(findExample(many, "coplanar_surfaces"),
+            "slab and rafter; not all surfaces were compared");
 }
 
 TEST(SceneReport, SpacesThatAreAirAreNotedAndNothingIsWrongWithThem) {
