@@ -333,6 +333,61 @@ TEST(IfcXml, AReferenceToAMissingIdIsReportedAndLeftOut) {
   EXPECT_EQ(model.objects.size(), 3u);
 }
 
+TEST(IfcXml, AReferenceToAnotherClassIsReportedAndLeftOut) {
+  ENFILADE_NEED_WEB_IFC();
+  const TemporaryFolder folder;
+  const std::string text = replaced(makeXml(), "<IfcRelContainedInSpatialStructure ref=\"content\"",
+                                    "<IfcRelContainedInSpatialStructure ref=\"zero\"");
+  const Model model = importModel(folder.write("a.ifcxml", text));
+  EXPECT_EQ(countDiagnostics(model, "xml_not_read"), 1u);
+  EXPECT_NE(diagnosticText(model, "xml_not_read")
+                .find("IfcCartesianPoint in place of IfcRelContainedInSpatialStructure"),
+            std::string::npos);
+  EXPECT_EQ(model.objects.size(), 3u);
+}
+
+TEST(IfcXml, AChoiceMayBeAReferenceWithoutAType) {
+  ENFILADE_NEED_WEB_IFC();
+  const TemporaryFolder folder;
+  const std::string text =
+      replaced(makeXml("<IfcAxis2Placement3D id=\"corner2\"><Location Coordinates=\"1500 0 0\"/>"
+                       "</IfcAxis2Placement3D>\n"),
+               R"(<RelativePlacement><IfcAxis2Placement3D>
+     <Location Coordinates="1.5e3 0 0"/>
+    </IfcAxis2Placement3D></RelativePlacement>)",
+               "<RelativePlacement ref=\"corner2\" xsi:nil=\"true\"/>");
+  const Model model = importModel(folder.write("a.ifcxml", text));
+  expectSame(model, importModel(folder.write("a.ifc", kStep)));
+  EXPECT_EQ(countXmlProblems(model), 0u);
+}
+
+TEST(IfcXml, HostileNumbersAndCyclesLoadOrAreErrorsInWords) {
+  ENFILADE_NEED_WEB_IFC();
+  const TemporaryFolder folder;
+  const std::string digits(400, '9');
+  const std::vector<std::pair<std::string, std::string>> changes{
+      {"CoordIndex=\"1 2 3", "CoordIndex=\"1 2 99999999999999999999"},
+      {"CoordIndex=\"1 2 3", "CoordIndex=\"1 0 -3"},
+      {"CoordList=\"0 0 0", "CoordList=\"1e308 -1e308 1e999"},
+      {"Depth=\"3000\"", "Depth=\"" + digits + "\""},
+      {"Elevation=\"0\"", "Elevation=\"" + digits + "\""},
+      {"RefLatitude=\"24 28 0\"", "RefLatitude=\"" + digits + " 28 0\""},
+      {"<PlacementRelTo xsi:type=\"IfcLocalPlacement\" ref=\"origin\"",
+       "<PlacementRelTo xsi:type=\"IfcLocalPlacement\" ref=\"corner\""},
+      {"<RelatingObject xsi:type=\"IfcSite\" ref=\"site\"",
+       "<RelatingObject xsi:type=\"IfcSite\" ref=\"ground\""},
+  };
+  int loaded = 0;
+  for (const auto& [from, to] : changes) {
+    const auto file = folder.write("a.ifcxml", replaced(makeXml(), from, to));
+    const std::string message = catchFailure(file);
+    loaded += message.empty() ? 1 : 0;
+    for (const char* fault : {"crashed", "hung", "timed out", "invalid data", "exited"})
+      EXPECT_EQ(message.find(fault), std::string::npos) << to.substr(0, 60) << ": " << message;
+  }
+  EXPECT_GE(loaded, 4);
+}
+
 TEST(IfcXml, AValueThatIsNotOfItsTypeIsReported) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;

@@ -79,6 +79,11 @@ export class IfcSchema {
     return this.names.get(code);
   }
 
+  // Whether the entity is of the class, or of one that derives from it.
+  isKind(name, base) {
+    return name === base || this.types[name].prototype instanceof this.types[base];
+  }
+
   // `name`: as STEP writes it.
   findEntityByUpperCase(name) {
     return this.findEntity(this.findName(this.web[name]));

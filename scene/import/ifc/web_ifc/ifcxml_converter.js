@@ -72,7 +72,7 @@ export class IfcXmlConverter {
     this.numbers = new Map(); // by id of XML
     this.statements = ['']; // by number; undefined: not defined yet
     this.awaited = new Map(); // number -> {id, line} of the first reference
-    this.inverses = new Map(); // relationship -> Map of its attribute -> entities that name it
+    this.inverses = new Map(); // number of a relationship -> Map of the attributes to complete
   }
 
   open(tag, line) {
@@ -105,8 +105,8 @@ export class IfcXmlConverter {
 
   // The lines of the data section.
   *finish() {
-    for (const [relation, positions] of this.inverses)
-      if (this.statements[relation]) this.addInverses(relation, positions);
+    for (const [number, positions] of this.inverses)
+      if (this.statements[number]) this.addInverses(number, positions);
     const missing = new Set();
     for (const [number, { id, line }] of this.awaited) {
       if (this.statements[number] !== undefined) continue;
@@ -140,15 +140,18 @@ export class IfcXmlConverter {
     else this.skip(tag);
   }
 
-  // `accept(text, position)` gets the reference to the entity. `inverse`: {position, parent} of the
-  // attribute that refers to the entity around it.
+  // `accept(text, position)` gets the reference to the entity. `inverse`: {relation, position, parent}
+  // of the attribute that refers to the entity around it. References need no name.
   openEntity(name, tag, accept, inverse) {
     const attributes = sortAttributes(tag);
-    const entity = this.schema.findEntity(attributes.type ?? name);
     if (attributes.ref !== undefined) {
       this.openReference(attributes, tag, accept, inverse);
-    } else if (entity === undefined) {
-      this.skip({ name: `${tag.name} of type ${attributes.type}` });
+      return;
+    }
+    const entity = this.schema.findEntity(attributes.type ?? name);
+    if (entity === undefined) {
+      const type = attributes.type === undefined ? '' : ` of type ${attributes.type}`;
+      this.skip({ name: tag.name + type });
     } else if (attributes.nil && !namesEntity({ ...attributes, type: undefined })) {
       this.frames.push({});
     } else {
@@ -219,7 +222,7 @@ export class IfcXmlConverter {
 
   openInverse({ relation, position }, parent, tag) {
     const open = (child, name = child.local) =>
-      this.openEntity(name, child, () => {}, { position, parent });
+      this.openEntity(name, child, () => {}, { relation, position, parent });
     if (namesEntity(sortAttributes(tag))) open(tag, relation);
     else this.openContainer(relation, (child) => open(child), () => open(tag, relation));
   }
@@ -338,11 +341,13 @@ export class IfcXmlConverter {
     return this.numbers.get(id);
   }
 
-  awaitInverse(relation, { position, parent }) {
-    if (!this.inverses.has(relation)) this.inverses.set(relation, new Map());
-    const positions = this.inverses.get(relation);
-    if (!positions.has(position)) positions.set(position, new Set());
-    positions.get(position).add(`#${parent}`);
+  awaitInverse(number, { relation, position, parent }) {
+    if (!this.inverses.has(number)) this.inverses.set(number, new Map());
+    const positions = this.inverses.get(number);
+    const key = `${relation}.${position}`;
+    if (!positions.has(key))
+      positions.set(key, { relation, position, parents: new Set(), line: this.line });
+    positions.get(key).parents.add(`#${parent}`);
   }
 
   splitStatement(statement) {
@@ -351,11 +356,16 @@ export class IfcXmlConverter {
   }
 
   // Adds the entities that name a relationship to its attributes.
-  addInverses(relation, positions) {
-    const [name, text] = this.splitStatement(this.statements[relation]);
+  addInverses(number, positions) {
+    const [name, text] = this.splitStatement(this.statements[number]);
     const values = splitArguments(text);
-    const { attributes } = this.schema.findEntityByUpperCase(name);
-    for (const [position, parents] of positions) {
+    const entity = this.schema.findEntityByUpperCase(name);
+    const { attributes } = entity;
+    for (const { relation, position, parents, line } of positions.values()) {
+      if (!this.schema.isKind(entity.name, relation)) {
+        this.report('xml_not_read', line, `${entity.name} in place of ${relation}`);
+        continue;
+      }
       const isList = attributes[position].type.depth > 0;
       const stated = isList ? values[position].replace(/^\(|\)$/g, '').split(',') : [values[position]];
       const all = new Set([...stated.filter((value) => value.startsWith('#')), ...parents]);
@@ -363,6 +373,6 @@ export class IfcXmlConverter {
         this.report('xml_not_read', this.line, `${all.size} values of ${attributes[position].name}`);
       values[position] = isList ? `(${[...all]})` : [...all][0];
     }
-    this.statements[relation] = `${name}(${values})`;
+    this.statements[number] = `${name}(${values})`;
   }
 }
