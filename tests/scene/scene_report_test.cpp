@@ -108,13 +108,13 @@ Model twoColoured(const std::vector<testing::NamedBox>& boxes, std::size_t first
 }
 
 TEST(SceneReport, CoplanarPairsAreCountedOnceEachAndTheLargestIsTheExample) {
-  // The wide rafter shares three planes with the slab, the others one.
+  // Most rafters share several planes with the slab. The wide one is found neither first nor last.
   const CoplanarSurfaces found =
       findCoplanarSurfaces(twoColoured({{"slab", {0, 0, 0}, {4, 0.3, 4}},
                                         {"far", {20, 0, 0}, {24, 0.3, 4}},
-                                        {"narrow", {0.5, 0, 0.5}, {0.7, 0.2, 3.5}},
-                                        {"wide", {1, 0, 0}, {3, 0.2, 4}},
-                                        {"short", {3.2, 0, 0.5}, {3.6, 0.2, 1.5}},
+                                        {"narrow", {0.5, 0, 0}, {0.7, 0.2, 3.5}},
+                                        {"wide", {1, 0, 0.2}, {3, 0.2, 4}},
+                                        {"short", {3.2, 0, 3}, {3.6, 0.2, 4}},
                                         {"on far", {21, 0, 1}, {22, 0.2, 2}}},
                                        2));
   EXPECT_EQ(found.pairs, 4u);

@@ -124,7 +124,8 @@ TEST_F(Inspect, StrictFailsOnWarningsThatAreNotAccepted) {
 TEST_F(Inspect, StrictFailsOnTheProblemsThatAreNotAcceptedAlone) {
   // No unit, no material file, and the same object twice; a degenerate triangle is but a note.
   write(folder_ / "room.obj",
-        "mtllib absent.mtl\n" + smallRoomObj() + "o first\nf 1 2 3\nf 1 1 2\no second\nf 1 2 3\n");
+        "mtllib absent.mtl\n" + smallRoomObj() +
+            "o first\nf 1 2 3\no second\nf 1 2 3\no thin\nf 1 2 4\nf 1 1 2\n");
   const auto failing = [&](const std::string& accepted) {
     std::vector<std::string> arguments{"inspect", path("room.obj"), "--strict", "--json"};
     if (!accepted.empty()) arguments.insert(arguments.end(), {"--accept", accepted});
@@ -134,17 +135,18 @@ TEST_F(Inspect, StrictFailsOnTheProblemsThatAreNotAcceptedAlone) {
     if (std::regex_search(ended.err, list, std::regex("--accept ([a-z_,]+) accepts them")))
       kinds.push_back(list[1]);
     EXPECT_EQ(ended.code, kinds.empty() ? 0 : 3) << ended.err;
-    for (const auto& problem : nlohmann::json::parse(ended.out).at("problems"))
+    const auto report = nlohmann::json::parse(ended.out);
+    for (const auto& problem : report.at("problems"))
       if (problem.at("accepted") == true) kinds.push_back(problem.at("kind"));
     return kinds;
   };
   using Kinds = std::vector<std::string>;
-  EXPECT_EQ(failing(""), Kinds({"missing_material_file,no_unit,repeated_object"}));
+  EXPECT_EQ(failing(""), Kinds({"no_unit,missing_material_file,repeated_object"}));
   EXPECT_EQ(failing("no_unit"), Kinds({"missing_material_file,repeated_object", "no_unit"}));
   EXPECT_EQ(failing("repeated_object,missing_material_file"),
             Kinds({"no_unit", "missing_material_file", "repeated_object"}));
   EXPECT_EQ(failing("no_unit,repeated_object,missing_material_file"),
-            Kinds({"missing_material_file", "no_unit", "repeated_object"}));
+            Kinds({"no_unit", "missing_material_file", "repeated_object"}));
 }
 
 TEST_F(Inspect, WritesAPageWithPlansAndEscapesTheFilesText) {
