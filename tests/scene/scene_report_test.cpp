@@ -114,7 +114,7 @@ TEST(SceneReport, CoplanarPairsAreCountedOnceEachAndTheLargestIsTheExample) {
                                         {"far", {20, 0, 0}, {24, 0.3, 4}},
                                         {"narrow", {0.5, 0, 0}, {0.7, 0.2, 3.5}},
                                         {"wide", {1, 0, 0.2}, {3, 0.2, 4}},
-                                        {"short", {3.2, 0, 3}, {3.6, 0.2, 4}},
+                                        {"short", {3.05, 0, 3}, {3.6, 0.28, 4}},
                                         {"on far", {21, 0, 1}, {22, 0.2, 2}}},
                                        2));
   EXPECT_EQ(found.pairs, 4u);
