@@ -244,7 +244,7 @@ function checkStep(step) {
   assert.equal(defined.size, lines.length, 'a number is defined twice');
   for (const line of lines) {
     const [, name, values] = /^#\d+=([A-Z0-9]+)\((.*)\);$/.exec(line) ?? assert.fail(line);
-    assert.equal(splitArguments(values).length, Math.max(1, schema.entityByUpperCase(name).attributes.length), line);
+    assert.equal(splitArguments(values).length, Math.max(1, schema.findEntityByUpperCase(name).attributes.length), line);
     const rest = values.replace(/'(?:[^']|'')*'|"[0-9A-F]*"/g, 'S');
     const references = rest.match(/#\d+/g) ?? [];
     for (const reference of references) assert.ok(defined.has(reference), `${reference} in ${line}`);

@@ -66,7 +66,7 @@ double measureShortestSampled(const NavigationMesh& mesh, const MeshPoint& from,
   std::vector<std::vector<std::size_t>> leaving(mesh.polygonCount());
   for (std::uint32_t polygon = 0; polygon < mesh.polygonCount(); ++polygon) {
     for (const Portal& portal : mesh.portals(polygon)) {
-      for (int i = 0; i <= 16; ++i) {
+      for (int i = 0; i <= 16 && !portal.closed; ++i) {
         leaving[polygon].push_back(places.size());
         places.push_back({portal.low + i / 16.0 * (portal.high - portal.low), portal.to});
       }
