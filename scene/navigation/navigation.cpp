@@ -1,19 +1,17 @@
 #include "scene/navigation/navigation.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <exception>
 #include <limits>
 #include <numeric>
 #include <stdexcept>
-#include <thread>
 #include <utility>
 
 #include "scene/model/shapes/space_solid.hpp"
 #include "scene/navigation/grid_search.hpp"
 #include "scene/navigation/link_routes.hpp"
+#include "scene/navigation/mesh/parallel_tiles.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
 #include "scene/navigation/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -23,6 +21,7 @@ namespace {
 
 constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile beyond the radius
 constexpr int kMaxRandomTries = 200;
+constexpr std::size_t kMaxLinkSets = 4;
 constexpr double kWallAndDoor = 1.5;  // metres between floors on both sides of a thick wall
 constexpr double kMaxGapDetour = 6;   // metres: a longer way around a gap does not pass it
 
@@ -30,34 +29,6 @@ constexpr double kMaxGapDetour = 6;   // metres: a longer way around a gap does 
 void placeBody(const collision::Pose& pose, Body& own) {
   setBodyPose(own, pose.translation, pose.rotation);
   own.motionBounds = own.boxes.whole;
-}
-
-/// Calls `work` with 0 to `count` - 1. Progress is reported by the calling thread.
-void forEachInParallel(std::size_t count, int threads, const Navigation::Progress& progress,
-                       const std::function<void(std::size_t)>& work) {
-  std::atomic<std::size_t> next{0}, done{0};
-  std::exception_ptr failure;
-  std::mutex failureMutex;
-  const auto run = [&](bool reports) {
-    try {
-      for (std::size_t i = next++; i < count; i = next++) {
-        work(i);
-        ++done;
-        if (reports && progress) progress(static_cast<double>(done) / static_cast<double>(count));
-      }
-    } catch (...) {
-      const std::lock_guard lock(failureMutex);
-      failure = std::current_exception();
-      next = count;
-    }
-  };
-  {
-    std::vector<std::jthread> workers;
-    for (int i = 1; i < threads; ++i) workers.emplace_back(run, false);
-    run(true);
-  }
-  if (failure) std::rethrow_exception(failure);
-  if (progress) progress(1);  // other threads may have finished last
 }
 
 }  // namespace
@@ -112,7 +83,7 @@ std::vector<std::uint8_t> Navigation::save() {
 }
 
 void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress) {
-  forEachInParallel(tiles.size(), threads, progress, [&](std::size_t i) {
+  forEachTile(tiles.size(), threads, progress, [&](std::size_t i) {
     const auto tile = static_cast<std::size_t>(tiles[i]);
     auto built = buildTileMeshes(world_.data(), agent_, grid_, tiles[i] % grid_.tilesX,
                                  tiles[i] / grid_.tilesX, {Clearance::ample, Clearance::scarce});
@@ -123,7 +94,7 @@ void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Pr
 
 void Navigation::assembleMeshes() {
   walker_.emplace(world_.data(), agent_);
-  links_.reset();
+  links_.clear();
   unobstructed_.reset();
   refusals_.clear();
   ample_.emplace(grid_, ampleTiles_);
@@ -245,7 +216,7 @@ NavigationReport Navigation::report() {
 
 NavigationMesh Navigation::buildUnobstructed(int threads) const {
   std::vector<TileMesh> tiles(ampleTiles_.size());
-  forEachInParallel(tiles.size(), threads, {}, [&](std::size_t i) {
+  forEachTile(tiles.size(), threads, {}, [&](std::size_t i) {
     const int tile = static_cast<int>(i);
     tiles[i] = std::move(buildTileMeshes(world_.data(), agent_, grid_, tile % grid_.tilesX,
                                          tile / grid_.tilesX, {Clearance::none})[0]);
@@ -269,9 +240,12 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
     path.legs.push_back({PathLeg::Kind::walk, 0, path.length, path.seconds});
   }
   if (options == PathOptions()) return path;
-  if (!links_ || links_->options() != options)
-    links_.emplace(world_.data(), agent_, *ample_, options);
-  return findLinkedPath(finder, *links_, *bodies_, from, to, std::move(path));
+  auto links = std::ranges::find(links_, options, &Links::options);
+  if (links == links_.end()) {
+    if (links_.size() == kMaxLinkSets) links_.pop_front();
+    links = links_.emplace(links_.end(), world_.data(), agent_, *ample_, options);
+  }
+  return findLinkedPath(finder, *links, *bodies_, from, to, std::move(path));
 }
 
 NavigationPath Navigation::findWayOut(const Vec3& from,

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <list>
 #include <map>
 #include <memory>
 #include <mutex>
@@ -144,7 +145,7 @@ class Navigation {
   std::optional<Walker> walker_;
   std::vector<TileMesh> ampleTiles_, scarceTiles_;
   std::optional<NavigationMesh> ample_, scarce_, unobstructed_;
-  std::optional<Links> links_;              ///< of the options that were asked for last
+  std::list<Links> links_;                  ///< of options that were asked for
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
   IslandList islands_;                      ///< of `ample_`
   struct Gap {

@@ -29,6 +29,7 @@ constexpr std::size_t kQuickWalks = 300;  // of a repair; those that succeed rar
 constexpr int kQuickProposals = 4;
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
+constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
 constexpr const char* kNotFound = "no way was found within the limits of the search";
 constexpr double kMaxConnection = 3;  // metres between places that are connected without a mesh
@@ -210,7 +211,8 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
     const auto corridor = findCorridor(mesh, *start, *goal);
     if (!corridor) return path;
     std::vector<Vec3> corners = mesh.straighten(*corridor, start->point, goal->point);
-    proof.shortestLine = std::min(proof.shortestLine, computeLength(corners));
+    const double lineLength = computeLength(corners);
+    proof.shortestLine = std::min(proof.shortestLine, lineLength);
     if (corners.size() > 1) corners.erase(corners.begin(), corners.begin() + 1);
     if (!corners.empty()) corners.pop_back();
     corners.push_back(to);
@@ -220,7 +222,8 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
     if (proveLegs(finder, corners, clearance, path, proof)) {
       path.points = shortenPath(finder.walker, path.points,
                                 proof.isRepaired ? Shortcuts::all : Shortcuts::free);
-      if (proof.isRepaired) pullTight(finder.walker, path.points);
+      if (proof.isRepaired && computeLength(path.points) > kTight * lineLength)
+        pullTight(finder.walker, path.points);
       path.length = computeLength(path.points);
       if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof)) {
         for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
@@ -374,7 +377,6 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
     if (isOn(place)) return std::optional(std::vector<Vec3>{place});
     return search([&](GridSearch& grid) { return findGridPathOut(walker, place, isOn, grid); });
   };
-  walker.takeCrossedSteps();
   std::optional<std::vector<Vec3>> way;
   if (computeGroundDistance(start, goal) < kMaxConnection) way = connect(start, goal);
   if (!way) {
@@ -390,7 +392,7 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
   }
   std::vector<Vec3> points = shortenPath(walker, *way, Shortcuts::all);
   pullTight(walker, points);
-  if (walker.takeCrossedSteps() && !walksOn(walker, points, proof)) return path;
+  if (!walksOn(walker, points, proof)) return path;
   path.length = computeLength(points);
   path.points = std::move(points);
   return path;

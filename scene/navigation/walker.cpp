@@ -25,6 +25,7 @@ constexpr double kMinStepRise = 0.01;  // metres in a tick
 constexpr double kTickedLength = 0.5;  // metres, through a place that is too narrow for the margin
 constexpr double kEvenHeight = 1e-3;   // metres: a step that rises or sinks more is not even
 constexpr int kMaxTicksWithoutGain = 30;  // half a second: no progress towards the way point
+constexpr int kMaxTicksSliding = 6;       // of these: later it passes an obstacle by chance alone
 constexpr double kMinGain = 1e-3;         // metres in that time
 constexpr double kMinSlideGain = 1e-4;    // metres in a tick
 constexpr double kAnyLength = std::numeric_limits<double>::infinity();
@@ -269,7 +270,7 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
       return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0, ticks};
     ticksWithoutGain = distance < least - kMinGain ? 0 : ticksWithoutGain + 1;
     least = std::min(least, distance);
-    if (ticksWithoutGain > kMaxTicksWithoutGain)
+    if (ticksWithoutGain > (maySlide ? kMaxTicksSliding : kMaxTicksWithoutGain))
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity, ticks};
     const Vec3 before = avatar_.footPosition;
     step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));

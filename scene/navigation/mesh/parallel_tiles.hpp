@@ -1,0 +1,14 @@
+// Builds the tiles of a mesh on several threads.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace enfilade::scene {
+
+/// Calls `work` with 0 to `count` - 1. `progress`, which may be empty, gets the share that is done;
+/// the calling thread reports it. Throws what `work` throws.
+void forEachTile(std::size_t count, int threads, const std::function<void(double)>& progress,
+                 const std::function<void(std::size_t)>& work);
+
+}  // namespace enfilade::scene
