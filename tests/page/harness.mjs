@@ -3,7 +3,7 @@ import { existsSync } from "node:fs";
 import { join } from "node:path";
 import { chromium } from "playwright-core";
 
-export const LONG = 40_000; // milliseconds: software rendering on a busy machine is slow
+export const LONG = 90_000; // milliseconds: software rendering on a busy machine is slow
 
 export function launchBrowser(executablePath) {
   return chromium.launch({
