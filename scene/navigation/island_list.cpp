@@ -209,8 +209,8 @@ std::vector<IslandNeighbour> findNeighbours(const NavigationMesh& mesh, const Is
 std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const IslandList& list,
                                           Walker& walker, const Vec3& place) {
   const double reach = 2 * walker.agent().radius;
-  constexpr double kOnMesh = 0.02;      // metres
-  constexpr double kSameHeight = 0.05;  // metres: the walk back comes to the same floor
+  constexpr double kOnMesh = 0.02;        // metres
+  constexpr double kReturnHeight = 0.05;  // metres: the walk back comes to the same floor
   struct Near {
     double distance;
     Vec3 point;
@@ -237,7 +237,7 @@ std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const Isla
   };
   for (const Near& near : nearby) {
     walker.returnTo(*standing);
-    if (walks(near.point, kHeightError) && walks(*standing, kSameHeight)) return getNumber(near);
+    if (walks(near.point, kHeightError) && walks(*standing, kReturnHeight)) return getNumber(near);
   }
   return std::nullopt;
 }

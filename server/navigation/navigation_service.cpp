@@ -43,6 +43,7 @@ struct Answer {
   std::optional<scene::EntityIndex>& lazyIndex;
   const std::shared_ptr<const scene::Scene>& shared;
   const PathPlaces& places;  ///< of a path query
+  ClosedDoors& closedDoors;
 
   scene::EntityIndex& index() const {
     if (!lazyIndex) lazyIndex.emplace(shared);
@@ -71,7 +72,8 @@ struct Answer {
     return {scene,           navigation,
             *state.snapshot, state.settings,
             doorsOpen,       withOpenDoors,
-            asTheyAre,       [this]() -> scene::EntityIndex& { return index(); }};
+            asTheyAre,       [this]() -> scene::EntityIndex& { return index(); },
+            closedDoors};
   }
 
   std::optional<v1::Error> operator()(const v1::NavigationQuery::Path& query) const {
@@ -232,13 +234,13 @@ NavigationService::Entry& NavigationService::prepare(const scene::NavigationAgen
   const auto snapshot = makeMeshSnapshot(doorsOpen, state);
   if (known != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, known);
-    known->navigation->update(*snapshot);
+    if (known->navigation->update(*snapshot) > 0) known->closedDoors.clear();
     known->snapshot = snapshot;
     return *known;
   }
   auto navigation =
       makeNavigation({scene_, state.settings, agent, doorsOpen, snapshot}, state.progress);
-  keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
+  keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation), {}});
   return entries_.front();
 }
 
@@ -273,7 +275,7 @@ std::optional<v1::Error> NavigationService::load(const scene::NavigationAgent& a
       return entry.agent == agent && entry.doorsOpen == doorsOpen &&
              entry.settings == state.settings;
     });
-    keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation)});
+    keep({agent, state.settings, doorsOpen, snapshot, std::move(navigation), {}});
     return std::nullopt;
   } catch (const scene::MeshFileError& error) {
     return makeNavigationError("load_mesh.mesh", error.what());
@@ -314,8 +316,9 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   };
   std::function<scene::Navigation&()> withOpenDoors;
   if (scene::hasDoors(*scene_)) withOpenDoors = withDoors(true);
-  const Answer answer{*scene_,       navigation,       reply,  state,  doorsOpen, *entry.snapshot,
-                      withOpenDoors, withDoors(false), index_, scene_, places};
+  const Answer answer{*scene_,   navigation,      reply,         state,
+                      doorsOpen, *entry.snapshot, withOpenDoors, withDoors(false),
+                      index_,    scene_,          places,        entry.closedDoors};
   std::optional<v1::Error> error;
   switch (query.query_case()) {
     case v1::NavigationQuery::kPath:

@@ -13,6 +13,7 @@
 #include "protocol/enfilade.pb.h"
 #include "scene/navigation/navigation.hpp"
 #include "scene/world/queries/entity_index.hpp"
+#include "server/navigation/path_answer.hpp"
 
 namespace enfilade::server {
 
@@ -41,6 +42,7 @@ class NavigationService {
     bool doorsOpen = false;
     std::shared_ptr<const scene::Snapshot> snapshot;  ///< the poses of bodies
     std::unique_ptr<scene::Navigation> navigation;
+    ClosedDoors closedDoors;  ///< of its islands
   };
   /// The navigation of a size, brought to the state of the query.
   Entry& prepare(const scene::NavigationAgent& agent, bool doorsOpen, const NavigationState& state);

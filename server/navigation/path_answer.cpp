@@ -180,17 +180,31 @@ struct PathWriter {
     }
   }
 
-  /// Gives a closed door as the reason, if a path leads through it when it is open.
+  /// The first closed door on a path through open ones.
+  std::optional<std::uint32_t> findClosedDoor(const Vec3& from, const Vec3& to,
+                                              const scene::PathOptions& options) const {
+    scene::Navigation& open = answer.withOpenDoors();
+    const scene::NavigationPath through = open.findPath(from, to, options);
+    if (!through.found()) return std::nullopt;
+    const auto doors = findDoors(open, through.points);
+    const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
+    return first == doors.end() ? std::nullopt : std::optional(first->body);
+  }
+
+  /// Gives a closed door as the reason, if a path leads through it when it is open. Of two islands
+  /// it is sought once.
   void explainByDoors(const Vec3& from, const Vec3& to, const scene::PathOptions& options,
                       v1::NavigationPath& message) const {
     if (answer.doorsOpen || !answer.withOpenDoors) return;
-    scene::Navigation& open = answer.withOpenDoors();
-    const scene::NavigationPath through = open.findPath(from, to, options);
-    if (!through.found()) return;
-    const auto doors = findDoors(open, through.points);
-    const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
-    if (first == doors.end()) return;
-    const scene::BodySpec& spec = answer.scene.model().bodies[first->body];
+    const auto first = answer.navigation.findIsland(from), last = answer.navigation.findIsland(to);
+    const bool isOfIslands = first && last && first != last && options == scene::PathOptions();
+    const std::pair islands(first.value_or(0), last.value_or(0));
+    const auto known = isOfIslands ? answer.closedDoors.find(islands) : answer.closedDoors.end();
+    const auto door = known != answer.closedDoors.end() ? std::optional(known->second)
+                                                        : findClosedDoor(from, to, options);
+    if (!door) return;
+    if (isOfIslands) answer.closedDoors.emplace(islands, *door);
+    const scene::BodySpec& spec = answer.scene.model().bodies[*door];
     message.set_reason("the door '" + spec.name + "' is closed: open it, or ask with open doors");
     message.set_obstacle(spec.objects.front() + 1);
     message.set_obstacle_name(spec.name);

@@ -2,14 +2,21 @@
 // others.
 #pragma once
 
+#include <cstdint>
 #include <functional>
+#include <map>
 #include <optional>
+#include <utility>
 
 #include "protocol/enfilade.pb.h"
 #include "scene/navigation/navigation.hpp"
 #include "scene/world/queries/entity_index.hpp"
 
 namespace enfilade::server {
+
+/// Doors that are the reason why no path leads from one island to another one, as indices into
+/// Model::bodies.
+using ClosedDoors = std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>;
 
 /// The means to find the paths of a query.
 struct PathAnswer {
@@ -22,6 +29,7 @@ struct PathAnswer {
   std::function<scene::Navigation&()> withOpenDoors;
   std::function<scene::Navigation&()> asTheyAre;  ///< the same with doors as they are
   std::function<scene::EntityIndex&()> index;     ///< built at the first call
+  ClosedDoors& closedDoors;                       ///< those that are known, of `navigation`
 };
 
 /// The path from one place to another. `measuresWidth`: also its narrowest place.

@@ -33,11 +33,13 @@ Answered ask(const std::shared_ptr<const scene::Scene>& scene, const v1::Navigat
   return answered;
 }
 
-/// Roofed rooms with a gap, in which a door leaf may stand.
-scene::Model roomsWithDoor(double gap, bool hasDoor) {
+/// Roofed rooms with a gap, in which a door leaf may stand. `more`: further objects.
+scene::Model roomsWithDoor(double gap, bool hasDoor,
+                           const std::vector<scene::testing::NamedBox>& more = {}) {
   std::vector<scene::testing::NamedBox> boxes = scene::testing::roofedRooms(gap, 6);
   if (hasDoor)
     boxes.push_back({"leaf", {5.98, 0.01, -0.5 * gap + 0.01}, {6.02, 2.9, 0.5 * gap - 0.01}});
+  boxes.insert(boxes.end(), more.begin(), more.end());
   scene::Model model = scene::testing::boxModel(boxes);
   if (!hasDoor) return model;
   scene::BodySpec door = scene::testing::bodySpec("door", scene::BodyKind::hinged, {8});
@@ -79,6 +81,39 @@ TEST(NavigationService, IslandsNameTheClosedDoorBetweenThem) {
     EXPECT_EQ(reply.islands(i).path().obstacle_name(), "door") << reply.islands(i).path().reason();
     EXPECT_NE(reply.islands(i).path().reason().find("'door' is closed"), std::string::npos);
   }
+}
+
+/// A closed door is remembered as the reason, until something else stands in the doorway.
+TEST(NavigationService, AClosedDoorIsTheReasonAsLongAsAWayLeadsThroughIt) {
+  scene::Model model = roomsWithDoor(1, true, {{"gate", {5.5, -3, -0.6}, {5.6, -1, 0.6}}});
+  scene::BodySpec gate = scene::testing::bodySpec("gate", scene::BodyKind::lift, {9});
+  gate.stops = {0, 3.01};
+  gate.high = 3.01;
+  model.bodies.push_back(gate);
+  const auto scene = std::make_shared<const scene::Scene>(std::move(model));
+  NavigationService service(scene);
+  scene::World world(scene);
+  v1::NavigationQuery query;
+  query.mutable_path()->mutable_from()->mutable_point()->set_x(2);
+  query.mutable_path()->add_to()->mutable_point()->set_x(9);
+  const auto askReason = [&] {
+    std::vector<std::uint8_t> attachment;
+    const auto answer = service.answer(query, {world.snapshot(), world.settings()}, attachment);
+    return std::get<v1::NavigationReply>(answer).paths(0).obstacle_name();
+  };
+  const auto moveGate = [&](std::uint32_t level) {
+    scene::BodyCommand command;
+    command.body = "gate";
+    command.action = scene::BodyCommand::Action::moveToLevel;
+    command.level = level;
+    submitBodyCommand(world, std::move(command));
+    for (int i = 0; i < 600; ++i) tickWorld(world);
+  };
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(askReason(), "door");
+  moveGate(1);
+  EXPECT_NE(askReason(), "door") << "the gate stands behind it";
+  moveGate(0);
+  EXPECT_EQ(askReason(), "door");
 }
 
 TEST(NavigationService, AStoreyIsReachedFromBothSidesOfAClosedDoor) {
