@@ -11,7 +11,7 @@
 #include "scene/model/shapes/space_solid.hpp"
 #include "scene/navigation/grid_search.hpp"
 #include "scene/navigation/link_routes.hpp"
-#include "scene/navigation/mesh/parallel_tiles.hpp"
+#include "scene/navigation/mesh/parallel_for.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
 #include "scene/navigation/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -22,6 +22,9 @@ namespace {
 constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile beyond the radius
 constexpr int kMaxRandomTries = 200;
 constexpr std::size_t kMaxLinkSets = 4;
+// Walks to look for exits of small islands: of all, where they are some dozens, and of one. Some
+// hundred find an exit nearby, thousands one through a long narrow way.
+constexpr std::size_t kMaxExitWalks = 50'000, kMinExitWalks = 300, kMaxWalksOfExit = 4000;
 constexpr double kWallAndDoor = 1.5;  // metres between floors on both sides of a thick wall
 constexpr double kMaxGapDetour = 6;   // metres: a longer way around a gap does not pass it
 
@@ -83,7 +86,7 @@ std::vector<std::uint8_t> Navigation::save() {
 }
 
 void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress) {
-  forEachTile(tiles.size(), threads, progress, [&](std::size_t i) {
+  parallelFor(tiles.size(), threads, progress, [&](std::size_t i) {
     const auto tile = static_cast<std::size_t>(tiles[i]);
     auto built = buildTileMeshes(world_.data(), agent_, grid_, tiles[i] % grid_.tilesX,
                                  tiles[i] / grid_.tilesX, {Clearance::ample, Clearance::scarce});
@@ -161,8 +164,9 @@ std::optional<std::uint32_t> Navigation::findExit(
   const auto known = std::ranges::find(gaps_, place, &Gap::from);
   if (known != gaps_.end() && !known->isPassable) return std::nullopt;
   if (const auto other = known != gaps_.end() ? findOther(known->to) : std::nullopt) return other;
-  const std::size_t walks = std::clamp<std::size_t>(50'000 / islands_.islands.size(), 300, 4000);
-  GridSearch out{0.12, kMaxGapDetour, walks}, back = out;  // few islands: also long narrow ways
+  const std::size_t share = kMaxExitWalks / islands_.islands.size();
+  GridSearch out{0.12, kMaxGapDetour, std::clamp(share, kMinExitWalks, kMaxWalksOfExit)};
+  GridSearch back = out;
   const auto way = findGridPathOut(
       *walker_, place, [&](const Vec3& feet) { return findOther(feet).has_value(); }, out);
   const bool isPassable = way && findGridPath(*walker_, way->back(), place, back);
@@ -216,7 +220,7 @@ NavigationReport Navigation::report() {
 
 NavigationMesh Navigation::buildUnobstructed(int threads) const {
   std::vector<TileMesh> tiles(ampleTiles_.size());
-  forEachTile(tiles.size(), threads, {}, [&](std::size_t i) {
+  parallelFor(tiles.size(), threads, {}, [&](std::size_t i) {
     const int tile = static_cast<int>(i);
     tiles[i] = std::move(buildTileMeshes(world_.data(), agent_, grid_, tile % grid_.tilesX,
                                          tile / grid_.tilesX, {Clearance::none})[0]);

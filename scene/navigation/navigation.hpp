@@ -145,7 +145,7 @@ class Navigation {
   std::optional<Walker> walker_;
   std::vector<TileMesh> ampleTiles_, scarceTiles_;
   std::optional<NavigationMesh> ample_, scarce_, unobstructed_;
-  std::list<Links> links_;                  ///< of options that were asked for
+  std::list<Links> links_;                  ///< of the last options, the oldest first
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
   IslandList islands_;                      ///< of `ample_`
   struct Gap {

@@ -25,7 +25,8 @@ constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the ob
 constexpr int kRefutations = 4;
 constexpr int kMaxRefusals = 3;  // searches for the reason; afterwards it is that of the last one
 constexpr int kMaxRepairs = 12;  // of a leg
-constexpr std::size_t kQuickWalks = 300;  // of a repair; those that succeed rarely need more
+constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed rarely need more
+constexpr std::size_t kMaxQuickWalks = 3000;  // of a path
 constexpr int kQuickProposals = 4;
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
@@ -46,11 +47,14 @@ double computeLength(const std::vector<Vec3>& points) {
 /// The work and the obstacles of a search so far.
 struct Proof {
   explicit Proof(std::size_t maxRepairWalks)
-      : coarse{kCoarseSpacing, 1.5, maxRepairWalks}, fine{kFineSpacing, 0.7, maxRepairWalks} {}
+      : coarse{kCoarseSpacing, 1.5, maxRepairWalks},
+        fine{kFineSpacing, 0.7, maxRepairWalks},
+        quickWalks(std::min(kMaxQuickWalks, maxRepairWalks)) {}
 
   GridSearch coarse, fine;
-  bool isQuick = false;  ///< what a short search does not repair is left out: proves nothing
-  double shortestLine = std::numeric_limits<double>::infinity();  ///< metres, of first proposals
+  std::size_t quickWalks;  ///< that are left
+  bool isQuick = false;    ///< what a short search does not repair is left out: proves nothing
+  double shortestLine = std::numeric_limits<double>::infinity();  ///< metres, of all proposals
   bool isRepaired = false;                                        ///< the present proposal
   Vec3 failedAt = Vec3::Zero();                                   ///< where the last proof failed
   std::vector<Obstruction> met;
@@ -81,19 +85,22 @@ bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& cor
       targets.push_back(*place);
   }
   targets.push_back(corner);
-  GridSearch quick{kCoarseSpacing, proof.coarse.margin, kQuickWalks};
-  const auto searches =
-      proof.isQuick ? std::vector{&quick} : std::vector{&proof.coarse, &proof.fine};
-  for (GridSearch* search : searches) {
+  const auto search = [&](GridSearch& grid) {
     for (const Vec3& target : targets) {
-      auto places = findGridPath(finder.walker, from, target, *search);
+      auto places = findGridPath(finder.walker, from, target, grid);
       if (!places) continue;
       path.points.insert(path.points.end(), places->begin() + 1, places->end());
       proof.isRepaired = true;
       return true;
     }
-  }
-  return false;
+    return false;
+  };
+  if (!proof.isQuick) return search(proof.coarse) || search(proof.fine);
+  const std::size_t maxWalks = std::min(kQuickWalks, proof.quickWalks);
+  GridSearch quick{kCoarseSpacing, proof.coarse.margin, maxWalks};
+  const bool isRepaired = search(quick);
+  proof.quickWalks -= maxWalks - quick.maxWalks;
+  return isRepaired;
 }
 
 /// Whether a walk arrived, also in height: the height of its goal does not stop it.
@@ -232,7 +239,8 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
       }
     }
     path.points.clear();
-    if (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0) return path;  // proves nothing
+    if (!proof.isQuick && (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0))
+      return path;  // proves nothing
     if (!closures.closeNearest(*corridor, proof.failedAt)) return path;
   }
   return path;
@@ -347,6 +355,7 @@ NavigationPath findPathByProposals(const PathFinder& finder, const Vec3& start, 
 NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
                                 Proof& proof) {
   proof.isQuick = true;
+  proof.shortestLine = std::numeric_limits<double>::infinity();
   NavigationPath quick = findPathByProposals(finder, start, goal, proof);
   proof.isQuick = false;
   if (quick.found() && quick.length <= kWorthTrying * proof.shortestLine) return quick;

@@ -24,16 +24,22 @@ constexpr double kMiddle = 0.75;       // of the radius: beyond the edge of the 
 constexpr double kMinStepRise = 0.01;  // metres in a tick
 constexpr double kTickedLength = 0.5;  // metres, through a place that is too narrow for the margin
 constexpr double kEvenHeight = 1e-3;   // metres: a step that rises or sinks more is not even
-constexpr int kMaxTicksWithoutGain = 30;  // half a second: no progress towards the way point
-constexpr int kMaxTicksSliding = 6;       // of these: later it passes an obstacle by chance alone
-constexpr double kMinGain = 1e-3;         // metres in that time
-constexpr double kMinSlideGain = 1e-4;    // metres in a tick
+constexpr double kMaxStall = 0.5;      // seconds without progress towards the way point
+// Seconds. A walk that slides for longer may pass the obstacle at last, but a walk that begins a
+// millimetre aside may not.
+constexpr double kMaxSlidingStall = 0.1;
+constexpr double kMinGain = 1e-3;       // metres in that time; less for a slow walk
+constexpr double kMinSlideGain = 1e-4;  // metres in a tick
 constexpr double kAnyLength = std::numeric_limits<double>::infinity();
 constexpr int kMaxTicks = 1'000'000;  // more than an hour: the goal is unreasonably far
 
 /// True if the feet rose or sank in a tick as on a step, or on a round or steep thing.
 bool isStep(const Vec3& before, const Vec3& after) {
   return std::abs(after.y() - before.y()) > kMinStepRise;
+}
+
+int countTicks(double seconds, double tickDuration) {
+  return static_cast<int>(std::ceil(seconds / tickDuration));
 }
 
 }  // namespace
@@ -261,6 +267,9 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
 WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, double maxDrop) {
   const Vec3 start = avatar_.footPosition;
   LastFloor floor{start.y()};
+  const double tick = world_.settings.tickDuration;
+  const double minGain = std::min(kMinGain, 0.5 * agent_.speed * tick);
+  const int maxStall = countTicks(maySlide ? kMaxSlidingStall : kMaxStall, tick);
   double least = computeGroundDistance(start, goal);
   int ticksWithoutGain = 0;
   for (int ticks = 0;; ++ticks) {
@@ -268,9 +277,10 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
     if (avatar_.grounded && (distance <= kArrivalDistance ||
                              computeGroundDistance(start, avatar_.footPosition) >= length))
       return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0, ticks};
-    ticksWithoutGain = distance < least - kMinGain ? 0 : ticksWithoutGain + 1;
-    least = std::min(least, distance);
-    if (ticksWithoutGain > (maySlide ? kMaxTicksSliding : kMaxTicksWithoutGain))
+    const bool gains = distance < least - minGain;
+    ticksWithoutGain = gains ? 0 : ticksWithoutGain + 1;
+    if (gains) least = distance;
+    if (ticksWithoutGain > maxStall)
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity, ticks};
     const Vec3 before = avatar_.footPosition;
     step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));
@@ -301,14 +311,18 @@ WalkOutcome Walker::walkOn(const Vec3& goal) {
 }
 
 WalkOutcome Walker::slideTo(const Vec3& goal) {
+  const double tick = world_.settings.tickDuration;
+  const double minGain = std::min(kMinSlideGain, 0.05 * agent_.speed * tick);
+  const int maxStall = countTicks(kMaxStall, tick);
   double least = computeGroundDistance(avatar_.footPosition, goal);
   for (int ticks = 0, ticksWithoutGain = 0; ticks < kMaxTicks; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (distance <= kArrivalDistance && avatar_.grounded)
       return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0};
-    ticksWithoutGain = distance < least - kMinSlideGain ? 0 : ticksWithoutGain + 1;
-    least = std::min(least, distance);
-    if (ticksWithoutGain > kMaxTicksWithoutGain) break;
+    const bool gains = distance < least - minGain;
+    ticksWithoutGain = gains ? 0 : ticksWithoutGain + 1;
+    if (gains) least = distance;
+    if (ticksWithoutGain > maxStall) break;
     step(computeWalkVelocity(avatar_.footPosition, goal, false, agent_.speed,
                              world_.settings.tickDuration));
     if (avatar_.footPosition.y() < world_.scene->bounds().min.y())

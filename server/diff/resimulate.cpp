@@ -43,7 +43,7 @@ ModelOptions makeModelOptions(const ModelOptions& requested, const v1::Recording
     model.import.ifcReader = recorded.import.ifcReader;
   if (model.doors == scene::IfcDoors::movable) model.doors = recorded.doors;
   model.import.georeference |= recorded.import.georeference;
-  model.import.ignoreAppearance |= recorded.import.ignoreAppearance;
+  model.import.ignoreAppearance |= start.choices().ignore_appearance();
   if (model.import.gltfScene.empty()) model.import.gltfScene = recorded.import.gltfScene;
   return model;
 }

@@ -269,9 +269,8 @@ void comparePair(Bench& bench, const FloodFill& fill, const Vec3& from, const Ve
 }
 
 /// Counts disagreements. Components have no direction, but an avatar may get down where it does not
-/// get up: the fill of the start alone decides. A thinner avatar passes where a path was found, a
-/// wider one does not where none was: then half a centimetre decides, as it does where a fill on a
-/// shifted grid does not find the same.
+/// get up: the fill of the start alone decides, by walks. Near is a pair of which a thinner avatar
+/// passes where a path was found, a wider one does not where none was, or two shifted grids differ.
 void judge(const Bench& bench, const std::vector<Vec3>& places,
            const std::vector<Disagreement>& disagreements, Comparison& result) {
   std::array<std::optional<FloodFill>, 2> others;  // for thinner avatars, and for wider ones
@@ -415,6 +414,7 @@ int main(int argc, char** argv) {
   std::string out;
   Effort effort;
   std::vector<std::string> scenes;
+  bool isUsed = true;  // as the usage says
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--quick") {
@@ -423,13 +423,15 @@ int main(int argc, char** argv) {
       effort.pairs = std::atoi(argv[++i]);
     } else if (argument == "--only" && i + 1 < argc) {
       effort.only = argv[++i];
+      isUsed =
+          isUsed && (effort.only == "times" || effort.only == "fill" || effort.only == "walks");
     } else if (argument == "--out" && i + 1 < argc) {
       out = argv[++i];
     } else {
       scenes.push_back(argument);
     }
   }
-  if (scenes.empty()) {
+  if (scenes.empty() || !isUsed) {
     std::fprintf(stderr,
                  "usage: %s [--quick] [--pairs N] [--only times|fill|walks] [--out FILE] "
                  "SCENE[@METRES_PER_UNIT]..\n",

@@ -358,6 +358,8 @@ const tests = {
     }
     const door = byKind.get("hinged");
     await page.evaluate((id) => enfilade.app.select(id), door.object);
+    const isMoving = () => page.evaluate((id) => enfilade.app.state.latest.bodies.some((body) => body.id === id), door.id);
+    assert.equal(await isMoving(), false, "the door rests at first");
     await page.getByRole("button", { name: DOOR[door.closed === 0 ? 0 : 1], exact: true }).click(); // it stands at 0
     await page.waitForFunction((id) => enfilade.app.state.latest.bodies.some((body) => body.id === id), door.id);
     await page.evaluate(() => enfilade.app.select(0));

@@ -573,6 +573,22 @@ TEST(Walker, ASteepStairIsDescendedWhereverTheTicksBegin) {
   }
 }
 
+TEST(Walker, ASlowWalkClimbsAStairToo) {
+  std::vector<NamedBox> boxes{{"floor", {-2, -0.2, -1}, {0, 0, 1}}};
+  for (int k = 1; k <= 3; ++k)
+    boxes.push_back({"tread" + std::to_string(k), {0.3 * (k - 1), 0, -1}, {2, 0.15 * k, 1}});
+  const auto scene = boxScene(boxes);
+  World world(scene);
+  NavigationAgent slow;
+  slow.speed = 0.05;  // less than a millimetre in a tick
+  Walker walker(world.data(), slow);
+  ASSERT_FALSE(walker.place({-0.4, 0.01, 0}, 0.5));
+  const Vec3 start = walker.footPosition(), goal(1.2, 0.45, 0);
+  EXPECT_EQ(walker.walkTo(goal).kind, WalkOutcome::Kind::arrived);
+  walker.returnTo(start);
+  EXPECT_EQ(walker.walkOn(goal).kind, WalkOutcome::Kind::arrived);
+}
+
 TEST(Walker, AFloorThatEndsAboveAStepsHeightIsNotWalkedDown) {
   for (const double drop : {0.28, 0.4, 1.0}) {
     const auto scene = boxScene(

@@ -150,7 +150,9 @@ void NavigationMesh::findRim(const TileGrid& grid) {
   for (std::uint32_t index = 0; index < polygonCount(); ++index) {
     const dtPoly* polygon = nullptr;
     const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
-    std::array<int, DT_VERTS_PER_POLYGON> covered{};  // 255ths of an edge that portals cover
+    // 255ths of an edge that portals cover. Those of one edge are of one floor: they do not
+    // overlap.
+    std::array<int, DT_VERTS_PER_POLYGON> covered{};
     for (unsigned link = polygon->firstLink; link != DT_NULL_LINK; link = tile.links[link].next) {
       const dtLink& to = tile.links[link];
       covered[to.edge] += to.side == 0xff ? kWhole : to.bmax - to.bmin;
@@ -329,22 +331,26 @@ Vec3 NavigationMesh::portalMiddle(std::uint32_t from, std::uint32_t to) const {
   return centres_[from];
 }
 
-/// Shortest lines may bend at the ends of a closed portal of `polygon`: marks them in the polygons
-/// around.
+/// Shortest lines may bend at the ends of a closed portal of `polygon`: marks them in all polygons
+/// around. They stay marked when it opens again: this costs time, but no line.
 void NavigationMesh::addRim(std::uint32_t polygon, const Portal& closed) {
-  const auto isEnd = [low = closed.low, high = closed.high](const Vec3& point) {
-    constexpr double kSame = 1e-3;  // metres
-    return std::hypot(point.x() - low.x(), point.z() - low.z()) < kSame ||
-           std::hypot(point.x() - high.x(), point.z() - high.z()) < kSame;
-  };
-  const auto mark = [&](std::uint32_t around) {
-    for (std::uint32_t p = firstPortal_[around]; p < firstPortal_[around + 1]; ++p) {
-      portals_[p].lowIsRim |= isEnd(portals_[p].low);
-      portals_[p].highIsRim |= isEnd(portals_[p].high);
+  constexpr double kSame = 1e-3;  // metres
+  for (const Vec3& end : {closed.low, closed.high}) {
+    const auto isEnd = [&](const Vec3& point) {
+      return std::hypot(point.x() - end.x(), point.z() - end.z()) < kSame;
+    };
+    std::vector<std::uint32_t> around{polygon};  // all with a portal that ends there
+    for (std::size_t i = 0; i < around.size(); ++i) {
+      const std::uint32_t one = around[i];
+      for (std::uint32_t p = firstPortal_[one]; p < firstPortal_[one + 1]; ++p) {
+        const bool isLow = isEnd(portals_[p].low), isHigh = isEnd(portals_[p].high);
+        portals_[p].lowIsRim |= isLow;
+        portals_[p].highIsRim |= isHigh;
+        if ((isLow || isHigh) && std::ranges::find(around, portals_[p].to) == around.end())
+          around.push_back(portals_[p].to);
+      }
     }
-  };
-  mark(polygon);
-  for (const Portal& portal : portals(polygon)) mark(portal.to);
+  }
 }
 
 /// The portals between two polygons, in both directions.

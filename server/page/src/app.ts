@@ -105,6 +105,7 @@ export class App {
   async requestClock(mode: RequestFields<"setClock">["mode"]): Promise<void> {
     const reply = await this.connection.request("setClock", { mode });
     this.setClock(reply.clock, Number(reply.tick));
+    this.view.invalidate();
   }
 
   async #begin(welcome: Welcome): Promise<void> {

@@ -77,8 +77,10 @@ export function splitArguments(text) {
   let depth = 0;
   for (let i = 0; i < text.length; ++i) {
     const c = text[i];
-    if (c === "'") i = text.indexOf("'", i + 1); // a doubled quote begins the next string
-    else if (c === '(' || c === '[' || c === '{') ++depth;
+    if (c === "'") {
+      const end = text.indexOf("'", i + 1); // a doubled quote begins the next string
+      i = end < 0 ? text.length : end;
+    } else if (c === '(' || c === '[' || c === '{') ++depth;
     else if (c === ')' || c === ']' || c === '}') --depth;
     else if (c === ',' && depth === 0) {
       parts.push(text.slice(start, i));

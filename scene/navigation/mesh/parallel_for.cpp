@@ -1,4 +1,4 @@
-#include "scene/navigation/mesh/parallel_tiles.hpp"
+#include "scene/navigation/mesh/parallel_for.hpp"
 
 #include <atomic>
 #include <exception>
@@ -8,7 +8,7 @@
 
 namespace enfilade::scene {
 
-void forEachTile(std::size_t count, int threads, const std::function<void(double)>& progress,
+void parallelFor(std::size_t count, int threads, const std::function<void(double)>& progress,
                  const std::function<void(std::size_t)>& work) {
   std::atomic<std::size_t> next{0}, done{0};
   std::exception_ptr failure;

@@ -1,4 +1,4 @@
-// Builds the tiles of a mesh on several threads.
+// A loop over numbers on several threads, as over the tiles of a mesh.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@ namespace enfilade::scene {
 
 /// Calls `work` with 0 to `count` - 1. `progress`, which may be empty, gets the share that is done;
 /// the calling thread reports it. Throws what `work` throws.
-void forEachTile(std::size_t count, int threads, const std::function<void(double)>& progress,
+void parallelFor(std::size_t count, int threads, const std::function<void(double)>& progress,
                  const std::function<void(std::size_t)>& work);
 
 }  // namespace enfilade::scene
