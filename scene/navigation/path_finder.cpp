@@ -29,7 +29,7 @@ constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed
 constexpr std::size_t kMaxQuickWalks = 3000;  // of a path
 constexpr int kQuickProposals = 4;
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
-constexpr double kWorthTrying = 1.02;      // a corridor that is shorter by less is not tried
+constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less is not tried
 constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
 constexpr const char* kNotFound = "no way was found within the limits of the search";
@@ -358,7 +358,7 @@ NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, con
   proof.shortestLine = std::numeric_limits<double>::infinity();
   NavigationPath quick = findPathByProposals(finder, start, goal, proof);
   proof.isQuick = false;
-  if (quick.found() && quick.length <= kWorthTrying * proof.shortestLine) return quick;
+  if (quick.found() && quick.length <= kTight * proof.shortestLine) return quick;
   NavigationPath best = findPathByProposals(finder, start, goal, proof);
   return quick.found() && (!best.found() || quick.length < best.length) ? quick : best;
 }

@@ -62,7 +62,8 @@ does not connect it, or the other way round; what they find differently is judge
 walked. *Near*: half a centimetre of radius, or a shift of the grid by one centimetre, changes the answer. *Skipped*: an end is
 at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
-shortest way in the fill, pulled straight, where an avatar can walk that; in brackets those where it cannot.
+shortest way in the fill, pulled straight, where an avatar can walk that; in brackets those where it cannot, or of
+which the fill has not both ends.
 
 {table(["scene", "places of the fill", "compared", "wrong", "near", "skipped", "islands", "lengths", "median share",
         "largest", "above 1.02"], [make_fill_row(row) for row in rows])}
