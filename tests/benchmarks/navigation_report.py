@@ -36,7 +36,8 @@ def main():
     scenes = {}
     for row in read(results, "navigation"):
         scenes.setdefault(row["scene"], {}).update(row)
-    rows = scenes.values()
+    rows = list(scenes.values())
+    parts = {part: [row for row in rows if part in row] for part in ("pairs", "reach_compared", "median_us")}
     report.mkdir(parents=True, exist_ok=True)
     (report / "navigation.md").write_text(f"""# Navigation: paths that are walked
 
@@ -52,28 +53,28 @@ lifts; in every sixth pair it may fall by up to 2 m. Doors and lifts are as in t
 are counted by themselves, too. *Refused*: a closed door stands at the start. *Silent*: no path and no reason.
 
 {table(["scene", "pairs", "refused", "paths", "wrong", "silent", "penetration m", "with doors (wrong)",
-        "with lifts", "with drops"], [make_walk_row(row) for row in rows])}
+        "with lifts", "with drops"], [make_walk_row(row) for row in parts["pairs"]])}
 
 ## Reach and length
 
 A flood fill tries every place of a grid of 2 cm by standing there (`flood_fill.hpp`): it uses no navigation
 mesh. A pair of places, drawn on all islands or anywhere in the fill, is *wrong* if a path is found and the fill
 does not connect it, or the other way round; what they find differently is judged by a fill of which each step is
-walked. *Near*: half a centimetre of radius, or a shift of the grid by one centimetre, changes the answer. *Skipped*: an end is
-at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
+walked. *Near*: half a centimetre of radius, or a shift of the grid by one centimetre, changes the answer.
+*Skipped*: an end is at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight, where an avatar can walk that; in brackets those where it cannot, or of
 which the fill has not both ends.
 
 {table(["scene", "places of the fill", "compared", "wrong", "near", "skipped", "islands", "lengths", "median share",
-        "largest", "above 1.02"], [make_fill_row(row) for row in rows])}
+        "largest", "above 1.02"], [make_fill_row(row) for row in parts["reach_compared"]])}
 
 ## Time
 
 Of a query for a path, with its proof, doors as they are, answered in process on one thread.
 
 {table(["scene", "navigable m²", "islands", "build s", "µs a path, median", "99 %", "µs without a path, 99 %"],
-       [make_time_row(row) for row in rows])}
+       [make_time_row(row) for row in parts["median_us"]])}
 """)
 
 
