@@ -22,7 +22,7 @@ constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way aro
 constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
 // Failures at a portal, without a proved path through it meanwhile, after which it is not tried
 // again.
-constexpr int kRefutations = 4;
+constexpr int kRefutations = 8;
 constexpr int kMaxRefusals = 3;  // searches for the reason; afterwards it is that of the last one
 constexpr int kMaxRepairs = 12;  // of a leg
 constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed rarely need more
