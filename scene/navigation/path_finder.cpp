@@ -23,8 +23,8 @@ constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the ob
 // Failures at a portal, without a proved path through it meanwhile, after which it is not tried
 // again.
 constexpr int kRefutations = 8;
-constexpr int kMaxRefusals = 3;  // searches for the reason; afterwards it is that of the last one
-constexpr int kMaxRepairs = 12;  // of a leg
+constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
+constexpr int kMaxRepairs = 12;   // of a leg
 constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed rarely need more
 constexpr std::size_t kMaxQuickWalks = 3000;  // of a path
 constexpr int kQuickProposals = 4;
@@ -432,7 +432,7 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
       findPolygonAt(finder.ample, goal))
     return refusals->last;
   best = findUnobstructedPath(finder, start, goal, proof);
-  if (refusals && !best.found()) *refusals = {refusals->count + 1, best};
+  if (refusals) *refusals = best.found() ? Refusals() : Refusals{refusals->count + 1, best};
   return best;
 }
 

@@ -41,7 +41,7 @@ struct NavigationPath {
   bool found() const { return !points.empty(); }
 };
 
-/// Searches between two islands that found nothing.
+/// The last searches between two islands: they found nothing.
 struct Refusals {
   int count = 0;
   NavigationPath last = {};  ///< the reason
