@@ -42,6 +42,21 @@ int countTicks(double seconds, double tickDuration) {
   return static_cast<int>(std::ceil(seconds / tickDuration));
 }
 
+/// Notices when a walk comes no closer to its goal.
+struct StallWatch {
+  double minGain;  ///< metres
+  int maxTicks;    ///< without such a gain
+  double least;    ///< distance at the last gain
+  int ticks = 0;   ///< since then
+
+  bool isStalledAt(double distance) {
+    const bool gains = distance < least - minGain;
+    ticks = gains ? 0 : ticks + 1;
+    if (gains) least = distance;
+    return ticks > maxTicks;
+  }
+};
+
 }  // namespace
 
 Walker::Walker(const WorldData& world, const NavigationAgent& agent)
@@ -268,27 +283,23 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
   const Vec3 start = avatar_.footPosition;
   LastFloor floor{start.y()};
   const double tick = world_.settings.tickDuration;
-  const double minGain = std::min(kMinGain, 0.5 * agent_.speed * tick);
-  const int maxStall = countTicks(maySlide ? kMaxSlidingStall : kMaxStall, tick);
-  double least = computeGroundDistance(start, goal);
-  int ticksWithoutGain = 0;
+  StallWatch watch{std::min(kMinGain, 0.5 * agent_.speed * tick),
+                   countTicks(maySlide ? kMaxSlidingStall : kMaxStall, tick),
+                   computeGroundDistance(start, goal)};
   for (int ticks = 0;; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (avatar_.grounded && (distance <= kArrivalDistance ||
                              computeGroundDistance(start, avatar_.footPosition) >= length))
       return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0, ticks};
-    const bool gains = distance < least - minGain;
-    ticksWithoutGain = gains ? 0 : ticksWithoutGain + 1;
-    if (gains) least = distance;
-    if (ticksWithoutGain > maxStall)
+    if (watch.isStalledAt(distance))
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity, ticks};
     const Vec3 before = avatar_.footPosition;
-    step(computeWalkVelocity(before, goal, false, agent_.speed, world_.settings.tickDuration));
+    step(computeWalkVelocity(before, goal, false, agent_.speed, tick));
     if (isStep(before, avatar_.footPosition)) hasStepped_ = crossedSteps_ = true;
     if (!avatar_.grounded) {
       if (hasFallen(floor, maxDrop))
         return {WalkOutcome::Kind::fell, avatar_.footPosition, 0, ticks};
-      if (before.y() - avatar_.footPosition.y() > kMinStepRise) ticksWithoutGain = 0;
+      if (before.y() - avatar_.footPosition.y() > kMinStepRise) watch.ticks = 0;
       continue;
     }
     floor = {avatar_.footPosition.y()};
@@ -312,19 +323,14 @@ WalkOutcome Walker::walkOn(const Vec3& goal) {
 
 WalkOutcome Walker::slideTo(const Vec3& goal) {
   const double tick = world_.settings.tickDuration;
-  const double minGain = std::min(kMinSlideGain, 0.05 * agent_.speed * tick);
-  const int maxStall = countTicks(kMaxStall, tick);
-  double least = computeGroundDistance(avatar_.footPosition, goal);
-  for (int ticks = 0, ticksWithoutGain = 0; ticks < kMaxTicks; ++ticks) {
+  StallWatch watch{std::min(kMinSlideGain, 0.05 * agent_.speed * tick), countTicks(kMaxStall, tick),
+                   computeGroundDistance(avatar_.footPosition, goal)};
+  for (int ticks = 0; ticks < kMaxTicks; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (distance <= kArrivalDistance && avatar_.grounded)
       return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0};
-    const bool gains = distance < least - minGain;
-    ticksWithoutGain = gains ? 0 : ticksWithoutGain + 1;
-    if (gains) least = distance;
-    if (ticksWithoutGain > maxStall) break;
-    step(computeWalkVelocity(avatar_.footPosition, goal, false, agent_.speed,
-                             world_.settings.tickDuration));
+    if (watch.isStalledAt(distance)) break;
+    step(computeWalkVelocity(avatar_.footPosition, goal, false, agent_.speed, tick));
     if (avatar_.footPosition.y() < world_.scene->bounds().min.y())
       return {WalkOutcome::Kind::fell, avatar_.footPosition, 0};
   }

@@ -366,7 +366,6 @@ void NavigationMesh::closePortal(std::uint32_t from, std::uint32_t to) {
   for (Portal* portal : findPortals(from, to)) {
     portal->closed = true;
     addRim(from, *portal);
-    addRim(to, *portal);
   }
 }
 
