@@ -6,10 +6,12 @@
 #include <numeric>
 #include <optional>
 #include <random>
+#include <set>
 #include <utility>
 
 #include "scene/navigation/mesh/polygon_sampler.hpp"
-#include "scene/navigation/stand.hpp"
+#include "scene/navigation/walk/grid_search.hpp"
+#include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
 namespace enfilade::scene {
@@ -18,7 +20,6 @@ namespace {
 constexpr std::size_t kMaxCentres = 8;        // polygons of an island whose centre is tried
 constexpr int kMaxTrials = 64;                // further places of an island that are tried
 constexpr double kMinDrawnArea = 1;           // square metres
-constexpr double kMaxSmallArea = 1;           // square metres: its exits are searched on a grid
 constexpr double kBelowRoof = 1;              // metres: a floor below is lower by more
 constexpr double kBesideFloor = 1;            // metres: walls and furniture interrupt floors below
 constexpr std::size_t kMaxSearchFrom = 2000;  // polygons of an island whose neighbours are sought
@@ -121,33 +122,20 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
   return list;
 }
 
-void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
-                 const std::function<bool(const Vec3&, const Vec3&)>& isJoined,
-                 const FindExit& findExit) {
+void joinIslands(IslandList& list, const PassageList& passages) {
   std::vector<std::uint32_t> joinedTo(list.islands.size());  // a smaller number, or itself
   std::iota(joinedTo.begin(), joinedTo.end(), 0u);
-  std::vector<double> areas;  // of islands with those that are joined to them
-  for (const Island& island : list.islands) areas.push_back(island.area);
   const auto findFirst = [&](std::uint32_t number) {
     while (joinedTo[number] != number) number = joinedTo[number];
     return number;
   };
-  const auto join = [&](std::uint32_t a, std::uint32_t b) {
-    if (a == b) return;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> ways;  // between islands, in one direction
+  for (const Passage& passage : passages.passages)
+    ways.emplace(list.numberOf[passage.fromPolygon], list.numberOf[passage.toPolygon]);
+  for (const auto& [from, to] : ways) {
+    if (from >= to || !ways.contains({to, from})) continue;
+    const std::uint32_t a = findFirst(from), b = findFirst(to);
     joinedTo[std::max(a, b)] = std::min(a, b);
-    areas[std::min(a, b)] += areas[std::max(a, b)];
-  };
-  for (std::uint32_t number = 1; number < joinedTo.size(); ++number)
-    for (const IslandNeighbour& near : findNeighbours(mesh, list, number, reach, heightReach)) {
-      const std::uint32_t a = findFirst(number), b = findFirst(near.number);
-      if (a != b && isJoined(near.from, near.to)) join(a, b);
-    }
-  for (std::uint32_t number = 1; number < joinedTo.size(); ++number) {
-    const std::uint32_t own = findFirst(number);
-    if (areas[own] > kMaxSmallArea) continue;
-    if (const auto other =
-            findExit(number, [&](std::uint32_t candidate) { return findFirst(candidate) != own; }))
-      join(own, findFirst(*other));
   }
   std::vector<std::uint32_t> order;  // of the islands that remain, the largest first
   for (std::uint32_t number = 0; number < joinedTo.size(); ++number) {
@@ -231,14 +219,10 @@ std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const Isla
     return getNumber(nearby.front());
   const auto standing = standAt(walker, place);
   if (!standing) return std::nullopt;
-  const auto walks = [&](const Vec3& to, double heightError) {
-    return walker.walkTo(to).kind == WalkOutcome::Kind::arrived &&
-           std::abs(walker.footPosition().y() - to.y()) <= heightError;
-  };
-  for (const Near& near : nearby) {
-    walker.returnTo(*standing);
-    if (walks(near.point, kHeightError) && walks(*standing, kReturnHeight)) return getNumber(near);
-  }
+  for (const Near& near : nearby)
+    if (walks(walker, *standing, near.point, kHeightError) &&
+        walks(walker, walker.footPosition(), *standing, kReturnHeight))
+      return getNumber(near);
   return std::nullopt;
 }
 

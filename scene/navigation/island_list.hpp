@@ -3,16 +3,18 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <limits>
 #include <span>
 #include <vector>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/passages.hpp"
+#include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::scene {
 
+/// metres between floors on both sides of a thick wall
+inline constexpr double kWallAndDoor = 1.5;
 inline constexpr std::uint32_t kNoIsland = std::numeric_limits<std::uint32_t>::max();
 
 struct Island {
@@ -33,17 +35,9 @@ struct IslandList {
 /// joinIslands() decides whether an island is drawn. `bounds`: of the scene.
 IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb& bounds);
 
-using FindExit = std::function<std::optional<std::uint32_t>(
-    std::uint32_t number, const std::function<bool(std::uint32_t)>& isOther)>;
-
-/// Makes one of islands that are close to each other and joined, and decides which are drawn.
-/// Portals of a mesh need some centimetres more than an agent, so a gap that it just passes
-/// separates them at first.
-/// `isJoined(from, to)`: an agent walks from one side of a gap to the other. `findExit(number,
-/// isOther)`: an island that `isOther` and to which an agent walks from a small one, and back.
-void joinIslands(const NavigationMesh& mesh, IslandList& list, double reach, double heightReach,
-                 const std::function<bool(const Vec3&, const Vec3&)>& isJoined,
-                 const FindExit& findExit);
+/// Makes one of islands between which passages lead in both directions, and decides which are
+/// drawn.
+void joinIslands(IslandList& list, const PassageList& passages);
 
 /// The number of the island on which an agent stands; nullopt: on none. The mesh ends at a distance
 /// from the rim of a floor: a place there has the island of the closest mesh to which an agent

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "scene/navigation/stand.hpp"
+#include "scene/navigation/walk/stand.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -66,6 +66,13 @@ std::optional<std::vector<RouteStep>> findRoute(const PathFinder& finder, Links&
       if (!portal.closed)
         reach(portal.to, here.seconds + (portal.middle() - here.point).norm() / speed,
               portal.middle(), polygon, {});
+    if (finder.passages)
+      for (const Passage& passage : finder.passages->passages)
+        if (passage.fromPolygon == polygon)
+          reach(passage.toPolygon,
+                here.seconds +
+                    ((passage.points.front() - here.point).norm() + passage.length) / speed,
+                passage.points.back(), polygon, {});
     const std::vector<PathLink>& found = links.from(polygon, finder.walker);
     for (std::size_t i = 0; i < found.size(); ++i) {
       const PathLink& link = found[i];

@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "collision/motion/sine_cosine.hpp"
-#include "scene/navigation/stand.hpp"
+#include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
 namespace enfilade::scene {

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::scene {
 

@@ -9,11 +9,10 @@
 #include <utility>
 
 #include "scene/model/shapes/space_solid.hpp"
-#include "scene/navigation/grid_search.hpp"
 #include "scene/navigation/link_routes.hpp"
 #include "scene/navigation/mesh/parallel_for.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
-#include "scene/navigation/stand.hpp"
+#include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
 namespace enfilade::scene {
@@ -22,11 +21,6 @@ namespace {
 constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile beyond the radius
 constexpr int kMaxRandomTries = 200;
 constexpr std::size_t kMaxLinkSets = 4;
-// Walks to look for exits of small islands: of all, where they are some dozens, and of one. Some
-// hundred find an exit nearby, thousands one through a long narrow way.
-constexpr std::size_t kMaxExitWalks = 50'000, kMinExitWalks = 300, kMaxWalksOfExit = 4000;
-constexpr double kWallAndDoor = 1.5;  // metres between floors on both sides of a thick wall
-constexpr double kMaxGapDetour = 6;   // metres: a longer way around a gap does not pass it
 
 /// Puts a body where it rests.
 void placeBody(const collision::Pose& pose, Body& own) {
@@ -120,58 +114,9 @@ void Navigation::assembleMeshes() {
 }
 
 void Navigation::joinIslands() {
-  const std::vector<std::uint32_t> scarce = scarce_->findIslands();
-  scene::joinIslands(
-      *ample_, islands_, kWallAndDoor + 2 * agent_.radius, world_.settings().stepHeight,
-      [&](const Vec3& from, const Vec3& to) { return isGapPassable(from, to, scarce); },
-      [&](std::uint32_t number, const auto& isOther) { return findExit(number, isOther); });
-}
-
-/// `scarce`: islands of the mesh with portals that may be too narrow.
-bool Navigation::isGapPassable(const Vec3& from, const Vec3& to,
-                               const std::vector<std::uint32_t>& scarce) {
-  constexpr std::size_t kMaxRepairWalks = 2000;
-  const Vec3 extent(agent_.radius, 0.5, agent_.radius);
-  const auto a = scarce_->findNearest(from, extent), b = scarce_->findNearest(to, extent);
-  if (!a || !b || scarce[a->polygon] != scarce[b->polygon]) return false;
-  for (const Gap& gap : gaps_)
-    if (gap.from == from && gap.to == to) return gap.isPassable;
-  const auto start = standNear(*walker_, from), goal = standNear(*walker_, to);
-  bool isPassable = false;
-  if (start && goal) {
-    const PathFinder finder{world_.data(), agent_,  *walker_,       *ample_,
-                            *scarce_,      nullptr, kMaxRepairWalks};
-    const auto isNear = [&](const Vec3& here, const Vec3& there) {
-      const NavigationPath path = scene::findPath(finder, here, there);
-      return path.found() && path.length <= (there - here).norm() + kMaxGapDetour;
-    };
-    isPassable = isNear(*start, *goal) && isNear(*goal, *start);
-  }
-  gaps_.push_back({from, to, isPassable});
-  return isPassable;
-}
-
-/// Searches on a grid from a small island, where this comes to an end soon, for a way to another
-/// one and back.
-std::optional<std::uint32_t> Navigation::findExit(
-    std::uint32_t number, const std::function<bool(std::uint32_t)>& isOther) {
-  const Vec3& place = islands_.islands[number].place;
-  const auto findOther = [&](const Vec3& feet) -> std::optional<std::uint32_t> {
-    const auto polygon = findPolygonAt(*ample_, feet);
-    const auto other = polygon ? islands_.numberOf[*polygon] : kNoIsland;
-    return other != kNoIsland && isOther(other) ? std::optional(other) : std::nullopt;
-  };
-  const auto known = std::ranges::find(gaps_, place, &Gap::from);
-  if (known != gaps_.end() && !known->isPassable) return std::nullopt;
-  if (const auto other = known != gaps_.end() ? findOther(known->to) : std::nullopt) return other;
-  const std::size_t share = kMaxExitWalks / islands_.islands.size();
-  GridSearch out{0.12, kMaxGapDetour, std::clamp(share, kMinExitWalks, kMaxWalksOfExit)};
-  GridSearch back = out;
-  const auto way = findGridPathOut(
-      *walker_, place, [&](const Vec3& feet) { return findOther(feet).has_value(); }, out);
-  const bool isPassable = way && findGridPath(*walker_, way->back(), place, back);
-  gaps_.push_back({place, isPassable ? way->back() : place, isPassable});
-  return isPassable ? findOther(way->back()) : std::nullopt;
+  passages_ = collectPassages({world_.data(), agent_, *walker_, *ample_, *scarce_, nullptr},
+                              islands_, triedGaps_);
+  scene::joinIslands(islands_, passages_);
 }
 
 std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
@@ -181,10 +126,7 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
   std::vector<bool> isChanged(ampleTiles_.size(), false);
   const double margin = agent_.radius + kTileMargin;
   const auto markTiles = [&](const Aabb& box) {
-    std::erase_if(gaps_, [&](const Gap& gap) {
-      const Aabb around{gap.from.cwiseMin(gap.to), gap.from.cwiseMax(gap.to)};
-      return overlaps(inflated(around, kMaxGapDetour + agent_.radius), box);
-    });
+    forgetGaps(triedGaps_, box);
     const auto computeTile = [&](double at, double origin, int count) {
       const double tile = std::floor((at - origin) / grid_.tileSize());
       return static_cast<int>(std::clamp(tile, 0.0, count - 1.0));
@@ -235,6 +177,7 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
     return *unobstructed_;
   };
   PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};
+  finder.passages = &passages_;
   const auto first = islandAt(from), last = islandAt(to);
   if (first && last && first != last) finder.refusals = &refusals_[{*first, *last}];
   NavigationPath path = scene::findPath(finder, from, to);

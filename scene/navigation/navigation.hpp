@@ -20,9 +20,10 @@
 #include "scene/navigation/links.hpp"
 #include "scene/navigation/mesh/navigation_mesh.hpp"
 #include "scene/navigation/mesh/polygon_sampler.hpp"
+#include "scene/navigation/passage_search.hpp"
 #include "scene/navigation/path_finder.hpp"
 #include "scene/navigation/place_names.hpp"
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/walk/walker.hpp"
 #include "scene/world/world.hpp"
 
 namespace enfilade::scene {
@@ -129,9 +130,6 @@ class Navigation {
   void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
   void assembleMeshes();
   void joinIslands();
-  bool isGapPassable(const Vec3& from, const Vec3& to, const std::vector<std::uint32_t>& scarce);
-  std::optional<std::uint32_t> findExit(std::uint32_t island,
-                                        const std::function<bool(std::uint32_t)>& isOther);
   NavigationMesh buildUnobstructed(int threads) const;
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;
@@ -148,11 +146,8 @@ class Navigation {
   std::list<Links> links_;                  ///< of the last options, the oldest first
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
   IslandList islands_;                      ///< of `ample_`
-  struct Gap {
-    Vec3 from, to;
-    bool isPassable;
-  };
-  std::vector<Gap> gaps_;  ///< between islands, that were examined
+  TriedGaps triedGaps_;
+  PassageList passages_;                                                  ///< of `ample_`
   std::map<std::pair<std::uint32_t, std::uint32_t>, Refusals> refusals_;  ///< by islands
   PolygonSampler drawn_;  ///< of islands with Island::isDrawn
   NavigationReport report_;

@@ -8,243 +8,21 @@
 #include <utility>
 
 #include "scene/navigation/clear_width.hpp"
-#include "scene/navigation/grid_search.hpp"
-#include "scene/navigation/mesh/shortest_corridor.hpp"
-#include "scene/navigation/stand.hpp"
+#include "scene/navigation/mesh_paths.hpp"
+#include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
 namespace enfilade::scene {
 namespace {
 
-constexpr int kMaxProposals = 12;                             // corridors to try on a mesh
-constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  // metres
-constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way around it begins
-constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
-// Failures at a portal, without a proved path through it meanwhile, after which it is not tried
-// again.
-constexpr int kRefutations = 8;
 constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
-constexpr int kMaxRepairs = 12;   // of a leg
-constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed rarely need more
-constexpr std::size_t kMaxQuickWalks = 3000;  // of a path
-constexpr int kQuickProposals = 4;
-constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
-constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less is not tried
-constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
+constexpr int kMaxPassageRoutes = 4;
+constexpr double kOnMesh = 0.1;  // metres
 constexpr const char* kNotFound = "no way was found within the limits of the search";
 constexpr double kMaxConnection = 3;  // metres between places that are connected without a mesh
-constexpr GridSearch kCoarseConnection{kCoarseSpacing, 1.5, 2000};
-constexpr GridSearch kFineConnection{kFineSpacing, 0.7, 4000};
-constexpr double kSameFloor = 1;  // metres between the heights of a mesh and its floor
-
-double computeLength(const std::vector<Vec3>& points) {
-  double length = 0;
-  for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
-  return length;
-}
-
-/// The work and the obstacles of a search so far.
-struct Proof {
-  explicit Proof(std::size_t maxRepairWalks)
-      : coarse{kCoarseSpacing, 1.5, maxRepairWalks},
-        fine{kFineSpacing, 0.7, maxRepairWalks},
-        quickWalks(std::min(kMaxQuickWalks, maxRepairWalks)) {}
-
-  GridSearch coarse, fine;
-  std::size_t quickWalks;  ///< that are left
-  bool isQuick = false;    ///< what a short search does not repair is left out: proves nothing
-  double shortestLine = std::numeric_limits<double>::infinity();  ///< metres, of all proposals
-  bool isRepaired = false;                                        ///< the present proposal
-  Vec3 failedAt = Vec3::Zero();                                   ///< where the last proof failed
-  std::vector<Obstruction> met;
-};
-
-/// Goes around what stopped the walker on the way from the last place of `path` to `corner`, and
-/// appends places up to where it joins that way again, or up to the corner.
-bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corner,
-              NavigationPath& path, Proof& proof) {
-  const Vec3 legStart = path.points.back();
-  const Vec3 way = projectToGround(corner - legStart);
-  const double length = way.norm();
-  if (!(length > 0)) return false;
-  const Vec3 direction = way / length;
-  const double stopped = computeGroundDistance(legStart, stop.footPosition);
-  if (stopped > 2 * kStandOff) {  // begin shortly before the obstacle
-    finder.walker.returnTo(legStart);
-    const Vec3 before = legStart + (stopped - kStandOff) * direction;
-    if (finder.walker.walkTo(before).kind == WalkOutcome::Kind::arrived)
-      path.points.push_back(finder.walker.footPosition());
-  }
-  const Vec3 from = path.points.back();
-  std::vector<Vec3> targets;
-  for (const double beyond : kRejoinDistances) {
-    const double along = (stopped + beyond) / length;
-    if (along >= 1) break;
-    if (const auto place = standNear(finder.walker, legStart + along * (corner - legStart)))
-      targets.push_back(*place);
-  }
-  targets.push_back(corner);
-  const auto search = [&](GridSearch& grid) {
-    for (const Vec3& target : targets) {
-      auto places = findGridPath(finder.walker, from, target, grid);
-      if (!places) continue;
-      path.points.insert(path.points.end(), places->begin() + 1, places->end());
-      proof.isRepaired = true;
-      return true;
-    }
-    return false;
-  };
-  if (!proof.isQuick) return search(proof.coarse) || search(proof.fine);
-  const std::size_t maxWalks = std::min(kQuickWalks, proof.quickWalks);
-  GridSearch quick{kCoarseSpacing, proof.coarse.margin, maxWalks};
-  const bool isRepaired = search(quick);
-  proof.quickWalks -= maxWalks - quick.maxWalks;
-  return isRepaired;
-}
-
-/// Whether a walk arrived, also in height: the height of its goal does not stop it.
-bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError) {
-  return outcome.kind == WalkOutcome::Kind::arrived &&
-         std::abs(outcome.footPosition.y() - goal.y()) <= heightError;
-}
-
-/// Walks from corner to corner, with repairs. Appends the places to `path`, which has the first
-/// one.
-bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance clearance,
-               NavigationPath& path, Proof& proof) {
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    const bool isLast = i + 1 == corners.size();
-    for (int repairs = 0;; ++repairs) {
-      const Vec3 from = path.points.back();
-      if (!isLast && computeGroundDistance(from, corners[i]) < kArrivalDistance) break;
-      finder.walker.returnTo(from);
-      const WalkOutcome outcome = finder.walker.walkTo(corners[i]);
-      if (isThere(outcome, corners[i], kSameFloor)) {
-        path.points.push_back(outcome.footPosition);
-        break;
-      }
-      proof.failedAt = outcome.footPosition;
-      if (repairs == 0 && !isLast && clearance == Clearance::scarce) {
-        const auto place = standNear(finder.walker, corners[i]);
-        if (!place) break;  // the next corner may be reached without this one
-        corners[i] = *place;
-      }
-      if (repairs < kMaxRepairs && goAround(finder, outcome, corners[i], path, proof)) continue;
-      proof.met.push_back({outcome.obstacle, outcome.footPosition, 0});
-      return false;
-    }
-  }
-  return true;
-}
-
-/// Closes portals of a mesh during a search. Those that failed often, and never led to a proved
-/// path meanwhile, stay closed: they are refuted. A quick search refutes nothing.
-class PortalClosures {
- public:
-  PortalClosures(NavigationMesh& mesh, bool isQuick) : mesh_(mesh), isQuick_(isQuick) {}
-  ~PortalClosures() {
-    for (const auto& [from, to] : closed_) mesh_.openPortal(from, to);
-  }
-  PortalClosures(const PortalClosures&) = delete;
-  PortalClosures& operator=(const PortalClosures&) = delete;
-
-  /// Closes the portal of a corridor that is closest to a failure; false: the corridor has none.
-  bool closeNearest(const Corridor& corridor, const Vec3& failure) {
-    const auto& polygons = corridor.polygons;
-    if (polygons.size() < 2) return false;
-    std::size_t at = 0;
-    double least = std::numeric_limits<double>::infinity();
-    for (std::size_t i = 0; i + 1 < polygons.size(); ++i) {
-      const double distance =
-          (mesh_.portalMiddle(polygons[i], polygons[i + 1]) - failure).squaredNorm();
-      if (distance < least) least = distance, at = i;
-    }
-    mesh_.closePortal(polygons[at], polygons[at + 1]);
-    if (isQuick_ || mesh_.countFailure(polygons[at], polygons[at + 1]) < kRefutations)
-      closed_.emplace_back(polygons[at], polygons[at + 1]);
-    return true;
-  }
-
- private:
-  NavigationMesh& mesh_;
-  const bool isQuick_;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_;
-};
-
-/// Walks the whole path without a stop: after a step a place may be reached at another height.
-bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
-  walker.returnTo(points.front());
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    const WalkOutcome outcome = walker.walkOn(points[i]);
-    if (outcome.kind == WalkOutcome::Kind::arrived) continue;
-    proof.failedAt = outcome.footPosition;
-    proof.met.push_back({outcome.obstacle, outcome.footPosition, 0});
-    return false;
-  }
-  return true;
-}
-
-double computeHorizontalLength(std::vector<Vec3> points) {
-  for (Vec3& point : points) point.y() = 0;
-  return computeLength(points);
-}
-
-/// A* through the middles of portals is quick. Where its line bends, another corridor may have a
-/// shorter one.
-std::optional<Corridor> findCorridor(const NavigationMesh& mesh, const MeshPoint& from,
-                                     const MeshPoint& to) {
-  std::optional<Corridor> corridor = mesh.findCorridor(from, to);
-  if (!corridor) return corridor;
-  const std::vector<Vec3> line = mesh.straighten(*corridor, from.point, to.point);
-  const double length = computeHorizontalLength(line);
-  if (length < kNearlyStraight * computeHorizontalLength({from.point, to.point})) return corridor;
-  std::optional<Corridor> other = findShortestCorridor(mesh, from, to, length / kNearlyStraight);
-  if (other && computeLength(mesh.straighten(*other, from.point, to.point)) < computeLength(line))
-    return other;
-  return corridor;
-}
-
-NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Clearance clearance,
-                          const Vec3& from, const Vec3& to, Proof& proof) {
-  const Vec3 extent(3 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
-                    3 * finder.agent.radius);
-  const auto start = mesh.findNearest(from, extent), goal = mesh.findNearest(to, extent);
-  NavigationPath path;
-  if (!start || !goal) return path;
-  PortalClosures closures(mesh, proof.isQuick);
-  const int maxProposals = proof.isQuick ? kQuickProposals : kMaxProposals;
-  for (int proposal = 0; proposal < maxProposals; ++proposal) {
-    const auto corridor = findCorridor(mesh, *start, *goal);
-    if (!corridor) return path;
-    std::vector<Vec3> corners = mesh.straighten(*corridor, start->point, goal->point);
-    const double lineLength = computeLength(corners);
-    proof.shortestLine = std::min(proof.shortestLine, lineLength);
-    if (corners.size() > 1) corners.erase(corners.begin(), corners.begin() + 1);
-    if (!corners.empty()) corners.pop_back();
-    corners.push_back(to);
-    path.points = {from};
-    finder.walker.takeCrossedSteps();
-    proof.isRepaired = false;
-    if (proveLegs(finder, corners, clearance, path, proof)) {
-      path.points = shortenPath(finder.walker, path.points,
-                                proof.isRepaired ? Shortcuts::all : Shortcuts::free);
-      if (proof.isRepaired && computeLength(path.points) > kTight * lineLength)
-        pullTight(finder.walker, path.points);
-      path.length = computeLength(path.points);
-      if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof)) {
-        for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
-          mesh.forgetFailures(corridor->polygons[i - 1], corridor->polygons[i]);
-        return path;
-      }
-    }
-    path.points.clear();
-    if (!proof.isQuick && (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0))
-      return path;  // proves nothing
-    if (!closures.closeNearest(*corridor, proof.failedAt)) return path;
-  }
-  return path;
-}
+constexpr GridSearch kCoarseConnection{kCoarseSpacing, 2.5, 4000, true};
+constexpr GridSearch kFineConnection{kFineSpacing, 2.5, 6000};
 
 /// The corners of a line on a mesh.
 struct Line {
@@ -332,44 +110,86 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
   return path;
 }
 
-NavigationPath findPathByProposals(const PathFinder& finder, const Vec3& start, const Vec3& goal,
-                                   Proof& proof) {
-  NavigationPath best = findPathOn(finder, finder.ample, Clearance::ample, start, goal, proof);
-  const Vec3 extent(finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
-                    finder.agent.radius);
-  const auto first = finder.scarce.findNearest(start, extent),
-             last = finder.scarce.findNearest(goal, extent);
-  const auto shortcut = first && last ? findCorridor(finder.scarce, *first, *last) : std::nullopt;
-  if (shortcut && (!best.found() ||
-                   computeLength(finder.scarce.straighten(*shortcut, first->point, last->point)) *
-                           kWorthTrying <
-                       best.length)) {
-    NavigationPath other = findPathOn(finder, finder.scarce, Clearance::scarce, start, goal, proof);
-    if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
+/// The ways to the passages of a route, and through them. Returns the first part that fails, or
+/// nullopt: `points` are the whole way.
+std::optional<std::size_t> walkRoute(const PathFinder& finder, const PassageRoute& route,
+                                     const Vec3& start, const Vec3& goal, Proof& proof,
+                                     std::vector<Vec3>& points) {
+  points = {start};
+  const auto append = [&](const std::vector<Vec3>& more) {
+    points.insert(points.end(), more.begin() + 1, more.end());
+  };
+  for (std::size_t i = 0; i <= route.passages.size(); ++i) {
+    const bool isLast = i == route.passages.size();
+    const std::vector<Vec3>* through =
+        isLast ? nullptr : &finder.passages->passages[route.passages[i]].points;
+    const Vec3& end = isLast ? goal : through->front();
+    if (computeGroundDistance(points.back(), end) > kArrivalDistance) {
+      const NavigationPath path = findPathByMeshes(finder, points.back(), end, proof);
+      if (!path.found()) return i;
+      append(path.points);
+    }
+    if (through) append(*through);
   }
-  return best;
+  return std::nullopt;
 }
 
-/// A repair that fails takes long, and the next proposal may be as short: first all are tried with
-/// quick repairs.
-NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+/// Makes a path of a way of which each leg was walked, as short as it can be walked without a stop.
+NavigationPath proveWay(const PathFinder& finder, const std::vector<Vec3>& way, Proof& proof) {
+  std::vector<Vec3> shortened = shortenPath(finder.walker, way, Shortcuts::all);
+  std::vector<Vec3> tight = shortened;
+  pullTight(finder.walker, tight);
+  NavigationPath path;
+  for (const std::vector<Vec3>* points : {&std::as_const(tight), &std::as_const(shortened), &way}) {
+    if (!walksOn(finder.walker, *points, proof)) continue;
+    path.points = *points;
+    path.length = computeLength(path.points);
+    break;
+  }
+  return path;
+}
+
+/// A path through passages that is shorter than `limit`, metres.
+NavigationPath findPathByPassages(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                  double limit, Proof& proof) {
+  const auto findNear = [&](const Vec3& place) {
+    const auto near = finder.ample.findNearest(place, {kOnMesh, kHeightError, kOnMesh});
+    return near ? near : finder.ample.findNearest(place, computeMeshReach(finder));
+  };
+  const auto from = findNear(start), to = findNear(goal);
+  if (!finder.passages || !from || !to) return {};
+  std::vector<bool> excluded(finder.passages->passages.size(), false);
+  for (int i = 0; i < kMaxPassageRoutes; ++i) {
+    const PassageRoute route = findPassageRoute(*finder.passages, *from, *to, excluded);
+    if (route.passages.empty() || route.length >= limit) break;
+    std::vector<Vec3> way;
+    const auto failed = walkRoute(finder, route, start, goal, proof, way);
+    if (!failed) {
+      NavigationPath path = proveWay(finder, way, proof);
+      if (path.found() && path.length < limit) return path;
+    }
+    excluded[route.passages[std::min(failed.value_or(0), route.passages.size() - 1)]] = true;
+  }
+  return {};
+}
+
+NavigationPath findPathOnMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
                                 Proof& proof) {
-  proof.isQuick = true;
-  proof.shortestLine = std::numeric_limits<double>::infinity();
-  NavigationPath quick = findPathByProposals(finder, start, goal, proof);
-  proof.isQuick = false;
-  if (quick.found() && quick.length <= kTight * proof.shortestLine) return quick;
-  NavigationPath best = findPathByProposals(finder, start, goal, proof);
-  return quick.found() && (!best.found() || quick.length < best.length) ? quick : best;
+  NavigationPath best = findPathByMeshes(finder, start, goal, proof);
+  const double limit =
+      best.found() ? best.length / kWorthTrying : std::numeric_limits<double>::infinity();
+  NavigationPath other = findPathByPassages(finder, start, goal, limit, proof);
+  return other.found() ? other : best;
 }
 
-/// Places without a mesh, as narrow ones on furniture, are connected with it by walks on a grid,
-/// and with one another if they are near.
+/// Places without a mesh, as narrow ones on furniture, or on a small part of one, are connected
+/// with it by walks on a grid, and with one another if they are near.
 NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
                                  Proof& proof) {
   Walker& walker = finder.walker;
   const auto isOn = [&](const Vec3& place) {
-    return findPolygonAt(finder.ample, place).has_value();
+    const auto polygon = findPolygonAt(finder.ample, place);
+    return polygon && !(finder.passages && finder.passages->isSmallPart(*polygon));
   };
   NavigationPath path;
   if (isOn(start) && isOn(goal)) return path;
@@ -382,29 +202,26 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
   const auto connect = [&](const Vec3& from, const Vec3& to) {
     return search([&](GridSearch& grid) { return findGridPath(walker, from, to, grid); });
   };
-  const auto leave = [&](const Vec3& place) {
+  const auto leave = [&](const Vec3& place, const Vec3& toward) {
     if (isOn(place)) return std::optional(std::vector<Vec3>{place});
-    return search([&](GridSearch& grid) { return findGridPathOut(walker, place, isOn, grid); });
+    return search([&](GridSearch& grid) {
+      return findGridPathOut(walker, place, {isOn, {}, toward}, grid);
+    });
   };
   std::optional<std::vector<Vec3>> way;
   if (computeGroundDistance(start, goal) < kMaxConnection) way = connect(start, goal);
   if (!way) {
-    way = leave(start);
+    way = leave(start, goal);
     // A walk may lead down where none leads up: the way back from the mesh is walked, too.
-    const auto fromGoal = way ? leave(goal) : std::nullopt;
+    const auto fromGoal = way ? leave(goal, start) : std::nullopt;
     const auto last = fromGoal ? connect(fromGoal->back(), goal) : std::nullopt;
     if (!last) return path;
-    const NavigationPath middle = findPathByMeshes(finder, way->back(), last->front(), proof);
+    const NavigationPath middle = findPathOnMeshes(finder, way->back(), last->front(), proof);
     if (!middle.found()) return path;
     way->insert(way->end(), middle.points.begin() + 1, middle.points.end());
     way->insert(way->end(), last->begin() + 1, last->end());
   }
-  std::vector<Vec3> points = shortenPath(walker, *way, Shortcuts::all);
-  pullTight(walker, points);
-  if (!walksOn(walker, points, proof)) return path;
-  path.length = computeLength(points);
-  path.points = std::move(points);
-  return path;
+  return proveWay(finder, *way, proof);
 }
 
 }  // namespace
@@ -422,7 +239,7 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
   }
   const Vec3 goal = finder.walker.footPosition();
   Proof proof(finder.maxRepairWalks);
-  NavigationPath best = findPathByMeshes(finder, start, goal, proof);
+  NavigationPath best = findPathOnMeshes(finder, start, goal, proof);
   if (best.found() || !finder.unobstructed) return best;
   best = findPathOffMeshes(finder, start, goal, proof);
   if (best.found()) return best;
@@ -444,7 +261,7 @@ NavigationPath findWayOut(Walker& walker, const Vec3& from,
     return path;
   }
   GridSearch search{kCoarseSpacing, 2, 20'000};
-  const auto way = findGridPathOut(walker, walker.footPosition(), isWanted, search);
+  const auto way = findGridPathOut(walker, walker.footPosition(), {isWanted}, search);
   if (!way) return path;
   path.points = shortenPath(walker, *way, Shortcuts::all);
   path.length = computeLength(path.points);

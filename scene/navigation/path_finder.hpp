@@ -7,7 +7,8 @@
 #include <vector>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/passages.hpp"
+#include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::scene {
 
@@ -59,6 +60,7 @@ struct PathFinder {
   std::size_t maxRepairWalks = 15'000;  ///< of a path: some tenths of a second
   /// Of the islands of both ends; null: these are one, or not known.
   Refusals* refusals = nullptr;
+  const PassageList* passages = nullptr;  ///< of `ample`; null: none
 };
 
 /// A path from where an agent at `from` stands to where it stands at `to`.

@@ -60,6 +60,7 @@ const std::vector<std::string> kRooms{
     "scene/world",
     "scene/world/checkpoint",
     "scene/navigation/mesh",
+    "scene/navigation/walk",
     "scene/navigation",
     "render",
     "render/image",

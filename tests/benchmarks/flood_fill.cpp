@@ -9,7 +9,7 @@
 #include <unordered_map>
 #include <utility>
 
-#include "scene/navigation/stand.hpp"
+#include "scene/navigation/walk/stand.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::benchmarks {
@@ -212,7 +212,7 @@ bool FloodFill::isStraight(const Vec3& from, const Vec3& to) const {
     if (place < 0) return false;
     height = places_[static_cast<std::size_t>(place)].height;
   }
-  return true;
+  return std::abs(height - to.y()) <= step_;  // not below or above it
 }
 
 std::vector<Vec3> FloodFill::findShortest(const Vec3& from, const Vec3& to) const {

@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::benchmarks {
 

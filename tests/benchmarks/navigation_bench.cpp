@@ -26,8 +26,8 @@
 
 #include "scene/import/import_worker.hpp"
 #include "scene/navigation/doors.hpp"
-#include "scene/navigation/stand.hpp"
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/walk/stand.hpp"
+#include "scene/navigation/walk/walker.hpp"
 #include "scene/world/world.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/messages/order_messages.hpp"
@@ -322,7 +322,9 @@ std::optional<double> measureShortest(const Bench& bench, const FloodFill& fill,
   walker.place(from, FloodFill::kSpacing);
   double length = 0;
   for (std::size_t i = 1; i < way.size(); ++i) {
-    if (walker.walkOn(way[i]).kind != scene::WalkOutcome::Kind::arrived) return std::nullopt;
+    if (walker.walkOn(way[i]).kind != scene::WalkOutcome::Kind::arrived ||
+        std::abs(walker.footPosition().y() - way[i].y()) > scene::kHeightError)
+      return std::nullopt;
     length += (way[i] - way[i - 1]).norm();
   }
   return length;

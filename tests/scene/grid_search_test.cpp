@@ -1,5 +1,5 @@
 // Walks on a grid: out of the swing of a door, around corners, and onto narrow places without mesh.
-#include "scene/navigation/grid_search.hpp"
+#include "scene/navigation/walk/grid_search.hpp"
 
 #include <gtest/gtest.h>
 
@@ -56,14 +56,32 @@ TEST(GridSearch, TheClosestWantedPlaceIsFound) {
   Walker walker(world.data(), {});
   GridSearch search{0.1, 2, 10'000};
   const auto way = findGridPathOut(
-      walker, {0, 0, 0}, [](const Vec3& at) { return at.x() < -0.95 || at.z() > 1.45; }, search);
+      walker, {0, 0, 0}, {[](const Vec3& at) { return at.x() < -0.95 || at.z() > 1.45; }}, search);
   ASSERT_TRUE(way);
   EXPECT_NEAR(way->back().x(), -1, 1e-6);
   EXPECT_NEAR(measureLength(*way), 1, 1e-6);
   search.maxWalks = 10'000;
-  EXPECT_FALSE(findGridPathOut(
-      walker, {0, 0, 0}, [](const Vec3& at) { return at.x() > 2; }, search))
+  EXPECT_FALSE(
+      findGridPathOut(walker, {0, 0, 0}, {[](const Vec3& at) { return at.x() > 2; }}, search))
       << "the wall is in between, and its ends are farther than the margin";
+}
+
+TEST(GridSearch, AWayOutLeadsTowardsAPointAndOverOpenPlacesAlone) {
+  const World world(std::make_shared<const Scene>(wallModel()));
+  Walker walker(world.data(), {});
+  const auto isAside = [](const Vec3& at) { return std::abs(at.z()) > 1.45; };
+  for (const double side : {-1.0, 1.0}) {
+    GridSearch search{0.1, 2, 10'000};
+    const auto way =
+        findGridPathOut(walker, {0, 0, 0}, {isAside, {}, Vec3(0, 0, side * 4)}, search);
+    ASSERT_TRUE(way);
+    EXPECT_NEAR(way->back().z(), 1.5 * side, 1e-6);
+  }
+  GridSearch search{0.1, 2, 10'000};
+  const auto isOpen = [](const Vec3& at) { return at.z() > -0.35; };
+  const auto way = findGridPathOut(walker, {0, 0, 0}, {isAside, isOpen, Vec3(0, 0, -4)}, search);
+  ASSERT_TRUE(way);
+  EXPECT_NEAR(way->back().z(), 1.5, 1e-6) << "the way to the other side is closed";
 }
 
 TEST(DoorSwing, TouchesWhatTheDoorMeetsAtAnyAngle) {

@@ -13,37 +13,10 @@
 
 #include "scene/navigation/mesh/tile_mesh.hpp"
 #include "scene/navigation/path_finder.hpp"
-#include "tests/scene/body_fixture.hpp"
+#include "tests/scene/random_room.hpp"
 
 namespace enfilade::scene::testing {
 namespace {
-
-/// A floor of 12 x 12 m with pillars and walls.
-std::vector<NamedBox> makeRoom(std::mt19937& random) {
-  std::uniform_real_distribution<double> place(0, 12), size(0.2, 3);
-  std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {12, 0, 12}}};
-  for (int i = 0; i < 14; ++i) {
-    const double x = place(random), z = place(random);
-    boxes.push_back({"pillar/" + std::to_string(i),
-                     {x, 0, z},
-                     {x + size(random) / (i % 3 + 1), 2.5, z + size(random) / (3 - i % 3)}});
-  }
-  return boxes;
-}
-
-NavigationMesh makeMesh(const World& world, const NavigationAgent& agent) {
-  const TileGrid grid = makeTileGrid(Aabb{{0, -0.2, 0}, {12, 2.5, 12}}, agent);
-  std::vector<TileMesh> tiles;
-  for (int z = 0; z < grid.tilesZ; ++z)
-    for (int x = 0; x < grid.tilesX; ++x)
-      tiles.push_back(
-          std::move(buildTileMeshes(world.data(), agent, grid, x, z, {Clearance::ample})[0]));
-  return {grid, std::move(tiles)};
-}
-
-NavigationMesh makeRoomMesh(std::mt19937& random) {
-  return makeMesh(World(boxScene(makeRoom(random))), {});
-}
 
 double horizontal(const Vec3& a, const Vec3& b) {
   return std::hypot(b.x() - a.x(), b.z() - a.z());

@@ -244,9 +244,10 @@ std::optional<MeshPoint> NavigationMesh::findNearest(const Vec3& point, const Ve
   std::optional<MeshPoint> best;
   double least = std::numeric_limits<double>::infinity();
   for (const std::uint32_t polygon : findPolygons(point, extent)) {
-    const Vec3 candidate = closestPoint(polygon, point);
-    const double distance = (candidate - point).squaredNorm();
-    if (!(distance < least)) continue;
+    const Vec3 candidate = closestPoint(polygon, point), aside = candidate - point;
+    const double distance = aside.squaredNorm();
+    // Of a slanted polygon, the box may be near alone.
+    if (!(distance < least) || (aside.array().abs() > extent.array()).any()) continue;
     least = distance;
     best = MeshPoint{polygon, candidate};
   }

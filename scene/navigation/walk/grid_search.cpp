@@ -1,4 +1,4 @@
-#include "scene/navigation/grid_search.hpp"
+#include "scene/navigation/walk/grid_search.hpp"
 
 #include <algorithm>
 #include <array>
@@ -51,18 +51,12 @@ std::vector<Vec3> collectPlaces(const std::map<Cell, Place>& places, Cell last) 
   return path;
 }
 
-/// True if the walker, who stands at `from`, arrives at `to`, also in height.
-bool walks(Walker& walker, const Vec3& from, const Vec3& to) {
-  walker.returnTo(from);
-  return walker.walkTo(to).kind == WalkOutcome::Kind::arrived &&
-         std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
-}
-
 /// The place that a search looks for.
 struct Target {
-  Aabb window;                                   ///< that the way may not leave
-  std::function<double(const Vec3&)> estimate;   ///< metres to the end, at most those of the way
-  std::function<bool(const Vec3&)> isReachedAt;  ///< the way ends there
+  Aabb window;                                  ///< that the way may not leave
+  std::function<double(const Vec3&)> estimate;  ///< metres to the end, at most those of the way
+  PlaceTest isReachedAt;                        ///< the way ends there
+  PlaceTest isOpen;                             ///< it may lead on from there; null: anywhere
 };
 
 std::optional<std::vector<Vec3>> findWay(Walker& walker, const Vec3& from, const Target& end,
@@ -83,6 +77,7 @@ std::optional<std::vector<Vec3>> findWay(Walker& walker, const Vec3& from, const
     const Vec3 feet = here.feet;
     const double cost = here.cost;
     if (end.isReachedAt(feet)) return collectPlaces(places, cell);
+    if (end.isOpen && !end.isOpen(feet)) continue;
     for (const auto& [dx, dz] : kDirections) {
       const int x = cell.x + dx, z = cell.z + dz;
       const Vec3 target = grid.centre(x, z);
@@ -95,7 +90,11 @@ std::optional<std::vector<Vec3>> findWay(Walker& walker, const Vec3& from, const
       if (search.maxWalks == 0) return std::nullopt;
       --search.maxWalks;
       walker.returnTo(feet);
-      if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
+      if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) {
+        if (!search.maySlide) continue;
+        walker.returnTo(feet);
+        if (walker.walkOn(target).kind != WalkOutcome::Kind::arrived) continue;
+      }
       const Vec3 reached = walker.footPosition();
       const Cell to2 = grid.computeCell(reached, x, z);
       const auto [at, isNew] = places.try_emplace(to2, Place{reached, next, cell, false});
@@ -111,26 +110,34 @@ std::optional<std::vector<Vec3>> findWay(Walker& walker, const Vec3& from, const
 
 }  // namespace
 
+bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError) {
+  walker.returnTo(from);
+  return walker.walkTo(to).kind == WalkOutcome::Kind::arrived &&
+         std::abs(walker.footPosition().y() - to.y()) <= heightError;
+}
+
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
                                               GridSearch& search) {
   Aabb window;
   window.include(from);
   window.include(to);
-  const Target end{
-      inflated(window, search.margin), [&](const Vec3& at) { return (to - at).norm(); },
-      [&](const Vec3& at) {
-        return computeGroundDistance(at, to) < 1.5 * search.spacing && walks(walker, at, to);
-      }};
+  const Target end{inflated(window, search.margin),
+                   [&](const Vec3& at) { return (to - at).norm(); },
+                   [&](const Vec3& at) {
+                     return computeGroundDistance(at, to) < 1.5 * search.spacing &&
+                            walks(walker, at, to, kSameHeight);
+                   },
+                   {}};
   auto way = findWay(walker, from, end, search);
   if (way) way->push_back(to);
   return way;
 }
 
 std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& from,
-                                                 const std::function<bool(const Vec3&)>& isWanted,
-                                                 GridSearch& search) {
-  const Target end{inflated(Aabb{from, from}, search.margin), [](const Vec3&) { return 0.0; },
-                   isWanted};
+                                                 const WayOut& out, GridSearch& search) {
+  const Target end{inflated(Aabb{from, from}, search.margin),
+                   [&](const Vec3& at) { return out.toward ? (*out.toward - at).norm() : 0.0; },
+                   out.isWanted, out.isOpen};
   return findWay(walker, from, end, search);
 }
 
@@ -151,7 +158,7 @@ void pullTight(Walker& walker, std::vector<Vec3>& places) {
         walker.returnTo(before);
         if (walker.walkTo(here + part * aside).kind != WalkOutcome::Kind::arrived) continue;
         const Vec3 reached = walker.footPosition();
-        if (!walks(walker, reached, after)) continue;
+        if (!walks(walker, reached, after, kSameHeight)) continue;
         places[i] = reached;
         isMoved = true;
         break;
@@ -162,7 +169,7 @@ void pullTight(Walker& walker, std::vector<Vec3>& places) {
 
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind) {
   const auto canWalk = [&](const Vec3& from, const Vec3& to) {
-    if (kind == Shortcuts::all) return walks(walker, from, to);
+    if (kind == Shortcuts::all) return walks(walker, from, to, kSameHeight);
     walker.returnTo(from);
     return walker.isPathClear(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
   };

@@ -1,4 +1,4 @@
-#include "scene/navigation/stand.hpp"
+#include "scene/navigation/walk/stand.hpp"
 
 #include <array>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/walk/walker.hpp"
 
 #include <algorithm>
 #include <cmath>

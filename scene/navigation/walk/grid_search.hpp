@@ -8,14 +8,19 @@
 #include <optional>
 #include <vector>
 
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::scene {
+
+/// True if the walker, who stands at `from`, arrives at `to`, up to `heightError` metres above or
+/// below.
+bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError);
 
 struct GridSearch {
   double spacing = 0.1;      ///< metres between places
   double margin = 1.5;       ///< metres: how far the way may leave the box of both ends
   std::size_t maxWalks = 0;  ///< edges to walk
+  bool maySlide = false;     ///< along obstacles, as over the round edge of a mattress
 };
 
 /// The places of a way between two places where the walker stood, with both; nullopt: none was
@@ -23,11 +28,19 @@ struct GridSearch {
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
                                               GridSearch& search);
 
+using PlaceTest = std::function<bool(const Vec3& feet)>;
+
+/// The end of a search that leads out of somewhere.
+struct WayOut {
+  PlaceTest isWanted;               ///< the way ends there
+  PlaceTest isOpen = {};            ///< it may lead on from there; null: from anywhere
+  std::optional<Vec3> toward = {};  ///< the way from here over its end to this point is short
+};
+
 /// As findGridPath(), to the closest place that is wanted and at most `search.margin` metres away
 /// on each axis.
 std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& from,
-                                                 const std::function<bool(const Vec3&)>& isWanted,
-                                                 GridSearch& search);
+                                                 const WayOut& out, GridSearch& search);
 
 /// Lines between places of a path that are tried as shortcuts. A line that is stopped is walked
 /// tick by tick, which takes long: this pays after a search on a grid, and rarely at the corners of

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
-#include "scene/navigation/walker.hpp"
+#include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::scene {
 

@@ -1,4 +1,4 @@
-#include "scene/navigation/floor_faces.hpp"
+#include "scene/navigation/walk/floor_faces.hpp"
 
 #include <algorithm>
 #include <array>

@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "scene/navigation/floor_faces.hpp"
 #include "scene/navigation/mesh/agent.hpp"
+#include "scene/navigation/walk/floor_faces.hpp"
 #include "scene/world/data/tick_report.hpp"
 #include "scene/world/data/world_data.hpp"
 

@@ -1,0 +1,257 @@
+#include "scene/navigation/mesh_paths.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "scene/navigation/mesh/shortest_corridor.hpp"
+#include "scene/navigation/walk/stand.hpp"
+#include "scene/world/avatars/walk_velocity.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr int kMaxProposals = 12;  // corridors to try on a mesh
+constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way around it begins
+constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
+// Failures at a portal, without a proved path through it meanwhile, after which it is not tried
+// again.
+constexpr int kRefutations = 8;
+constexpr int kMaxRepairs = 12;               // of a leg
+constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed rarely need more
+constexpr std::size_t kMaxQuickWalks = 3000;  // of a path
+constexpr int kQuickProposals = 4;
+constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
+constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
+constexpr double kShortPath = 5;  // metres: mesh lines keep some centimetres more than is needed
+
+/// Goes around what stopped the walker on the way from the last place of `path` to `corner`, and
+/// appends places up to where it joins that way again, or up to the corner.
+bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corner,
+              NavigationPath& path, Proof& proof) {
+  const Vec3 legStart = path.points.back();
+  const Vec3 way = projectToGround(corner - legStart);
+  const double length = way.norm();
+  if (!(length > 0)) return false;
+  const Vec3 direction = way / length;
+  const double stopped = computeGroundDistance(legStart, stop.footPosition);
+  if (stopped > 2 * kStandOff) {  // begin shortly before the obstacle
+    finder.walker.returnTo(legStart);
+    const Vec3 before = legStart + (stopped - kStandOff) * direction;
+    if (finder.walker.walkTo(before).kind == WalkOutcome::Kind::arrived)
+      path.points.push_back(finder.walker.footPosition());
+  }
+  const Vec3 from = path.points.back();
+  std::vector<Vec3> targets;
+  for (const double beyond : kRejoinDistances) {
+    const double along = (stopped + beyond) / length;
+    if (along >= 1) break;
+    if (const auto place = standNear(finder.walker, legStart + along * (corner - legStart)))
+      targets.push_back(*place);
+  }
+  targets.push_back(corner);
+  const auto search = [&](GridSearch& grid) {
+    for (const Vec3& target : targets) {
+      auto places = findGridPath(finder.walker, from, target, grid);
+      if (!places) continue;
+      path.points.insert(path.points.end(), places->begin() + 1, places->end());
+      proof.isRepaired = true;
+      return true;
+    }
+    return false;
+  };
+  if (!proof.isQuick) return search(proof.coarse) || search(proof.fine);
+  const std::size_t maxWalks = std::min(kQuickWalks, proof.quickWalks);
+  GridSearch quick{kCoarseSpacing, proof.coarse.margin, maxWalks};
+  const bool isRepaired = search(quick);
+  proof.quickWalks -= maxWalks - quick.maxWalks;
+  return isRepaired;
+}
+
+/// Walks from corner to corner, with repairs. Appends the places to `path`, which has the first
+/// one.
+bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance clearance,
+               NavigationPath& path, Proof& proof) {
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    const bool isLast = i + 1 == corners.size();
+    for (int repairs = 0;; ++repairs) {
+      const Vec3 from = path.points.back();
+      if (!isLast && computeGroundDistance(from, corners[i]) < kArrivalDistance) break;
+      finder.walker.returnTo(from);
+      const WalkOutcome outcome = finder.walker.walkTo(corners[i]);
+      if (isThere(outcome, corners[i], kSameFloor)) {
+        path.points.push_back(outcome.footPosition);
+        break;
+      }
+      proof.failedAt = outcome.footPosition;
+      if (repairs == 0 && !isLast && clearance == Clearance::scarce) {
+        const auto place = standNear(finder.walker, corners[i]);
+        if (!place) break;  // the next corner may be reached without this one
+        corners[i] = *place;
+      }
+      if (repairs < kMaxRepairs && goAround(finder, outcome, corners[i], path, proof)) continue;
+      proof.met.push_back({outcome.obstacle, outcome.footPosition, 0});
+      return false;
+    }
+  }
+  return true;
+}
+
+/// Closes portals of a mesh during a search. Those that failed often, and never led to a proved
+/// path meanwhile, stay closed: they are refuted. A quick search refutes nothing.
+class PortalClosures {
+ public:
+  PortalClosures(NavigationMesh& mesh, bool isQuick) : mesh_(mesh), isQuick_(isQuick) {}
+  ~PortalClosures() {
+    for (const auto& [from, to] : closed_) mesh_.openPortal(from, to);
+  }
+  PortalClosures(const PortalClosures&) = delete;
+  PortalClosures& operator=(const PortalClosures&) = delete;
+
+  /// Closes the portal of a corridor that is closest to a failure; false: the corridor has none.
+  bool closeNearest(const Corridor& corridor, const Vec3& failure) {
+    const auto& polygons = corridor.polygons;
+    if (polygons.size() < 2) return false;
+    std::size_t at = 0;
+    double least = std::numeric_limits<double>::infinity();
+    for (std::size_t i = 0; i + 1 < polygons.size(); ++i) {
+      const double distance =
+          (mesh_.portalMiddle(polygons[i], polygons[i + 1]) - failure).squaredNorm();
+      if (distance < least) least = distance, at = i;
+    }
+    mesh_.closePortal(polygons[at], polygons[at + 1]);
+    if (isQuick_ || mesh_.countFailure(polygons[at], polygons[at + 1]) < kRefutations)
+      closed_.emplace_back(polygons[at], polygons[at + 1]);
+    return true;
+  }
+
+ private:
+  NavigationMesh& mesh_;
+  const bool isQuick_;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_;
+};
+
+double computeHorizontalLength(std::vector<Vec3> points) {
+  for (Vec3& point : points) point.y() = 0;
+  return computeLength(points);
+}
+
+/// A* through the middles of portals is quick. Where its line bends, another corridor may have a
+/// shorter one.
+std::optional<Corridor> findCorridor(const NavigationMesh& mesh, const MeshPoint& from,
+                                     const MeshPoint& to) {
+  std::optional<Corridor> corridor = mesh.findCorridor(from, to);
+  if (!corridor) return corridor;
+  const std::vector<Vec3> line = mesh.straighten(*corridor, from.point, to.point);
+  const double length = computeHorizontalLength(line);
+  if (length < kNearlyStraight * computeHorizontalLength({from.point, to.point})) return corridor;
+  std::optional<Corridor> other = findShortestCorridor(mesh, from, to, length / kNearlyStraight);
+  if (other && computeLength(mesh.straighten(*other, from.point, to.point)) < computeLength(line))
+    return other;
+  return corridor;
+}
+
+NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Clearance clearance,
+                          const Vec3& from, const Vec3& to, Proof& proof) {
+  const Vec3 extent = computeMeshReach(finder);
+  const auto start = mesh.findNearest(from, extent), goal = mesh.findNearest(to, extent);
+  NavigationPath path;
+  if (!start || !goal) return path;
+  PortalClosures closures(mesh, proof.isQuick);
+  const int maxProposals = proof.isQuick ? kQuickProposals : kMaxProposals;
+  for (int proposal = 0; proposal < maxProposals; ++proposal) {
+    const auto corridor = findCorridor(mesh, *start, *goal);
+    if (!corridor) return path;
+    std::vector<Vec3> corners = mesh.straighten(*corridor, start->point, goal->point);
+    const double lineLength = computeLength(corners);
+    proof.shortestLine = std::min(proof.shortestLine, lineLength);
+    if (corners.size() > 1) corners.erase(corners.begin(), corners.begin() + 1);
+    if (!corners.empty()) corners.pop_back();
+    corners.push_back(to);
+    path.points = {from};
+    finder.walker.takeCrossedSteps();
+    proof.isRepaired = false;
+    if (proveLegs(finder, corners, clearance, path, proof)) {
+      path.points = shortenPath(finder.walker, path.points,
+                                proof.isRepaired ? Shortcuts::all : Shortcuts::free);
+      path.length = computeLength(path.points);
+      if (path.length < kShortPath || (proof.isRepaired && path.length > kTight * lineLength)) {
+        pullTight(finder.walker, path.points);
+        path.length = computeLength(path.points);
+      }
+      if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof)) {
+        for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
+          mesh.forgetFailures(corridor->polygons[i - 1], corridor->polygons[i]);
+        return path;
+      }
+    }
+    path.points.clear();
+    if (!proof.isQuick && (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0))
+      return path;  // proves nothing
+    if (!closures.closeNearest(*corridor, proof.failedAt)) return path;
+  }
+  return path;
+}
+
+NavigationPath findPathByProposals(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                   Proof& proof) {
+  NavigationPath best = findPathOn(finder, finder.ample, Clearance::ample, start, goal, proof);
+  const Vec3 extent(finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
+                    finder.agent.radius);
+  const auto first = finder.scarce.findNearest(start, extent),
+             last = finder.scarce.findNearest(goal, extent);
+  const auto shortcut = first && last ? findCorridor(finder.scarce, *first, *last) : std::nullopt;
+  if (shortcut && (!best.found() ||
+                   computeLength(finder.scarce.straighten(*shortcut, first->point, last->point)) *
+                           kWorthTrying <
+                       best.length)) {
+    NavigationPath other = findPathOn(finder, finder.scarce, Clearance::scarce, start, goal, proof);
+    if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
+  }
+  return best;
+}
+
+}  // namespace
+
+Proof::Proof(std::size_t maxRepairWalks)
+    : coarse{kCoarseSpacing, 1.5, maxRepairWalks},
+      fine{kFineSpacing, 0.7, maxRepairWalks},
+      quickWalks(std::min(kMaxQuickWalks, maxRepairWalks)) {}
+
+Vec3 computeMeshReach(const PathFinder& finder) {
+  return {3 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight, 3 * finder.agent.radius};
+}
+
+bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError) {
+  return outcome.kind == WalkOutcome::Kind::arrived &&
+         std::abs(outcome.footPosition.y() - goal.y()) <= heightError;
+}
+
+bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
+  walker.returnTo(points.front());
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const WalkOutcome outcome = walker.walkOn(points[i]);
+    if (outcome.kind == WalkOutcome::Kind::arrived) continue;
+    proof.failedAt = outcome.footPosition;
+    proof.met.push_back({outcome.obstacle, outcome.footPosition, 0});
+    return false;
+  }
+  return true;
+}
+
+/// A repair that fails takes long, and the next proposal may be as short: first all are tried with
+/// quick repairs.
+NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                Proof& proof) {
+  proof.isQuick = true;
+  proof.shortestLine = std::numeric_limits<double>::infinity();
+  NavigationPath quick = findPathByProposals(finder, start, goal, proof);
+  proof.isQuick = false;
+  if (quick.found() && quick.length <= kTight * proof.shortestLine) return quick;
+  NavigationPath best = findPathByProposals(finder, start, goal, proof);
+  return quick.found() && (!best.found() || quick.length < best.length) ? quick : best;
+}
+
+}  // namespace enfilade::scene

@@ -1,0 +1,44 @@
+// Paths on the meshes of an agent: corridors are proposed, walked, repaired and refuted.
+#pragma once
+
+#include <cstddef>
+#include <limits>
+#include <vector>
+
+#include "scene/navigation/path_finder.hpp"
+#include "scene/navigation/walk/grid_search.hpp"
+
+namespace enfilade::scene {
+
+inline constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  ///< metres, of grids
+/// A path that is shorter by less is not sought.
+inline constexpr double kWorthTrying = 1.015;
+inline constexpr double kSameFloor = 1;  ///< metres between the heights of a mesh and its floor
+
+/// The work and the obstacles of a search so far.
+struct Proof {
+  explicit Proof(std::size_t maxRepairWalks);
+
+  GridSearch coarse, fine;
+  std::size_t quickWalks;  ///< that are left
+  bool isQuick = false;    ///< what a short search does not repair is left out: proves nothing
+  double shortestLine = std::numeric_limits<double>::infinity();  ///< metres, of all proposals
+  bool isRepaired = false;                                        ///< the present proposal
+  Vec3 failedAt = Vec3::Zero();                                   ///< where the last proof failed
+  std::vector<Obstruction> met;
+};
+
+/// Metres on each axis: how far a place may be off its mesh.
+Vec3 computeMeshReach(const PathFinder& finder);
+
+/// Whether a walk arrived, also in height: the height of its goal does not stop it.
+bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError);
+
+/// Walks the whole path without a stop: after a step a place may be reached at another height.
+bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof);
+
+/// A path on the ample mesh, or on the scarce one; without a reason if none is found.
+NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                Proof& proof);
+
+}  // namespace enfilade::scene

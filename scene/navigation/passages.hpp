@@ -1,0 +1,61 @@
+// Ways off a navigation mesh, from one place of it to another. A mesh keeps some centimetres more
+// than an agent needs, so it ends before a gap that the agent just passes.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "scene/navigation/mesh/navigation_mesh.hpp"
+
+namespace enfilade::scene {
+
+/// Metres, in space.
+double computeLength(const std::vector<Vec3>& points);
+
+/// A way in one direction that an agent walked.
+struct Passage {
+  std::uint32_t fromPolygon = 0, toPolygon = 0;
+  std::vector<Vec3> points;  ///< feet, scene frame, metres
+  double length = 0;         ///< metres
+};
+
+inline constexpr double kMaxSmallArea = 1;  ///< square metres, of a part of a mesh
+
+/// The passages of a mesh.
+struct PassageList {
+  std::vector<std::uint32_t> partOf;  ///< by polygon: part of the mesh that open portals join
+  std::vector<double> areas;          ///< by part, square metres; 0: no place to stand was found
+  std::vector<Passage> passages;
+
+  bool isSmallPart(std::uint32_t polygon) const { return areas[partOf[polygon]] <= kMaxSmallArea; }
+};
+
+/// The parts of a mesh, without passages.
+PassageList listParts(const NavigationMesh& mesh);
+
+/// Two places of the rim of a mesh that face each other.
+struct RimGap {
+  std::uint32_t fromPolygon = 0, toPolygon = 0;
+  Vec3 from = Vec3::Zero(), to = Vec3::Zero();  ///< scene frame, metres
+  bool joinsParts = false;                      ///< both places are on one part otherwise
+};
+
+/// Gaps across which an agent may pass. Those between parts come first, then the shorter ones.
+/// `reach`: metres, horizontal, between parts, and `heightReach`; within a part gaps are shorter,
+/// and the way around them on the mesh is long.
+std::vector<RimGap> findRimGaps(const NavigationMesh& mesh,
+                                const std::vector<std::uint32_t>& partOf, double reach,
+                                double heightReach);
+
+/// The passages of the shortest way that uses some, in order; empty: none. `excluded`: by index of
+/// a passage. The way within a part counts as a straight line.
+struct PassageRoute {
+  std::vector<std::size_t> passages;
+  double length = 0;  ///< metres, at most that of the way
+};
+PassageRoute findPassageRoute(const PassageList& list, const MeshPoint& from, const MeshPoint& to,
+                              const std::vector<bool>& excluded);
+
+}  // namespace enfilade::scene

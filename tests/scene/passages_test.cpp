@@ -1,0 +1,94 @@
+// Passages: ways off the mesh through gaps that an agent just passes, routes of several passages,
+// and places of a mesh.
+#include "scene/navigation/passages.hpp"
+
+#include <gtest/gtest.h>
+
+#include <random>
+#include <vector>
+
+#include "scene/navigation/navigation.hpp"
+#include "scene/navigation/passage_search.hpp"
+#include "tests/scene/random_room.hpp"
+
+namespace enfilade::scene::testing {
+namespace {
+
+TEST(NavigationMesh, TheNearestPointIsWithinTheExtent) {
+  std::mt19937 random(5);
+  const NavigationMesh mesh = makeRoomMesh(random);
+  std::uniform_real_distribution<double> place(0, 12);
+  const Vec3 extent(0.05, 0.3, 0.05);
+  int found = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const Vec3 point(place(random), 0, place(random));
+    const auto nearest = mesh.findNearest(point, extent);
+    if (!nearest) continue;
+    ++found;
+    const Vec3 aside = (nearest->point - point).cwiseAbs();
+    EXPECT_TRUE((aside.array() <= extent.array()).all()) << point.transpose();
+  }
+  EXPECT_GT(found, 1000);
+  EXPECT_LT(found, 3900) << "pillars stand there";
+}
+
+/// Two rooms with a thin wall in between, of which a far part has a gap of this width.
+std::vector<NamedBox> roomsWithFarGap(double gap) {
+  return {{"floor", {0, -0.2, 0}, {8, 0, 24}},
+          {"wall/near", {3.95, 0, 0}, {4.05, 2.5, 20}},
+          {"wall/thick", {3.8, 0, 20}, {4.2, 2.5, 21}},
+          {"wall/end", {3.8, 0, 21 + gap}, {4.2, 2.5, 24}}};
+}
+
+/// The closest places of both rooms are anywhere along the wall; the gap is far from most of them.
+TEST(Passages, AGapFarFromTheClosestPlacesJoinsIslands) {
+  for (const double gap : {0.62, 0.59}) {
+    Navigation navigation(boxScene(roomsWithFarGap(gap)), {}, {});
+    const Vec3 left(3, 0, 2), right(5, 0, 2);
+    const NavigationPath path = navigation.findPath(left, right);
+    EXPECT_EQ(path.found(), gap > 0.6);
+    EXPECT_EQ(navigation.islands().size(), gap > 0.6 ? 1u : 2u);
+    EXPECT_EQ(navigation.findPath(right, left).found(), gap > 0.6);
+    EXPECT_NEAR(path.length, gap > 0.6 ? 2 * 19.5 : 0, 1);
+  }
+}
+
+/// Whether there is a path does not depend on earlier queries.
+TEST(Passages, AnAnswerDoesNotDependOnEarlierOnes) {
+  Navigation navigation(boxScene(roomsWithFarGap(0.61)), {}, {});
+  std::mt19937 random(9);
+  std::uniform_real_distribution<double> x(0.5, 3.3), z(0.5, 18);
+  for (int i = 0; i < 40; ++i) {
+    const Vec3 left(x(random), 0, z(random)), right(8 - x(random), 0, z(random));
+    EXPECT_TRUE(navigation.findPath(left, right).found()) << i;
+  }
+}
+
+Passage makePassage(std::uint32_t from, std::uint32_t to, const Vec3& start, const Vec3& end) {
+  return {from, to, {start, end}, (end - start).norm()};
+}
+
+/// Each polygon is a part of its own.
+TEST(Passages, TheShortestRouteAvoidsExcludedPassages) {
+  const PassageList list{
+      {0, 1, 2},
+      {10, 10, 10},
+      {makePassage(0, 1, {1, 0, 0}, {2, 0, 0}), makePassage(1, 2, {3, 0, 0}, {4, 0, 0}),
+       makePassage(0, 2, {0, 0, 9}, {4, 0, 9}), makePassage(2, 0, {4, 0, 0}, {1, 0, 0})}};
+  const MeshPoint from{0, {0, 0, 0}}, to{2, {5, 0, 0}};
+  std::vector<bool> excluded(4, false);
+  const PassageRoute straight = findPassageRoute(list, from, to, excluded);
+  EXPECT_EQ(straight.passages, (std::vector<std::size_t>{0, 1}));
+  EXPECT_NEAR(straight.length, 5, 1e-12);
+  excluded[1] = true;
+  const PassageRoute around = findPassageRoute(list, from, to, excluded);
+  EXPECT_EQ(around.passages, (std::vector<std::size_t>{2}));
+  EXPECT_NEAR(around.length, 9 + 4 + (Vec3(5, 0, 0) - Vec3(4, 0, 9)).norm(), 1e-12);
+  excluded[2] = true;
+  EXPECT_TRUE(findPassageRoute(list, from, to, excluded).passages.empty());
+  EXPECT_EQ(findPassageRoute(list, to, from, excluded).passages, (std::vector<std::size_t>{3}))
+      << "one direction alone";
+}
+
+}  // namespace
+}  // namespace enfilade::scene::testing
