@@ -24,6 +24,7 @@ constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed
 constexpr std::size_t kMaxQuickWalks = 3000;  // of a path
 constexpr int kQuickProposals = 4;
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
+constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less is not tried
 constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
 constexpr double kShortPath = 5;  // metres: mesh lines keep some centimetres more than is needed
 

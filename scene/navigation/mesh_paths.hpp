@@ -11,8 +11,6 @@
 namespace enfilade::scene {
 
 inline constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  ///< metres, of grids
-/// A path that is shorter by less is not sought.
-inline constexpr double kWorthTrying = 1.015;
 inline constexpr double kSameFloor = 1;  ///< metres between the heights of a mesh and its floor
 
 /// The work and the obstacles of a search so far.

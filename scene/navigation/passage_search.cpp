@@ -13,16 +13,16 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kHeightReach = 0.6;  // metres between both sides of a gap
-constexpr double kMaxGapDetour = 6;   // metres: a longer way around a gap does not pass it
-constexpr double kSpacing = 0.12;     // metres
-constexpr double kGapMargin = 1.6;    // metres around the beginning of a way across a gap
-constexpr double kNearStart = 0.3, kNearEnd = 0.5;  // metres
-constexpr double kMaxStraightGap = 1;               // metres
-constexpr double kLineSpacing = 0.01;               // metres
-constexpr int kMaxLines = 26;                       // to each side: gaps are tried every 0.5 m
-constexpr double kMinRise = 0.1;                    // metres between both sides of furniture
-constexpr double kSameGap = 0.8;                    // metres between ends of passages
+constexpr double kHeightReach = 0.6;       // metres between both sides of a gap
+constexpr double kMaxGapDetour = 6;        // metres: a longer way around a gap does not pass it
+constexpr double kSpacing = 0.12;          // metres
+constexpr double kGapMargin = 1.6;         // metres around the beginning of a way across a gap
+constexpr double kNearStart = 0.3;         // metres
+constexpr double kMaxStraightGap = 1;      // metres
+constexpr double kLineSpacing = 0.01;      // metres
+constexpr int kMaxLines = 26;              // to each side: gaps are tried every 0.5 m
+constexpr double kMinRise = 0.1;           // metres between both sides of furniture
+constexpr double kSameGap = 0.8;           // metres between ends of passages
 constexpr std::size_t kMaxWalks = 60'000;  // on grids, of all gaps: some tenths of a second
 constexpr std::size_t kGapWalks = 1000;
 // Of the exits of small islands. Some hundred find an exit nearby, thousands one through a long
@@ -129,9 +129,7 @@ GapWays crossOnGrid(Collection& all, const RimGap& gap) {
   if (!start) return {};
   const auto isWanted = [&](const Vec3& feet) {
     const auto polygon = findPolygonAt(mesh, feet);
-    return polygon &&
-           (gap.joinsParts ? all.list.partOf[*polygon] != all.list.partOf[gap.fromPolygon]
-                           : computeGroundDistance(feet, gap.to) < kNearEnd);
+    return polygon && all.list.partOf[*polygon] != all.list.partOf[gap.fromPolygon];
   };
   const auto isOpen = [&](const Vec3& feet) {
     return computeGroundDistance(feet, *start) < kNearStart || !findPolygonAt(mesh, feet);
@@ -186,7 +184,7 @@ void crossGap(Collection& all, const RimGap& gap) {
   auto known = all.tried.find(key);
   if (known == all.tried.end()) {
     const double width = computeGroundDistance(gap.from, gap.to);
-    const bool isOnScarce = gap.joinsParts && isOnScarceMesh(all, gap);
+    const bool isOnScarce = isOnScarceMesh(all, gap);
     // The other gaps of joined islands are found by searches on the scarce mesh.
     if (isOnScarce ? all.joined.contains({a, b}) : all.walksLeft == 0 || width > kGapMargin) return;
     GapWays ways = isOnScarce ? crossOnScarceMesh(all, gap) : crossOnGrid(all, gap);

@@ -16,8 +16,8 @@ struct GapWays {
   std::vector<Vec3> there, back;
 };
 
-/// Gaps that were tried, by the coordinates of both places: most stay as they are when a body moves.
-/// The exit of a small island has its place twice.
+/// Gaps that were tried, by the coordinates of both places: most stay as they are when a body
+/// moves. The exit of a small island has its place twice.
 using TriedGaps = std::map<std::array<double, 6>, GapWays>;
 
 /// All passages of `finder.ample`. `islands`: as collectIslands() returns them.

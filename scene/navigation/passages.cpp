@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <queue>
 #include <utility>
 
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -15,41 +14,8 @@ namespace {
 
 constexpr double kSampleSpacing = 0.25;  // metres along the rim
 constexpr double kMinFacing = 0.5;       // cosine of the angle between a gap and the rim's outside
-constexpr double kMaxPartGap = 0.75;     // metres within a part: a wall separates by more
-constexpr double kMinDetour = 1.5;       // metres that a passage within a part must save
 constexpr double kClusterSize = 0.5;     // metres: of gaps whose middles are closer one is kept
 constexpr double kNone = std::numeric_limits<double>::infinity();
-
-/// Whether a way on the mesh from a point of one polygon to one of another is short.
-bool isNearOnMesh(const NavigationMesh& mesh, const RimGap& gap, double maxLength) {
-  std::map<std::uint32_t, double> lengths;  // to where a polygon is entered
-  using Entry = std::pair<double, std::pair<std::uint32_t, std::array<double, 3>>>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
-  const auto push = [&](double length, std::uint32_t polygon, const Vec3& at) {
-    const auto [known, isNew] = lengths.try_emplace(polygon, length);
-    if (!isNew && known->second <= length) return;
-    known->second = length;
-    open.push({length, {polygon, {at.x(), at.y(), at.z()}}});
-  };
-  push(0, gap.fromPolygon, gap.from);
-  while (!open.empty()) {
-    const auto [length, place] = open.top();
-    open.pop();
-    const Vec3 at(place.second[0], place.second[1], place.second[2]);
-    if (place.first == gap.toPolygon && length + (gap.to - at).norm() <= maxLength) return true;
-    if (length > lengths[place.first]) continue;
-    for (const Portal& portal : mesh.portals(place.first)) {
-      const Vec3 side = portal.high - portal.low;
-      const double squared = side.squaredNorm();
-      const double share =
-          squared > 0 ? std::clamp(side.dot(at - portal.low) / squared, 0.0, 1.0) : 0.5;
-      const Vec3 crossing = portal.low + share * side;
-      const double next = length + (crossing - at).norm();
-      if (!portal.closed && next <= maxLength) push(next, portal.to, crossing);
-    }
-  }
-  return false;
-}
 
 }  // namespace
 
@@ -90,21 +56,17 @@ std::vector<RimGap> findRimGaps(const NavigationMesh& mesh,
   const auto addGapsAt = [&](const BoundaryEdge& edge, const Vec3& from) {
     std::map<std::uint32_t, Candidate> nearest;  // by part
     for (const std::uint32_t other : mesh.findPolygons(from, {reach, heightReach, reach})) {
-      if (other == edge.polygon) continue;
-      RimGap gap{edge.polygon, other, from, mesh.closestPoint(other, from),
-                 partOf[edge.polygon] != partOf[other]};
+      if (partOf[other] == partOf[edge.polygon]) continue;
+      const RimGap gap{edge.polygon, other, from, mesh.closestPoint(other, from)};
       const Vec3 across = projectToGround(gap.to - from);
       const double length = across.norm();
-      if (length > (gap.joinsParts ? reach : kMaxPartGap) || !(length > 0) ||
-          std::abs(gap.to.y() - from.y()) > heightReach ||
+      if (length > reach || !(length > 0) || std::abs(gap.to.y() - from.y()) > heightReach ||
           across.dot(edge.outward) < kMinFacing * length)
         continue;
       const auto [known, isNew] = nearest.try_emplace(partOf[other], Candidate{length, gap});
       if (!isNew && length < known->second.length) known->second = {length, gap};
     }
-    for (const auto& [part, one] : nearest)
-      if (one.gap.joinsParts || !isNearOnMesh(mesh, one.gap, one.length + kMinDetour))
-        add(one.gap, one.length);
+    for (const auto& [part, one] : nearest) add(one.gap, one.length);
   };
   for (const BoundaryEdge& edge : mesh.collectBoundary()) {
     const double length = (edge.to - edge.from).norm();
@@ -114,9 +76,7 @@ std::vector<RimGap> findRimGaps(const NavigationMesh& mesh,
   }
   std::vector<Candidate> candidates;
   for (const auto& [key, candidate] : clusters) candidates.push_back(candidate);
-  std::ranges::stable_sort(candidates, {}, [](const Candidate& one) {
-    return std::pair(!one.gap.joinsParts, one.length);
-  });
+  std::ranges::stable_sort(candidates, {}, &Candidate::length);
   std::vector<RimGap> gaps;
   for (const Candidate& one : candidates) gaps.push_back(one.gap);
   return gaps;

@@ -35,26 +35,23 @@ struct PassageList {
 /// The parts of a mesh, without passages.
 PassageList listParts(const NavigationMesh& mesh);
 
-/// Two places of the rim of a mesh that face each other.
+/// Two places of the rim of a mesh that face each other, on different parts.
 struct RimGap {
   std::uint32_t fromPolygon = 0, toPolygon = 0;
   Vec3 from = Vec3::Zero(), to = Vec3::Zero();  ///< scene frame, metres
-  bool joinsParts = false;                      ///< both places are on one part otherwise
 };
 
-/// Gaps across which an agent may pass. Those between parts come first, then the shorter ones.
-/// `reach`: metres, horizontal, between parts, and `heightReach`; within a part gaps are shorter,
-/// and the way around them on the mesh is long.
+/// Gaps up to `reach` metres, horizontally, across which an agent may pass: the shortest first.
 std::vector<RimGap> findRimGaps(const NavigationMesh& mesh,
                                 const std::vector<std::uint32_t>& partOf, double reach,
                                 double heightReach);
 
-/// The passages of the shortest way that uses some, in order; empty: none. `excluded`: by index of
-/// a passage. The way within a part counts as a straight line.
+/// The passages of the shortest way that leads through some, in order; empty: none.
 struct PassageRoute {
   std::vector<std::size_t> passages;
   double length = 0;  ///< metres, at most that of the way
 };
+/// `excluded`: by index of a passage. The way within a part counts as a straight line.
 PassageRoute findPassageRoute(const PassageList& list, const MeshPoint& from, const MeshPoint& to,
                               const std::vector<bool>& excluded);
 

@@ -149,9 +149,8 @@ NavigationPath proveWay(const PathFinder& finder, const std::vector<Vec3>& way, 
   return path;
 }
 
-/// A path through passages that is shorter than `limit`, metres.
 NavigationPath findPathByPassages(const PathFinder& finder, const Vec3& start, const Vec3& goal,
-                                  double limit, Proof& proof) {
+                                  Proof& proof) {
   const auto findNear = [&](const Vec3& place) {
     const auto near = finder.ample.findNearest(place, {kOnMesh, kHeightError, kOnMesh});
     return near ? near : finder.ample.findNearest(place, computeMeshReach(finder));
@@ -161,12 +160,12 @@ NavigationPath findPathByPassages(const PathFinder& finder, const Vec3& start, c
   std::vector<bool> excluded(finder.passages->passages.size(), false);
   for (int i = 0; i < kMaxPassageRoutes; ++i) {
     const PassageRoute route = findPassageRoute(*finder.passages, *from, *to, excluded);
-    if (route.passages.empty() || route.length >= limit) break;
+    if (route.passages.empty()) break;
     std::vector<Vec3> way;
     const auto failed = walkRoute(finder, route, start, goal, proof, way);
     if (!failed) {
       NavigationPath path = proveWay(finder, way, proof);
-      if (path.found() && path.length < limit) return path;
+      if (path.found()) return path;
     }
     excluded[route.passages[std::min(failed.value_or(0), route.passages.size() - 1)]] = true;
   }
@@ -175,11 +174,8 @@ NavigationPath findPathByPassages(const PathFinder& finder, const Vec3& start, c
 
 NavigationPath findPathOnMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
                                 Proof& proof) {
-  NavigationPath best = findPathByMeshes(finder, start, goal, proof);
-  const double limit =
-      best.found() ? best.length / kWorthTrying : std::numeric_limits<double>::infinity();
-  NavigationPath other = findPathByPassages(finder, start, goal, limit, proof);
-  return other.found() ? other : best;
+  NavigationPath path = findPathByMeshes(finder, start, goal, proof);
+  return path.found() ? path : findPathByPassages(finder, start, goal, proof);
 }
 
 /// Places without a mesh, as narrow ones on furniture, or on a small part of one, are connected
