@@ -72,9 +72,10 @@ std::string describeExternalReaders(const fs::path& file) {
   if (!location.missing.empty()) return " without web-ifc";
   const fs::path folder = fs::path(location.script).parent_path();
   std::string text = " web-ifc";
-  for (const char* part : {"read_ifc.js", "worker_io.js", "convert_ifcxml.js", "ifcxml_document.js",
-                           "ifcxml_converter.js", "ifc_schema.js", "step_text.js",
-                           "node_modules/web-ifc/package.json", "node_modules/saxes/package.json"})
+  for (const char* part :
+       {"read_ifc.js", "engine.js", "worker_io.js", "convert_ifcxml.js", "ifcxml_document.js",
+        "ifcxml_converter.js", "ifc_schema.js", "step_text.js", "node_modules/web-ifc/package.json",
+        "node_modules/saxes/package.json"})
     text += " " + toHex(computeFileHash(folder / part).value_or(ContentHash{}));
   return text;
 }

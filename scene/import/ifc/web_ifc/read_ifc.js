@@ -6,8 +6,7 @@
 // of ranges of the file (64 bits), the first byte and the size of each (64 bits), and the express
 // ids of the requested products (32 bits). Products before index FIRST are done. The contents of the
 // messages are documented in scene/import/ifc/ifc_meshes.hpp.
-import { createRequire } from 'node:module';
-
+import { openModel, startEngine } from './engine.js';
 import {
   IFC_FILE, WANTED, packDoubles, packWords, readAll, readInto, sendMessage, sendProgress,
 } from './worker_io.js';
@@ -16,8 +15,8 @@ const FLOATS_A_VERTEX = 6; // position and normal, as web-ifc delivers them
 
 // Words of 32 bits in the memory of web-ifc, as bytes, without the copy that GetVertexArray makes.
 // Valid until web-ifc allocates.
-function viewWords(api, address, count) {
-  return Buffer.from(api.wasmModule.HEAPF32.buffer, address, 4 * count);
+function viewWords(engine, address, count) {
+  return Buffer.from(engine.HEAPU8.buffer, address, 4 * count);
 }
 
 function readList() {
@@ -39,45 +38,41 @@ function nameKnownSchema(bytes) {
   if (at >= 0) bytes.write("'IFC4X3'    ", at, 'latin1');
 }
 
-// Returns a function that reads a block of the ranges' text into a buffer, which it reuses: web-ifc
-// copies each block, so that the text is never in memory twice.
+// Returns a function that fills a block with the ranges' text from `offset` on.
 function makeReader(ranges) {
-  let buffer = Buffer.alloc(0);
-  return (offset, size) => {
-    if (buffer.length < size) buffer = Buffer.alloc(size);
+  return (block, offset) => {
     let done = 0;
     for (const { start, first, size: length } of ranges) {
       if (start + length <= offset + done) continue;
       const from = offset + done - start;
-      const wanted = Math.min(size - done, length - from);
-      readInto(IFC_FILE, buffer.subarray(done, done + wanted), first + from);
+      const wanted = Math.min(block.length - done, length - from);
+      readInto(IFC_FILE, block.subarray(done, done + wanted), first + from);
       done += wanted;
-      if (done === size) break;
+      if (done === block.length) break;
     }
-    const block = buffer.subarray(0, done);
-    if (offset === 0) nameKnownSchema(block);
-    return block;
+    if (offset === 0) nameKnownSchema(Buffer.from(block.buffer, block.byteOffset, done));
+    return done;
   };
 }
 
 // Sends each geometry once, before the first product that uses it.
-function sendGeometry(api, model, id, known) {
+function sendGeometry(engine, model, id, known) {
   if (known.has(id)) return;
   known.add(id);
-  const geometry = api.GetGeometry(model, id);
-  const vertices = viewWords(api, geometry.GetVertexData(), geometry.GetVertexDataSize());
-  const indices = viewWords(api, geometry.GetIndexData(), geometry.GetIndexDataSize());
+  const geometry = engine.GetGeometry(model, id);
+  const vertices = viewWords(engine, geometry.GetVertexData(), geometry.GetVertexDataSize());
+  const indices = viewWords(engine, geometry.GetIndexData(), geometry.GetIndexDataSize());
   sendMessage('G', [packWords(id, vertices.length / 4 / FLOATS_A_VERTEX, indices.length / 4)],
             [vertices, indices]);
   geometry.delete();
 }
 
-function sendProduct(api, model, mesh, known) {
+function sendProduct(engine, model, mesh, known) {
   const parts = [];
   const count = mesh.geometries.size();
   for (let i = 0; i < count; ++i) {
     const placed = mesh.geometries.get(i);
-    sendGeometry(api, model, placed.geometryExpressID, known);
+    sendGeometry(engine, model, placed.geometryExpressID, known);
     const { x, y, z, w } = placed.color;
     parts.push(packWords(placed.geometryExpressID), packDoubles(x, y, z, w, ...placed.flatTransformation));
   }
@@ -97,12 +92,10 @@ function describeError(error) {
 
 async function main() {
   const first = Number(process.argv[2]);
-  const { IfcAPI, LogLevel } = createRequire(import.meta.url)('web-ifc');
-  const api = new IfcAPI();
-  await api.Init();
-  api.SetLogLevel(LogLevel.LOG_LEVEL_OFF); // it logs to stdout otherwise
+  const started = await startEngine();
+  const { engine } = started;
   const { ranges, wanted } = readList();
-  const model = api.OpenModelFromCallback(makeReader(ranges));
+  const model = openModel(started, makeReader(ranges));
   if (model < 0) {
     sendMessage('E', [Buffer.from('web-ifc does not know its schema')]);
     return 1;
@@ -112,7 +105,8 @@ async function main() {
     sendMessage('T', [packWords(i)]); // identifies the product if this process dies
     if (i % 64 === 0) sendProgress('shapes (web-ifc)', i / wanted.length);
     try {
-      api.StreamMeshes(model, [wanted[i]], (mesh) => sendProduct(api, model, mesh, known));
+      const send = (mesh) => sendProduct(engine, model, mesh, known);
+      engine.StreamMeshes(model, [wanted[i]], send, true); // in metres
     } catch (error) {
       sendMessage('F', [packWords(wanted[i]), Buffer.from(describeError(error))]);
       if (isBroken(error)) return 1; // the importer starts another process for the rest
