@@ -2,7 +2,9 @@
 
 #include <bit>
 #include <map>
+#include <span>
 
+#include "scene/import/file/content_hash.hpp"
 #include "scene/model/hasher.hpp"
 
 namespace enfilade::scene {
@@ -10,26 +12,21 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffff;
 
-template <class Vector>
-void addVectorBits(Hasher& hash, const std::vector<Vector>& values) {
+template <class T>
+void addBytes(Hasher& hash, const std::vector<T>& values) {
+  const ContentHash bytes = computeContentHash(std::as_bytes(std::span(values)));
   hash.add(std::uint64_t{values.size()});
-  for (const Vector& v : values) {
-    for (Eigen::Index i = 0; i < v.size(); ++i) {
-      hash.add(std::uint64_t{std::bit_cast<std::uint32_t>(v[i])});
-    }
-  }
+  hash.add(bytes.high);
+  hash.add(bytes.low);
 }
 
 std::uint64_t computeMeshHash(const Mesh& mesh) {
   Hasher hash;
-  addVectorBits(hash, mesh.positions);
-  addVectorBits(hash, mesh.normals);
-  addVectorBits(hash, mesh.uvs);
-  hash.add(std::uint64_t{mesh.colours.size()});
-  for (const VertexColour colour : mesh.colours)
-    hash.add(std::uint64_t{std::bit_cast<std::uint32_t>(colour)});
-  hash.add(std::uint64_t{mesh.indices.size()});
-  for (const std::uint32_t i : mesh.indices) hash.add(std::uint64_t{i});
+  addBytes(hash, mesh.positions);
+  addBytes(hash, mesh.normals);
+  addBytes(hash, mesh.uvs);
+  addBytes(hash, mesh.colours);
+  addBytes(hash, mesh.indices);
   hash.add(std::uint64_t{mesh.material});
   return hash.value();
 }
