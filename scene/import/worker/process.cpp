@@ -12,10 +12,13 @@
 #include <cerrno>
 #include <charconv>
 #include <chrono>
+#include <cstdlib>
 #include <cstring>
 #include <limits>
+#include <new>
 #include <thread>
 #include <utility>
+#include <vector>
 
 extern char** environ;
 
@@ -24,7 +27,8 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kReadSize = 1 << 18;  // bytes per read from the pipe
+constexpr std::size_t kReadSize = 1 << 18;  // bytes per read from the pipe, at least
+constexpr int kPipeSize = 1 << 20;          // bytes; the writer waits less often than at 64 KiB
 constexpr double kExitTimeout = 10;    // seconds between the end of the pipe and of the process
 constexpr double kMaxPollWait = 3600;  // seconds; poll() counts milliseconds in an int
 
@@ -195,6 +199,7 @@ std::array<int, 2> openPipe(const ImportRequest& request) {
   };
   if (pipe2(ends.data(), O_CLOEXEC) != 0) fail();
   const FileDescriptor lowRead(ends[0]), lowWrite(ends[1]);
+  fcntl(lowRead.get(), F_SETPIPE_SZ, kPipeSize);  // refused where users have few pages for pipes
   FileDescriptor readEnd(fcntl(lowRead.get(), F_DUPFD_CLOEXEC, kFirstParentDescriptor));
   FileDescriptor writeEnd(fcntl(lowWrite.get(), F_DUPFD_CLOEXEC, kFirstParentDescriptor));
   if (readEnd.get() < 0 || writeEnd.get() < 0) fail();
@@ -207,32 +212,52 @@ bool isMessageKind(std::uint8_t kind) {
   return std::string_view("PEMTGOFDXW").find(static_cast<char>(kind)) != std::string_view::npos;
 }
 
-/// Assembles messages from bytes.
+/// Assembles messages from bytes. Its memory grows by realloc(), which moves the pages of large
+/// blocks instead of copying them.
 class MessageBuffer {
  public:
   /// A message may not exceed the memory that its writer may use.
   explicit MessageBuffer(std::size_t maxMessageSize) : maxMessageSize_(maxMessageSize) {}
-  /// Returns false if the bytes are invalid.
-  bool append(std::span<const std::byte> bytes, const MessageHandler& handler) {
-    buffer_.insert(buffer_.end(), bytes.begin(), bytes.end());
-    std::size_t used = 0;
-    while (buffer_.size() - used >= ImportMessageHeader::kSize) {
-      ImportMessageHeader header{};
-      header.kind = static_cast<std::uint8_t>(buffer_[used]);
-      std::memcpy(&header.size, buffer_.data() + used + 1, sizeof header.size);
-      if (!isMessageKind(header.kind) || header.size > maxMessageSize_) return false;
-      if (header.size > buffer_.size() - used - ImportMessageHeader::kSize) break;
-      const std::span body(buffer_.data() + used + ImportMessageHeader::kSize, header.size);
-      if (!handler(static_cast<ImportMessage>(header.kind), body)) return false;
-      used += ImportMessageHeader::kSize + header.size;
+  ~MessageBuffer() { std::free(bytes_); }
+  MessageBuffer(const MessageBuffer&) = delete;
+  MessageBuffer& operator=(const MessageBuffer&) = delete;
+
+  /// Room for the next bytes. Its size is at least kReadSize.
+  std::span<std::byte> reserve() {
+    if (begin_ > 0 && (begin_ == end_ || capacity_ - end_ < kReadSize)) {
+      std::memmove(bytes_, bytes_ + begin_, end_ - begin_);
+      end_ -= std::exchange(begin_, 0);
     }
-    buffer_.erase(buffer_.begin(), buffer_.begin() + static_cast<std::ptrdiff_t>(used));
+    if (capacity_ - end_ < kReadSize) {
+      const std::size_t capacity = std::max(2 * capacity_, end_ + kReadSize);
+      void* const grown = std::realloc(bytes_, capacity);
+      if (grown == nullptr) throw std::bad_alloc();
+      bytes_ = static_cast<std::byte*>(grown);
+      capacity_ = capacity;
+    }
+    return {bytes_ + end_, capacity_ - end_};
+  }
+  /// Takes `count` bytes that lie in the room. Returns false if they are invalid.
+  bool append(std::size_t count, const MessageHandler& handler) {
+    end_ += count;
+    while (end_ - begin_ >= ImportMessageHeader::kSize) {
+      ImportMessageHeader header{};
+      const std::byte* const message = bytes_ + begin_;
+      header.kind = static_cast<std::uint8_t>(*message);
+      std::memcpy(&header.size, message + 1, sizeof header.size);
+      if (!isMessageKind(header.kind) || header.size > maxMessageSize_) return false;
+      if (header.size > end_ - begin_ - ImportMessageHeader::kSize) break;
+      const std::span body(message + ImportMessageHeader::kSize, header.size);
+      if (!handler(static_cast<ImportMessage>(header.kind), body)) return false;
+      begin_ += ImportMessageHeader::kSize + header.size;
+    }
     return true;
   }
 
  private:
   std::size_t maxMessageSize_;
-  std::vector<std::byte> buffer_;
+  std::byte* bytes_ = nullptr;  // those from begin_ to end_ are not handled yet
+  std::size_t begin_ = 0, end_ = 0, capacity_ = 0;
 };
 
 double secondsSince(Clock::time_point start) {
@@ -245,7 +270,6 @@ ImportExit::Reason receiveMessages(int readEnd, const ImportRequest& request,
                                    const std::function<double()>& stallLimit) {
   const auto start = Clock::now();
   auto lastMessage = start;
-  std::vector<std::byte> chunk(kReadSize);
   MessageBuffer messages(request.options.memoryLimit > 0 ? request.options.memoryLimit
                                                          : std::numeric_limits<std::size_t>::max());
   for (;;) {  // ends with the time limit at the latest
@@ -256,13 +280,13 @@ ImportExit::Reason receiveMessages(int readEnd, const ImportRequest& request,
     const double wait = std::min({left, stallTime, kMaxPollWait});
     pollfd waiting{readEnd, POLLIN, 0};
     if (poll(&waiting, 1, static_cast<int>(wait * 1000) + 1) <= 0) continue;  // or interrupted
-    const ssize_t size = read(readEnd, chunk.data(), chunk.size());
+    const std::span<std::byte> room = messages.reserve();
+    const ssize_t size = read(readEnd, room.data(), room.size());
     if (size < 0 && errno == EINTR) continue;
     if (size <= 0) return ImportExit::Reason::exited;
     lastMessage = Clock::now();
-    if (!messages.append(std::span(chunk).first(static_cast<std::size_t>(size)), handler)) {
+    if (!messages.append(static_cast<std::size_t>(size), handler))
       return ImportExit::Reason::malformed;
-    }
   }
 }
 
