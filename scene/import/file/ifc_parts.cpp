@@ -219,7 +219,10 @@ class IfcDivider {
 std::vector<IfcPart> divideIfc(const StepFile& file, const std::vector<std::uint32_t>& products,
                                std::size_t count) {
   ENFILADE_ASSERT(count > 0 && count <= 8);  // bits of a PartMask
-  return IfcDivider(file, products, count).divide();
+  std::vector<IfcPart> parts = IfcDivider(file, products, count).divide();
+  if (std::ranges::any_of(parts, [](const IfcPart& part) { return part.products.empty(); }))
+    parts.clear();
+  return parts;
 }
 
 }  // namespace enfilade::scene

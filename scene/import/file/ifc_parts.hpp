@@ -22,7 +22,7 @@ struct IfcPart {
 
 /// Divides `products` among `count` (1..8) parts of about equal bytes of geometry. Products that
 /// share a mapped geometry share a part. A part lacks only statements that shapes of products in
-/// other parts refer to, and nothing else.
+/// other parts refer to, and nothing else. Empty: a part would have no product.
 std::vector<IfcPart> divideIfc(const StepFile& file, const std::vector<std::uint32_t>& products,
                                std::size_t count);
 

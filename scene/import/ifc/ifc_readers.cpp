@@ -4,15 +4,15 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <array>
 #include <cerrno>
 #include <chrono>
 #include <cstring>
-#include <future>
 #include <limits>
-#include <mutex>
 #include <numeric>
+#include <utility>
 
-#include "scene/import/ifc/web_ifc.hpp"
+#include "collision/assert.hpp"
 #include "scene/import/worker/model_stream.hpp"
 
 namespace enfilade::scene {
@@ -23,28 +23,52 @@ using Clock = std::chrono::steady_clock;
 constexpr int kMaxStarts = 8;           // of web-ifc per part of a file; each parses the part again
 constexpr double kProductTimeout = 20;  // seconds that web-ifc may spend on one product
 
-/// Copies `bytes` to anonymous memory and returns its file descriptor.
-int createSharedMemory(const void* bytes, std::size_t size, const std::string& file) {
-  int fd = -1;
-  const auto fail = [&] {
-    const std::string reason = std::strerror(errno);
-    if (fd >= 0) close(fd);
-    throw ImportError(file + ": no memory to pass the file to its reader: " + reason);
-  };
-  const int low = memfd_create("enfilade-ifc", MFD_CLOEXEC);
-  if (low < 0) fail();
-  fd = fcntl(low, F_DUPFD_CLOEXEC, kFirstParentDescriptor);
+[[noreturn]] void throwNoMemory(const std::string& file) {
+  throw ImportError(file + ": no memory to pass the file to its reader: " + std::strerror(errno));
+}
+
+/// Moves a descriptor out of the way of those of a worker; -1 stays.
+int moveUp(int low) {
+  if (low < 0) return -1;
+  const int fd = fcntl(low, F_DUPFD_CLOEXEC, kFirstParentDescriptor);
   close(low);
-  if (fd < 0) fail();
+  return fd;
+}
+
+/// Anonymous memory, as a file descriptor.
+int openSharedMemory(const std::string& file) {
+  const int fd = moveUp(memfd_create("enfilade-ifc", MFD_CLOEXEC));
+  if (fd < 0) throwNoMemory(file);
+  return fd;
+}
+
+void writeShared(int fd, const void* bytes, std::size_t size, const std::string& file) {
   const auto* next = static_cast<const char*>(bytes);
   while (size > 0) {
     const ssize_t written = write(fd, next, size);
     if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) fail();
+    if (written <= 0) throwNoMemory(file);
     next += written;
     size -= static_cast<std::size_t>(written);
   }
-  return fd;
+}
+
+/// The list for a process of web-ifc, as read_ifc.js documents it.
+std::string formatList(const IfcPart& part) {
+  const std::uint64_t count = part.ranges.size();
+  std::string list;
+  const auto append = [&](const auto* values, std::size_t size) {
+    list.append(reinterpret_cast<const char*>(values), size);
+  };
+  append(&count, sizeof count);
+  append(part.ranges.data(), part.ranges.size() * sizeof part.ranges[0]);
+  append(part.products.data(), part.products.size() * sizeof part.products[0]);
+  return list;
+}
+
+void closeIfOpen(int& fd) {
+  if (fd >= 0) close(fd);
+  fd = -1;
 }
 
 /// Status that a reader has reported so far.
@@ -97,32 +121,41 @@ double noTimeout() {
 
 }  // namespace
 
-IfcInput::IfcInput(const ImportRequest& request, const std::string& text,
-                   std::vector<std::uint32_t> wanted, const std::vector<IfcPart>& parts)
-    : IfcInput(request) {  // so that the destructor runs if something below throws
-  fileDescriptor_ = createSharedMemory(text.data(), text.size(), request.file);
-  listDescriptor_ =
-      createSharedMemory(wanted.data(), wanted.size() * sizeof wanted[0], request.file);
-  for (const IfcPart& part : parts) addPart(part);
-  if (parts.empty()) addPart({std::move(wanted), {{0, text.size()}}});
+IfcInput::IfcInput(const ImportRequest& request, std::size_t parts)
+    : request_(request), parts_(parts) {
+  std::array<int, 2> ends{-1, -1};
+  if (pipe2(ends.data(), O_CLOEXEC) != 0) throwNoMemory(request.file);
+  readyDescriptor_ = moveUp(ends[0]);
+  unreadyDescriptor_ = moveUp(ends[1]);
+  fileDescriptor_ = openSharedMemory(request.file);
+  listDescriptor_ = openSharedMemory(request.file);
+  for (Part& part : parts_) part.listDescriptor = openSharedMemory(request.file);
 }
 
-void IfcInput::addPart(const IfcPart& part) {
-  const std::uint64_t count = part.ranges.size();
-  const auto append = [](std::string& to, const auto* values, std::size_t size) {
-    to.append(reinterpret_cast<const char*>(values), size);
-  };
-  std::string list;
-  append(list, &count, sizeof count);
-  append(list, part.ranges.data(), part.ranges.size() * sizeof part.ranges[0]);
-  append(list, part.products.data(), part.products.size() * sizeof part.products[0]);
-  parts_.push_back({part.products, createSharedMemory(list.data(), list.size(), request_.file)});
+void IfcInput::fill(const std::string& text, std::vector<std::uint32_t> wanted,
+                    std::vector<IfcPart> parts) {
+  ENFILADE_ASSERT(parts.size() <= parts_.size());
+  writeShared(fileDescriptor_, text.data(), text.size(), request_.file);
+  writeShared(listDescriptor_, wanted.data(), wanted.size() * sizeof wanted[0], request_.file);
+  if (parts.empty()) parts.push_back({std::move(wanted), {{0, text.size()}}});
+  for (std::size_t i = 0; i < parts.size(); ++i) {
+    const std::string list = formatList(parts[i]);
+    writeShared(parts_[i].listDescriptor, list.data(), list.size(), request_.file);
+    parts_[i].products = std::move(parts[i].products);
+  }
+  abandon();
+}
+
+void IfcInput::abandon() {
+  if (unreadyDescriptor_ < 0) return;
+  closeIfOpen(unreadyDescriptor_);
+  filled_.count_down();
 }
 
 IfcInput::~IfcInput() {
-  close(fileDescriptor_);
-  close(listDescriptor_);
-  for (const Part& part : parts_) close(part.listDescriptor);
+  for (int* fd : {&fileDescriptor_, &listDescriptor_, &readyDescriptor_, &unreadyDescriptor_})
+    closeIfOpen(*fd);
+  for (Part& part : parts_) closeIfOpen(part.listDescriptor);
 }
 
 ImportRequest IfcInput::makeRequest(ImportTask task, double timeLimit) const {
@@ -131,6 +164,13 @@ ImportRequest IfcInput::makeRequest(ImportTask task, double timeLimit) const {
   request.options.timeLimit = timeLimit;
   request.ifcFile = fileDescriptor_;
   request.ifcProductIds = listDescriptor_;
+  return request;
+}
+
+ImportRequest IfcInput::makePartRequest(std::size_t part, double timeLimit) const {
+  ImportRequest request = makeRequest(ImportTask::webIfc, timeLimit);
+  request.ifcProductIds = parts_[part].listDescriptor;
+  request.ifcReady = readyDescriptor_;
   return request;
 }
 
@@ -145,19 +185,49 @@ void markNotTried(std::size_t first, const std::vector<std::uint32_t>& wanted,
       result.meshes.failures.try_emplace(wanted[i], "not tried: web-ifc " + result.failure);
 }
 
-IfcReadResult readPart(const IfcInput& input, const IfcInput::Part& part,
-                       const WebIfcLocation& location, double timeLimit,
-                       const ImportProgress& progress) {
+/// A geometry that several parts deliver is the same in each.
+void mergeResult(IfcReadResult&& from, IfcReadResult& to) {
+  to.meshes.geometries.merge(from.meshes.geometries);
+  to.meshes.products.merge(from.meshes.products);
+  to.meshes.failures.merge(from.meshes.failures);
+  if (to.failure.empty()) to.failure = std::move(from.failure);
+}
+
+}  // namespace
+
+WebIfcReading::WebIfcReading(IfcInput& input, double timeLimit, const ImportProgress& progress)
+    : input_(input), location_(findWebIfc()), progress_(progress), fractions_(input.partCount()) {
+  if (!location_.missing.empty()) return;
+  for (std::size_t i = 0; i < input.partCount(); ++i)  // one after another where threads are short
+    readings_.push_back(std::async(std::launch::async | std::launch::deferred,
+                                   [this, i, timeLimit] { return readPart(i, timeLimit); }));
+}
+
+WebIfcReading::~WebIfcReading() {
+  input_.abandon();
+}
+
+void WebIfcReading::reportProgress(std::size_t part, const std::string& stage, double fraction) {
+  const std::lock_guard lock(mutex_);
+  fractions_[part] = fraction;
+  if (progress_)
+    progress_(stage, std::reduce(fractions_.begin(), fractions_.end()) /
+                         static_cast<double>(fractions_.size()));
+}
+
+IfcReadResult WebIfcReading::readPart(std::size_t part, double timeLimit) {
   IfcReadResult result;
-  const std::vector<std::uint32_t>& products = part.products;
   const auto start = Clock::now();
+  const std::vector<std::uint32_t>& products = input_.products(part);  // not before it is filled
+  const ImportProgress progress = [&](const std::string& stage, double fraction) {
+    reportProgress(part, stage, fraction);
+  };
   std::uint32_t first = 0;
   for (int starts = 0; starts < kMaxStarts; ++starts) {
     const double used = std::chrono::duration<double>(Clock::now() - start).count();
-    ImportRequest request = input.makeRequest(ImportTask::webIfc, timeLimit - used);
-    request.ifcProductIds = part.listDescriptor;
-    request.program = location.node;
-    request.script = location.script;
+    ImportRequest request = input_.makePartRequest(part, timeLimit - used);
+    request.program = location_.node;
+    request.script = location_.script;
     request.firstProduct = first;
     ReaderStatus status;
     const ImportExit end = runImportProcess(
@@ -166,6 +236,7 @@ IfcReadResult readPart(const IfcInput& input, const IfcInput::Part& part,
           return handleMessage(kind, body, progress, status, result.meshes);
         },
         [&] { return status.trying ? kProductTimeout : noTimeout(); });
+    input_.waitUntilFilled();
     result.failure = describeFailure(status, end);
     const bool failedOnProduct = status.trying && *status.trying < products.size();
     if (status.done) return result;
@@ -183,58 +254,13 @@ IfcReadResult readPart(const IfcInput& input, const IfcInput::Part& part,
   return result;
 }
 
-/// Progress of all parts, as that of one reader.
-class JoinedProgress {
- public:
-  JoinedProgress(std::size_t parts, const ImportProgress& progress)
-      : fractions_(parts), progress_(progress) {}
-
-  ImportProgress makeProgress(std::size_t part) {
-    return [this, part](const std::string& stage, double fraction) {
-      const std::lock_guard lock(mutex_);
-      fractions_[part] = fraction;
-      if (progress_)
-        progress_(stage, std::reduce(fractions_.begin(), fractions_.end()) /
-                             static_cast<double>(fractions_.size()));
-    };
-  }
-
- private:
-  std::mutex mutex_;
-  std::vector<double> fractions_;
-  const ImportProgress& progress_;
-};
-
-/// A geometry that several parts deliver is the same in each.
-void mergeResult(IfcReadResult&& from, IfcReadResult& to) {
-  to.meshes.geometries.merge(from.meshes.geometries);
-  to.meshes.products.merge(from.meshes.products);
-  to.meshes.failures.merge(from.meshes.failures);
-  if (to.failure.empty()) to.failure = std::move(from.failure);
-}
-
-}  // namespace
-
-IfcReadResult readWithWebIfc(const IfcInput& input, double timeLimit,
-                             const ImportProgress& progress) {
+IfcReadResult WebIfcReading::finish() {
   IfcReadResult result;
-  const WebIfcLocation location = findWebIfc();
-  if (!location.missing.empty()) {
-    result.failure = location.missing;
+  if (!location_.missing.empty()) {
+    result.failure = location_.missing;
     result.notInstalled = true;
-    return result;
   }
-  const std::vector<IfcInput::Part>& parts = input.parts();
-  if (parts.size() == 1) return readPart(input, parts[0], location, timeLimit, progress);
-  JoinedProgress joined(parts.size(), progress);
-  std::vector<std::future<IfcReadResult>> readings;
-  const auto read = [&](std::size_t i) {
-    return readPart(input, parts[i], location, timeLimit, joined.makeProgress(i));
-  };
-  for (std::size_t i = 0; i + 1 < parts.size(); ++i)  // one after another where threads are short
-    readings.push_back(std::async(std::launch::async | std::launch::deferred, read, i));
-  mergeResult(read(parts.size() - 1), result);
-  for (std::future<IfcReadResult>& reading : readings) mergeResult(reading.get(), result);
+  for (std::future<IfcReadResult>& reading : readings_) mergeResult(reading.get(), result);
   return result;
 }
 

@@ -104,7 +104,8 @@ std::string convertIfcXml(const ImportRequest& request, const std::string& xml,
                           const IfcXmlLimits& limits, const ImportProgress& progress,
                           std::vector<Diagnostic>& diagnostics) {
   const WebIfcLocation location = findConverter(request.file);
-  const IfcInput input(request, xml, {}, {});
+  IfcInput input(request, 1);
+  input.fill(xml, {}, {});
   ImportRequest conversion = input.makeRequest(ImportTask::ifcXml, limits.timeLimit);
   conversion.program = location.node;
   conversion.script = location.script;

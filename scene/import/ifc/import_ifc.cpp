@@ -188,6 +188,7 @@ class IfcImport {
                         "ISO-10303-21); export it again as IFC");
     }
     reportProgress("index", 0);
+    startWebIfc(text);
     readText(std::move(text));
     Model model = readMeshes();
     model.source = request_.file;
@@ -199,6 +200,14 @@ class IfcImport {
   }
 
  private:
+  /// Starts as many processes of web-ifc as the text may need. They wait for the input.
+  void startWebIfc(const std::string& text) {
+    const bool divided =
+        text.size() >= kMinDividedText && std::thread::hardware_concurrency() >= kReaderProcesses;
+    input_.emplace(request_, divided ? kReaderProcesses : 1);
+    if (isReaderAllowed(IfcReader::webIfc)) webIfc_.emplace(*input_, readerTimeLimit(), progress_);
+  }
+
   /// Reads the metadata and passes the text on to the readers; it is not kept.
   void readText(std::string text) {
     const StepFile file(std::move(text));
@@ -208,24 +217,17 @@ class IfcImport {
     std::vector<std::uint32_t> read = wanted_;
     for (const IfcProduct& product : metadata_.products)
       if (product.hasBody && product.role == IfcProduct::Role::space) read.push_back(product.id);
-    const std::vector<IfcPart> parts = divideForProcesses(file, read);
-    input_.emplace(request_, file.text(), std::move(read), parts);
+    std::vector<IfcPart> parts = divideForProcesses(file, read);
+    input_->fill(file.text(), std::move(read), std::move(parts));
   }
 
   /// The parts that processes of web-ifc read at the same time; empty: one process reads all. A
   /// damaged file is read whole, because its readers may find other statements than the index.
   std::vector<IfcPart> divideForProcesses(const StepFile& file,
                                           const std::vector<std::uint32_t>& products) const {
-    const bool pays = file.text().size() >= kMinDividedText &&
-                      products.size() >= kReaderProcesses &&
-                      std::thread::hardware_concurrency() >= kReaderProcesses;
-    if (!pays || !isReaderAllowed(IfcReader::webIfc) || !metadata_.complete ||
-        file.damagedCount() > 0)
-      return {};
-    std::vector<IfcPart> parts = divideIfc(file, products, kReaderProcesses);
-    const bool divided =
-        std::ranges::none_of(parts, [](const IfcPart& part) { return part.products.empty(); });
-    return divided ? parts : std::vector<IfcPart>();
+    const std::size_t count = webIfc_ ? input_->partCount() : 1;
+    const bool isWhole = metadata_.complete && file.damagedCount() == 0;
+    return count > 1 && isWhole ? divideIfc(file, products, count) : std::vector<IfcPart>();
   }
 
   void reportProgress(const char* stage, double fraction) const {
@@ -296,8 +298,8 @@ class IfcImport {
   }
 
   Model readMeshes() {
-    if (isReaderAllowed(IfcReader::webIfc)) {
-      IfcReadResult web = readWithWebIfc(*input_, readerTimeLimit(), progress_);
+    if (webIfc_) {
+      IfcReadResult web = webIfc_->finish();
       recordFailure("web-ifc", web);
       if (hasTriangles(web.meshes)) return makeModel(web.meshes, "web-ifc");
     }
@@ -483,6 +485,7 @@ class IfcImport {
   IfcMetadata metadata_;
   std::vector<std::uint32_t> wanted_;  ///< products of the model; readers also read spaces
   std::optional<IfcInput> input_;
+  std::optional<WebIfcReading> webIfc_;
   std::vector<Diagnostic> diagnostics_;
   std::set<std::uint32_t> fullyCutHosts_;
   std::string failures_;

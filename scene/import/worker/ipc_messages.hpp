@@ -38,6 +38,7 @@ inline constexpr int kImportPipe = 3;  ///< messages, written
 inline constexpr int kIfcFile = 4;     ///< IFC readers: the file
 /// IFC readers: express ids of the requested products, 32 bits each
 inline constexpr int kIfcProductIds = 5;
+inline constexpr int kIfcReady = 6;  ///< web-ifc: a pipe, at its end when both are complete
 /// The parent's own descriptors begin here, so that none collides with those of a worker.
 inline constexpr int kFirstParentDescriptor = 10;
 

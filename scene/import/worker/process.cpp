@@ -163,6 +163,8 @@ void configureDescriptors(SpawnSettings& settings, const ImportRequest& request,
   if (request.ifcProductIds >= 0) {
     posix_spawn_file_actions_adddup2(&settings.files, request.ifcProductIds, kIfcProductIds);
   }
+  if (request.ifcReady >= 0)
+    posix_spawn_file_actions_adddup2(&settings.files, request.ifcReady, kIfcReady);
   posix_spawn_file_actions_addopen(&settings.files, 0, "/dev/null", O_RDONLY, 0);
   posix_spawn_file_actions_addopen(&settings.files, 1, "/dev/null", O_WRONLY, 0);
   posix_spawn_file_actions_addopen(&settings.files, 2, "/dev/null", O_WRONLY, 0);

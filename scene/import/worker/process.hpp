@@ -26,10 +26,11 @@ enum class ImportTask : std::uint8_t {
 struct ImportRequest {
   ImportTask task = ImportTask::model;
   std::string file;
-  ImportOptions options;                 ///< memoryLimit 0: unlimited
-  std::string program, script;           ///< webIfc, ifcXml: the node program and its script
-  std::uint32_t firstProduct = 0;        ///< webIfc: index into the requested products
-  int ifcFile = -1, ifcProductIds = -1;  ///< inherited file descriptors; not owned, -1: unset
+  ImportOptions options;           ///< memoryLimit 0: unlimited
+  std::string program, script;     ///< webIfc, ifcXml: the node program and its script
+  std::uint32_t firstProduct = 0;  ///< webIfc: index into the requested products
+  /// Inherited file descriptors; not owned, -1: unset.
+  int ifcFile = -1, ifcProductIds = -1, ifcReady = -1;
 };
 
 /// Parses the arguments of a worker; nullopt if they are invalid. `parent`: process id of the

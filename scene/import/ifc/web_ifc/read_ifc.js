@@ -4,11 +4,13 @@
 //
 // File descriptor 3 receives the messages, 4 is the IFC file, 5 the list of what to read: the number
 // of ranges of the file (64 bits), the first byte and the size of each (64 bits), and the express
-// ids of the requested products (32 bits). Products before index FIRST are done. The contents of the
-// messages are documented in scene/import/ifc/ifc_meshes.hpp.
+// ids of the requested products (32 bits). Both are complete when the pipe 6 is at its end. Products
+// before index FIRST are done. The contents of the messages are documented in
+// scene/import/ifc/ifc_meshes.hpp.
 import { openModel, startEngine } from './engine.js';
 import {
   IFC_FILE, WANTED, packDoubles, packWords, readAll, readInto, sendMessage, sendProgress,
+  waitForInput,
 } from './worker_io.js';
 
 const FLOATS_A_VERTEX = 6; // position and normal, as web-ifc delivers them
@@ -21,6 +23,7 @@ function viewWords(engine, address, count) {
 
 function readList() {
   const bytes = readAll(WANTED);
+  if (bytes.length === 0) return { ranges: [], wanted: [] }; // other processes read all
   const count = Number(new BigUint64Array(bytes.buffer, 0, 1)[0]);
   const numbers = Array.from(new BigUint64Array(bytes.buffer, 8, 2 * count), Number);
   const ranges = [];
@@ -94,7 +97,13 @@ async function main() {
   const first = Number(process.argv[2]);
   const started = await startEngine();
   const { engine } = started;
+  waitForInput();
   const { ranges, wanted } = readList();
+  if (wanted.length === 0) {
+    sendProgress('shapes (web-ifc)', 1);
+    sendMessage('D');
+    return 0;
+  }
   const model = openModel(started, makeReader(ranges));
   if (model < 0) {
     sendMessage('E', [Buffer.from('web-ifc does not know its schema')]);

@@ -5,6 +5,7 @@ import fs from 'node:fs';
 const ANSWER = 3;
 export const IFC_FILE = 4;
 export const WANTED = 5;
+const READY = 6;
 
 // Sends small parts in one piece, and large blocks after them without copying them.
 export function sendMessage(kind, parts = [], blocks = []) {
@@ -45,4 +46,9 @@ export function readBlock(descriptor, position, size) {
 
 export function readAll(descriptor) {
   return readBlock(descriptor, 0, fs.fstatSync(descriptor).size);
+}
+
+// Waits until the importer has written the files; nothing is ever written to this pipe.
+export function waitForInput() {
+  fs.readSync(READY, Buffer.alloc(1));
 }
