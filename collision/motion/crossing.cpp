@@ -23,7 +23,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdlib>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "collision/assert.hpp"
@@ -210,11 +212,21 @@ class ExactTranslation {
     constexpr double kNever = std::numeric_limits<double>::infinity();
     if (!isTransversal_) return std::nullopt;
     if (!first_) return CrossingTime{kNever, kNever};
-    const double lo = first_->get_d();  // rounds towards zero
-    return CrossingTime{lo, mpq_class(lo) == *first_ ? lo : std::nextafter(lo, kNever)};
+    const int scale = difference_.scale();
+    (scale >= 0 ? first_->numerator : first_->denominator) <<=
+        static_cast<unsigned>(std::abs(scale));
+    mpq_class first(first_->numerator, first_->denominator);
+    first.canonicalize();
+    const double lo = first.get_d();  // rounds towards zero
+    return CrossingTime{lo, mpq_class(lo) == first ? lo : std::nextafter(lo, kNever)};
   }
 
  private:
+  /// A fraction, not reduced: common divisors are sought of the first time alone.
+  struct Time {
+    Integer numerator, denominator;  ///< the denominator is above 0
+  };
+
   /// Adds each face with `corner` as the one of the highest vertices.
   void addFaces(VertexPair corner) {
     const auto [a, b] = corner;
@@ -240,14 +252,11 @@ class ExactTranslation {
       anyRight = anyRight || side < 0;
     }
     if (anyLeft && anyRight) return;
-    mpq_class time(height * denominator_, speed);
-    time.canonicalize();
-    if (time < 0) return;
-    if (difference_.scale() >= 0)
-      time *= Integer(1) << static_cast<unsigned>(difference_.scale());
-    else
-      time /= Integer(1) << static_cast<unsigned>(-difference_.scale());
-    if (!first_ || time < *first_) first_ = time;
+    Time time{height * denominator_, speed};
+    if (speed < 0) time = {-time.numerator, -time.denominator};
+    if (time.numerator < 0) return;
+    if (!first_ || time.numerator * first_->denominator < first_->numerator * time.denominator)
+      first_ = std::move(time);
   }
 
   ExactMinkowskiDifference difference_;
@@ -255,7 +264,7 @@ class ExactTranslation {
   Integer denominator_ = 1;
   ExactPoint velocity_;         ///< times denominator_
   bool isTransversal_ = false;  ///< the velocity is not parallel to every face
-  std::optional<mpq_class> first_;
+  std::optional<Time> first_;
 };
 
 /// Number of the faces of a difference that ExactTranslation examines.

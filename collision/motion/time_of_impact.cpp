@@ -53,6 +53,7 @@ constexpr int kMaxSteps = 400;             // steps; 5 to 10 are usual
 constexpr int kMaxRootIterations = 32;     // iterations over the lines of f to find its root
 constexpr int kMaxProbes = 8;              // failed probes during the advance
 constexpr double kSmallStep = 0x1p-43;     // of (1 s + time): step below which contacts are probed
+constexpr double kMinWindow = 0x1p-46;     // of (1 s + time): first probe window
 constexpr double kNarrowWindow = 0x1p-40;  // of (1 s + time): normal probe window, below 1e-12
 constexpr double kMaxWindow = 0x1p-24;     // of (1 s + time): last window before `unproved`
 constexpr double kSharpGapRatio = 0x1p12;  // gap in errors above which no exact distance is needed
@@ -374,7 +375,10 @@ class ImpactSearch {
       return {};
     }
     SeparatingPlane plane = makeSeparatingPlane(separation.normal, at, pair.error());
-    if (!(plane.gap > 0)) plane = findExactPlane(pair);
+    if (!(plane.gap > 0)) {
+      if (findCrossingWithin(kNarrowWindow)) return {};  // it takes less than an exact distance
+      plane = findExactPlane(pair);
+    }
     if (plane.gap > 0) {
       result_.separation = separation;
       result_.separation.normal = plane.normal;
@@ -406,14 +410,25 @@ class ImpactSearch {
   /// whether the query is decided.
   bool findContactWithin(double maxWidth) {
     ++probes_;
-    for (double width = 0x1p-46; width <= maxWidth; width *= 4) {
-      const double hi = std::min(horizon_, roundToFewBits(time_ + width * (1 + time_), width / 32));
-      if (findCrossingBy(hi) || findContactBy(hi)) return true;
-    }
-    if (decideExactly()) return true;
+    if (findCrossingWithin(maxWidth) ||
+        findBy(maxWidth, [this](double hi) { return findContactBy(hi); }) || decideExactly())
+      return true;
     // Grazing bodies touch at one instant. It can be detected only if it is a double, and then it
     // probably has few bits.
     return findContactBy(std::min(horizon_, findSimplestTime(time_, kNarrowWindow * (1 + time_))));
+  }
+
+  /// Calls `find(hi)` for times up to `maxWidth` (of 1 s + time) ahead, nearest first, until it
+  /// returns true.
+  bool findBy(double maxWidth, const auto& find) const {
+    for (double width = kMinWindow; width <= maxWidth; width *= 4)
+      if (find(std::min(horizon_, roundToFewBits(time_ + width * (1 + time_), width / 32))))
+        return true;
+    return false;
+  }
+
+  bool findCrossingWithin(double maxWidth) {
+    return findBy(maxWidth, [this](double hi) { return findCrossingBy(hi); });
   }
 
   /// The interval of the proof extends as far back from time_, so that its signs are certain there.
