@@ -42,6 +42,9 @@ constexpr double kCubeCost = 6, kScanCost = 9, kScanCostPerVertex = 1.4, kClimbC
 constexpr double kPairCost = 200;
 
 constexpr std::size_t kBlock = 6;  // doubles a block: two vertices
+// Neighbours of a vertex at least, some repeated: most loops over them have one length then, which
+// the processor predicts.
+constexpr std::size_t kMinFan = 8;
 const Double2 kLowest = {-std::numeric_limits<double>::infinity(),
                          -std::numeric_limits<double>::infinity()};
 
@@ -66,9 +69,11 @@ void appendFans(const Hull& hull, SupportTable& table) {
   for (std::uint32_t v = 0; v < hull.vertices.size(); ++v) {
     table.fanOffsets.push_back(static_cast<std::uint32_t>(table.fans.size() / kBlock));
     const auto neighbours = hull.getNeighbours(v);
-    for (std::size_t k = 0; k < neighbours.size(); k += 2) {
-      const std::uint32_t first = neighbours[k],
-                          second = neighbours[std::min(k + 1, neighbours.size() - 1)];
+    const std::size_t count = neighbours.empty() ? 0 : std::max(neighbours.size(), kMinFan);
+    for (std::size_t k = 0; k < count; k += 2) {
+      const std::size_t last = neighbours.size() - 1;
+      const std::uint32_t first = neighbours[std::min(k, last)],
+                          second = neighbours[std::min(k + 1, last)];
       table.fanVertices.insert(table.fanVertices.end(), {first, second});
       for (int axis = 0; axis < 3; ++axis)
         table.fans.insert(table.fans.end(),

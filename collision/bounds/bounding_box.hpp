@@ -22,8 +22,8 @@ enum class AabbMethod : std::uint8_t {
 struct SupportTable {
   AabbMethod method = AabbMethod::vertexScan;
   /// Neighbours of vertex v: blocks fanOffsets[v] to fanOffsets[v + 1] of `fans`, each two
-  /// neighbours as x x y y z z, with their indices in `fanVertices`. The last block of a vertex may
-  /// repeat a neighbour.
+  /// neighbours as x x y y z z, with their indices in `fanVertices`. The blocks of a vertex may
+  /// repeat its last neighbour.
   std::vector<std::uint32_t> fanOffsets, fanVertices;
   std::vector<double> fans;
 };
@@ -46,7 +46,7 @@ struct ExtremalVertices {
 // values finite.
 
 /// Box by the method of `table`, which is that of `hull`. Adds the vertices that it looks at to
-/// `looked`.
+/// `looked`, repeated ones too.
 Aabb computeAabb(const Hull& hull, const SupportTable& table, const Mat3& rotation,
                  const Vec3& translation, ExtremalVertices& last, std::uint64_t& looked,
                  double clearance = 0);
