@@ -96,7 +96,8 @@ constexpr std::array kCatalog{
                    "a mesh names a material that the file lacks: drawn in a plain colour"},
     DiagnosticKind{
         "missing_texture", warning,
-        "missing, or of a kind that is not decoded: drawn without it; put a PNG next to the model"},
+        "missing, or of a kind that is not read: drawn without it; a PNG next to the model, or the "
+        "model as glTF with a PNG texture, is drawn"},
     DiagnosticKind{"opacity_zero", warning, "the material is invisible; drawn opaque"},
     DiagnosticKind{"reduced_texture", note,
                    "the textures are many or large; drawn at a lower resolution"},

@@ -71,7 +71,7 @@ std::vector<LegendEntry> makeLegend(const WalkTrace& trace) {
   if (!trace.contacts.empty())
     entries.push_back({"contact begins (without floors)", Symbol::dot, {kContactColour}});
   if (!trace.blockedWalks.empty())
-    entries.push_back({"walk ends blocked", Symbol::dot, {kBlockedColour}});
+    entries.push_back({"walk blocked, order refused", Symbol::dot, {kBlockedColour}});
   if (!trace.captures.empty())
     entries.push_back({"picture taken, towards the open end", Symbol::wedge, {}});
   return entries;

@@ -30,7 +30,7 @@ struct WalkTrace {
   std::string title;
   std::vector<WalkedPath> paths;
   std::vector<MapContact> contacts;      ///< contacts that began
-  std::vector<MapContact> blockedWalks;  ///< ends of blocked walks
+  std::vector<MapContact> blockedWalks;  ///< ends of blocked walks, and refused orders
   std::vector<MapCapture> captures;
   /// metres: heights that get a plan, however little walking is there
   std::vector<double> floors = {};

@@ -232,6 +232,15 @@ TEST(Spawn, WhereThereIsNoRoomItSaysWhereThereIs) {
   EXPECT_NE(text.find("there is room at [1.4"), std::string::npos) << text;
 }
 
+TEST(Spawn, ARefusalIsAtThePlaceThatItGave) {
+  WorldFixture run({floorBox(), {"pillar", {0, 0, -1}, {1, 3, 1}}});
+  run.order("ann", Spawn{{0.5, 0, 0.25}});
+  run.untilIdle();
+  ASSERT_EQ(run.count(Notice::Kind::refused), 1);
+  const auto refusal = std::ranges::find(run.notices, Notice::Kind::refused, &Notice::kind);
+  EXPECT_EQ(refusal->position, Vec3(0.5, 0, 0.25));
+}
+
 TEST(Spawn, WithTheHeadInTheCeilingItNamesTheFloorBelow) {
   // A hall without walls near; the roof above the ceiling has free places too, but higher.
   WorldFixture run({floorBox(), {"ceiling", {-9, 2.5, -9}, {9, 2.8, 9}}});

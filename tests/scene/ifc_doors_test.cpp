@@ -383,6 +383,15 @@ const Building kBuildings[] = {
     {"duplex/Duplex_A_20110907.ifc", 14, 14, 0, 0},
 };
 
+TEST(IfcDoors, HowADoorOpensIsNotGuessedWhereNoneOpens) {
+  for (const IfcDoors doors :
+       {IfcDoors::movable, IfcDoors::open, IfcDoors::fixed, IfcDoors::absent}) {
+    const Model model = found(doorModel("NOTDEFINED", singleDoor()), doors);
+    const bool opens = doors == IfcDoors::movable || doors == IfcDoors::open;
+    EXPECT_EQ(countDiagnostics(model, "guessed_doors"), opens ? 1u : 0u) << toString(doors);
+  }
+}
+
 TEST(IfcDoors, OfRealBuildingsBecomeBodiesOrAreReported) {
   ENFILADE_NEED_SHARED(shared);
   ENFILADE_NEED_WEB_IFC();

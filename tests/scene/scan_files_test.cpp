@@ -506,6 +506,14 @@ TEST(ScanSizes, ACountThatTheFileCannotHoldIsRefused) {
   EXPECT_NE(text.find("4294967295 triangles announced"), std::string::npos) << text;
 }
 
+TEST(StlFile, AFileThatIsNoStlIsRefusedAsSuch) {
+  const TemporaryFolder folder;
+  const std::string text = catchFailure(folder.write("a.stl", "hello world\n"));
+  EXPECT_NE(text.find("neither text, which begins with 'solid', nor binary: 12 bytes"),
+            std::string::npos)
+      << text;
+}
+
 // ---- zipped COLLADA -----------------------------------------------------------------------------
 
 constexpr char kTriangleDae[] =

@@ -133,6 +133,9 @@ void collectBodies(Model& model, const std::filesystem::path& file, IfcDoors doo
   if (doors != IfcDoors::fixed)
     mergeLowerPriorityBodies(model, std::move(ofIfc), sidecar.staticObjects);
   if (doors == IfcDoors::open || doors == IfcDoors::absent) fixDoors(model, doors);
+  if (doors == IfcDoors::fixed || doors == IfcDoors::absent)  // no door opens
+    std::erase_if(model.diagnostics,
+                  [](const Diagnostic& one) { return one.kind == "guessed_doors"; });
   attachCollisionShapes(model);
   dropBodiesWithoutArea(model);
 }

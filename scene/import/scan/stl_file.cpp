@@ -150,6 +150,9 @@ std::vector<ScanMesh> parseStl(std::string_view bytes) {
   if (isKeyword(text.substr(0, 5), "solid") &&
       text.substr(0, 2 * kStlHeader).find('\0') == std::string_view::npos)
     return parseTextStl(text);
+  if (bytes.size() < kStlHeader + 4)
+    failStl("neither text, which begins with 'solid', nor binary: " + std::to_string(bytes.size()) +
+            " bytes, and a binary file has at least " + std::to_string(kStlHeader + 4));
   if (!holds)
     failStl("cut off: " + std::to_string(count) + " triangles announced, " +
             std::to_string(bytes.size()) + " bytes present");

@@ -75,6 +75,7 @@ OrderStatus executeOrder(const Spawn& spawn, OrderContext& context) {
           placeOrSuggest(context.world, spawn.position, avatar, message, context.count)) {
     context.emitNotice(Notice::Kind::refused,
                        *error + formatDroppedCount(context.queue.orders.size() - 1));
+    context.report.notices.back().position = spawn.position;
     dropQueuedOrders(context.queue.orders, 1, context.report.notices.back(), "by a refused Spawn",
                      context.report);
     return OrderStatus::done;

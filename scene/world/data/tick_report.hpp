@@ -79,7 +79,7 @@ struct Notice {
   std::string avatar;
   EntityId id = 0;
   std::uint64_t tag = 0;
-  Vec3 position = Vec3::Zero();  ///< the feet
+  Vec3 position = Vec3::Zero();  ///< the feet; of a refused Spawn, the place that it gave
   EntityId obstacle = 0;
   std::string text;
   bool isAvatarUnknown = false;  ///< refused, because no avatar has this name
