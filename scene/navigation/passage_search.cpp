@@ -21,7 +21,6 @@ constexpr double kNearStart = 0.3;         // metres
 constexpr double kMaxStraightGap = 1;      // metres
 constexpr double kLineSpacing = 0.01;      // metres
 constexpr int kMaxLines = 26;              // to each side: gaps are tried every 0.5 m
-constexpr double kMinRise = 0.1;           // metres between both sides of furniture
 constexpr double kSameGap = 0.8;           // metres between ends of passages
 constexpr std::size_t kMaxWalks = 60'000;  // on grids, of all gaps: some tenths of a second
 constexpr std::size_t kGapWalks = 1000;
@@ -135,8 +134,7 @@ GapWays crossOnGrid(Collection& all, const RimGap& gap) {
     return computeGroundDistance(feet, *start) < kNearStart || !findPolygonAt(mesh, feet);
   };
   const std::size_t limit = std::min(kGapWalks, all.walksLeft);
-  const GridSearch limits{kSpacing, kGapMargin, limit,
-                          std::abs(gap.to.y() - gap.from.y()) > kMinRise};
+  const GridSearch limits{kSpacing, kGapMargin, limit};
   GridSearch search = limits;
   auto way = findGridPathOut(all.finder.walker, *start, {isWanted, isOpen, gap.to}, search);
   all.walksLeft -= limit - search.maxWalks;

@@ -21,8 +21,8 @@ constexpr int kMaxPassageRoutes = 4;
 constexpr double kOnMesh = 0.1;  // metres
 constexpr const char* kNotFound = "no way was found within the limits of the search";
 constexpr double kMaxConnection = 3;  // metres between places that are connected without a mesh
-constexpr GridSearch kCoarseConnection{kCoarseSpacing, 2.5, 4000, true};
-constexpr GridSearch kFineConnection{kFineSpacing, 2.5, 6000};
+constexpr GridSearch kCoarseConnection{kCoarseSpacing, 2.5, 4000};
+constexpr GridSearch kFineConnection{0.02, 2.5, 16000};
 
 /// The corners of a line on a mesh.
 struct Line {
@@ -180,9 +180,9 @@ NavigationPath findPathOnMeshes(const PathFinder& finder, const Vec3& start, con
 
 /// Places without a mesh, as narrow ones on furniture, or on a small part of one, are connected
 /// with it by walks on a grid, and with one another if they are near.
-NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
-                                 Proof& proof) {
+NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal) {
   Walker& walker = finder.walker;
+  Proof proof(finder.maxRepairWalks);
   const auto isOn = [&](const Vec3& place) {
     const auto polygon = findPolygonAt(finder.ample, place);
     return polygon && !(finder.passages && finder.passages->isSmallPart(*polygon));
@@ -237,7 +237,7 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
   Proof proof(finder.maxRepairWalks);
   NavigationPath best = findPathOnMeshes(finder, start, goal, proof);
   if (best.found() || !finder.unobstructed) return best;
-  best = findPathOffMeshes(finder, start, goal, proof);
+  best = findPathOffMeshes(finder, start, goal);
   if (best.found()) return best;
   Refusals* refusals = finder.refusals;
   // From places off the mesh an agent may get farther than from the islands next to them.

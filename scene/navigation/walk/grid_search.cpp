@@ -90,11 +90,7 @@ std::optional<std::vector<Vec3>> findWay(Walker& walker, const Vec3& from, const
       if (search.maxWalks == 0) return std::nullopt;
       --search.maxWalks;
       walker.returnTo(feet);
-      if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) {
-        if (!search.maySlide) continue;
-        walker.returnTo(feet);
-        if (walker.walkOn(target).kind != WalkOutcome::Kind::arrived) continue;
-      }
+      if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
       const Vec3 reached = walker.footPosition();
       const Cell to2 = grid.computeCell(reached, x, z);
       const auto [at, isNew] = places.try_emplace(to2, Place{reached, next, cell, false});

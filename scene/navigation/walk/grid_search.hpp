@@ -20,7 +20,6 @@ struct GridSearch {
   double spacing = 0.1;      ///< metres between places
   double margin = 1.5;       ///< metres: how far the way may leave the box of both ends
   std::size_t maxWalks = 0;  ///< edges to walk
-  bool maySlide = false;     ///< along obstacles, as over the round edge of a mattress
 };
 
 /// The places of a way between two places where the walker stood, with both; nullopt: none was
