@@ -376,7 +376,8 @@ class ImpactSearch {
     }
     SeparatingPlane plane = makeSeparatingPlane(separation.normal, at, pair.error());
     if (!(plane.gap > 0)) {
-      if (findCrossingWithin(kNarrowWindow)) return {};  // it takes less than an exact distance
+      // To prove a crossing takes less time than an exact distance.
+      if (crossingProbes_++ < kMaxProbes && findCrossingWithin(kNarrowWindow)) return {};
       plane = findExactPlane(pair);
     }
     if (plane.gap > 0) {
@@ -406,13 +407,12 @@ class ImpactSearch {
     return pair.error() == 0 || refined.penetration * (1 - 1e-9) > pair.error();
   }
 
-  /// Probes for a contact up to `maxWidth` (of 1 s + time) ahead, nearest times first. Returns
-  /// whether the query is decided.
+  /// Probes for a contact up to `maxWidth` (of 1 s + time) ahead: for crossings in narrow windows,
+  /// then for all contacts, nearest times first. Returns whether the query is decided.
   bool findContactWithin(double maxWidth) {
     ++probes_;
-    if (findCrossingWithin(maxWidth) ||
-        findBy(maxWidth, [this](double hi) { return findContactBy(hi); }) || decideExactly())
-      return true;
+    const auto find = [this](double hi) { return findCrossingBy(hi) || findContactBy(hi); };
+    if (findCrossingWithin(kNarrowWindow) || findBy(maxWidth, find) || decideExactly()) return true;
     // Grazing bodies touch at one instant. It can be detected only if it is a double, and then it
     // probably has few bits.
     return findContactBy(std::min(horizon_, findSimplestTime(time_, kNarrowWindow * (1 + time_))));
@@ -464,7 +464,7 @@ class ImpactSearch {
   double horizon_;
   FeatureCache& cache_;
   double time_ = 0;
-  int probes_ = 0;
+  int probes_ = 0, crossingProbes_ = 0;
   bool exactlyUndecided_ = false;
   bool ended_ = false;
   MotionResult result_;

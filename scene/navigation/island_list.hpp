@@ -4,7 +4,7 @@
 
 #include <cstdint>
 #include <limits>
-#include <span>
+#include <optional>
 #include <vector>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
@@ -13,7 +13,7 @@
 
 namespace enfilade::scene {
 
-/// metres between floors on both sides of a thick wall
+/// Metres between floors on both sides of a thick wall
 inline constexpr double kWallAndDoor = 1.5;
 inline constexpr std::uint32_t kNoIsland = std::numeric_limits<std::uint32_t>::max();
 

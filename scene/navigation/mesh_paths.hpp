@@ -19,7 +19,7 @@ struct Proof {
 
   GridSearch coarse, fine;
   std::size_t quickWalks;  ///< that are left
-  bool isQuick = false;    ///< what a short search does not repair is left out: proves nothing
+  bool isQuick = false;    ///< only short repairs are tried: a failure refutes no portal
   double shortestLine = std::numeric_limits<double>::infinity();  ///< metres, of all proposals
   bool isRepaired = false;                                        ///< the present proposal
   Vec3 failedAt = Vec3::Zero();                                   ///< where the last proof failed

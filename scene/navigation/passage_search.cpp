@@ -19,8 +19,8 @@ constexpr double kSpacing = 0.12;          // metres
 constexpr double kGapMargin = 1.6;         // metres around the beginning of a way across a gap
 constexpr double kNearStart = 0.3;         // metres
 constexpr double kMaxStraightGap = 1;      // metres
-constexpr double kLineSpacing = 0.01;      // metres
-constexpr int kMaxLines = 26;              // to each side: gaps are tried every 0.5 m
+constexpr double kLineSpacing = 0.012;     // metres
+constexpr int kMaxLines = 84;              // 0.5 m to each side: neighbours may be 1 m apart
 constexpr double kSameGap = 0.8;           // metres between ends of passages
 constexpr std::size_t kMaxWalks = 60'000;  // on grids, of all gaps: some tenths of a second
 constexpr std::size_t kGapWalks = 1000;
@@ -71,13 +71,19 @@ struct Collection {
 
 /// Whether passages lead across a gap next to this one, in both directions.
 bool hasPassageAt(const PassageList& list, const RimGap& gap) {
-  const auto leads = [&](const Vec3& from, const Vec3& to) {
+  const auto isAt = [&](const Vec3& end, std::uint32_t polygon, const Vec3& place,
+                        std::uint32_t other) {
+    return (end - place).norm() < kSameGap && list.partOf[polygon] == list.partOf[other];
+  };
+  const auto leads = [&](const Vec3& from, std::uint32_t fromPolygon, const Vec3& to,
+                         std::uint32_t toPolygon) {
     return std::ranges::any_of(list.passages, [&](const Passage& one) {
-      return computeGroundDistance(one.points.front(), from) < kSameGap &&
-             computeGroundDistance(one.points.back(), to) < kSameGap;
+      return isAt(one.points.front(), one.fromPolygon, from, fromPolygon) &&
+             isAt(one.points.back(), one.toPolygon, to, toPolygon);
     });
   };
-  return leads(gap.from, gap.to) && leads(gap.to, gap.from);
+  return leads(gap.from, gap.fromPolygon, gap.to, gap.toPolygon) &&
+         leads(gap.to, gap.toPolygon, gap.from, gap.fromPolygon);
 }
 
 bool isOnScarceMesh(const Collection& all, const RimGap& gap) {
@@ -109,15 +115,15 @@ GapWays crossStraight(Walker& walker, const RimGap& gap) {
   const Vec3 across = projectToGround(gap.to - gap.from);
   const Vec3 aside = Vec3(-across.z(), 0, across.x()).normalized();
   const Vec3 up(0, kHeightError, 0);
-  for (int i = 0; i <= kMaxLines; ++i)
-    for (const double offset : {i * kLineSpacing, -i * kLineSpacing}) {
-      const auto from = standAt(walker, gap.from + offset * aside + up, 2 * kHeightError);
-      if (!from) continue;
-      walker.returnTo(*from);
-      if (!walker.isPathClear(gap.to + offset * aside)) continue;
-      const Vec3 to = walker.footPosition();
-      if (walks(walker, to, *from, kHeightError)) return {{*from, to}, {to, *from}};
-    }
+  for (int i = 0; i <= kMaxLines; ++i) {
+    const double offset = (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * kLineSpacing;
+    const auto from = standAt(walker, gap.from + offset * aside + up, 2 * kHeightError);
+    if (!from) continue;
+    walker.returnTo(*from);
+    if (!walker.isPathClear(gap.to + offset * aside)) continue;
+    const Vec3 to = walker.footPosition();
+    if (walks(walker, to, *from, kHeightError)) return {{*from, to}, {to, *from}};
+  }
   return {};
 }
 
@@ -128,10 +134,13 @@ GapWays crossOnGrid(Collection& all, const RimGap& gap) {
   if (!start) return {};
   const auto isWanted = [&](const Vec3& feet) {
     const auto polygon = findPolygonAt(mesh, feet);
-    return polygon && all.list.partOf[*polygon] != all.list.partOf[gap.fromPolygon];
+    return polygon && all.getIsland(*polygon) != kNoIsland &&
+           all.list.partOf[*polygon] != all.list.partOf[gap.fromPolygon];
   };
   const auto isOpen = [&](const Vec3& feet) {
-    return computeGroundDistance(feet, *start) < kNearStart || !findPolygonAt(mesh, feet);
+    const auto polygon = findPolygonAt(mesh, feet);
+    return !polygon || all.getIsland(*polygon) == kNoIsland ||
+           computeGroundDistance(feet, *start) < kNearStart;
   };
   const std::size_t limit = std::min(kGapWalks, all.walksLeft);
   const GridSearch limits{kSpacing, kGapMargin, limit};
@@ -184,7 +193,9 @@ void crossGap(Collection& all, const RimGap& gap) {
     const double width = computeGroundDistance(gap.from, gap.to);
     const bool isOnScarce = isOnScarceMesh(all, gap);
     // The other gaps of joined islands are found by searches on the scarce mesh.
-    if (isOnScarce ? all.joined.contains({a, b}) : all.walksLeft == 0 || width > kGapMargin) return;
+    if (isOnScarce ? all.joined.contains({a, b}) && all.joined.contains({b, a})
+                   : all.walksLeft == 0 || width > kGapMargin)
+      return;
     GapWays ways = isOnScarce ? crossOnScarceMesh(all, gap) : crossOnGrid(all, gap);
     if (ways.there.empty() && width < kMaxStraightGap) ways = crossStraight(all.finder.walker, gap);
     known = all.tried.emplace(key, std::move(ways)).first;

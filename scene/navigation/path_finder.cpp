@@ -175,7 +175,9 @@ NavigationPath findPathByPassages(const PathFinder& finder, const Vec3& start, c
 NavigationPath findPathOnMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,
                                 Proof& proof) {
   NavigationPath path = findPathByMeshes(finder, start, goal, proof);
-  return path.found() ? path : findPathByPassages(finder, start, goal, proof);
+  if (path.found()) return path;
+  Proof own(finder.maxRepairWalks);  // the search before may have used up its walks
+  return findPathByPassages(finder, start, goal, own);
 }
 
 /// Places without a mesh, as narrow ones on furniture, or on a small part of one, are connected

@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
+#include <string>
 #include <vector>
 
 #include "scene/navigation/navigation.hpp"
@@ -53,7 +55,6 @@ TEST(Passages, AGapFarFromTheClosestPlacesJoinsIslands) {
   }
 }
 
-/// Whether there is a path does not depend on earlier queries.
 TEST(Passages, AnAnswerDoesNotDependOnEarlierOnes) {
   Navigation navigation(boxScene(roomsWithFarGap(0.61)), {}, {});
   std::mt19937 random(9);
@@ -61,6 +62,50 @@ TEST(Passages, AnAnswerDoesNotDependOnEarlierOnes) {
   for (int i = 0; i < 40; ++i) {
     const Vec3 left(x(random), 0, z(random)), right(8 - x(random), 0, z(random));
     EXPECT_TRUE(navigation.findPath(left, right).found()) << i;
+  }
+}
+
+/// Passages of one storey say nothing about the gaps above them.
+TEST(Passages, GapsOfEachStoreyAreTried) {
+  std::vector<NamedBox> boxes;
+  for (int storey = 0; storey < 3; ++storey) {
+    const Vec3 up(0, 3.0 * storey, 0);
+    for (NamedBox box : roomsWithFarGap(0.61)) {
+      box.path += "/" + std::to_string(storey);
+      box.min += up;
+      box.max += up;
+      boxes.push_back(box);
+    }
+  }
+  Navigation navigation(boxScene(boxes), {}, {});
+  for (int storey = 0; storey < 3; ++storey) {
+    const double floor = 3.0 * storey;
+    const auto left = navigation.findIsland({2, floor, 10}),
+               right = navigation.findIsland({6, floor, 10});
+    EXPECT_TRUE(left && left == right) << storey;
+  }
+}
+
+/// The wall has another thickness every metre, so that the closest places are anywhere.
+TEST(Passages, AGapInAnIrregularWallIsFound) {
+  std::mt19937 random(11);
+  std::uniform_real_distribution<double> thickness(0.05, 0.3), shift(0, 1);
+  for (int room = 0; room < 8; ++room) {
+    const double gap = 3 + 5 * shift(random);
+    std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {6, 0, 12}}};
+    const auto addWall = [&](double from, double to) {
+      for (double z = from; z < to; z += 1) {
+        const double half = 0.5 * thickness(random);
+        boxes.push_back({"wall/" + std::to_string(boxes.size()),
+                         {3 - half, 0, z},
+                         {3 + half, 2.5, std::min(to, z + 1)}});
+      }
+    };
+    addWall(0, gap);
+    addWall(gap + 0.62, 12);
+    Navigation navigation(boxScene(boxes), {}, {});
+    EXPECT_TRUE(navigation.findPath({1.5, 0, 1}, {4.5, 0, 1}).found()) << gap;
+    EXPECT_EQ(navigation.findIsland({1.5, 0, 1}), navigation.findIsland({4.5, 0, 1})) << gap;
   }
 }
 

@@ -122,14 +122,15 @@ double noTimeout() {
 }  // namespace
 
 IfcInput::IfcInput(const ImportRequest& request, std::size_t parts)
-    : request_(request), parts_(parts) {
+    : IfcInput(request) {  // so that the destructor runs if something below throws
   std::array<int, 2> ends{-1, -1};
   if (pipe2(ends.data(), O_CLOEXEC) != 0) throwNoMemory(request.file);
   readyDescriptor_ = moveUp(ends[0]);
   unreadyDescriptor_ = moveUp(ends[1]);
+  if (readyDescriptor_ < 0 || unreadyDescriptor_ < 0) throwNoMemory(request.file);
   fileDescriptor_ = openSharedMemory(request.file);
   listDescriptor_ = openSharedMemory(request.file);
-  for (Part& part : parts_) part.listDescriptor = openSharedMemory(request.file);
+  for (std::size_t i = 0; i < parts; ++i) parts_.push_back({{}, openSharedMemory(request.file)});
 }
 
 void IfcInput::fill(const std::string& text, std::vector<std::uint32_t> wanted,
@@ -233,6 +234,7 @@ IfcReadResult WebIfcReading::readPart(std::size_t part, double timeLimit) {
     const ImportExit end = runImportProcess(
         request,
         [&](ImportMessage kind, std::span<const std::byte> body) {
+          input_.waitUntilFilled();  // from then on, no other thread reports progress
           return handleMessage(kind, body, progress, status, result.meshes);
         },
         [&] { return status.trying ? kProductTimeout : noTimeout(); });

@@ -52,6 +52,8 @@ class IfcInput {
     int listDescriptor = -1;
   };
 
+  explicit IfcInput(const ImportRequest& request) : request_(request) {}
+
   ImportRequest request_;
   std::vector<Part> parts_;  ///< at least one
   int fileDescriptor_ = -1, listDescriptor_ = -1;

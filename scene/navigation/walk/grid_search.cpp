@@ -118,7 +118,7 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
   window.include(from);
   window.include(to);
   const Target end{inflated(window, search.margin),
-                   [&](const Vec3& at) { return (to - at).norm(); },
+                   [&](const Vec3& at) { return computeGroundDistance(at, to); },
                    [&](const Vec3& at) {
                      return computeGroundDistance(at, to) < 1.5 * search.spacing &&
                             walks(walker, at, to, kSameHeight);
@@ -131,9 +131,10 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
 
 std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& from,
                                                  const WayOut& out, GridSearch& search) {
-  const Target end{inflated(Aabb{from, from}, search.margin),
-                   [&](const Vec3& at) { return out.toward ? (*out.toward - at).norm() : 0.0; },
-                   out.isWanted, out.isOpen};
+  const Target end{
+      inflated(Aabb{from, from}, search.margin),
+      [&](const Vec3& at) { return out.toward ? computeGroundDistance(*out.toward, at) : 0.0; },
+      out.isWanted, out.isOpen};
   return findWay(walker, from, end, search);
 }
 

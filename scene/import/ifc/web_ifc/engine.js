@@ -63,6 +63,6 @@ export function openModel({ engine, schemas }, read) {
   const model = engine.OpenModel(SETTINGS, (address, offset, size) =>
     read(engine.HEAPU8.subarray(address, address + size), offset));
   if (model < 0) return -1;
-  const schema = engine.GetHeaderLine(model, FILE_SCHEMA).arguments[0][0].value;
-  return schemas.has(schema.toUpperCase()) ? model : -1;
+  const schema = engine.GetHeaderLine(model, FILE_SCHEMA)?.arguments?.[0]?.[0]?.value;
+  return typeof schema === 'string' && schemas.has(schema.toUpperCase()) ? model : -1;
 }
