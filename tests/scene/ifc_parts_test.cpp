@@ -138,6 +138,18 @@ void expectSameMeshes(const IfcMeshes& whole, const IfcMeshes& parts) {
   }
 }
 
+/// An import that fails while it indexes the file leaves processes that wait for their input.
+TEST(IfcParts, ReadersThatGetNoInputEnd) {
+  ENFILADE_NEED_WEB_IFC();
+  ImportRequest request;
+  request.file = "a.ifc";
+  request.options.timeLimit = 60;
+  const ImportProgress none;
+  IfcInput input(request, 2);
+  { const WebIfcReading reading(input, 60, none); }
+  input.waitUntilFilled();  // returns
+}
+
 TEST(IfcParts, ReadAtTheSameTimeGiveTheMeshesOfTheWholeFile) {
   ENFILADE_NEED_WEB_IFC();
   ENFILADE_NEED_SHARED(shared);
