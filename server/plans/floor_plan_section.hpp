@@ -13,7 +13,7 @@ using collision::Vec3;
 struct ObjectSection {
   std::uint32_t object = 0;
   scene::Aabb box;                       ///< of the whole object
-  std::vector<std::vector<Vec3>> loops;  ///< closed outlines; the last point joins the first
+  std::vector<std::vector<Vec3>> loops;  ///< closed outlines, those of scans over small holes
   std::vector<std::vector<Vec3>> lines;  ///< of open surfaces
 
   bool empty() const { return loops.empty() && lines.empty(); }

@@ -2,6 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
+#include <functional>
+#include <random>
+#include <utility>
+
 #include "scene/model/box_mesh.hpp"
 
 namespace enfilade::server {
@@ -73,6 +78,62 @@ TEST(FloorPlanSection, TwoOutlinesOfOneObjectAreTwoLoops) {
   for (std::size_t i = 0; i < 36; ++i)
     model.meshes[0].indices.push_back(model.meshes[0].indices[i] + 8);
   EXPECT_EQ(cutObject(model, 0, 1.2).loops.size(), 2u);
+}
+
+/// The sides of a box of 4 x 4 m in strips of 10 cm, of which every tenth is missing. `inwards`:
+/// its triangles face the inside, as a room's.
+scene::Model makeScannedBox(bool inwards, const std::function<bool(int strip)>& isMissing) {
+  scene::Mesh mesh;
+  const std::array<Vec3, 4> corners{Vec3(0, 0, 0), Vec3(0, 0, 4), Vec3(4, 0, 4),
+                                    Vec3(4, 0, 0)};  // outward normals
+  for (std::size_t side = 0; side < 4; ++side)
+    for (int strip = 0; strip < 40; ++strip) {
+      if (isMissing(strip)) continue;
+      const Vec3 &a = corners[side], along = (corners[(side + 1) % 4] - a) / 40;
+      const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+      for (const Vec3& at : {Vec3(a + strip * along), Vec3(a + (strip + 1) * along)}) {
+        mesh.positions.push_back(at.cast<float>());
+        mesh.positions.push_back((at + Vec3(0, 3, 0)).cast<float>());
+      }
+      for (const std::uint32_t i : {0u, 2u, 3u, 0u, 3u, 1u}) mesh.indices.push_back(first + i);
+    }
+  if (inwards)
+    for (std::size_t i = 0; i < mesh.indices.size(); i += 3)
+      std::swap(mesh.indices[i], mesh.indices[i + 1]);
+  scene::Model model;
+  model.meshes = {mesh};
+  model.objects.resize(1);
+  model.objects[0].meshes = {0};
+  return model;
+}
+
+TEST(FloorPlanSection, AnOutlineWithSmallHolesIsClosedAndARoomIsNot) {
+  const auto isMissing = [](int strip) { return strip % 10 == 5; };
+  const ObjectSection solid = cutObject(makeScannedBox(false, isMissing), 0, 1.2);
+  EXPECT_EQ(solid.loops.size(), 1u);
+  EXPECT_TRUE(solid.lines.empty());
+  EXPECT_NEAR(computeLength(solid), 16, 1e-5);
+  const ObjectSection room = cutObject(makeScannedBox(true, isMissing), 0, 1.2);
+  EXPECT_TRUE(room.loops.empty());
+  EXPECT_EQ(room.lines.size(), 16u);
+  EXPECT_NEAR(computeLength(room), 16 - 1.6, 1e-5);
+}
+
+TEST(FloorPlanSection, NoStripIsLostWhicheverAreMissing) {
+  std::mt19937 random(3);
+  for (int scan = 0; scan < 200; ++scan) {
+    std::bernoulli_distribution missing(0.01 * (scan % 60));
+    int present = 0;
+    const auto isMissing = [&](int) {
+      const bool is = missing(random);
+      present += is ? 0 : 1;
+      return is;
+    };
+    const ObjectSection section = cutObject(makeScannedBox(false, isMissing), 0, 1.2);
+    const double length = computeLength(section);  // with the holes of closed outlines
+    EXPECT_GE(length, 0.1 * present - 1e-5);
+    EXPECT_LE(length, section.loops.empty() ? 0.1 * present + 1e-5 : 16.5);
+  }
 }
 
 }  // namespace
