@@ -258,9 +258,8 @@ const Verb kVerbs[] = {
      }},
     {"walk", "Run a walk script on a server", addWalkOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
-       return WalkCommand{read.script,       read.out,   *parseHostPort(read.connect),
-                          read.world,        read.token, read.strict,
-                          parseSamples(read)};
+       return WalkCommand{read.script, read.out,    *parseHostPort(read.connect), read.world,
+                          read.token,  read.strict, parseSamples(read),           read.mapModel};
      }},
     {"doctor", "Test all graphics devices and report missing components", addDoctorOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand { return read.doctor; }},

@@ -35,7 +35,7 @@ struct ScriptTarget {
   std::function<std::vector<v1::ContactEvent>()> endContacts;
   v1::Scene scene;
   std::string renderer;
-  const scene::Scene* localScene = nullptr;  ///< for walls in maps; null: in another process
+  const scene::Scene* localScene = nullptr;  ///< for walls in maps; null: none
 };
 
 protocol::CaptureFormat makeCaptureFormat(std::uint32_t samples) {
@@ -249,6 +249,21 @@ ExitCode replay(const ReplayCommand& command) {
       kAbortNote);
 }
 
+/// The model of a walk's map; null: none is given, or the server serves another one.
+std::shared_ptr<const scene::Scene> loadMapScene(const std::filesystem::path& file,
+                                                 const v1::Scene& served) {
+  if (file.empty()) return nullptr;
+  ModelOptions model;
+  model.file = file;
+  std::shared_ptr<const scene::Scene> scene = loadScene(model);
+  if (scene->hash() == served.hash()) return scene;
+  logWarning(
+      "{}: the server serves another model or reads it with other options; the map has no "
+      "walls",
+      file.string());
+  return nullptr;
+}
+
 ExitCode walk(const WalkCommand& command) {
   return runInterruptible(
       [&] {
@@ -259,13 +274,15 @@ ExitCode walk(const WalkCommand& command) {
         options.world = command.world;
         options.token = command.token;
         protocol::Client client(command.connect.host, command.connect.port, options);
+        const auto scene = loadMapScene(command.model, client.welcome().scene());
         protocol::SocketDriver driver(client, makeCaptureFormat(command.samples));
         ScriptTarget target{driver,
                             [&](const v1::FrameRequest& request) { return client.frame(request); },
                             [&] { return client.metrics(); },
                             [&] { return leaveWorld(driver, report.presentAvatars()); },
                             client.welcome().scene(),
-                            client.welcome().renderer()};
+                            client.welcome().renderer(),
+                            scene.get()};
         return runAndReport(script, report, command.strict, std::move(target));
       },
       kAbortNote);
