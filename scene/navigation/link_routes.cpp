@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "scene/navigation/mesh_paths.hpp"
 #include "scene/navigation/walk/stand.hpp"
 
 namespace enfilade::scene {
@@ -67,12 +68,12 @@ std::optional<std::vector<RouteStep>> findRoute(const PathFinder& finder, Links&
         reach(portal.to, here.seconds + (portal.middle() - here.point).norm() / speed,
               portal.middle(), polygon, {});
     if (finder.passages)
-      for (const Passage& passage : finder.passages->passages)
-        if (passage.fromPolygon == polygon)
-          reach(passage.toPolygon,
-                here.seconds +
-                    ((passage.points.front() - here.point).norm() + passage.length) / speed,
-                passage.points.back(), polygon, {});
+      for (const Passage& passage :
+           std::ranges::equal_range(finder.passages->passages, polygon, {}, &Passage::fromPolygon))
+        reach(
+            passage.toPolygon,
+            here.seconds + ((passage.points.front() - here.point).norm() + passage.length) / speed,
+            passage.points.back(), polygon, {});
     const std::vector<PathLink>& found = links.from(polygon, finder.walker);
     for (std::size_t i = 0; i < found.size(); ++i) {
       const PathLink& link = found[i];
@@ -186,8 +187,7 @@ class PathBuilder {
 
 NavigationPath findLinkedPath(const PathFinder& finder, Links& links, const Snapshot& bodies,
                               const Vec3& from, const Vec3& to, NavigationPath walked) {
-  const Vec3 extent(3 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
-                    3 * finder.agent.radius);
+  const Vec3 extent = computeMeshReach(finder);
   const auto start = standAt(finder.walker, from), goal = standAt(finder.walker, to);
   if (!start || !goal) return walked;
   const auto first = finder.ample.findNearest(*start, extent),

@@ -223,6 +223,7 @@ PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedG
     if (!tried.contains(key)) tried.emplace(key, leaveIsland(all, island));
     addPassages(all, tried.at(key));
   }
+  std::ranges::stable_sort(all.list.passages, {}, &Passage::fromPolygon);
   return std::move(all.list);
 }
 

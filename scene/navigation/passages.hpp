@@ -25,7 +25,7 @@ inline constexpr double kMaxSmallArea = 1;  ///< square metres, of a part of a m
 struct PassageList {
   std::vector<std::uint32_t> partOf;  ///< by polygon: part of the mesh that open portals join
   std::vector<double> areas;          ///< by part, square metres; 0: no place to stand was found
-  std::vector<Passage> passages;
+  std::vector<Passage> passages;      ///< ascending by fromPolygon
 
   bool isSmallPart(std::uint32_t polygon) const { return areas[partOf[polygon]] <= kMaxSmallArea; }
 };

@@ -121,7 +121,7 @@ void collectBodies(Model& model, const std::filesystem::path& file, IfcDoors doo
   std::vector<BodySpec> ofFile = std::move(model.bodies), ofIfc;
   model.bodies.clear();
   // Doors are split before the sidecar is read, because it may name their leaves and frames.
-  ofIfc = splitDoors(model);
+  ofIfc = splitDoors(model, doors == IfcDoors::movable || doors == IfcDoors::open);
   const Sidecar sidecar = applySidecarFile(model, file);
   const auto firstOfIfc =
       std::stable_partition(ofFile.begin(), ofFile.end(),
@@ -133,9 +133,6 @@ void collectBodies(Model& model, const std::filesystem::path& file, IfcDoors doo
   if (doors != IfcDoors::fixed)
     mergeLowerPriorityBodies(model, std::move(ofIfc), sidecar.staticObjects);
   if (doors == IfcDoors::open || doors == IfcDoors::absent) fixDoors(model, doors);
-  if (doors == IfcDoors::fixed || doors == IfcDoors::absent)  // no door opens
-    std::erase_if(model.diagnostics,
-                  [](const Diagnostic& one) { return one.kind == "guessed_doors"; });
   attachCollisionShapes(model);
   dropBodiesWithoutArea(model);
 }

@@ -173,7 +173,7 @@ void dropUnusedMeshes(Model& model, std::size_t before) {
 
 class DoorSplitter {
  public:
-  explicit DoorSplitter(Model& model) : model_(model), meshes_(model) {
+  DoorSplitter(Model& model, bool theyOpen) : model_(model), theyOpen_(theyOpen), meshes_(model) {
     for (const Object& object : model.objects) paths_.insert(object.path);
   }
 
@@ -189,7 +189,7 @@ class DoorSplitter {
       return reportStatic(door, door.operationType + " does not match " +
                                     std::to_string(pieces.leaves.size()) +
                                     " leaves, or is not modelled");
-    if (motion->isGuessed) reportGuess(door, *motion);
+    if (theyOpen_ && motion->isGuessed) reportGuess(door, *motion);
     for (std::uint8_t leaf = 0; leaf < pieces.leaves.size(); ++leaf) {
       BodySpec body = makeBodySpec(door, pieces, pieces.leaves[leaf], motion->leaves[leaf]);
       body.objects = {leaf == 0 ? index : addPiece(door, index, pieces, leaf, "/leaf2")};
@@ -233,13 +233,14 @@ class DoorSplitter {
   }
 
   Model& model_;
+  const bool theyOpen_;
   MeshSplitter meshes_;
   std::set<std::string> paths_;
 };
 
 }  // namespace
 
-std::vector<BodySpec> splitDoors(Model& model) {
+std::vector<BodySpec> splitDoors(Model& model, bool theyOpen) {
   std::vector<std::uint32_t> doors;
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
     const std::string& word = model.objects[i].ifcClass;
@@ -247,7 +248,7 @@ std::vector<BodySpec> splitDoors(Model& model) {
   }
   if (doors.empty()) return {};
   const std::size_t before = model.meshes.size();
-  DoorSplitter splitter(model);
+  DoorSplitter splitter(model, theyOpen);
   for (const std::uint32_t door : doors) splitter.split(door);
   dropUnusedMeshes(model, before);
   return std::move(splitter.bodies);
