@@ -73,23 +73,25 @@ TEST(Passages, AnAnswerDoesNotDependOnEarlierOnes) {
   }
 }
 
-/// Passages of one storey say nothing about the gaps above them.
+/// A narrow door at the end of an alcove in each storey: it is the only gap, and those of other
+/// storeys lie above and below it.
 TEST(Passages, GapsOfEachStoreyAreTried) {
+  constexpr double kDoor = 0.61;
   std::vector<NamedBox> boxes;
   for (int storey = 0; storey < 3; ++storey) {
-    const Vec3 up(0, 3.0 * storey, 0);
-    for (NamedBox box : roomsWithFarGap(0.61)) {
-      box.path += "/" + std::to_string(storey);
-      box.min += up;
-      box.max += up;
-      boxes.push_back(box);
-    }
+    const double y = 4.0 * storey;
+    const std::string number = "/" + std::to_string(storey);
+    boxes.push_back({"floor" + number, {0, y - 0.2, 0}, {8, y, 12}});
+    boxes.push_back({"fill/left" + number, {2.5, y, 0}, {5.5, y + 2.5, 5}});
+    boxes.push_back({"fill/right" + number, {2.5, y, 6.2}, {5.5, y + 2.5, 12}});
+    boxes.push_back({"wall/left" + number, {3.9, y, 5}, {4.1, y + 2.5, 5.6 - 0.5 * kDoor}});
+    boxes.push_back({"wall/right" + number, {3.9, y, 5.6 + 0.5 * kDoor}, {4.1, y + 2.5, 6.2}});
   }
   Navigation navigation(boxScene(boxes), {}, {});
   for (int storey = 0; storey < 3; ++storey) {
-    const double floor = 3.0 * storey;
-    const auto left = navigation.findIsland({2, floor, 10}),
-               right = navigation.findIsland({6, floor, 10});
+    const double y = 4.0 * storey;
+    const auto left = navigation.findIsland({1.5, y, 2}),
+               right = navigation.findIsland({6.5, y, 2});
     EXPECT_TRUE(left && left == right) << storey;
   }
 }
