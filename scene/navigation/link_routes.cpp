@@ -68,8 +68,7 @@ std::optional<std::vector<RouteStep>> findRoute(const PathFinder& finder, Links&
         reach(portal.to, here.seconds + (portal.middle() - here.point).norm() / speed,
               portal.middle(), polygon, {});
     if (finder.passages)
-      for (const Passage& passage :
-           std::ranges::equal_range(finder.passages->passages, polygon, {}, &Passage::fromPolygon))
+      for (const Passage& passage : finder.passages->passagesFrom(polygon))
         reach(
             passage.toPolygon,
             here.seconds + ((passage.points.front() - here.point).norm() + passage.length) / speed,

@@ -25,6 +25,12 @@ double computeLength(const std::vector<Vec3>& points) {
   return length;
 }
 
+std::span<const Passage> PassageList::passagesFrom(std::uint32_t polygon) const {
+  const auto first = std::ranges::lower_bound(passages, polygon, {}, &Passage::fromPolygon);
+  const auto last = std::ranges::upper_bound(passages, polygon, {}, &Passage::fromPolygon);
+  return {first, last};
+}
+
 PassageList listParts(const NavigationMesh& mesh) {
   PassageList list{mesh.findIslands(), {}, {}};
   for (std::uint32_t polygon = 0; polygon < mesh.polygonCount(); ++polygon) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
@@ -28,6 +29,7 @@ struct PassageList {
   std::vector<Passage> passages;      ///< ascending by fromPolygon
 
   bool isSmallPart(std::uint32_t polygon) const { return areas[partOf[polygon]] <= kMaxSmallArea; }
+  std::span<const Passage> passagesFrom(std::uint32_t polygon) const;
 };
 
 /// The parts of a mesh, without passages.
