@@ -1,6 +1,7 @@
 #include "render/draw_list.hpp"
 
 #include <algorithm>
+#include <span>
 #include <utility>
 
 #include "collision/assert.hpp"
@@ -9,7 +10,7 @@ namespace enfilade::render {
 namespace {
 
 /// Farthest first; equal distances keep their order.
-void sortBackToFront(std::vector<std::uint32_t>& transparent, const std::vector<DrawItem>& items,
+void sortBackToFront(std::vector<std::uint32_t>& transparent, std::span<const DrawItem> items,
                      const std::vector<BodyPlacement>& bodies, const Camera& camera) {
   const bool perspective = camera.projection == Camera::Projection::perspective;
   const Vec3 forward = computeCameraBasis(camera).forward;
@@ -31,9 +32,10 @@ void appendCommand(DrawList& list, const DrawItem& item, AlphaMode alphaMode,
   const auto instance = static_cast<std::uint32_t>(list.instances.size() - 1);
   const bool sameBatch = !list.batches.empty() && list.batches.back().alphaMode == alphaMode &&
                          list.batches.back().coloured == item.coloured &&
-                         list.batches.back().texture == item.texture;
+                         list.batches.back().texture == item.texture &&
+                         list.batches.back().coplanarRank == item.coplanarRank;
   if (!sameBatch) {
-    list.batches.push_back({alphaMode, item.coloured, item.texture,
+    list.batches.push_back({alphaMode, item.coloured, item.texture, item.coplanarRank,
                             static_cast<std::uint32_t>(list.commands.size()), 0});
   }
   Batch& batch = list.batches.back();

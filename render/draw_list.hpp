@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "render/camera_basis.hpp"
@@ -45,11 +46,12 @@ struct DrawCommand {
   std::uint32_t baseInstance;
 };
 
-/// Consecutive commands with the same program and texture.
+/// Consecutive commands with the same program, texture and coplanar rank.
 struct Batch {
   AlphaMode alphaMode = AlphaMode::opaque;
   bool coloured = false;  ///< with vertex colours
   std::int32_t texture = -1;
+  std::uint8_t coplanarRank = 0;
   std::uint32_t firstCommand = 0, commandCount = 0;
 };
 
@@ -68,7 +70,7 @@ MaterialData makeMaterialData(const scene::Model& model, const scene::Mesh& mesh
 /// The data to draw a scene; `ranges` and `materials` have one entry per mesh.
 struct Drawable {
   const scene::Model& model;
-  const std::vector<DrawItem>& items;
+  std::span<const DrawItem> items;
   const std::vector<MeshRange>& ranges;
   const std::vector<MaterialData>& materials;
 };

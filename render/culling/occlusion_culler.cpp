@@ -36,7 +36,7 @@ void forEachBit(std::uint64_t bits, const Each& each) {
 
 }  // namespace
 
-OcclusionCuller::OcclusionCuller(const std::vector<DrawItem>& items) : items_(items) {
+OcclusionCuller::OcclusionCuller(std::span<const DrawItem> items) : items_(items) {
   std::vector<scene::Aabb> boxes;
   std::vector<std::uint32_t> staticItems;
   for (std::uint32_t i = 0; i < items.size(); ++i) {

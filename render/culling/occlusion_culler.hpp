@@ -15,7 +15,7 @@ namespace enfilade::render {
 class OcclusionCuller {
  public:
   /// `items` is kept by reference.
-  explicit OcclusionCuller(const std::vector<DrawItem>& items);
+  explicit OcclusionCuller(std::span<const DrawItem> items);
 
   /// A view of findVisible().
   struct CullingView {
@@ -36,7 +36,7 @@ class OcclusionCuller {
  private:
   std::uint32_t linkNodes(std::uint32_t node);
 
-  const std::vector<DrawItem>& items_;
+  std::span<const DrawItem> items_;
   collision::BoxTree tree_;                      ///< of static items
   std::vector<std::uint32_t> itemOfTreeEntry_;   ///< draw item of each tree entry
   std::vector<std::uint32_t> nodeOfItem_;        ///< parent node of the item's leaf

@@ -2,6 +2,8 @@
 // Independent of OpenGL.
 #pragma once
 
+#include <span>
+
 #include "render/avatar_mesh.hpp"
 #include "render/culling/occlusion_culler.hpp"
 #include "render/culling/visibility_cache.hpp"
@@ -16,7 +18,7 @@ struct VisibleSet {
 
 /// The items of a scene at one snapshot.
 struct SceneItems {
-  const std::vector<DrawItem>& items;
+  std::span<const DrawItem> items;
   const std::vector<BodyPlacement>& bodies;
   const std::vector<AvatarMeshes::Item>& avatarItems;
 

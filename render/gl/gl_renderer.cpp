@@ -85,7 +85,7 @@ struct GlRenderer::State {
   ShadowMaskFunction shadowMask;  // may be empty
   EglContext context;             // before all members that own GL objects
   SceneBuffers buffers;
-  std::vector<DrawItem> items;
+  std::span<const DrawItem> items;  // of the scene; empty until it is uploaded
   std::optional<OcclusionCuller> culler;
   std::optional<SurfacePass> surfacePass;         // empty: the scene is not uploaded yet
   std::deque<DynamicInstances> dynamicInstances;  // one per snapshot of the views drawn together
@@ -141,9 +141,9 @@ GlRenderer::State::State(std::shared_ptr<const scene::Scene> shared, const Devic
 void GlRenderer::State::prepareScene() {
   if (surfacePass) return;
   buffers = uploadModel(scene->model());
-  items = buildDrawItems(scene->model());
+  items = scene->drawItems();
   culler.emplace(items);
-  surfacePass.emplace(roundsVertices);
+  surfacePass.emplace(roundsVertices, planeDepth);
 }
 
 GlRenderer::State::~State() {

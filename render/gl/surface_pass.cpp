@@ -17,6 +17,12 @@ namespace {
 constexpr GLuint kVertexBinding = 0, kInstanceBinding = 1, kColourBinding = 2;
 constexpr GLuint kFrameUniformBinding = 0;
 
+// A surface of coplanar rank r is drawn by r of these steps behind its plane. Units are the last
+// bits of the nearest depth of a triangle: less leaves stripes near the eye. GPUs round vertices to
+// 1/256 pixel, so that triangles of one plane differ by slopes (the depth that a pixel spans), too.
+// The depth of frames is then that of planes, without these steps.
+constexpr float kCoplanarUnits = 32, kCoplanarSlope = 1.0f / 64;
+
 void setVec4(float (&target)[4], const Vec3& xyz, double w) {
   for (int i = 0; i < 3; ++i) target[i] = static_cast<float>(xyz[i]);
   target[3] = static_cast<float>(w);
@@ -120,8 +126,9 @@ void StreamBuffer::fill(const void* data, std::size_t bytes) {
   glNamedBufferSubData(buffer_.name(), 0, static_cast<GLsizeiptr>(bytes), data);
 }
 
-SurfacePass::SurfacePass(bool roundsVertices)
+SurfacePass::SurfacePass(bool roundsVertices, bool hasPlaneDepth)
     : roundsVertices_(roundsVertices),
+      coplanarSlope_(hasPlaneDepth ? kCoplanarSlope : 0),
       vertexArray_(makeVertexArray()),
       uniforms_(GlBuffer::create()),
       sky_(buildProgram("sky", skyVertexSource(), skyFragmentSource())) {
@@ -164,6 +171,13 @@ void SurfacePass::enableColours(bool coloured) {
   } else {
     glDisableVertexArrayAttrib(vertexArray_.name(), location);
   }
+}
+
+void SurfacePass::setCoplanarRank(std::uint8_t rank) {
+  if (coplanarRank_ == rank) return;
+  coplanarRank_ = rank;
+  glPolygonOffset(-coplanarSlope_ * rank, -kCoplanarUnits * rank);  // larger depths are nearer
+  (rank > 0 ? glEnable : glDisable)(GL_POLYGON_OFFSET_FILL);
 }
 
 void SurfacePass::begin(const Camera& camera) {
@@ -220,6 +234,7 @@ void SurfacePass::draw(const DrawList& list, const Geometry& geometry) {
   for (const Batch& batch : list.batches) {
     glUseProgram(findProgram(batch));
     enableColours(batch.coloured);
+    setCoplanarRank(batch.coplanarRank);
     if (batch.texture >= 0) {
       ENFILADE_ASSERT(static_cast<std::size_t>(batch.texture) < geometry.textures.size());
       glBindTextureUnit(0, geometry.textures[static_cast<std::size_t>(batch.texture)].name());
@@ -233,6 +248,7 @@ void SurfacePass::draw(const DrawList& list, const Geometry& geometry) {
                                 reinterpret_cast<const void*>(offset),
                                 static_cast<GLsizei>(batch.commandCount), sizeof(DrawCommand));
   }
+  setCoplanarRank(0);
 }
 
 void SurfacePass::drawSky() const {

@@ -32,8 +32,9 @@ struct Geometry {
 /// Programs and state of all passes. Needs a current context, always the same.
 class SurfacePass {
  public:
-  /// `roundsVertices`: see DeviceChoice.
-  explicit SurfacePass(bool roundsVertices);
+  /// `roundsVertices`: see DeviceChoice. `hasPlaneDepth`: the depth of frames is that of planes, so
+  /// offsets in the depth buffer do not change it.
+  SurfacePass(bool roundsVertices, bool hasPlaneDepth);
 
   /// Sets the common state and the camera.
   void begin(const Camera& camera);
@@ -53,8 +54,11 @@ class SurfacePass {
  private:
   unsigned findProgram(const Batch& batch);
   void enableColours(bool coloured);
+  void setCoplanarRank(std::uint8_t rank);
 
   bool roundsVertices_;
+  float coplanarSlope_;
+  std::uint8_t coplanarRank_ = 0;  ///< of the current draws
   GlVertexArray vertexArray_;
   GlBuffer uniforms_;
   GlProgram sky_;

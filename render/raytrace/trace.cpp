@@ -12,6 +12,8 @@ namespace enfilade::render {
 namespace {
 
 constexpr int kPacketSize = kTileSize * kTileSize;  // rays per packet
+constexpr double kCoplanarGap = 2e-5;               // metres, between surfaces in one plane
+constexpr double kMinCoplanarCosine = 1 - 1e-6;     // of their normals
 
 // A key: 3 bits of tree, 1 of geometry, 28 of instance (all ones: none), 32 of primitive.
 constexpr HitKey kNoInstance = (HitKey{1} << 28) - 1;
@@ -161,6 +163,37 @@ void intersectPacket(RayPacket& packet, const TraceContext& trace, FilterContext
                  &packet.query);
 }
 
+/// Of opaque surfaces in the plane of a hit, that of the lowest rank at a point of the image:
+/// rounding decides which of them Embree finds.
+HitKey chooseCoplanar(const TraceContext& trace, double x, double y, HitKey hit) {
+  const BatchTriangle found = findTriangle(trace, hit);
+  if (found.batch->coplanarRank == 0) return hit;
+  const PrimaryRays& rays = trace.rays;
+  const EyeSpaceCorners corners = found.corners(rays.eye);
+  const double z = computePlaneDepth(corners, rays).at(x, y);
+  const Vec3 direction = rays.directionAt(x, y), point = rays.originAt(x, y) + z * direction;
+  const Vec3 normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
+  // Embree's coordinates are floats, relative to the origin of the trees.
+  const double rounding = 1e-6 * (point + rays.eye - trace.origin).cwiseAbs().maxCoeff();
+  const double slack =
+      std::min((kCoplanarGap + rounding) / std::abs(normal.dot(direction)), 0.01 * z);
+  std::vector<HitKey> keys;
+  traceBetween(trace, x, y, z - slack, z + slack, keys);
+  std::uint8_t rank = found.batch->coplanarRank;
+  for (const HitKey key : keys) {
+    const BatchTriangle other = findTriangle(trace, key);
+    if (other.batch->coplanarRank >= rank) continue;
+    if (other.batch->material->alpha != scene::Material::Alpha::opaque) continue;
+    const std::array<Vec3, 3> c = other.corners(rays.eye);
+    const Vec3 otherNormal = (c[1] - c[0]).cross(c[2] - c[0]).normalized();
+    if (!(std::abs(otherNormal.dot(point - c[0])) <= kCoplanarGap)) continue;
+    if (!(std::abs(otherNormal.dot(normal)) >= kMinCoplanarCosine)) continue;
+    hit = key;
+    rank = other.batch->coplanarRank;
+  }
+  return hit;
+}
+
 }  // namespace
 
 BatchTriangle findTriangle(const TraceContext& trace, HitKey key) {
@@ -192,6 +225,16 @@ void traceRows(const TraceContext& trace, int y, std::vector<HitKey>& keys) {
         hit.geomID[lane] = hit.instID[0][lane] = RTC_INVALID_GEOMETRY_ID;
       }
     }
+  }
+  HitKey kept = kNoHit;  // most neighbours have one triangle, of no coplanar surface
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    if (keys[i] == kept || keys[i] == kNoHit) continue;
+    if (findTriangle(trace, keys[i]).batch->coplanarRank == 0) {
+      kept = keys[i];
+      continue;
+    }
+    keys[i] = chooseCoplanar(trace, static_cast<double>(i % width),
+                             y + static_cast<double>(i / width), keys[i]);
   }
 }
 
@@ -322,7 +365,7 @@ HitKey traceFirst(const TraceContext& trace, double x, double y, double from, do
     key = makeHitKey(t, query.hit.instID[0], query.hit.geomID, query.hit.primID);
     query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;  // the next must be nearer
   }
-  return key;
+  return key == kNoHit ? key : chooseCoplanar(trace, x, y, key);
 }
 
 bool isInShadow(const TraceContext& trace, double x, double y, double z) {

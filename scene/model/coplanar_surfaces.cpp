@@ -7,7 +7,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <set>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -22,9 +22,11 @@ constexpr double kNormalStep = 1e-3;     // of the grid of planes, of a unit vec
 constexpr double kDistanceStep = 1e-3;   // of the grid of planes, metres
 constexpr double kMaxComparedDistance = 1e7;        // metres; farther surfaces are not compared
 constexpr std::size_t kMaxComparisons = 5'000'000;  // of boxes; a few seconds
+constexpr std::size_t kMaxRankedTriangles = 2'000'000;
 
 using Triangle = std::array<Vec3, 3>;
 using Point = Eigen::Vector2d;
+using ObjectPair = std::pair<std::uint32_t, std::uint32_t>;
 
 struct Facet {
   std::array<std::int64_t, 4> plane{};            ///< normal and distance on the grid
@@ -112,8 +114,9 @@ class CoplanarSearch {
              std::pair(b.plane, std::pair(b.min.x(), b.object));
     });
     for (std::size_t i = 0; i < facets_.size() && found_.isComplete; ++i) compareWithNext(i);
-    found_.pairs = pairs_.size();
-    if (!pairs_.empty())
+    for (const auto& [pair, looksEqual] : pairs_)
+      found_.pairs.push_back({pair.first, pair.second, looksEqual});
+    if (largestOverlap_ > 0)
       found_.example =
           model_.objects[largest_.first].path + " and " + model_.objects[largest_.second].path;
     return std::move(found_);
@@ -178,11 +181,14 @@ class CoplanarSearch {
         return;
       }
       if (b.min.y() >= a.max.y() || a.min.y() >= b.max.y()) continue;
-      if (lookEqual(getMaterial(a), getMaterial(b))) continue;
-      const std::pair<std::uint32_t, std::uint32_t> pair = std::minmax(a.object, b.object);
+      const ObjectPair pair = std::minmax(a.object, b.object);
+      const bool looksEqual = lookEqual(getMaterial(a), getMaterial(b));
+      if (looksEqual && pairs_.contains(pair)) continue;
       const double overlap = computeCoplanarOverlap(a, b);
       if (overlap < kMinOverlap) continue;
-      pairs_.insert(pair);
+      bool& pairLooksEqual = pairs_.try_emplace(pair, true).first->second;
+      if (looksEqual) continue;
+      pairLooksEqual = false;
       if (overlap > largestOverlap_) largest_ = pair;
       largestOverlap_ = std::max(overlap, largestOverlap_);
     }
@@ -200,17 +206,61 @@ class CoplanarSearch {
 
   const Model& model_;
   std::vector<Facet> facets_;
-  std::set<std::pair<std::uint32_t, std::uint32_t>> pairs_;
-  std::pair<std::uint32_t, std::uint32_t> largest_;
-  double largestOverlap_ = 0;  ///< projected, square metres
+  std::map<ObjectPair, bool> pairs_;  ///< whether they look equal
+  ObjectPair largest_;                ///< of those that do not
+  double largestOverlap_ = 0;         ///< projected, square metres; 0: there are none
   std::size_t comparisons_ = 0;
   CoplanarSurfaces found_;
 };
 
+/// Metres; 0 without vertices.
+double computeBoxDiagonal(const Model& model, const Object& object) {
+  Aabb box;
+  for (const std::uint32_t mesh : object.meshes)
+    for (const Eigen::Vector3f& position : model.meshes[mesh].positions)
+      box.include(object.worldFromMesh * position.cast<double>());
+  return box.empty() ? 0 : box.size().norm();
+}
+
+std::size_t countTriangles(const Model& model) {
+  std::size_t triangles = 0;
+  for (const Object& object : model.objects)
+    for (const std::uint32_t mesh : object.meshes) triangles += model.meshes[mesh].triangleCount();
+  return triangles;
+}
+
 }  // namespace
+
+std::size_t CoplanarSurfaces::countDifferentLooks() const {
+  return static_cast<std::size_t>(std::ranges::count(pairs, false, &CoplanarPair::looksEqual));
+}
 
 CoplanarSurfaces findCoplanarSurfaces(const Model& model) {
   return CoplanarSearch(model).run();
+}
+
+std::vector<std::uint8_t> rankCoplanarObjects(const Model& model) {
+  constexpr std::uint8_t kMaxRank = 255;
+  std::vector<std::uint8_t> ranks(model.objects.size(), 0);
+  if (countTriangles(model) > kMaxRankedTriangles) return ranks;
+  std::map<std::uint32_t, std::vector<std::uint32_t>> partners;
+  for (const CoplanarPair& pair : findCoplanarSurfaces(model).pairs) {
+    partners[pair.first].push_back(pair.second);
+    partners[pair.second].push_back(pair.first);
+  }
+  // Objects from the smallest to the largest: an object yields to its partners before it.
+  std::vector<std::pair<double, std::uint32_t>> bySize;
+  for (const auto& [object, others] : partners)
+    bySize.emplace_back(computeBoxDiagonal(model, model.objects[object]), object);
+  std::ranges::sort(bySize);
+  std::vector<bool> isRanked(model.objects.size(), false);
+  for (const auto& [size, object] : bySize) {
+    for (const std::uint32_t other : partners[object])
+      if (isRanked[other] && ranks[other] < kMaxRank)
+        ranks[object] = std::max<std::uint8_t>(ranks[object], ranks[other] + 1);
+    isRanked[object] = true;
+  }
+  return ranks;
 }
 
 }  // namespace enfilade::scene

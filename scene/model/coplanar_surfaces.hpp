@@ -1,22 +1,37 @@
-// Finds surfaces of different objects that lie in one plane, face the same side and overlap. Which
-// of them a picture shows is decided pixel by pixel by rounding, so that they flicker.
+// Finds surfaces of different objects that lie in one plane, face the same side and overlap.
+// Rounding would decide pixel by pixel which of them a picture shows; ranks decide instead.
 #pragma once
 
-#include <cstddef>
+#include <cstdint>
 #include <string>
+#include <vector>
 
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
-struct CoplanarSurfaces {
-  std::size_t pairs = 0;   ///< of objects; at least so many if `isComplete` is false
-  std::string example;     ///< the paths of the pair whose triangles overlap most
-  bool isComplete = true;  ///< false: the scene has too many surfaces in one plane
+/// Two objects, by index.
+struct CoplanarPair {
+  std::uint32_t first = 0, second = 0;  ///< first < second
+  bool looksEqual = true;               ///< no overlapping triangles have different materials
+
+  auto operator<=>(const CoplanarPair&) const = default;
 };
 
-/// Compares drawn triangles of 0.01 m^2 or more. Surfaces of equal materials are left out, because
-/// without vertex colours they flicker only in ids.
+struct CoplanarSurfaces {
+  std::vector<CoplanarPair> pairs;  ///< ascending; some are missing if `isComplete` is false
+  std::string example;              ///< the paths of the pair of different looks that overlaps most
+  bool isComplete = true;           ///< false: the scene has too many surfaces in one plane
+
+  std::size_t countDifferentLooks() const;
+};
+
+/// Compares drawn opaque triangles of 0.01 m^2 or more.
 CoplanarSurfaces findCoplanarSurfaces(const Model& model);
+
+/// One rank an object. Of coplanar surfaces the one of the lowest rank is visible: that of the
+/// object with the smaller box, because details lie on large surfaces. Models of more than two
+/// million triangles get ranks of 0, since the search would delay their first picture by seconds.
+std::vector<std::uint8_t> rankCoplanarObjects(const Model& model);
 
 }  // namespace enfilade::scene

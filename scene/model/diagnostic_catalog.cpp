@@ -85,9 +85,10 @@ constexpr std::array kCatalog{
     DiagnosticKind{"object_without_area", note, "it has no surface to collide with"},
     DiagnosticKind{"points_and_lines_dropped", note,
                    "points and lines are neither drawn nor solid"},
-    DiagnosticKind{"coplanar_surfaces", note,
-                   "surfaces of two objects in one plane: where both are seen, they flicker; move "
-                   "one by a millimetre"},
+    DiagnosticKind{
+        "coplanar_surfaces", note,
+        "surfaces of two objects in one plane: pictures show the smaller object; move one "
+        "by a millimetre to show the other"},
     DiagnosticKind{"repeated_object", warning,
                    "the same shape twice in the same place; delete one, they flicker"},
     // appearance

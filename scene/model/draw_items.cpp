@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <tuple>
 
+#include "scene/model/coplanar_surfaces.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -21,7 +23,8 @@ void sortInDrawingOrder(std::vector<DrawItem>& items) {
   const auto key = [](const DrawItem& item) {
     // Transparent items are sorted again in every frame; here only the object counts.
     const bool blend = item.alphaMode == Material::Alpha::blend;
-    return std::tuple(item.alphaMode, blend ? -1 : item.texture, !blend && item.coloured);
+    return std::tuple(item.alphaMode, blend ? -1 : item.texture, !blend && item.coloured,
+                      blend ? 0 : -item.coplanarRank);
   };
   std::stable_sort(items.begin(), items.end(),
                    [&](const DrawItem& a, const DrawItem& b) { return key(a) < key(b); });
@@ -35,6 +38,7 @@ std::vector<DrawItem> buildDrawItems(const Model& model) {
   for (const Mesh& mesh : model.meshes) meshBoxes.push_back(computeMeshAabb(mesh));
 
   const std::vector<const BodySpec*> bodyOfObject = mapObjectsToBodies(model);
+  const std::vector<std::uint8_t> ranks = rankCoplanarObjects(model);
   std::vector<DrawItem> items;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const Object& object = model.objects[o];
@@ -47,7 +51,7 @@ std::vector<DrawItem> buildDrawItems(const Model& model) {
       const Material& material = findMaterial(model, mesh);
       items.push_back(
           {transformAabb(object.worldFromMesh, meshBoxes[m]), o, m, findTexture(model, material),
-           material.alpha, !mesh.colours.empty(),
+           material.alpha, !mesh.colours.empty(), ranks[o],
            body ? static_cast<std::uint32_t>(body - model.bodies.data()) : DrawItem::kStatic});
     }
   }

@@ -16,15 +16,17 @@ struct DrawItem {
   std::uint32_t object = 0, mesh = 0;
   std::int32_t texture = -1;  ///< index into Model::textures; -1: none
   Material::Alpha alphaMode = Material::Alpha::opaque;
-  bool coloured = false;         ///< the mesh has vertex colours
+  bool coloured = false;  ///< the mesh has vertex colours
+  /// Of surfaces in one plane the lowest rank is visible (coplanar_surfaces.hpp).
+  std::uint8_t coplanarRank = 0;
   std::uint32_t body = kStatic;  ///< index into Model::bodies
 
   bool isStatic() const { return body == kStatic; }
 };
 
 /// All items of the model except triggers and collision-only objects, in drawing order: by alpha
-/// mode, texture, vertex colours, object. The order never depends on the camera, so that depth ties
-/// are resolved equally in every frame.
+/// mode, texture, vertex colours, descending coplanar rank, object. The order never depends on the
+/// camera, so that depth ties are resolved equally in every frame.
 std::vector<DrawItem> buildDrawItems(const Model& model);
 
 /// The mesh's material; a default material if the mesh of a hand-made model has none.

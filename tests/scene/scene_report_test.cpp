@@ -117,7 +117,7 @@ TEST(SceneReport, CoplanarPairsAreCountedOnceEachAndTheLargestIsTheExample) {
                                         {"short", {3.05, 0, 3}, {3.6, 0.28, 4}},
                                         {"on far", {21, 0, 1}, {22, 0.2, 2}}},
                                        2));
-  EXPECT_EQ(found.pairs, 4u);
+  EXPECT_EQ(found.countDifferentLooks(), 4u);
   EXPECT_EQ(found.example, "slab and wide");
   EXPECT_TRUE(found.isComplete);
 }

@@ -320,6 +320,11 @@ const std::vector<Aabb>& Scene::objectBoxes() const {
   return objectBoxes_;
 }
 
+const std::vector<DrawItem>& Scene::drawItems() const {
+  std::call_once(itemsBuilt_, [this] { drawItems_ = buildDrawItems(model_); });
+  return drawItems_;
+}
+
 SceneTrees& Scene::trees(const std::function<std::shared_ptr<SceneTrees>()>& make) const {
   std::call_once(treesMade_, [&] { trees_ = make(); });
   return *trees_;

@@ -17,9 +17,10 @@ struct TriangleBatch {
   const Mesh* mesh = nullptr;
   const Eigen::Affine3d* worldFromMesh = nullptr;
   const Material* material = nullptr;
-  EntityId id = 0;            ///< of the object or avatar
-  EntityId entity = 0;        ///< of the body to which the object belongs; otherwise as `id`
-  std::int32_t texture = -1;  ///< index into Model::textures
+  EntityId id = 0;                ///< of the object or avatar
+  EntityId entity = 0;            ///< of the body to which the object belongs; otherwise as `id`
+  std::int32_t texture = -1;      ///< index into Model::textures
+  std::uint8_t coplanarRank = 0;  ///< as in DrawItem
   /// true: the mesh has its own tree, which can be shared and moved. false: it is copied into this
   /// tree, which is faster to trace.
   bool instanced = false;

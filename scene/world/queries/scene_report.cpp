@@ -77,7 +77,7 @@ void countCoplanarSurfaces(const Model& model, std::vector<Diagnostic>& diagnost
   const CoplanarSurfaces found = findCoplanarSurfaces(model);
   addDiagnostic(diagnostics, "coplanar_surfaces",
                 found.example + (found.isComplete ? "" : "; not all surfaces were compared"),
-                found.pairs);
+                found.countDifferentLooks());
 }
 
 }  // namespace

@@ -17,7 +17,7 @@ SceneTrees& SceneTrees::of(const Scene& scene) {
   return scene.trees([&] { return std::make_shared<SceneTrees>(scene); });
 }
 
-SceneTrees::SceneTrees(const Scene& scene) : scene_(scene), items_(buildDrawItems(scene.model())) {
+SceneTrees::SceneTrees(const Scene& scene) : scene_(scene), items_(scene.drawItems()) {
   if (!scene.bounds().empty()) origin_ = scene.bounds().centre().array().round().matrix();
   for (std::size_t i = 0; i < items_.size(); ++i)
     (items_[i].isStatic() ? staticItems_ : bodyItems_).push_back(i);
@@ -86,6 +86,7 @@ std::vector<TriangleBatch> SceneTrees::collectBatches(const PlacedItems& placed,
     batch.id = item.object + 1;
     batch.entity = (isStatic ? item.object : model.bodies[item.body].objects.front()) + 1;
     batch.texture = item.texture;
+    batch.coplanarRank = item.coplanarRank;
     batch.instanced = instanced_[items[k]];
     batches.push_back(batch);
   }

@@ -70,7 +70,7 @@ class SceneTrees {
 
   const Scene& scene_;
   Vec3 origin_ = Vec3::Zero();
-  std::vector<DrawItem> items_;
+  const std::vector<DrawItem>& items_;
   std::vector<std::size_t> staticItems_, bodyItems_;  ///< indices into items_
   std::vector<bool> instanced_;                       ///< one per item
   std::shared_ptr<PlacedItems> static_ = std::make_shared<PlacedItems>();
