@@ -12,6 +12,7 @@
 namespace enfilade::scene {
 namespace {
 
+constexpr double kDropError = 0.005;   // metres, of landings
 constexpr double kEdgeSpacing = 0.75;  // metres between places along an edge
 /// Metres of the landing beyond a place at the edge of a mesh, in addition to twice the radius: the
 /// mesh ends up to two cells further from the drop than the radius.
@@ -155,8 +156,9 @@ std::optional<PathLink> Links::proveDrop(const Edge& edge, Walker& walker) const
       if (phase > 0) walker.walkTo(*place + (way * phase / kPhases) * edge.outward);
       const double height = walker.footPosition().y();
       const WalkOutcome outcome = walker.dropTo(goal, options_.maxDrop);
-      if (outcome.kind != WalkOutcome::Kind::arrived ||
-          height - outcome.footPosition.y() <= settings_.stepHeight ||
+      const double fall = height - outcome.footPosition.y();  // the walker may land far lower
+      if (outcome.kind != WalkOutcome::Kind::arrived || fall <= settings_.stepHeight ||
+          fall > options_.maxDrop + kDropError ||
           (phase > 0 &&
            std::abs(outcome.footPosition.y() - link.points.back().y()) > kSameLanding)) {
         link.points.resize(1);

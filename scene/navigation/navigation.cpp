@@ -252,13 +252,23 @@ std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
   return std::nullopt;
 }
 
-std::optional<Vec3> Navigation::findPlaceIn(const NamedPlace& named,
+std::optional<Vec3> Navigation::findPlaceIn(std::span<const NamedPlace> named,
                                             const std::optional<Vec3>& start) {
   const std::lock_guard lock(mutex_);
+  std::vector<const NamedPlace*> nearestFirst;
+  for (const NamedPlace& place : named) nearestFirst.push_back(&place);
+  if (start)
+    std::ranges::stable_sort(
+        nearestFirst, {}, [&](const NamedPlace* place) { return (place->middle - *start).norm(); });
+  const auto findOn = [&](const std::optional<std::uint32_t>& island) -> std::optional<Vec3> {
+    for (const NamedPlace* place : nearestFirst)
+      if (const auto found = findPlaceOn(*place, island)) return found;
+    return std::nullopt;
+  };
   const auto standing = start ? standAt(*walker_, *start) : std::nullopt;
   if (const auto island = standing ? islandAt(*standing) : std::nullopt)
-    if (const auto place = findPlaceOn(named, island)) return place;
-  return findPlaceOn(named, std::nullopt);
+    if (const auto found = findOn(island)) return found;
+  return findOn(std::nullopt);
 }
 
 std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance) {

@@ -98,9 +98,9 @@ class Navigation {
   NavigationPath findWayOut(const Vec3& from, const std::function<bool(const Vec3&)>& isWanted);
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
   std::optional<NarrowPlace> findNarrowest(const std::vector<Vec3>& points);
-  /// The standing place in a named place that is horizontally closest to its middle. `start`: a
-  /// place on the island that has such places is preferred, if it has any.
-  std::optional<Vec3> findPlaceIn(const NamedPlace& named,
+  /// The standing place in one of some named places that is horizontally closest to its middle.
+  /// `start`: named places on the island of that place are preferred, then the closest to it.
+  std::optional<Vec3> findPlaceIn(std::span<const NamedPlace> named,
                                   const std::optional<Vec3>& start = std::nullopt);
   /// The standing place at `point`, or else the closest one within `maxDistance` metres.
   std::optional<Vec3> snap(const Vec3& point, double maxDistance);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <optional>
 #include <string_view>
 
 #include "scene/model/shapes/space_solid.hpp"
@@ -15,27 +16,31 @@ NamedPlace makePlace(const Aabb& box) {
   return {.box = box, .middle = box.centre()};
 }
 
-std::optional<NamedPlace> findRoom(const Model& model, std::string_view name) {
+using NamedPlaces = std::vector<NamedPlace>;
+
+NamedPlaces findRooms(const Model& model, std::string_view name) {
+  NamedPlaces rooms;
   for (const Space& space : model.spaces) {
     if (space.name != name && space.longName != name && space.globalId != name) continue;
     if (space.box.empty()) continue;
     const Vec3 middle = findSpaceMiddle(space, space.box).point;
     // An open surface has no inside: the box alone says where the room is.
     const bool solid = !space.surface.empty() && isInSpace(space, middle);
-    return NamedPlace{.box = space.box, .middle = middle, .space = solid ? &space : nullptr};
+    rooms.push_back({.box = space.box, .middle = middle, .space = solid ? &space : nullptr});
   }
-  return std::nullopt;
+  return rooms;
 }
 
-std::optional<NamedPlace> findStorey(const Scene& scene, std::string_view name) {
+NamedPlaces findStoreys(const Scene& scene, std::string_view name) {
+  NamedPlaces storeys;
   for (const Storey& storey : scene.model().storeys) {
     if (storey.name != name && storey.globalId != name) continue;
     Aabb box = scene.bounds();
     box.min.y() = storey.elevation - kStoreyDepth;
     box.max.y() = storey.elevation + kStoreyHeight;
-    return makePlace(box);
+    storeys.push_back(makePlace(box));
   }
-  return std::nullopt;
+  return storeys;
 }
 
 void includeObject(const Model& model, const Object& object, Aabb& box) {
@@ -50,35 +55,38 @@ std::uint32_t findBodyOfObject(const Model& model, std::uint32_t object) {
   return kNoBody;
 }
 
-std::optional<NamedPlace> placeAround(const Aabb& box, std::uint32_t body, double reach) {
-  if (box.empty()) return std::nullopt;
+/// Adds the place around an object or a body, unless its extent is unknown.
+void addPlaceAround(const Aabb& box, std::uint32_t body, double reach, NamedPlaces& places) {
+  if (box.empty()) return;
   NamedPlace place = makePlace(inflateAround(box, reach));
   place.body = body;
   place.reach = reach;
-  return place;
+  places.push_back(place);
 }
 
-std::optional<NamedPlace> findObject(const Model& model, std::string_view name, double reach) {
+NamedPlaces findObjects(const Model& model, std::string_view name, double reach) {
+  NamedPlaces objects;
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
     const Object& object = model.objects[i];
     if (object.path != name && (object.globalId != name || name.empty())) continue;
     Aabb box;
     includeObject(model, object, box);
-    return placeAround(box, findBodyOfObject(model, i), reach);
+    addPlaceAround(box, findBodyOfObject(model, i), reach, objects);
   }
-  return std::nullopt;
+  return objects;
 }
 
-std::optional<NamedPlace> findBody(const Model& model, std::string_view name, double reach) {
+NamedPlaces findBodies(const Model& model, std::string_view name, double reach) {
+  NamedPlaces bodies;
   for (std::uint32_t i = 0; i < model.bodies.size(); ++i) {
     const BodySpec& body = model.bodies[i];
     if (body.name != name) continue;
     Aabb box;
     for (const std::uint32_t object : body.objects)
       includeObject(model, model.objects[object], box);
-    return placeAround(box, i, reach);
+    addPlaceAround(box, i, reach, bodies);
   }
-  return std::nullopt;
+  return bodies;
 }
 
 }  // namespace
@@ -103,20 +111,20 @@ std::vector<Vec3> listAims(const NamedPlace& named, const Vec3& middle) {
   return aims;
 }
 
-std::optional<NamedPlace> findNamedPlace(const Scene& scene, const std::string& name,
-                                         double reach) {
+std::vector<NamedPlace> findNamedPlaces(const Scene& scene, const std::string& name, double reach) {
+  const Model& model = scene.model();
   const auto after = [&](std::string_view prefix) -> std::optional<std::string_view> {
     if (!name.starts_with(prefix)) return std::nullopt;
     return std::string_view(name).substr(prefix.size());
   };
-  if (const auto room = after("room:")) return findRoom(scene.model(), *room);
-  if (const auto storey = after("storey:")) return findStorey(scene, *storey);
-  if (const auto object = after("object:")) return findObject(scene.model(), *object, reach);
-  if (const auto body = after("body:")) return findBody(scene.model(), *body, reach);
-  if (const auto room = findRoom(scene.model(), name)) return room;
-  if (const auto storey = findStorey(scene, name)) return storey;
-  if (const auto object = findObject(scene.model(), name, reach)) return object;
-  return findBody(scene.model(), name, reach);
+  if (const auto room = after("room:")) return findRooms(model, *room);
+  if (const auto storey = after("storey:")) return findStoreys(scene, *storey);
+  if (const auto object = after("object:")) return findObjects(model, *object, reach);
+  if (const auto body = after("body:")) return findBodies(model, *body, reach);
+  if (NamedPlaces rooms = findRooms(model, name); !rooms.empty()) return rooms;
+  if (NamedPlaces storeys = findStoreys(scene, name); !storeys.empty()) return storeys;
+  if (NamedPlaces objects = findObjects(model, name, reach); !objects.empty()) return objects;
+  return findBodies(model, name, reach);
 }
 
 }  // namespace enfilade::scene

@@ -1,7 +1,6 @@
 // Places by name: rooms, storeys and objects of a model as goals of navigation.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,7 +27,9 @@ std::vector<Vec3> listAims(const NamedPlace& named, const Vec3& middle);
 
 /// `name`: a space's name, long name or GlobalId, a storey's, then an object's path or GlobalId,
 /// or a body's name; with the prefix "room:", "storey:", "object:" or "body:" only one of these.
-/// `reach`: how far from an object or a body. nullopt: the name is unknown, or its extent is.
-std::optional<NamedPlace> findNamedPlace(const Scene& scene, const std::string& name, double reach);
+/// Several rooms, storeys, objects or bodies may have one name: all of the first kind that has it,
+/// in the model's order. `reach`: how far from an object or a body. Empty: the name is unknown, or
+/// its extent is.
+std::vector<NamedPlace> findNamedPlaces(const Scene& scene, const std::string& name, double reach);
 
 }  // namespace enfilade::scene

@@ -39,14 +39,15 @@ std::optional<Vec3> parsePoint(const std::string& text) {
   return at == end && point.allFinite() ? std::optional(point) : std::nullopt;
 }
 
-using Place = std::variant<Vec3, scene::NamedPlace>;
+using Place = std::variant<Vec3, std::vector<scene::NamedPlace>>;
 
 /// The place that an argument means. Throws std::runtime_error, which names the argument.
 Place parsePlace(const std::string& text, const char* argument, const scene::Scene& scene,
                  double radius) {
   constexpr double kNextTo = 1;  // metres from an object
   if (const auto point = parsePoint(text)) return *point;
-  if (const auto named = scene::findNamedPlace(scene, text, radius + kNextTo)) return *named;
+  if (auto named = scene::findNamedPlaces(scene, text, radius + kNextTo); !named.empty())
+    return named;
   throw std::runtime_error(fmt::format(
       "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey, an object or a body; "
       "`enfilade inspect --objects` lists the names",
@@ -58,7 +59,8 @@ Place parsePlace(const std::string& text, const char* argument, const scene::Sce
 Vec3 resolvePlace(const Place& place, const std::string& text, const char* argument,
                   scene::Navigation& navigation, const std::optional<Vec3>& from) {
   if (const auto* point = std::get_if<Vec3>(&place)) return *point;
-  if (const auto free = navigation.findPlaceIn(std::get<scene::NamedPlace>(place), from))
+  if (const auto free =
+          navigation.findPlaceIn(std::get<std::vector<scene::NamedPlace>>(place), from))
     return *free;
   throw std::runtime_error(
       fmt::format("{}: there is no free place to stand at '{}'", argument, text));

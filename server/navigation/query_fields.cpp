@@ -25,8 +25,9 @@ std::variant<QueryPlace, v1::Error> findQueryPlace(const v1::NavigationPlace& pl
     return avatar->footPosition;
   }
   if (place.name().empty()) return makeNavigationError(field, "give a point, a name or an avatar");
-  if (const auto named = scene::findNamedPlace(scene, place.name(), radius + kNextToObject))
-    return *named;
+  if (auto named = scene::findNamedPlaces(scene, place.name(), radius + kNextToObject);
+      !named.empty())
+    return named;
   return makeNavigationError(
       field + ".name",
       "no room, storey, object or body is named '" + place.name() + "', or its extent is not known",

@@ -25,7 +25,7 @@ std::optional<v1::Error> validateCount(const std::string& field, std::int64_t co
 std::optional<v1::Error> validatePoint(const std::string& field, const v1::Vec3& point);
 
 /// A point, or where to look for one.
-using QueryPlace = std::variant<scene::Vec3, scene::NamedPlace>;
+using QueryPlace = std::variant<scene::Vec3, std::vector<scene::NamedPlace>>;
 
 struct PathPlaces {
   QueryPlace from;

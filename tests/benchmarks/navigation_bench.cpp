@@ -195,6 +195,38 @@ void measureWalks(Bench& bench, const Effort& effort, nlohmann::json& row) {
     row[name] = counts[name];
 }
 
+/// The mesh that proposes paths.
+scene::NavigationMesh buildMesh(const scene::World& world) {
+  const scene::NavigationAgent agent;
+  const scene::TileGrid grid = scene::makeTileGrid(world.scene().bounds(), agent);
+  std::vector<scene::TileMesh> tiles;
+  for (int z = 0; z < grid.tilesZ; ++z)
+    for (int x = 0; x < grid.tilesX; ++x)
+      tiles.push_back(std::move(
+          scene::buildTileMeshes(world.data(), agent, grid, x, z, {scene::Clearance::ample})[0]));
+  return {grid, std::move(tiles)};
+}
+
+/// Microseconds of each query of the mesh for a corridor and the corners of its shortest line,
+/// without a proof.
+std::vector<double> timeMeshQueries(const scene::NavigationMesh& mesh,
+                                    const std::vector<Vec3>& starts,
+                                    const std::vector<Vec3>& goals) {
+  const Vec3 extent(0.3, 0.5, 0.3);
+  std::vector<double> times;
+  for (std::size_t i = 0; i < std::min(starts.size(), goals.size()); ++i) {
+    const auto start = Clock::now();
+    const auto from = mesh.findNearest(starts[i], extent), to = mesh.findNearest(goals[i], extent);
+    if (!from || !to) continue;
+    const auto corridor = mesh.findCorridor(*from, *to);
+    if (!corridor) continue;
+    const bool isLine = mesh.straighten(*corridor, from->point, to->point).size() >= 2;
+    const double seconds = secondsSince(start);
+    if (isLine) times.push_back(1e6 * seconds);
+  }
+  return times;
+}
+
 void measureTimes(Bench& bench, const Effort& effort, nlohmann::json& row) {
   const auto doors = v1::NavigationQuery::DOORS_AS_THEY_ARE;
   const int count = std::min(effort.pairs, 2000);
@@ -205,6 +237,7 @@ void measureTimes(Bench& bench, const Effort& effort, nlohmann::json& row) {
     const bool isFound = bench.findPath(starts[i], goals[i], doors).found();
     (isFound ? found : notFound).push_back(1e6 * secondsSince(start));
   }
+  row["mesh_us"] = number(quantile(timeMeshQueries(buildMesh(bench.atRest), starts, goals), 0.5));
   row["median_us"] = number(quantile(found, 0.5));
   row["p99_us"] = number(quantile(found, 0.99));
   row["not_found_p99_us"] = number(quantile(notFound, 0.99));

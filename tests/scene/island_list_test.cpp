@@ -80,15 +80,41 @@ TEST(Islands, AStoreyAsAGoalIsOnTheIslandOfTheStart) {
   model.storeys.push_back({"Ground", "", 0});
   const auto scene = std::make_shared<const Scene>(std::move(model));
   Navigation navigation(scene, {}, {});
-  const auto storey = findNamedPlace(*scene, "storey:Ground", 1);
-  ASSERT_TRUE(storey);
+  const auto storey = findNamedPlaces(*scene, "storey:Ground", 1);
+  ASSERT_EQ(storey.size(), 1u);
   for (const Vec3& start : {Vec3(2, 0, 1), Vec3(8, 0, -1)}) {
-    const auto place = navigation.findPlaceIn(*storey, start);
+    const auto place = navigation.findPlaceIn(storey, start);
     ASSERT_TRUE(place);
     EXPECT_EQ(navigation.findIsland(*place), navigation.findIsland(start));
     EXPECT_TRUE(navigation.findPath(start, *place).found());
   }
-  EXPECT_TRUE(navigation.findPlaceIn(*storey, Vec3(5, 3.2, 0))) << "elsewhere, if not there";
+  EXPECT_TRUE(navigation.findPlaceIn(storey, Vec3(5, 3.2, 0))) << "elsewhere, if not there";
+}
+
+TEST(Islands, OfRoomsWithOneNameTheOneOnTheIslandOfTheStartIsMeant) {
+  Model model = boxModel(roofedRooms(0.5));
+  for (const double x : {2.0, 8.0}) {
+    Space room;
+    room.name = "Bath";
+    room.box = {{x - 1, 0, -1}, {x + 1, 2.4, 1}};
+    model.spaces.push_back(room);
+  }
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  Navigation navigation(scene, {}, {});
+  const auto baths = findNamedPlaces(*scene, "Bath", 1);
+  ASSERT_EQ(baths.size(), 2u);
+  for (const Vec3& start : {Vec3(1.5, 0, 1.5), Vec3(8.5, 0, -1.5)}) {
+    const auto place = navigation.findPlaceIn(baths, start);
+    ASSERT_TRUE(place);
+    EXPECT_NEAR(place->x(), start.x() < 5 ? 2 : 8, 0.2);
+    EXPECT_TRUE(navigation.findPath(start, *place).found());
+  }
+  const auto onRoof = navigation.findPlaceIn(baths, Vec3(7, 3.2, 0));
+  ASSERT_TRUE(onRoof);
+  EXPECT_NEAR(onRoof->x(), 8, 0.2) << "none is on that island: the closest";
+  const auto first = navigation.findPlaceIn(baths);
+  ASSERT_TRUE(first);
+  EXPECT_NEAR(first->x(), 2, 0.2);
 }
 
 TEST(Islands, ABodyIsAPlaceWhereItStandsNow) {
@@ -99,11 +125,11 @@ TEST(Islands, ABodyIsAPlaceWhereItStandsNow) {
   model.bodies.push_back(crate);
   const auto scene = std::make_shared<const Scene>(std::move(model));
   Navigation navigation(scene, {}, {});
-  EXPECT_FALSE(findNamedPlace(*scene, "object:yard/crate", 1));
+  EXPECT_TRUE(findNamedPlaces(*scene, "object:yard/crate", 1).empty());
   for (const char* name : {"yard/crate", "body:yard/crate", "crates/mesh7"}) {
-    const auto named = findNamedPlace(*scene, name, 1);
-    ASSERT_TRUE(named) << name;
-    const auto place = navigation.findPlaceIn(*named);
+    const auto named = findNamedPlaces(*scene, name, 1);
+    ASSERT_EQ(named.size(), 1u) << name;
+    const auto place = navigation.findPlaceIn(named);
     ASSERT_TRUE(place) << name;
     EXPECT_LT(place->x(), -6.5);
   }
@@ -111,7 +137,7 @@ TEST(Islands, ABodyIsAPlaceWhereItStandsNow) {
   submitBodyCommand(world, {"yard/crate", BodyCommand::Action::open, 0, 0, std::nullopt});
   for (int tick = 0; tick < 60 * 60; ++tick) tickWorld(world);
   navigation.update(*world.snapshot());
-  const auto moved = navigation.findPlaceIn(*findNamedPlace(*scene, "yard/crate", 1));
+  const auto moved = navigation.findPlaceIn(findNamedPlaces(*scene, "yard/crate", 1));
   ASSERT_TRUE(moved);
   EXPECT_GT(moved->x(), 3.5) << "the crate ends at x = 5";
 }

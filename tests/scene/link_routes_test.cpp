@@ -92,7 +92,9 @@ TEST(LinkRoutes, ADropJoinsAGalleryWithTheFloorBelow) {
   Navigation navigation(scene, {}, {});
   const Vec3 from(1, kGallery + 0.1, -2), to(10, 0.1, -2);
   EXPECT_FALSE(navigation.findPath(from, to).found());
-  EXPECT_FALSE(navigation.findPath(from, to, {1.2, false}).found());  // not that deep
+  for (const double drop : {1.2, kGallery - 0.2, kGallery - 0.15, kGallery - 0.1, kGallery - 0.05,
+                            kGallery - 0.01})  // not that deep
+    EXPECT_FALSE(navigation.findPath(from, to, {drop, false}).found()) << drop;
   const NavigationPath path = navigation.findPath(from, to, {2, false});
   ASSERT_TRUE(path.found()) << path.reason;
   ASSERT_EQ(path.legs.size(), 3u);

@@ -208,15 +208,15 @@ TEST(Navigation, FindsRoomsStoreysAndObjectsByName) {
   const auto scene = std::make_shared<const Scene>(std::move(model));
   Navigation navigation(scene, {}, {});
   for (const char* name : {"A1", "Kitchen", "room:A1", "Ground", "storey:Ground", "wall/left"}) {
-    const auto named = findNamedPlace(*scene, name, 1.3);
-    ASSERT_TRUE(named) << name;
-    const auto place = navigation.findPlaceIn(*named);
+    const auto named = findNamedPlaces(*scene, name, 1.3);
+    ASSERT_EQ(named.size(), 1u) << name;
+    const auto place = navigation.findPlaceIn(named);
     ASSERT_TRUE(place) << name;
     EXPECT_NEAR(place->y(), 0, 0.01) << name;
   }
-  EXPECT_FALSE(findNamedPlace(*scene, "storey:A1", 1));
-  EXPECT_FALSE(findNamedPlace(*scene, "object:Ground", 1));
-  EXPECT_FALSE(findNamedPlace(*scene, "nowhere", 1));
+  EXPECT_TRUE(findNamedPlaces(*scene, "storey:A1", 1).empty());
+  EXPECT_TRUE(findNamedPlaces(*scene, "object:Ground", 1).empty());
+  EXPECT_TRUE(findNamedPlaces(*scene, "nowhere", 1).empty());
 }
 
 TEST(Navigation, ARoomShapedLikeAnLIsFoundInItsSolid) {
@@ -228,15 +228,15 @@ TEST(Navigation, ARoomShapedLikeAnLIsFoundInItsSolid) {
   model.spaces.push_back(room);
   const auto scene = std::make_shared<const Scene>(std::move(model));
   Navigation navigation(scene, {}, {});
-  const auto named = findNamedPlace(*scene, "room:L", 1.3);
-  ASSERT_TRUE(named);
-  EXPECT_TRUE(isInSpace(room, named->middle));
-  const auto place = navigation.findPlaceIn(*named);
+  const auto named = findNamedPlaces(*scene, "room:L", 1.3);
+  ASSERT_EQ(named.size(), 1u);
+  EXPECT_TRUE(isInSpace(room, named[0].middle));
+  const auto place = navigation.findPlaceIn(named);
   ASSERT_TRUE(place);
   EXPECT_TRUE(isInSpace(room, *place + Vec3(0, 1, 0))) << place->transpose();
   // Near the reflex corner the closest place is in the notch, but not in the room.
-  NamedPlace corner = *named;
-  corner.middle = Vec3(1.3, named->middle.y(), -1.7);
+  std::vector<NamedPlace> corner = named;
+  corner[0].middle = Vec3(1.3, named[0].middle.y(), -1.7);
   const auto inside = navigation.findPlaceIn(corner);
   ASSERT_TRUE(inside);
   EXPECT_TRUE(isInSpace(room, *inside + Vec3(0, 1, 0))) << inside->transpose();
@@ -470,7 +470,7 @@ TEST(Navigation, ARoomByNameIsItsFloorAndNoTable) {
   NamedPlace room;
   room.box = {{0, 0, -3}, {8, 2.5, 3}};
   room.middle = {4, 1.2, 0};
-  const auto place = navigation.findPlaceIn(room);
+  const auto place = navigation.findPlaceIn(std::vector{room});
   ASSERT_TRUE(place);
   EXPECT_LT(place->y(), 0.1);
 }
