@@ -127,8 +127,13 @@ GapWays crossStraight(Walker& walker, const RimGap& gap) {
   return {};
 }
 
-/// Searches on a grid off the mesh: the way soon comes to an end at a wall.
-GapWays crossOnGrid(Collection& all, const RimGap& gap) {
+/// Searches on a grid off the mesh, from the higher side, since some ways lead down alone: the way
+/// soon comes to an end at a wall.
+GapWays crossOnGrid(Collection& all, RimGap gap) {
+  if (gap.from.y() < gap.to.y()) {
+    std::swap(gap.from, gap.to);
+    std::swap(gap.fromPolygon, gap.toPolygon);
+  }
   const NavigationMesh& mesh = all.finder.ample;
   const auto start = standNear(all.finder.walker, gap.from);
   if (!start) return {};

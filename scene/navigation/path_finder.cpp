@@ -18,7 +18,8 @@ namespace {
 constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
 constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
 constexpr int kMaxPassageRoutes = 4;
-constexpr double kOnMesh = 0.1;  // metres
+constexpr double kOnMesh = 0.1;         // metres
+constexpr double kMaxMeshHeight = 0.2;  // metres between a place and its mesh, also over stairs
 constexpr const char* kNotFound = "no way was found within the limits of the search";
 constexpr double kMaxConnection = 3;  // metres between places that are connected without a mesh
 constexpr GridSearch kCoarseConnection{kCoarseSpacing, 2.5, 4000};
@@ -62,52 +63,6 @@ void explain(const PathFinder& finder, const Line& line, const WalkOutcome& stop
                   path.obstruction->clearWidth, 2 * finder.agent.radius);
     path.reason += text.data();
   }
-}
-
-/// Walks along the line of the mesh for anything thinner and without bodies. Finds what is in the
-/// way, or, where the agent passes a place that is too narrow for its own meshes, the path.
-NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, const Vec3& to,
-                                    Proof& proof) {
-  NavigationPath path;
-  const std::optional<Line> line = findUnobstructedLine(finder, from, to);
-  if (!line) {
-    path.reason = "no floor, step or stair leads there";
-    if (!proof.met.empty()) path.obstruction = proof.met.front();
-    return path;
-  }
-  std::vector<Vec3> places{from};
-  finder.walker.takeCrossedSteps();
-  for (const Vec3& corner : line->corners) {
-    const auto place =
-        &corner == &line->corners.back() ? std::optional(to) : standNear(finder.walker, corner);
-    if (!place) continue;
-    GridSearch search{kCoarseSpacing, 1, 20'000};
-    finder.walker.returnTo(places.back());
-    const WalkOutcome outcome = finder.walker.walkTo(*place);
-    if (isThere(outcome, *place, kSameFloor)) {
-      places.push_back(finder.walker.footPosition());
-      continue;
-    }
-    const auto around = findGridPath(finder.walker, places.back(), *place, search);
-    if (!around) {
-      path.reason = kNotFound;  // it may stand above or below the corner
-      if (outcome.kind != WalkOutcome::Kind::arrived) explain(finder, *line, outcome, path);
-      return path;
-    }
-    places.insert(places.end(), around->begin() + 1, around->end());
-  }
-  path.reason = kNotFound;
-  if (std::abs(places.back().y() - to.y()) > kHeightError) return path;
-  std::vector<Vec3> points = shortenPath(finder.walker, places, Shortcuts::all);
-  pullTight(finder.walker, points);
-  if (finder.walker.takeCrossedSteps() && !walksOn(finder.walker, points, proof)) {
-    path.obstruction = proof.met.back();
-    return path;
-  }
-  path.reason.clear();
-  path.length = computeLength(points);
-  path.points = std::move(points);
-  return path;
 }
 
 /// The ways to the passages of a route, and through them. Returns the first part that fails, or
@@ -180,15 +135,82 @@ NavigationPath findPathOnMeshes(const PathFinder& finder, const Vec3& start, con
   return findPathByPassages(finder, start, goal, own);
 }
 
+/// Whether a place is on a part of the mesh that is not small. The rim of furniture may be above a
+/// polygon of the floor by about a step.
+bool isOnMesh(const PathFinder& finder, const Vec3& place) {
+  const auto polygon = findPolygonAt(finder.ample, place);
+  return polygon && !(finder.passages && finder.passages->isSmallPart(*polygon)) &&
+         std::abs(finder.ample.closestPoint(*polygon, place).y() - place.y()) < kMaxMeshHeight;
+}
+
+/// Replaces the part of a way that begins and ends on the mesh by a path there, if this is shorter.
+void rejoinMesh(const PathFinder& finder, std::vector<Vec3>& way) {
+  const auto isOn = [&](const Vec3& place) { return isOnMesh(finder, place); };
+  const auto first = std::ranges::find_if(way, isOn);
+  const auto end = std::find_if(way.rbegin(), way.rend(), isOn).base();  // after the last
+  if (end - first < 3) return;
+  Proof proof(finder.maxRepairWalks);
+  const NavigationPath path = findPathOnMeshes(finder, *first, *std::prev(end), proof);
+  if (!path.found() || path.length >= computeLength({first, end})) return;
+  std::vector<Vec3> rest(end, way.end());
+  way.erase(first, way.end());
+  way.insert(way.end(), path.points.begin(), path.points.end());
+  way.insert(way.end(), rest.begin(), rest.end());
+}
+
+/// Walks along the line of the mesh for anything thinner and without bodies. Finds what is in the
+/// way, or, where the agent passes a place that is too narrow for its own meshes, the path.
+NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, const Vec3& to,
+                                    Proof& proof) {
+  NavigationPath path;
+  const std::optional<Line> line = findUnobstructedLine(finder, from, to);
+  if (!line) {
+    path.reason = "no floor, step or stair leads there";
+    if (!proof.met.empty()) path.obstruction = proof.met.front();
+    return path;
+  }
+  std::vector<Vec3> places{from};
+  finder.walker.takeCrossedSteps();
+  for (const Vec3& corner : line->corners) {
+    const auto place =
+        &corner == &line->corners.back() ? std::optional(to) : standNear(finder.walker, corner);
+    if (!place) continue;
+    GridSearch search{kCoarseSpacing, 1, 20'000};
+    finder.walker.returnTo(places.back());
+    const WalkOutcome outcome = finder.walker.walkTo(*place);
+    if (isThere(outcome, *place, kSameFloor)) {
+      places.push_back(finder.walker.footPosition());
+      continue;
+    }
+    const auto around = findGridPath(finder.walker, places.back(), *place, search);
+    if (!around) {
+      path.reason = kNotFound;  // it may stand above or below the corner
+      if (outcome.kind != WalkOutcome::Kind::arrived) explain(finder, *line, outcome, path);
+      return path;
+    }
+    places.insert(places.end(), around->begin() + 1, around->end());
+  }
+  path.reason = kNotFound;
+  if (std::abs(places.back().y() - to.y()) > kHeightError) return path;
+  rejoinMesh(finder, places);
+  std::vector<Vec3> points = shortenPath(finder.walker, places, Shortcuts::all);
+  pullTight(finder.walker, points);
+  if (finder.walker.takeCrossedSteps() && !walksOn(finder.walker, points, proof)) {
+    path.obstruction = proof.met.back();
+    return path;
+  }
+  path.reason.clear();
+  path.length = computeLength(points);
+  path.points = std::move(points);
+  return path;
+}
+
 /// Places without a mesh, as narrow ones on furniture, or on a small part of one, are connected
 /// with it by walks on a grid, and with one another if they are near.
 NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal) {
   Walker& walker = finder.walker;
   Proof proof(finder.maxRepairWalks);
-  const auto isOn = [&](const Vec3& place) {
-    const auto polygon = findPolygonAt(finder.ample, place);
-    return polygon && !(finder.passages && finder.passages->isSmallPart(*polygon));
-  };
+  const auto isOn = [&](const Vec3& place) { return isOnMesh(finder, place); };
   NavigationPath path;
   if (isOn(start) && isOn(goal)) return path;
   const auto search = [](const auto& find) {

@@ -113,8 +113,12 @@ struct Walked {
   bool hasDoors = false, hasLifts = false, hasDrops = false;  ///< on the path
 };
 
-/// The walk of an order Go. In a sixth of them the avatar may fall by up to 2 m.
-Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const Vec3& to) {
+/// The ways of an order Go: all that there are, and in a sixth of them the avatar may fall by up to
+/// 2 m; or walks alone, through doors as they are.
+enum class Ways : std::uint8_t { all, walks };
+
+Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const Vec3& to,
+          Ways ways) {
   const std::string name = "walker" + std::to_string(number);
   scene::Spawn spawn;
   spawn.position = from;
@@ -122,9 +126,10 @@ Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const
   v1::Command command;
   command.set_avatar(name);
   *command.mutable_go()->mutable_to()->mutable_point() = server::toProto(to);
-  command.mutable_go()->set_doors(v1::NavigationQuery::DOORS_OPEN);
-  command.mutable_go()->set_lifts(true);
-  if (number % 6 == 0) command.mutable_go()->set_max_drop(2);
+  command.mutable_go()->set_doors(ways == Ways::all ? v1::NavigationQuery::DOORS_OPEN
+                                                    : v1::NavigationQuery::DOORS_AS_THEY_ARE);
+  command.mutable_go()->set_lifts(ways == Ways::all);
+  if (ways == Ways::all && number % 6 == 0) command.mutable_go()->set_max_drop(2);
   Walked walked;
   const auto query = server::makePathQuery(world, command);
   const v1::NavigationReply reply = bench.ask(std::get<v1::NavigationQuery>(query), world);
@@ -171,7 +176,7 @@ void measureWalks(Bench& bench, const Effort& effort, nlohmann::json& row) {
   for (std::size_t i = 0; i < pairs; ++i) {
     if (i % kWalksOfWorld == 0 && (i == 0 || !bench.scene->model().bodies.empty()))
       world.emplace(bench.scene);
-    const Walked walked = go(bench, *world, static_cast<int>(i), starts[i], goals[i]);
+    const Walked walked = go(bench, *world, static_cast<int>(i), starts[i], goals[i], Ways::all);
     penetration = std::max(penetration, walked.penetration);
     counts["without_reason"] += !walked.isFound && walked.text.size() < 10 ? 1 : 0;
     if (walked.isRefused || !walked.isFound) {
@@ -260,6 +265,7 @@ struct Comparison {
   int compared = 0, skipped = 0;
   int wrong = 0;
   int nearWidth = 0;     ///< half a centimetre of the radius decides
+  int walked = 0;        ///< an avatar walks the path; the fill does not have it
   int islandsWrong = 0;  ///< paths are found between two islands both ways, or none on one
 };
 
@@ -302,12 +308,21 @@ void comparePair(Bench& bench, const FloodFill& fill, const Vec3& from, const Ve
 }
 
 /// Counts disagreements. Components have no direction, but an avatar may get down where it does not
-/// get up: the fill of the start alone decides, by walks. Near is a pair of which a thinner avatar
-/// passes where a path was found, a wider one does not where none was, or two shifted grids differ.
-void judge(const Bench& bench, const std::vector<Vec3>& places,
+/// get up: an avatar that walks the path decides, or the fill of the start alone, by walks. Near is
+/// a pair of which a thinner avatar passes where a path was found, a wider one does not where none
+/// was, or two shifted grids differ.
+void judge(Bench& bench, const std::vector<Vec3>& places,
            const std::vector<Disagreement>& disagreements, Comparison& result) {
   std::array<std::optional<FloodFill>, 2> others;  // for thinner avatars, and for wider ones
   for (const auto& [from, to, isFound, reason] : disagreements) {
+    if (isFound) {
+      scene::World world(bench.scene);
+      const Walked walked = go(bench, world, 0, from, to, Ways::walks);
+      if (walked.isArrived && walked.penetration == 0) {
+        ++result.walked;
+        continue;
+      }
+    }
     scene::NavigationAgent agent;
     agent.radius += isFound ? -kNearWidth : kNearWidth;
     auto& other = others[isFound ? 0 : 1];
@@ -400,6 +415,7 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   row["reach_compared"] = result.compared;
   row["reach_skipped"] = result.skipped;
   row["reach_near_width"] = result.nearWidth;
+  row["reach_walked"] = result.walked;
   row["reach_wrong"] = result.wrong;
   row["islands_wrong"] = result.islandsWrong;
   row["lengths"] = ratios.size();
