@@ -172,8 +172,8 @@ NavigationMesh Navigation::buildUnobstructed(int threads) const {
 
 NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const PathOptions& options) {
   const std::lock_guard lock(mutex_);
-  const auto unobstructed = [this]() -> const NavigationMesh& {
-    if (!unobstructed_) unobstructed_.emplace(buildUnobstructed(2));
+  const auto unobstructed = [this]() -> const UnobstructedMesh& {
+    if (!unobstructed_) unobstructed_.emplace(makeUnobstructedMesh(buildUnobstructed(2)));
     return *unobstructed_;
   };
   PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};

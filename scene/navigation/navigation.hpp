@@ -23,6 +23,7 @@
 #include "scene/navigation/passage_search.hpp"
 #include "scene/navigation/path_finder.hpp"
 #include "scene/navigation/place_names.hpp"
+#include "scene/navigation/reasons.hpp"
 #include "scene/navigation/walk/walker.hpp"
 #include "scene/world/world.hpp"
 
@@ -142,7 +143,8 @@ class Navigation {
   std::mutex mutex_;
   std::optional<Walker> walker_;
   std::vector<TileMesh> ampleTiles_, scarceTiles_;
-  std::optional<NavigationMesh> ample_, scarce_, unobstructed_;
+  std::optional<NavigationMesh> ample_, scarce_;
+  std::optional<UnobstructedMesh> unobstructed_;
   std::list<Links> links_;                  ///< of the last options, the oldest first
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
   IslandList islands_;                      ///< of `ample_`

@@ -1,14 +1,12 @@
 #include "scene/navigation/path_finder.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <cstdio>
 #include <limits>
 #include <utility>
 
-#include "scene/navigation/clear_width.hpp"
 #include "scene/navigation/mesh_paths.hpp"
+#include "scene/navigation/reasons.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -16,7 +14,6 @@ namespace enfilade::scene {
 namespace {
 
 constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
-constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopped
 constexpr int kMaxPassageRoutes = 4;
 constexpr double kOnMesh = 0.1;         // metres
 constexpr double kMaxMeshHeight = 0.2;  // metres between a place and its mesh, also over stairs
@@ -31,38 +28,24 @@ struct Line {
   std::vector<Vec3> middles;  ///< of its portals, with both ends
 };
 
-std::optional<Line> findUnobstructedLine(const PathFinder& finder, const Vec3& from,
-                                         const Vec3& to) {
-  const NavigationMesh& mesh = finder.unobstructed();
-  const Vec3 extent(2 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight,
-                    2 * finder.agent.radius);
-  const auto first = mesh.findNearest(from, extent);
-  const auto last = mesh.findNearest(to, extent);
-  const auto corridor = first && last ? mesh.findCorridor(*first, *last) : std::nullopt;
-  if (!corridor) return std::nullopt;
-  Line line{mesh.straighten(*corridor, first->point, last->point), {first->point}};
-  line.corners.push_back(to);
-  for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
-    line.middles.push_back(mesh.portalMiddle(corridor->polygons[i - 1], corridor->polygons[i]));
-  line.middles.push_back(last->point);
-  return line;
+/// A place on the unobstructed mesh; nullopt: it is not near.
+std::optional<MeshPoint> findUnobstructed(const PathFinder& finder, const Vec3& place) {
+  return finder.unobstructed().mesh.findNearest(
+      place,
+      {2 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight, 2 * finder.agent.radius});
 }
 
-void explain(const PathFinder& finder, const Line& line, const WalkOutcome& stop,
-             NavigationPath& path) {
-  path.obstruction = Obstruction{stop.obstacle, stop.footPosition, 0};
-  const double width = measureNarrowest(finder.world, finder.agent, line.middles, stop.footPosition,
-                                        kMaxWidthDistance)
-                           .clearWidth;
-  if (width < 2 * finder.agent.radius) path.obstruction->clearWidth = width;
-  const std::string name = finder.world.findEntityName(path.obstruction->entity);
-  path.reason = (name.empty() ? std::string("the floor ends") : name + " is in the way");
-  if (path.obstruction->clearWidth > 0) {
-    std::array<char, 96> text{};
-    std::snprintf(text.data(), text.size(), ": clear width %.3f m, needs %.3f",
-                  path.obstruction->clearWidth, 2 * finder.agent.radius);
-    path.reason += text.data();
-  }
+std::optional<Line> findUnobstructedLine(const PathFinder& finder, const MeshPoint& from,
+                                         const MeshPoint& to, const Vec3& goal) {
+  const NavigationMesh& mesh = finder.unobstructed().mesh;
+  const auto corridor = mesh.findCorridor(from, to);
+  if (!corridor) return std::nullopt;
+  Line line{mesh.straighten(*corridor, from.point, to.point), {from.point}};
+  line.corners.push_back(goal);
+  for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
+    line.middles.push_back(mesh.portalMiddle(corridor->polygons[i - 1], corridor->polygons[i]));
+  line.middles.push_back(to.point);
+  return line;
 }
 
 /// The ways to the passages of a route, and through them. Returns the first part that fails, or
@@ -163,8 +146,10 @@ void rejoinMesh(const PathFinder& finder, std::vector<Vec3>& way) {
 NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, const Vec3& to,
                                     Proof& proof) {
   NavigationPath path;
-  const std::optional<Line> line = findUnobstructedLine(finder, from, to);
+  const auto first = findUnobstructed(finder, from), last = findUnobstructed(finder, to);
+  const auto line = first && last ? findUnobstructedLine(finder, *first, *last, to) : std::nullopt;
   if (!line) {
+    if (first && last && explainGaps(finder, *first, *last, path)) return path;
     path.reason = "no floor, step or stair leads there";
     if (!proof.met.empty()) path.obstruction = proof.met.front();
     return path;
@@ -185,7 +170,9 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
     const auto around = findGridPath(finder.walker, places.back(), *place, search);
     if (!around) {
       path.reason = kNotFound;  // it may stand above or below the corner
-      if (outcome.kind != WalkOutcome::Kind::arrived) explain(finder, *line, outcome, path);
+      if (outcome.kind != WalkOutcome::Kind::arrived)
+        explainStop(finder, outcome, projectToGround(*place - places.back()).normalized(),
+                    line->middles, path);
       return path;
     }
     places.insert(places.end(), around->begin() + 1, around->end());

@@ -48,6 +48,8 @@ struct Refusals {
   NavigationPath last = {};  ///< the reason
 };
 
+struct UnobstructedMesh;
+
 /// Inputs of a search. A search may close portals of the meshes.
 struct PathFinder {
   const WorldData& world;
@@ -56,7 +58,7 @@ struct PathFinder {
   NavigationMesh& ample;
   NavigationMesh& scarce;
   /// The mesh of Clearance::none; built at the first call. Null: reasons are not sought.
-  std::function<const NavigationMesh&()> unobstructed;
+  std::function<const UnobstructedMesh&()> unobstructed;
   std::size_t maxRepairWalks = 15'000;  ///< of a path: some tenths of a second
   /// Of the islands of both ends; null: these are one, or not known.
   Refusals* refusals = nullptr;

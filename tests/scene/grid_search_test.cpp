@@ -13,6 +13,7 @@
 #include "scene/navigation/ghost.hpp"
 #include "scene/navigation/mesh/tile_mesh.hpp"
 #include "scene/navigation/path_finder.hpp"
+#include "scene/navigation/reasons.hpp"
 #include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene::testing {
@@ -140,11 +141,11 @@ TEST(PathFinder, PlacesWithoutAMeshAreConnectedWithIt) {
     return NavigationMesh(grid, std::move(tiles));
   };
   NavigationMesh ample = makeMesh(Clearance::ample), scarce = makeMesh(Clearance::scarce);
-  const NavigationMesh unobstructed = makeMesh(Clearance::none);
+  const UnobstructedMesh unobstructed = makeUnobstructedMesh(makeMesh(Clearance::none));
   Walker walker(whole.data(), agent);
   const PathFinder finder{whole.data(), agent,
                           walker,       ample,
-                          scarce,       [&]() -> const NavigationMesh& { return unobstructed; }};
+                          scarce,       [&]() -> const UnobstructedMesh& { return unobstructed; }};
   const Vec3 onMesh(1, 0, 1), offMesh(4, 0, 3);
   for (const auto& [from, to] : {std::pair(onMesh, offMesh), std::pair(offMesh, onMesh)}) {
     const NavigationPath path = findPath(finder, from, to);

@@ -167,8 +167,7 @@ TEST(ShortestCorridor, AProvedPathForgetsTheFailuresOfItsPortals) {
     for (int failures = 1; failures < 4; ++failures)
       mesh.countFailure(polygons[i - 1], polygons[i]);
   Walker walker(world.data(), agent);
-  const PathFinder finder{world.data(), agent,  walker,
-                          mesh,         scarce, [&]() -> const NavigationMesh& { return mesh; }};
+  const PathFinder finder{world.data(), agent, walker, mesh, scarce, nullptr};
   ASSERT_TRUE(findPath(finder, from, to).found());
   int forgotten = 0;
   for (std::size_t i = 1; i < polygons.size(); ++i)

@@ -1,0 +1,43 @@
+// Why an agent cannot get from one place to another: what stops it there, and what it would need.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "scene/navigation/mesh/navigation_mesh.hpp"
+#include "scene/navigation/path_finder.hpp"
+#include "scene/navigation/walk/walker.hpp"
+
+namespace enfilade::scene {
+
+/// The closest places of two parts of a mesh.
+struct PartGap {
+  std::uint32_t fromPart = 0, toPart = 0;
+  Vec3 from = Vec3::Zero(), to = Vec3::Zero();  ///< scene frame, metres
+  Vec3 across = Vec3::UnitX();                  ///< horizontal, unit: the way out of `fromPart`
+
+  double length() const { return (to - from).norm(); }
+  PartGap reversed() const { return {toPart, fromPart, to, from, -across}; }
+};
+
+/// The mesh of Clearance::none, its parts, and the closest places of those that are near each
+/// other.
+struct UnobstructedMesh {
+  NavigationMesh mesh;
+  std::vector<std::uint32_t> partOf;  ///< by polygon
+  std::vector<PartGap> gaps;  ///< at most one from a part to another; ascending by `fromPart`
+};
+UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh);
+
+/// The end of a walk that did not arrive, as the reason of `path`: the entity, and its clear width
+/// or height, the step or the drop. `direction`: of the walk, horizontal, unit. `line`: the places
+/// around, along the way.
+void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& direction,
+                 const std::vector<Vec3>& line, NavigationPath& path);
+
+/// Explains `path` by the first gap that stops the walker, of the shortest sequence of gaps of the
+/// unobstructed mesh that leads to the goal. Returns false if no gap does.
+bool explainGaps(const PathFinder& finder, const MeshPoint& from, const MeshPoint& to,
+                 NavigationPath& path);
+
+}  // namespace enfilade::scene

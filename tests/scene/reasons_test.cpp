@@ -1,0 +1,43 @@
+// Reasons why no path leads somewhere.
+#include "scene/navigation/reasons.hpp"
+
+#include <gtest/gtest.h>
+
+#include <string>
+#include <vector>
+
+#include "scene/navigation/navigation.hpp"
+#include "tests/scene/box_scene.hpp"
+
+namespace enfilade::scene::testing {
+namespace {
+
+TEST(Reasons, NameWhatStopsTheAgentAndWhatItWouldNeed) {
+  const NamedBox floor{"floor", {0, -0.2, 0}, {10, 0, 5}};
+  const auto findReason = [](const std::vector<NamedBox>& boxes, const Vec3& goal) {
+    return Navigation(boxScene(boxes), {}, {}).findPath({2, 0, 2}, goal).reason;
+  };
+  EXPECT_EQ(findReason({floor, {"wall", {5, 0, -1}, {5.2, 2.5, 6}}}, {8, 0, 2}),
+            "wall is in the way");
+  EXPECT_EQ(findReason({floor, {"kerb", {5, 0, 0}, {10, 0.4, 5}}}, {8, 0.4, 2}),
+            "kerb is in the way: a step of 0.400 m, climbs 0.300");
+  EXPECT_EQ(findReason({floor, {"beam", {5, 1.5, -1}, {5.3, 3, 6}}}, {8, 0, 2}),
+            "beam is in the way: clear height 1.500 m, needs 1.750");
+  EXPECT_EQ(findReason({floor, {"low", {0, -2.2, 5}, {10, -2, 10}}}, {5, -2, 8}),
+            "the floor ends: the next one is 2.00 m lower");
+  EXPECT_EQ(findReason({floor, {"island", {14, -0.2, 0}, {18, 0, 5}}}, {16, 0, 2}),
+            "no floor, step or stair leads there");
+}
+
+TEST(Reasons, AreThoseOfTheFirstRoomOnTheWay) {
+  std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {15, 0, 5}},
+                              {"kerb", {5, 0, -1}, {5.4, 0.5, 6}},
+                              {"wall", {10, 0, -1}, {10.2, 2.5, 6}}};
+  Navigation navigation(boxScene(boxes), {}, {});
+  EXPECT_EQ(navigation.findPath({2, 0, 2}, {13, 0, 2}).reason,
+            "kerb is in the way: a step of 0.500 m, climbs 0.300");
+  EXPECT_EQ(navigation.findPath({13, 0, 2}, {2, 0, 2}).reason, "wall is in the way");
+}
+
+}  // namespace
+}  // namespace enfilade::scene::testing
