@@ -83,6 +83,16 @@ class GroupTest(RoomCase):
             group.members[0].take(posted[0])
         self.assertEqual(group.members[1].take(posted[1])[0][0].step.tick, 1)
 
+    def test_a_world_that_does_not_exist_is_named_and_the_others_can_be_entered(self):
+        name = self.client.create_world(drop_when_empty=True).name
+        with self.server.connect() as base:
+            for worlds in (["nope"], [name, "nope"], ["nope", name]):
+                with self.assertRaisesRegex(enfilade.ServerError, "ERROR_UNKNOWN_WORLD: .*'nope'"):
+                    enfilade.WorldGroup(base, worlds)
+            name = self.client.create_world(drop_when_empty=True).name
+            self.assertEqual(enfilade.WorldGroup(base, [name]).members[0].world, name)
+            self.assertEqual(enfilade.WorldGroup(base, ["main"]).members[0].world, "main")
+
     def test_unusable_requests_are_named(self):
         m = enfilade.messages
         step = m.ClientMessage(step=m.Step(ticks=1))

@@ -115,7 +115,8 @@ class Environments(RoomCase):
         episodes = [enfilade.Episode(start, 0.0, (3.0, 0.0, 0.0), 5.0, name)
                     for name, start in (("bad", (0.0, 0.0, 6.0)), ("good", (0.0, 0.0, 0.0)))]
         env = self.environment(starts=(), episodes=episodes, channels=())
-        env.reset(seed=1)
+        with self.assertWarnsRegex(UserWarning, r"\(0, 0, 6\).*; the next episode is taken"):
+            env.reset(seed=1)
         self.assertEqual(env.episode.id, "good")
         env = self.environment(starts=(), episodes=episodes[:1], channels=())
         with self.assertRaisesRegex(enfilade.OrderFailed, "^the avatar could not spawn"):
@@ -321,6 +322,22 @@ class Environments(RoomCase):
         self.addCleanup(vector.close)
         with self.assertRaisesRegex(enfilade.OrderFailed, r"environment 1: .*\(0, 0, 6\).*column"):
             vector.reset(seed=1)
+
+    def test_a_refused_start_leaves_the_other_environments_usable(self):
+        vector = self.vector(3)
+        vector.envs[1].starts = [(0, 0, 6)]
+        with self.assertRaisesRegex(enfilade.OrderFailed, "^environment 1: "):
+            vector.reset(seed=1)
+        with self.assertRaisesRegex(enfilade.OrderFailed, "^environment 1: "):
+            vector.step(np.zeros((3, 2)))
+        vector.envs[1].starts = _STARTS
+        seen, *_, infos = vector.step(np.zeros((3, 2)))
+        self.assertEqual(list(infos["tick"]), [13, 1, 13])
+        self.assertTrue(vector.single_observation_space.contains({name: one[1] for name, one in seen.items()}))
+        with self.assertRaisesRegex(ValueError, "options"):
+            vector.reset(options={"goal": (0, 0, 0)})
+        with self.assertRaisesRegex(RuntimeError, "call reset"):  # none has begun
+            vector.step(np.zeros((3, 2)))
 
     def test_a_vector_has_worlds_of_one_server_and_leaves_none(self):
         vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=3, starts=_STARTS,

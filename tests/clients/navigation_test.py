@@ -1,8 +1,13 @@
 """Navigation by the Python client: paths, places, maps, and habitat-sim's names."""
 
+import contextlib
 import math
 import os
+import socket
+import struct
 import tempfile
+import threading
+import time
 import unittest
 from pathlib import Path
 
@@ -12,6 +17,32 @@ import enfilade
 from enfilade.compat import (GreedyGeodesicFollower, MultiGoalShortestPath, NavMeshSettings, PathFinder,
                              ShortestPath)
 from room import RoomCase, obj
+
+
+def build_slowly(listener):
+    """A server that builds a mesh for twice the time that the client waits for a reply."""
+    m = enfilade.messages
+    peer, _ = listener.accept()
+
+    def receive():
+        total, _ = struct.unpack("<II", peer.recv(8, socket.MSG_WAITALL))
+        return m.ClientMessage.FromString(peer.recv(total - 4, socket.MSG_WAITALL))
+
+    def send(message):
+        body = message.SerializeToString()
+        peer.sendall(struct.pack("<II", 4 + len(body), len(body)) + body)
+
+    with peer, contextlib.suppress(OSError):  # the client may give up
+        peer.sendall(peer.recv(4, socket.MSG_WAITALL))  # the magic number
+        send(m.ServerMessage(reply_to=receive().request_id, welcome=m.Welcome()))
+        request = receive()
+        for share in range(10):
+            time.sleep(0.2)
+            if request.navigation.progress:
+                send(m.ServerMessage(navigation_progress=m.NavigationProgress(
+                    request_id=request.request_id, share=share / 10)))
+        send(m.ServerMessage(reply_to=request.request_id, navigation=m.NavigationReply(
+            spots=[m.NavigationSpot()])))
 
 
 class NavigationTest(RoomCase):
@@ -204,6 +235,11 @@ class CompatTest(RoomCase):
         radius = self.finder.island_radius((0, 0, 0))
         self.assertEqual(self.finder.island_radius((9, 0, 9)), radius)
         self.assertEqual(self.finder.island_radius(0), radius)
+        self.assertEqual(self.finder.island_radius(island_index=0), radius)
+        self.assertEqual(self.finder.island_radius(pt=(9, 0, 9)), radius)
+        for options in ({}, {"pt": (0, 0, 0), "island_index": 0}):
+            with self.assertRaisesRegex(TypeError, "either pt or island_index"):
+                self.finder.island_radius(**options)
         self.assertGreater(radius, 12)  # of a floor of 20 m x 20 m: up to 14.1
         self.assertLess(radius, 15)
         self.assertEqual(self.finder.island_radius((50, 0, 0)), 0)
@@ -220,6 +256,37 @@ class CompatTest(RoomCase):
         with self.assertRaises(TypeError):
             NavMeshSettings(cellsize=0.1)
 
+    def test_a_refused_size_leaves_the_present_agent(self):
+        with self.assertRaises(enfilade.ServerError):
+            self.finder.build_nav_mesh(NavMeshSettings(agent_radius=-1))
+        self.assertEqual(self.finder.nav_mesh_settings.agent_radius, 0.1)
+        self.assertTrue(self.finder.is_navigable((2, 0, 0)))
+
+    def test_the_radius_of_a_random_point_is_named(self):
+        for radius in (0, -1, math.nan):
+            with self.assertRaisesRegex(ValueError, "^radius: "):
+                self.finder.get_random_navigable_point_near((0, 0, 0), radius)
+
+    def test_points_that_are_not_finite_are_nowhere(self):
+        nowhere = self.finder.snap_point((50, 0, 0))
+        for point in (nowhere, (0, math.inf, 0)):
+            self.assertIs(self.finder.is_navigable(point), False)
+            self.assertTrue(np.isnan(self.finder.snap_point(point)).all())
+            self.assertTrue(np.isnan(self.finder.get_random_navigable_point_near(point, 3)).all())
+            self.assertEqual((self.finder.get_island(point), self.finder.island_radius(point)), (-1, 0))
+            self.assertEqual(self.finder.distance_to_closest_obstacle(point), math.inf)
+            np.testing.assert_array_equal(self.finder.try_step(point, (1, 0, 0)), point)
+            np.testing.assert_array_equal(self.finder.try_step_no_sliding((1, 0, 0), point), (1, 0, 0))
+            path = ShortestPath()
+            for path.requested_start, path.requested_end in ((point, (1, 0, 0)), ((1, 0, 0), point)):
+                self.assertFalse(self.finder.find_path(path))
+                self.assertEqual((path.geodesic_distance, path.points), (math.inf, []))
+            many = MultiGoalShortestPath()
+            many.requested_start, many.requested_ends = (2, 0, 0), [point, (3, 0, 0)]
+            self.assertTrue(self.finder.find_path(many))
+            self.assertEqual(many.closest_end_point_index, 1)
+        with self.assertRaisesRegex(ValueError, "give three numbers"):
+            self.finder.find_path(ShortestPath())
 
     def test_the_triangles_of_the_mesh_cover_the_island(self):
         navigation = self.finder.navigation
@@ -247,6 +314,12 @@ class CompatTest(RoomCase):
         before = len(shown)
         navigation.snap((2, 0, 0))  # the meshes are there
         self.assertEqual(len(shown), before)
+
+    def test_progress_restarts_the_wait_for_a_reply(self):
+        with socket.create_server(("127.0.0.1", 0)) as listener:
+            threading.Thread(target=build_slowly, args=(listener,), daemon=True).start()
+            with enfilade.connect(f"127.0.0.1:{listener.getsockname()[1]}", timeout=1.0) as client:
+                self.assertIsNone(client.navigation().snap((0, 0, 0)))
 
     def test_meshes_are_saved_and_loaded(self):
         with tempfile.TemporaryDirectory() as folder:

@@ -4,6 +4,7 @@ import json
 import math
 import tempfile
 import unittest
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -153,6 +154,54 @@ class PointNavigation(RoomCase):
             enfilade.Episode((2, 0, 0), 0, (5.1, 3.1, 0), math.nan, "to the wall")])
         with self.assertRaisesRegex(enfilade.EnfiladeError, "'to the wall': no path leads .*: .+"):
             env.reset(seed=1)
+
+    def test_an_episode_whose_goal_no_path_reaches_is_passed_over_with_a_warning(self):
+        far = enfilade.Episode((2.0, 0.0, 0.0), 0.0, (1000.0, 0.0, 0.0), 998.0, "far")
+        near = enfilade.Episode((2.0, 0.0, 0.0), 0.0, (8.0, 0.0, 0.0), 11.0, "near")
+        env = self.environment(goals=None, starts=(), episodes=[far, near])
+        with self.assertWarnsRegex(UserWarning, "'far': no path leads .*: .+; the next episode is taken") as warned:
+            _, info = env.reset(seed=1)
+        self.assertEqual(warned.filename, __file__)
+        self.assertEqual((env.episode, info["geodesic_distance"]), (near, 11))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            vector = enfilade.VectorWalkEnv(self.scene, 3, episodes=[far, near], channels=())
+            self.addCleanup(vector.close)
+            vector.reset(seed=1)
+        self.assertEqual([one.episode for one in vector.envs], [near] * 3)
+        env = self.environment(goals=None, starts=(), episodes=[far])
+        with self.assertRaisesRegex(enfilade.EnfiladeError, "^episode 'far': no path leads .*: .+"):
+            env.reset(seed=1)
+        with self.assertRaisesRegex(RuntimeError, "call reset"):
+            env.step((1, 0))
+
+    def test_an_episode_of_a_hook_is_not_played_without_a_path(self):
+        class Far(enfilade.WalkEnv):
+            def new_episode(self):
+                return enfilade.Episode((2.0, 0.0, 0.0), 0.0, (1000.0, 0.0, 0.0), 998.0, "far")
+        env = Far(self.scene, starts="anywhere", goals="anywhere", channels=())
+        self.addCleanup(env.close)
+        with self.assertRaisesRegex(enfilade.EnfiladeError, "'far': no path leads"):
+            env.reset(seed=1)
+
+    def test_after_a_reset_that_failed_on_its_options_no_step_counts(self):
+        env = self.environment(starts=[(2, 0, 0, 0)], goals=[(4, 0, 0)])
+        for options in ({"starts": (0, 0, 0)}, {"goal": (0, 0)}, {"start": 5}, {"goal": (1000, 0, 0)}):
+            env.reset(seed=1)
+            env.step((0, 1))
+            with self.assertRaises((ValueError, enfilade.EnfiladeError)):
+                env.reset(options=options)
+            with self.assertRaisesRegex(RuntimeError, "call reset"):
+                env.step((1, 0))
+
+    def test_meshes_are_there_before_environments_wait_for_each_other(self):
+        shown, size = [], {"radius": 0.23, "height": 1.61}
+        vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=2, starts="anywhere",
+                                        channels=(), **size)
+        self.addCleanup(vector.close)
+        with self.server.connect(world=vector.envs[0].client.world) as client:
+            client.navigation(**size, progress=shown.append).snap((0, 0, 0))
+        self.assertEqual(shown, [])
 
     def test_a_file_without_the_distance_is_written_and_read(self):
         episode = enfilade.Episode((2.0, 0.0, 0.0), 90.0, (8.0, 0.0, 0.0), math.nan, "1")

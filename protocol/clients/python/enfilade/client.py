@@ -622,8 +622,8 @@ class Client:
                    step: Optional[float] = None, *, speed: Optional[float] = None, doors: str = "as_they_are",
                    progress: Optional[Callable[[float], None]] = None) -> Navigation:
         """Returns paths and places for an upright avatar of a size in metres (default: as an avatar's).
-        `doors`: "as_they_are" at the tick of each query, or "open". The first query builds meshes, and
-        calls `progress` with the share that is done, 0 to 1. `step`: the height, that of the world alone."""
+        `doors`: "as_they_are" at the tick of each query, or "open". The first query builds meshes, and calls
+        `progress` with the share that is done, 0 to 1; each restarts the timeout. `step`: that of the world."""
         return Navigation(self, radius, height, speed, doors, progress, step)
 
     def names(self, ids: Union[np.ndarray, Iterable[int]]) -> Dict[int, str]:

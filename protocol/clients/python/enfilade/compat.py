@@ -19,7 +19,9 @@ from typing import List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
+from .arguments import number
 from .navigation import Navigation, Spot
+from .questions import vec
 
 _NOWHERE = np.full(3, np.nan)
 _MAX_ACTIONS = 2000  # of find_path(): 500 m of steps ahead
@@ -164,7 +166,8 @@ class PathFinder:
 
     def build_nav_mesh(self, settings: NavMeshSettings) -> bool:
         """Builds meshes for another agent, as habitat's recompute_navmesh(). Raises ValueError if the world
-        has another climb or slope."""
+        has another climb or slope, and ServerError if the server refuses the size. The present agent then
+        stays."""
         client = self.navigation._client
         policies = client.welcome.policies
         for name, wanted, given, option in (
@@ -174,9 +177,11 @@ class PathFinder:
             if wanted is not None and not math.isclose(wanted, given, abs_tol=1e-6):
                 raise ValueError(f"{name} is {given:g} in this world, not {wanted:g}: start the server with "
                                  f"{option} {wanted:g}")
-        self.navigation = client.navigation(settings.agent_radius, settings.agent_height,
-                                            speed=self.navigation.speed, doors=self.navigation.doors)
-        return self.navigation.build_seconds >= 0
+        navigation = client.navigation(settings.agent_radius, settings.agent_height,
+                                       speed=self.navigation.speed, doors=self.navigation.doors)
+        is_built = navigation.build_seconds >= 0
+        self.navigation = navigation  # a refusal leaves the present one
+        return is_built
 
     @property
     def nav_mesh_settings(self) -> NavMeshSettings:
@@ -216,6 +221,9 @@ class PathFinder:
 
     def get_random_navigable_point_near(self, circle_center: Sequence[float], radius: float,
                                         max_tries: int = 100, island_index: int = -1) -> np.ndarray:
+        number(radius, "radius", above=0)
+        if not _is_finite(circle_center):
+            return _NOWHERE.copy()
         return _point(self.navigation.random_place(self._draw(), near=circle_center, max_distance=radius,
                                                    island=_island(island_index)))
 
@@ -226,8 +234,11 @@ class PathFinder:
 
     def _projected(self, wanted: Sequence[Sequence[float]],
                    island: Optional[int] = None) -> List[Optional[Spot]]:
-        """The places that snap_point() has for points."""
-        return self.navigation.snap_all(wanted, extents=_EXTENTS, island=island, drawn=island is None)
+        """The places that snap_point() has for points; none for those that are not finite."""
+        finite = [_is_finite(point) for point in wanted]
+        found = iter(self.navigation.snap_all([point for point, one in zip(wanted, finite) if one],
+                                              extents=_EXTENTS, island=island, drawn=island is None))
+        return [next(found) if one else None for one in finite]
 
     def build_navmesh_vertices(self, island_index: int = -1) -> List[np.ndarray]:
         """The corners of all triangles, three by three."""
@@ -237,11 +248,11 @@ class PathFinder:
         return list(range(3 * len(self.navigation.triangles(_island(island_index)))))
 
     def is_navigable(self, pt: Sequence[float], max_y_delta: float = 0.5) -> bool:
-        return self.navigation.is_navigable(pt, max_y_delta)
+        return _is_finite(pt) and self.navigation.is_navigable(pt, max_y_delta)
 
     def try_step(self, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
         """Where a straight walk ends that slides along obstacles. If no agent can stand at `start`, it begins
-        at its snap_point(); without one it is `start`."""
+        at its snap_point(); without one, or with an end that is not finite, it is `start`."""
         return self._stepped(start, end, True)
 
     def try_step_no_sliding(self, start: Sequence[float], end: Sequence[float]) -> np.ndarray:
@@ -249,6 +260,8 @@ class PathFinder:
         return self._stepped(start, end, False)
 
     def _stepped(self, start: Sequence[float], end: Sequence[float], slide: bool) -> np.ndarray:
+        if not (_is_finite(start) and _is_finite(end)):
+            return np.array(start, float)
         spot = self.navigation.try_step(start, end, slide=slide)
         if spot is None:
             snapped = self._projected([start])[0]
@@ -297,10 +310,14 @@ class PathFinder:
         bounds = self.navigation._client.welcome.scene.bounds
         return tuple(np.array((p.x, p.y, p.z)) for p in (bounds.min, bounds.max))  # type: ignore[return-value]
 
-    def island_radius(self, pt: Union[int, Sequence[float]]) -> float:
+    def island_radius(self, pt: Union[None, int, Sequence[float]] = None, *,
+                      island_index: Optional[int] = None) -> float:
         """The largest distance of 1000 random places of an island from their centroid: one value for all
         points of the island, which a number may name instead; 0: no island."""
-        island = int(pt) if isinstance(pt, (int, np.integer)) else self.get_island(pt)
+        if (pt is None) == (island_index is None):
+            raise TypeError("island_radius: give either pt or island_index")
+        which = island_index if pt is None else pt
+        island = int(which) if isinstance(which, (int, np.integer)) else self.get_island(which)
         if island < 0:
             return 0.0
         places = np.array([spot.at for spot in self.navigation.random_places(1000, 1, island=island) if spot])
@@ -313,6 +330,11 @@ class PathFinder:
 
 def _island(index: int) -> Optional[int]:
     return index if index >= 0 else None
+
+
+def _is_finite(point: Sequence[float]) -> bool:
+    one = vec(point)
+    return all(map(math.isfinite, (one.x, one.y, one.z)))
 
 
 def _point(spot: Optional[Spot]) -> np.ndarray:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 import operator
+import warnings
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
@@ -21,7 +22,7 @@ from .cameras import Camera, CameraRequest, chosen_cameras
 from .client import Client, Reply, connect
 from .connection import raise_refusal
 from .episodes import Episode, check_episode, draw_episode
-from .errors import EnfiladeError, OrderFailed
+from .errors import OrderFailed
 from .kept_request import KeptRequest
 from .process import Server, serve
 from .world_group import Member
@@ -66,8 +67,8 @@ class WalkEnv(spaces.EnvBase):
         close() leaves open.
     starts: start positions, (x, y, z) of the feet or (x, y, z, facing in degrees); each reset chooses
         one at random, and a facing if none is given. Or "anywhere": random places. A start that the world
-        refuses is drawn again, up to 32 times (of `episodes`: the next one is taken); one that
-        reset(options=...) names is not.
+        refuses is drawn again, up to 32 times; one that reset(options=...) names is not. Of `episodes`
+        one whose start is refused, or whose goal no path reaches, is passed over with a warning.
     goal: the walk succeeds within `goal_radius` metres of it, on the ground.
     goals: goals instead, of which each reset chooses one that can be reached, or "anywhere". Distances
         are then geodesic, at least `min_distance` at the start. Or `episodes` instead of starts and goals,
@@ -158,6 +159,7 @@ class WalkEnv(spaces.EnvBase):
         self._steps = 0
         self._start: Sequence[float] = ()  # of the episode
         self.episode: Optional[Episode] = None  # the present one, with goals or episodes
+        self._drawn: Optional[Episode] = None  # the last one that has a path, as it was drawn
         self._episode_number = 0
         self._walked = 0.0  # metres in this episode
         self._left = math.inf  # geodesic distance to the goal, metres
@@ -224,8 +226,9 @@ class WalkEnv(spaces.EnvBase):
             episode = self.episodes[self._episode_number % len(self.episodes)]
             self._episode_number += 1
             return episode
-        return draw_episode(self.navigation, self.np_random, min_distance=self.min_distance,
-                            starts=self.starts, goals=self.goals or ())
+        self._drawn = draw_episode(self.navigation, self.np_random, min_distance=self.min_distance,
+                                   starts=self.starts, goals=self.goals or ())
+        return self._drawn
 
     def _one_of(self, places: Any) -> Optional[Sequence[float]]:
         return places[int(self.np_random.integers(len(places)))] if places else None
@@ -288,9 +291,9 @@ class WalkEnv(spaces.EnvBase):
     # ---- in two halves, so that several environments work at the same time --------------------
 
     def _post_reset(self, seed: Optional[int], options: Dict[str, Any]) -> List[int]:
+        self._feet = self._rgb = None  # until the reset succeeds
         start, self.goal = self._chosen(seed, options)
         facing = start[3] if len(start) > 3 else float(self.np_random.uniform(0, 360))
-        self._feet = self._rgb = None  # until the spawn succeeds
         self._face(math.radians(facing))
         self._steps = 0
         self._tag += 1
@@ -301,10 +304,12 @@ class WalkEnv(spaces.EnvBase):
             messages.ClientMessage(restart=messages.Restart()),
             messages.ClientMessage(command=messages.Command(avatar=self._name, tag=self._tag,
                                                             spawn=spawn)),
-            messages.ClientMessage(step=messages.Step(ticks=1, avatars=True)), *self._pictures()])
+            messages.ClientMessage(step=messages.Step(ticks=1, avatars=True)), *self._pictures(),
+            *self._reach_query()])
 
     def _entered(self, posted: List[int], options: Dict[str, Any]) -> Tuple[Observation, Dict[str, Any]]:
-        """Takes the reply to _post_reset(). Draws again while the start is refused."""
+        """Takes the reply to _post_reset(). Draws again while the start is refused or no path leads to the
+        goal."""
         given = self.starts if self.episodes is None else self.episodes
         draws = 1 if "start" in options or len(given) == 1 else MAX_STARTS
         for refused in range(1, draws + 1):
@@ -315,6 +320,8 @@ class WalkEnv(spaces.EnvBase):
                     if draws > 1:
                         error.args = (f"{draws} starts were refused; the last: {error}",)
                     raise
+                if self.episodes is not None:
+                    warnings.warn(f"{error}; the next episode is taken", stacklevel=3)
             posted = self._post_reset(None, options)
         raise AssertionError("at least one start is drawn")
 
@@ -340,23 +347,33 @@ class WalkEnv(spaces.EnvBase):
         if not self.is_geodesic:
             return start or self._one_of(self.starts) or self._anywhere(), goal
         if start is None and goal is None:
-            self.episode = self._with_distance(self.new_episode())
+            self.episode = self.new_episode()
         else:
-            self.episode = draw_episode(self.navigation, self.np_random, min_distance=0.0,
-                                        start=start, goal=goal, starts=self.starts,
-                                        goals=self.goals or ())
+            self.episode = self._drawn = draw_episode(
+                self.navigation, self.np_random, min_distance=0.0, start=start, goal=goal,
+                starts=self.starts, goals=self.goals or ())
         self._left = self.episode.geodesic_distance
         return (*self.episode.start, self.episode.facing), np.array(self.episode.goal)
 
-    def _with_distance(self, episode: Episode) -> Episode:
-        """Measures `geodesic_distance` if the episode, for example of a file, has none."""
-        if math.isfinite(episode.geodesic_distance):
-            return episode
-        path = self.navigation.path(episode.start, episode.goal)
+    def _reach_query(self) -> List[Any]:
+        """Asks for the path of an episode that was not drawn, for example of a file: it may have none."""
+        if not self.is_geodesic or self.episode is self._drawn:
+            return []
+        assert self.episode is not None
+        return [messages.ClientMessage(
+            navigation=self.navigation.query([self.episode.goal], start=self.episode.start))]
+
+    def _check_reach(self, path: Any) -> None:
+        """Raises OrderFailed without a path. Its length is the `geodesic_distance` of an episode that has
+        none."""
+        episode = self.episode
+        assert episode is not None
         if not path.found:
-            raise EnfiladeError(f"episode {episode.id!r}: no path leads from {episode.start} to "
-                                f"{episode.goal}: {path.reason}")
-        return replace(episode, geodesic_distance=path.length)
+            raise OrderFailed(f"episode {episode.id!r}: no path leads from {episode.start} to "
+                              f"{episode.goal}: {path.reason}")
+        if not math.isfinite(episode.geodesic_distance):
+            self.episode = replace(episode, geodesic_distance=path.length)
+            self._left = path.length
 
     def _anywhere(self) -> Sequence[float]:
         spot = self.navigation.random_place(int(self.np_random.integers(0, 2 ** 63)))
@@ -374,8 +391,12 @@ class WalkEnv(spaces.EnvBase):
         if not self._take_avatar(entered):
             where = ", ".join(f"{metres:g}" for metres in self._start[:3])
             raise OrderFailed(f"the avatar could not spawn at ({where}): {' '.join(why)}")
+        feet, self._feet = self._feet, None  # in case this fails
         for reply, _ in replies[3:]:
             raise_refusal(reply)
+        if len(replies) > 3 + len(self.cameras):
+            self._check_reach(replies.pop()[0].navigation.paths[0])
+        self._feet = feet
         info = self._info(entered.tick, entered.state_hash, contacts, False)
         if self.is_geodesic:
             info["geodesic_distance"] = self._left

@@ -150,23 +150,23 @@ class Navigation:
         self.height = 1.75 if height is None else height
         self._options = {"radius": radius, "height": height, "speed": speed,
                          "doors": doors_value(doors)}
-        self._progress = progress
+        self._progress = progress or (lambda share: None)
         self.speed, self.doors = speed, doors
         self._report: Any = None  # the last reply
 
     def _ask(self, **query: Any) -> Tuple[Any, memoryview]:
-        if self._progress is not None:
-            query["progress"] = True
-            self._client._show_progress = self._progress
-        reply, attachment = self._client.request(
-            navigation=messages.NavigationQuery(**self._options, **query))
+        self._client._show_progress = self._progress
+        reply, attachment = self._client.request(  # each progress restarts the wait for the reply
+            navigation=messages.NavigationQuery(**self._options, progress=True, **query))
         self._report = reply.navigation
         return reply.navigation, attachment
 
-    def query(self, goals: Sequence[Place], *, avatar: str) -> Any:
-        """Returns the NavigationQuery of the paths from an avatar to goals, for Client.pipeline()."""
-        return messages.NavigationQuery(**self._options, path=messages.NavigationQuery.Path(
-            **{"from": messages.NavigationPlace(avatar=avatar)}, to=[_place(goal) for goal in goals]))
+    def query(self, goals: Sequence[Place], *, avatar: str = "", start: Optional[Place] = None) -> Any:
+        """Returns the NavigationQuery of the paths from an avatar, or a start, to goals, for
+        Client.pipeline()."""
+        first = messages.NavigationPlace(avatar=avatar) if start is None else _place(start)
+        return messages.NavigationQuery(**self._options, progress=True, path=messages.NavigationQuery.Path(
+            **{"from": first}, to=[_place(goal) for goal in goals]))
 
     def path(self, start: Place, goal: Place, *, narrowest: bool = False, max_drop: float = 0.0,
              lifts: bool = False) -> Path:

@@ -54,8 +54,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
     A wrong number of actions or seeds, or an invalid action, is a ValueError before anything is sent.
     If an environment fails later, all replies are awaited and its error is raised with its number.
-    After a failed step() the next one restarts that environment, and the others go on; after a
-    failed reset() call reset(). If the server ended, create all environments again.
+    The next step() restarts that environment, and the others go on: also after a reset() in which
+    some started. If none did, call reset(). If the server ended, create all environments again.
     """
 
     metadata: Dict[str, Any] = {"render_modes": ["rgb_array"], "autoreset_mode": spaces.NEXT_STEP}
@@ -85,6 +85,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             self._maker = connect(address, name="enfilade environments", token=token)
             for number, client in enumerate(self._in_worlds(self._maker, world_scene)):
                 self.envs.append(make(number, client))
+            self._build_meshes(address, token)
         except BaseException:
             self.close()
             raise
@@ -99,6 +100,13 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                             for env in self.envs]
         self._kept: List[Optional[KeptRequest]] = []  # the requests of a step, if not to be made
         self._last = _Batch(self.single_observation_space, num_envs)  # of the last reset() or step()
+
+    def _build_meshes(self, address: str, token: str) -> None:
+        """Those that reset() needs. Their progress keeps a connection waiting, but not a round of the group."""
+        sizes = {tuple(env._size.items()): env for env in self.envs if env.is_geodesic or not env.starts}
+        for env in sizes.values():
+            with connect(address, name="enfilade environments", token=token, world=env.client.world) as client:
+                client.navigation(**env._size).snap((0.0, 0.0, 0.0))
 
     def _in_worlds(self, maker: Client, scene: str) -> Sequence[Client]:
         """Creates num_envs worlds, and a client in each: all on one connection."""
@@ -125,10 +133,11 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
         infos, failures = self._each(
             lambda i: self.envs[i]._post_reset(seeds[i], options), take)
+        self._last = batch  # those that failed restart: theirs are not read
+        over = np.array([info is None for info in infos])
+        self._over = None if over.all() else over
         if failures:
             raise self._numbered(failures)
-        self._last = batch
-        self._over = np.zeros(self.num_envs, bool)
         return batch.observations, self._gathered(infos)
 
     def _seeds(self, seed: Any) -> List[Optional[int]]:
@@ -145,7 +154,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                                           Dict[str, Any]]:
         over = self._over
         if over is None:
-            raise RuntimeError("call reset() first, also after a failed step()")
+            raise RuntimeError("call reset() first: no environment has begun, reset() or step() was "
+                               "interrupted, or the environments were closed")
         meanings = self._meanings(actions, over)
 
         def post(i: int) -> List[int]:

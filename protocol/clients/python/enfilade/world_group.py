@@ -17,7 +17,7 @@ import numpy as np
 from . import messages
 from .client import Client
 from .connection import Received
-from .errors import ConnectionFailed, EnfiladeError
+from .errors import ConnectionFailed, EnfiladeError, ServerError
 from .kept_request import KeptRequest, varint
 
 _ALIGNMENT = 64  # bytes, of attachments in the reply
@@ -57,7 +57,16 @@ class WorldGroup:
         for connection in self._connections:
             connection.is_entering = True
         self._run()
-        self.members = [Member(connection) for connection in self._connections]
+        try:
+            self.members = [Member(connection) for connection in self._connections]
+        except ServerError:
+            self._leave()
+            raise
+
+    def _leave(self) -> None:
+        """Leaves the worlds, which another group of the client can then enter."""
+        self._client.request(step_many=messages.StepMany(worlds=[
+            messages.StepMany.World(world=one.world, leave=True) for one in self._connections]))
 
     def _run(self) -> None:
         """Sends the waiting requests of all members, and takes the replies. An interrupted call
@@ -315,6 +324,8 @@ class Member(Client):
 
     def __init__(self, connection: _MemberConnection) -> None:
         self._start(connection)
+        if not connection._received:  # it has not entered: the reply to any request says why
+            self.request(list_worlds=messages.ListWorlds())
         received = connection.next()
         assert received is not None
         if not received.message.HasField("welcome"):
