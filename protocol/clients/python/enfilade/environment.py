@@ -88,8 +88,8 @@ class WalkEnv(spaces.EnvBase):
     goal, or without a goal the distance walked, in metres; override reward() and is_over(), and
     new_episode() for other starts and goals. `info` has "collided": in any tick of the step an obstacle
     stopped the avatar, or came into contact with it; the ground on which it stands is no obstacle. With goals or
-    episodes `info` has "geodesic_distance", "success" and "spl", too. A fall out of the scene ends the
-    episode, with "fell" in `info` and the observation before it.
+    episodes `info` has "geodesic_distance", "success" and "spl", too: the distance that is left counts as
+    walked. A fall out of the scene ends the episode, with "fell" in `info` and the observation before it.
 
     Raises ValueError with the name of the argument before anything is sent. An exception during a
     step (KeyboardInterrupt) leaves it usable, but the world may have advanced by that step.
