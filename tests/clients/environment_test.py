@@ -144,7 +144,7 @@ class Environments(RoomCase):
         self.addCleanup(vector.close)
         self.assertEqual(vector._is_packing, [True] * count)
         if not is_packing:
-            vector._is_packing = [False] * count  # as with a server without packed_steps
+            vector._is_packing, vector._plain = [False] * count, None  # as with a server without packed_steps
         return vector
 
     def assert_same_steps(self, count, steps, actions, **options):
@@ -199,7 +199,7 @@ class Environments(RoomCase):
         for interrupted in range(3):
             for step in range(6):
                 vector.step(np.ones((3, 2)))
-            with unittest.mock.patch.object(vector.envs[interrupted], "reward",
+            with unittest.mock.patch.object(vector.envs[interrupted], "_contacts_of_step",
                                             side_effect=KeyboardInterrupt):
                 with self.assertRaises(KeyboardInterrupt):
                     vector.step(np.ones((3, 2)))

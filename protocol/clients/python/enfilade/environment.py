@@ -247,7 +247,7 @@ class WalkEnv(spaces.EnvBase):
             return bool(info["success"])
         return self.goal is not None and self._to_goal(position) <= self.goal_radius
 
-    def _to_goal(self, position: np.ndarray) -> float:
+    def _to_goal(self, position: Sequence[float]) -> float:
         assert self.goal is not None
         return math.hypot(self.goal[0] - position[0], self.goal[2] - position[2])
 
@@ -485,10 +485,14 @@ class WalkEnv(spaces.EnvBase):
         """Keeps the avatar's state of a packed step. Returns its info."""
         tick, state_hash, self._feet, self._stopped_by, self._last_stopped = step
         self._steps += 1
+        contacts = self._contacts_of_step()
+        return self._info(tick, state_hash, contacts, self._has_collided(tick, contacts))
+
+    def _contacts_of_step(self) -> List[results.Contact]:
+        """Takes the contacts that came with a packed step."""
         client = self.client
         client._notices.clear()
-        contacts = client._kept_contacts() if client._contacts else []
-        return self._info(tick, state_hash, contacts, self._has_collided(tick, contacts))
+        return client._kept_contacts() if client._contacts else []
 
     def _has_collided(self, tick: int, contacts: List[results.Contact]) -> bool:
         """Whether an obstacle stopped the avatar in any tick of the step that ended at `tick`, or came into
@@ -585,10 +589,13 @@ class WalkEnv(spaces.EnvBase):
         seen = {"position": self._feet.copy(), "heading": np.array(self._direction)}
         if self.goal is not None:
             seen["to_goal"] = self.goal - seen["position"]
-            angle = math.atan2(-seen["to_goal"][2], seen["to_goal"][0]) - self._heading
-            seen["goal_polar"] = np.array([math.hypot(seen["to_goal"][0], seen["to_goal"][2]),
-                                           math.remainder(angle, math.tau)])
+            seen["goal_polar"] = np.array(self._polar(seen["to_goal"][0], seen["to_goal"][2]))
         return seen
+
+    def _polar(self, x: float, z: float) -> Tuple[float, float]:
+        """The distance of a place relative to the feet, and its angle from the heading."""
+        angle = math.atan2(-z, x) - self._heading
+        return math.hypot(x, z), math.remainder(angle, math.tau)
 
     def _info(self, tick: int, state_hash: int, contacts: List[results.Contact],
               collided: bool) -> Dict[str, Any]:

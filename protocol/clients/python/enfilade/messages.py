@@ -7,6 +7,7 @@ avoids clashes with other programs' messages.
 
 from __future__ import annotations
 
+import functools
 from importlib import resources
 from typing import Any, Dict
 
@@ -50,6 +51,7 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"enfilade.proto has no {name}") from None
 
 
+@functools.lru_cache(maxsize=256)  # a descriptor takes a microsecond
 def word(enum: Any, number: int, prefix: str) -> str:
     """Returns a value's name without its prefix, in lower case: KIND_BEGIN is "begin"."""
     value = enum.values_by_number.get(number)

@@ -54,13 +54,16 @@ class Contact:
     room_name: str = ""
 
 
+_CONTACT_ENUMS = messages.ContactEvent.DESCRIPTOR.enum_types_by_name
+_KIND, _REASON, _PHASE = (_CONTACT_ENUMS[name] for name in ("Kind", "Reason", "Phase"))
+
+
 def contact(event: Any) -> Contact:
-    kinds = messages.ContactEvent.DESCRIPTOR.enum_types_by_name
     return Contact(
         tick=event.tick, time=event.time,
-        kind=messages.word(kinds["Kind"], event.kind, "KIND_"),
-        reason=messages.word(kinds["Reason"], event.reason, "REASON_") if event.reason else "",
-        phase=messages.word(kinds["Phase"], event.phase, "PHASE_") if event.phase else "",
+        kind=messages.word(_KIND, event.kind, "KIND_"),
+        reason=messages.word(_REASON, event.reason, "REASON_") if event.reason else "",
+        phase=messages.word(_PHASE, event.phase, "PHASE_") if event.phase else "",
         a=event.a, b=event.b, a_name=event.a_name, b_name=event.b_name,
         verdict=_verdict(event.verdict), distance=event.distance, error_bound=event.error_bound,
         point_a=vector(event.point_a), point_b=vector(event.point_b), normal=vector(event.normal),

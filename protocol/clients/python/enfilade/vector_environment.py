@@ -13,6 +13,7 @@ from . import spaces
 from .client import Client, connect
 from .environment import Observation, WalkEnv
 from .kept_request import KeptRequest
+from .plain_steps import PlainSteps, Result
 from .process import Server, serve
 from .world_group import Member, WorldGroup
 
@@ -28,9 +29,6 @@ class _Batch:
     def add(self, i: int, seen: Observation) -> None:
         for name, one in seen.items():
             self.observations[name][i] = one
-
-    def of(self, i: int) -> Observation:
-        return {name: all_[i] for name, all_ in self.observations.items()}
 
 
 class VectorWalkEnv(spaces.VectorEnvBase):
@@ -98,8 +96,12 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         self._over: Optional[np.ndarray] = None  # None: reset() is next
         self._is_packing = [isinstance(env.client, Member) and "packed_steps" in env.client.capabilities
                             for env in self.envs]
+        self._plain: Optional[PlainSteps] = None
+        if all(self._is_packing) and PlainSteps.fits(self.envs):
+            self._plain = PlainSteps(self.envs)
+        self._is_discrete = any(env.discrete for env in self.envs)
         self._kept: List[Optional[KeptRequest]] = []  # the requests of a step, if not to be made
-        self._last = _Batch(self.single_observation_space, num_envs)  # of the last reset() or step()
+        self._last: Observation = {}  # of the last reset() or step()
 
     def _build_meshes(self, address: str, token: str) -> None:
         """Those that reset() needs. Their progress keeps a connection waiting, but not a round of the group."""
@@ -133,7 +135,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
         infos, failures = self._each(
             lambda i: self.envs[i]._post_reset(seeds[i], options), take)
-        self._last = batch  # those that failed restart: theirs are not read
+        self._last = batch.observations  # those that failed restart: theirs are not read
         over = np.array([info is None for info in infos])
         self._over = None if over.all() else over
         if failures:
@@ -150,20 +152,36 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             raise ValueError(f"seed: give {self.num_envs}, one per environment, not {len(seeds)}")
         return seeds
 
-    def step(self, actions: Any) -> Tuple[Observation, np.ndarray, np.ndarray, np.ndarray,
-                                          Dict[str, Any]]:
+    def step(self, actions: Any) -> Result:
         over = self._over
         if over is None:
             raise RuntimeError("call reset() first: no environment has begun, reset() or step() was "
                                "interrupted, or the environments were closed")
         meanings = self._meanings(actions, over)
+        self._over = None
+        if self._plain is None or over.any() or not self._plain.can_post():
+            return self._step_each(over, self._posted(over, meanings))
+        try:
+            made = self._plain.step(meanings, [self._kept_of(i) for i in range(self.num_envs)])
+        except Exception as error:
+            self._over = np.ones(self.num_envs, bool)
+            raise self._numbered([(0, error)])
+        if made is None:
+            return self._step_each(over, lambda i: [])
+        self._last = made[0]
+        self._over = made[2] | made[3]
+        return made
 
+    def _posted(self, over: np.ndarray, meanings: Sequence[Tuple[float, float]],
+                ) -> Callable[[int], List[int]]:
         def post(i: int) -> List[int]:
             if over[i]:
                 self._kept[i] = None  # it may have another goal
                 return self.envs[i]._post_reset(None, {})
             return self._post_step(i, meanings[i])
+        return post
 
+    def _step_each(self, over: np.ndarray, post: Callable[[int], List[int]]) -> Result:
         batch = _Batch(self.single_observation_space, self.num_envs)
 
         def take(i: int, ids: List[int]) -> Tuple[float, bool, bool, Dict[str, Any]]:
@@ -173,9 +191,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                 return 0.0, False, False, info
             return self._take_step(i, ids, batch)
 
-        self._over = None
         taken, failures = self._each(post, take)
-        self._last = batch  # those that failed restart: theirs are not read
+        self._last = batch.observations  # those that failed restart: theirs are not read
         if failures:
             self._over = np.array([one is None or one[1] or one[2] for one in taken])
             raise self._numbered(failures)
@@ -187,9 +204,9 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     def _meanings(self, actions: Any, over: np.ndarray) -> Sequence[Tuple[float, float]]:
         """WalkEnv._meaning() of each action; any for an environment that restarts."""
         is_array = isinstance(actions, np.ndarray) and actions.shape == (self.num_envs, 2) and \
-            actions.dtype.kind == "f" and not any(env.discrete for env in self.envs)
+            actions.dtype.kind == "f" and not self._is_discrete
         if is_array and not np.isnan(actions).any():
-            return np.clip(actions.astype(np.float64), -1.0, 1.0).tolist()
+            return np.minimum(np.maximum(actions.astype(np.float64), -1.0), 1.0).tolist()
         try:
             actions = list(actions)
         except TypeError:
@@ -203,12 +220,16 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         env = self.envs[i]
         if not self._is_packing[i]:
             return env._post_step(meaning)
-        kept = self._kept[i]
-        if kept is None:
-            kept = self._kept[i] = env._kept_step(env.client)
+        kept = self._kept_of(i)
         kept.set(*env._step_numbers(meaning))
         env.client.post_kept(kept)
         return []
+
+    def _kept_of(self, i: int) -> KeptRequest:
+        kept = self._kept[i]
+        if kept is None:
+            kept = self._kept[i] = self.envs[i]._kept_step(self.envs[i].client)
+        return kept
 
     def _take_step(self, i: int, ids: List[int],
                    batch: _Batch) -> Tuple[float, bool, bool, Dict[str, Any]]:
@@ -227,7 +248,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                 env.client.forget_reply()
                 return env._judged(before, info, path)
             ids = env.client.unpack_reply(env._name, 2 + others)
-        env._seen = self._last.of(i)  # for an avatar that falls out of the scene
+        # For an avatar that falls out of the scene:
+        env._seen = {name: all_[i] for name, all_ in self._last.items()}
         seen, *result = env._take_step(ids)
         batch.add(i, seen)
         return tuple(result)

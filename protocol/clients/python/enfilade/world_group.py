@@ -88,7 +88,7 @@ class WorldGroup:
         elif self._shares:
             self._memory = None  # the server is on another machine
         many, start = reply.step_many, 0
-        steps = _Steps(many.steps) if many.HasField("steps") else None
+        steps = PackedSteps(many.steps) if many.HasField("steps") else None
         for i, (connection, world) in enumerate(zip(active, many.worlds)):
             found = WorldReply(world, attachment, start, steps, i)
             start = found.end()
@@ -135,8 +135,8 @@ class _SharedMemory:
             self._number, self._bytes = int.from_bytes(number, "little"), memoryview(mapped)
 
 
-class _Steps:
-    """PackedSteps as Python data, of all worlds of a round."""
+class PackedSteps:
+    """The message as Python data, of all worlds of a round."""
 
     def __init__(self, packed: Any) -> None:
         self.ticks, self.hashes = packed.tick[:], packed.state_hash[:]
@@ -148,13 +148,14 @@ class _Steps:
 class WorldReply:
     """The reply of one world to StepMany: its messages, and a packed step if it was requested."""
 
-    __slots__ = ("messages", "_ends", "_attachment", "_start", "_steps", "_index")
+    __slots__ = ("messages", "steps", "_ends", "_attachment", "_start", "_index", "_found")
 
-    def __init__(self, world: Any, attachment: memoryview, start: int, steps: Optional[_Steps],
+    def __init__(self, world: Any, attachment: memoryview, start: int, steps: Optional[PackedSteps],
                  index: int) -> None:
         self.messages = world.messages
         self._ends, self._attachment, self._start = world.attachment_ends, attachment, start
-        self._steps, self._index = steps, index
+        self.steps, self._index = steps, index
+        self._found: Optional[List[memoryview]] = None  # None: attachments() has to find them
 
     def end(self) -> int:
         """Where its last attachment ends in that of the round."""
@@ -162,6 +163,8 @@ class WorldReply:
 
     def attachments(self) -> List[memoryview]:
         """The attachment of each message."""
+        if self._found is not None:
+            return self._found
         found: List[memoryview] = []
         start = self._start
         for end in self._ends:
@@ -171,10 +174,17 @@ class WorldReply:
             start = max(start, end)
         return found
 
+    def take_unsolicited(self) -> List[Tuple[Any, memoryview]]:
+        """Removes and returns the messages that reply to nothing."""
+        both = list(zip(self.messages, self.attachments()))
+        self.messages = [one for one, _ in both if one.reply_to]
+        self._found = [attachment for one, attachment in both if one.reply_to]
+        return [one for one in both if not one[0].reply_to]
+
     def packed(self, others: int) -> Optional[Tuple[int, int, np.ndarray, str, int]]:
         """Returns tick, hash, feet, stopped_by_name and last_stopped_tick of the packed step; None if it was
         refused, the avatar is not in the world, or more came with it than `others` replies."""
-        steps, i = self._steps, self._index
+        steps, i = self.steps, self._index
         if steps is None or not steps.has_avatar[i] or len(self.messages) != others:
             return None
         if others and any(one.HasField("error") for one in self.messages):
@@ -184,7 +194,7 @@ class WorldReply:
     def unpacked(self, avatar: str) -> List[Any]:
         """Returns the replies to Drive and Step, the first two requests, that are in none of the
         messages."""
-        steps, i = self._steps, self._index
+        steps, i = self.steps, self._index
         answered = {one.reply_to for one in self.messages}
         found = []
         if 1 not in answered:
@@ -251,8 +261,7 @@ class _MemberConnection:
 
     def encoded(self) -> List[bytes]:
         """Returns the parts of StepMany with the waiting requests, which are then under way."""
-        if self.raw is not None:  # of an interrupted call: its replies are not awaited any more
-            self.unpack([])
+        self.raw = None  # of an interrupted call: its replies are not awaited any more
         if self.kept is not None:
             kept, self.kept, self._is_raw = self.kept, None, True
             return [kept.body]
@@ -265,10 +274,12 @@ class _MemberConnection:
         return [_WORLDS_KEY, varint(sum(map(len, parts))), *parts]
 
     def receive(self, reply: WorldReply) -> None:
-        if self._is_raw:
-            self.raw = reply
-        else:
-            self._append(reply.messages, reply.attachments(), self._sent)
+        if not self._is_raw:
+            return self._append(reply.messages, reply.attachments(), self._sent)
+        if reply.messages:
+            self._received += [Received(message, attachment, None, 0)
+                               for message, attachment in reply.take_unsolicited()]
+        self.raw = reply
 
     def _append(self, found: Any, attachments: Sequence[memoryview], ids: Sequence[int]) -> None:
         """Makes next() return messages; `ids`: of the requests, by number."""
@@ -278,14 +289,11 @@ class _MemberConnection:
             self._received.append(Received(message, attachment, None, 0))
 
     def unpack(self, ids: Sequence[int], avatar: str = "") -> None:
-        """Makes next() return the messages of a raw reply as if the requests had these ids; without
-        ids, the unsolicited messages only."""
+        """Makes next() return the replies as if the requests had these ids."""
         assert self.raw is not None
         reply, self.raw = self.raw, None
-        made = [(one, _NOTHING) for one in (reply.unpacked(avatar) if ids else ())]
-        came = [one for one in zip(reply.messages, reply.attachments()) if ids or not one[0].reply_to]
-        # Unsolicited messages precede the reply to the Step that led to them, the second request.
-        both = sorted(made + came, key=lambda one: one[0].reply_to or 1.5)
+        made = [(one, _NOTHING) for one in reply.unpacked(avatar)]
+        both = sorted([*made, *zip(reply.messages, reply.attachments())], key=lambda one: one[0].reply_to)
         self._append([one for one, _ in both], [attachment for _, attachment in both], ids)
 
     def has_unread_picture(self) -> bool:
@@ -347,11 +355,29 @@ class Member(Client):
         connection.kept = kept
 
     def reply_to_kept(self) -> WorldReply:
-        """Call forget_reply() or unpack_reply() next."""
+        """The reply without unsolicited messages, which are kept. Call forget_reply() or unpack_reply()
+        next."""
         connection = self._connection
         if connection.raw is None:
             connection._group._run()
+        while connection._received:
+            self._keep(connection._received[0])
         return connection.raw
+
+    def packed_steps(self) -> Optional[PackedSteps]:
+        """The packed steps of the round of post_kept(); None if this world sent more than its own and
+        events."""
+        connection = self._connection
+        if connection.raw is None:
+            connection._group._run()
+        reply = connection.raw
+        if reply.packed(0) is None or any(one.message.WhichOneof("body") != "events"
+                                          for one in connection._received):
+            return None
+        return reply.steps
+
+    def is_closed(self) -> bool:
+        return self._connection._broken != ""
 
     def forget_reply(self) -> None:
         self._connection.raw = None
