@@ -32,6 +32,10 @@ const Buffer& findOrSerializeEvents(TickBroadcast& outgoing, const v1::Subscribe
   ENFILADE_ASSERT(subscribed < outgoing.eventBuffers.size());
   Buffer& bytes = outgoing.eventBuffers[subscribed];
   if (bytes) return bytes;
+  static const Buffer nothing = std::make_shared<const std::vector<std::uint8_t>>();
+  if (outgoing.tickEvents.contacts().empty() && outgoing.tickEvents.notices().empty() &&
+      outgoing.persistentContacts.empty())
+    return nothing;
   v1::TickEvents events;
   for (const v1::ContactEvent& event : outgoing.tickEvents.contacts()) {
     if (isSubscribedTo(subscription, event)) *events.add_contacts() = event;

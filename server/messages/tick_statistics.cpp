@@ -1,7 +1,8 @@
 #include "server/messages/tick_statistics.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <bit>
+#include <cstdint>
 
 #include "collision/assert.hpp"
 #include "server/messages/world_messages.hpp"
@@ -10,20 +11,26 @@ namespace enfilade::server {
 
 namespace {
 
-constexpr double kBucketsPerOctave = 64;
-constexpr std::size_t kBucketCount = 64 * 46;  // 2^46 ns
+// A bucket has the exponent and the first bits of the mantissa of a duration in nanoseconds: 64
+// buckets for each power of two, without a logarithm in each stage of each tick.
+constexpr int kMantissaBits = 6, kDroppedBits = 52 - kMantissaBits;
+constexpr std::uint64_t kFirstBucket = std::uint64_t{1023} << kMantissaBits;  // of 1 ns
+constexpr std::size_t kBucketCount = 46 << kMantissaBits;                     // 2^46 ns
 
 constexpr std::size_t kMaxAvatarWork = 1000;  // in a message
 
 std::size_t findBucket(double seconds) {
   const double nanoseconds = seconds * 1e9;
   if (!(nanoseconds > 1)) return 0;
-  const double bucket = std::log2(nanoseconds) * kBucketsPerOctave;
-  return std::min(static_cast<std::size_t>(bucket), kBucketCount - 1);
+  const std::uint64_t bucket =
+      (std::bit_cast<std::uint64_t>(nanoseconds) >> kDroppedBits) - kFirstBucket;
+  return std::min<std::size_t>(bucket, kBucketCount - 1);
 }
 
 double bucketMidpoint(std::size_t bucket) {
-  return std::exp2((static_cast<double>(bucket) + 0.5) / kBucketsPerOctave) * 1e-9;
+  const std::uint64_t start = (bucket + kFirstBucket) << kDroppedBits;
+  constexpr std::uint64_t kHalf = std::uint64_t{1} << (kDroppedBits - 1);
+  return std::bit_cast<double>(start | kHalf) * 1e-9;
 }
 
 void fillAvatarWork(v1::AvatarWork& message, const scene::AvatarWork& work, std::uint64_t tick) {

@@ -163,9 +163,16 @@ double computeVelocityDeviation(const KinematicTarget& target, double radius, do
   return n * maxDeviation / tick;
 }
 
+/// Whether no motion is planned: then all fields but the pose and the position are as in a new one.
+bool isEmpty(const KinematicTarget& target) {
+  const JointPose& next = target.keyPoses[1];
+  return target.segments == 1 && target.maxDisplacement == 0 && target.velocityDeviation == 0 &&
+         next.angle == 0 && next.offset.isZero(0);
+}
+
 void planKinematicTarget(Body& body, double tick) {
   KinematicTarget& target = body.kinematicTarget;
-  target = {};
+  if (!isEmpty(target)) target = {};
   target.keyPoses[0] = body.drive.pose;
   target.jointPosition = body.drive.jointPosition;
   if (!body.drive.moving) return;
