@@ -69,6 +69,8 @@ Snapshot takeDoors(const Scene& scene, Snapshot present, const Snapshot& open) {
 
 namespace {
 
+constexpr double kDoorDistanceError = 0.01;  // metres
+
 /// The snapshot with all doors closed.
 Snapshot closeDoors(const Scene& scene, Snapshot snapshot) {
   auto bodies = std::make_shared<std::vector<BodySnapshot>>(*snapshot.bodies);
@@ -99,13 +101,25 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
     box.include(placeBox(prism->box, points[i]));
     box = inflated(box, settings.contactOffset);
     std::shared_ptr<const AvatarShape> swept;  // built for the first door that is near
-    const auto touches = [&](const Snapshot& state, std::size_t body) {
-      const BodySnapshot& door = (*state.bodies)[body];
-      if (!overlaps(box, computeBodyAabb({index, state}, door))) return false;
-      if (!swept) swept = makeSweptShape(*prism, leg);
+    const auto meets = [&](const Snapshot& state, std::size_t body,
+                           const std::shared_ptr<const AvatarShape>& shape) {
       const auto separation =
-          computeSeparationFromShape(index, state, swept, points[i - 1], door.id);
+          computeSeparationFromShape(index, state, shape, points[i - 1], (*state.bodies)[body].id);
       return separation && separation->distance < computeContactThreshold(settings);
+    };
+    const auto touches = [&](const Snapshot& state, std::size_t body) {
+      if (!overlaps(box, computeBodyAabb({index, state}, (*state.bodies)[body]))) return false;
+      if (!swept) swept = makeSweptShape(*prism, leg);
+      return meets(state, body, swept);
+    };
+    // Metres along the line to where the agent touches the door, to a centimetre.
+    const auto measureWay = [&](const Snapshot& state, std::size_t body) {
+      double clear = 0, met = 1;
+      while ((met - clear) * leg.norm() > kDoorDistanceError) {
+        const double middle = 0.5 * (clear + met);
+        (meets(state, body, makeSweptShape(*prism, middle * leg)) ? met : clear) = middle;
+      }
+      return met * leg.norm();
     };
     for (std::size_t b = 0; b < snapshot.bodies->size(); ++b) {
       const BodySnapshot& body = (*snapshot.bodies)[b];
@@ -119,8 +133,9 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
         known->isInTheWay = isInTheWay;
       } else if (isInTheWay || touches(closed, b)) {
         const double rest = findOpenLimit(spec) - body.jointPosition;
+        const double way = measureWay(isInTheWay ? snapshot : closed, b);
         doors.push_back(
-            {body.index, i - 1, distance, computeMotionSeconds(spec, rest), isInTheWay});
+            {body.index, i - 1, distance + way, computeMotionSeconds(spec, rest), isInTheWay});
       }
     }
     distance += leg.norm();

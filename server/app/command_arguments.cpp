@@ -21,6 +21,16 @@ std::string validateFile(const std::string& text) {
   return text.empty() ? "the file name is empty: give one, for example walk.mcap" : "";
 }
 
+/// Also checks that the file can be created where it is.
+std::string validatePng(const std::string& text) {
+  const std::filesystem::path file(text);
+  if (file.extension() != ".png") return "'" + text + "' must end in .png";
+  const std::filesystem::path folder = file.parent_path();
+  if (!folder.empty() && !std::filesystem::is_directory(folder))
+    return "the folder '" + folder.string() + "' does not exist";
+  return {};
+}
+
 std::string validateEndpoint(const std::string& text) {
   if (parseHostPort(text)) return {};
   return text + ": give HOST:PORT with a port from 0 to 65535, for example 127.0.0.1:7878";
@@ -417,8 +427,8 @@ void addRouteOptions(CLI::App& verb, CommandArguments& into) {
       ->capture_default_str();
   verb.add_flag("--lifts", into.route.links.lifts, "Rides lifts");
   verb.add_flag("--json", into.json, "Print one JSON object");
-  verb.add_option("--plan", into.plan, "File for a plan with the path (png)")
-      ->check(CLI::Validator(validateFile, "FILE"));
+  verb.add_option("--plan", into.plan, "Picture of the path on the plan, or of what is in the way")
+      ->check(CLI::Validator(validatePng, "FILE.png"));
   addMotion(verb, into);
   verb.footer(
       "Every leg of the path was walked by the motion of avatars. Exits with 3 if there is no\n"

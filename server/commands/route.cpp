@@ -17,6 +17,8 @@
 #include "server/base/progress.hpp"
 #include "server/base/standard_output.hpp"
 #include "server/log/log.hpp"
+#include "server/messages/world_messages.hpp"
+#include "server/navigation/path_answer.hpp"
 #include "server/navigation/shared_meshes.hpp"
 #include "server/plans/path_map.hpp"
 
@@ -66,71 +68,67 @@ Vec3 resolvePlace(const Place& place, const std::string& text, const char* argum
       fmt::format("{}: there is no free place to stand at '{}'", argument, text));
 }
 
-Json toJson(const Vec3& point) {
+Json toJson(const v1::Vec3& point) {
   return Json::array({point.x(), point.y(), point.z()});
 }
 
-const char* toString(scene::PathLeg::Kind kind) {
+const char* toString(v1::NavigationLeg::Kind kind) {
   switch (kind) {
-    case scene::PathLeg::Kind::drop:
+    case v1::NavigationLeg::KIND_DOOR:
+      return "door";
+    case v1::NavigationLeg::KIND_DROP:
       return "drop";
-    case scene::PathLeg::Kind::lift:
+    case v1::NavigationLeg::KIND_LIFT:
       return "lift";
-    case scene::PathLeg::Kind::aside:
+    case v1::NavigationLeg::KIND_ASIDE:
       return "aside";
-    case scene::PathLeg::Kind::walk:
+    default:
       return "walk";
   }
-  return "";
 }
 
-Json makeLegs(const scene::NavigationPath& path, const scene::Scene& scene) {
+Json makeLegs(const v1::NavigationPath& path) {
   Json legs = Json::array();
-  for (const scene::PathLeg& leg : path.legs) {
-    Json one{{"kind", toString(leg.kind)},
-             {"first", leg.first},
-             {"length", leg.length},
-             {"seconds", leg.seconds}};
-    if (leg.kind == scene::PathLeg::Kind::lift) {
-      one["name"] = scene.model().bodies[leg.body].name;
-      one["from_level"] = leg.fromLevel;
-      one["to_level"] = leg.toLevel;
+  for (const v1::NavigationLeg& leg : path.legs()) {
+    Json one{{"kind", toString(leg.kind())},
+             {"first", leg.first()},
+             {"length", leg.length()},
+             {"seconds", leg.seconds()}};
+    if (!leg.name().empty()) one["name"] = leg.name();
+    if (leg.kind() == v1::NavigationLeg::KIND_LIFT) {
+      one["from_level"] = leg.from_level();
+      one["to_level"] = leg.to_level();
     }
     legs.push_back(std::move(one));
   }
   return legs;
 }
 
-Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
-                const std::optional<scene::NarrowPlace>& narrowest,
-                const std::vector<scene::DoorOnPath>& doors, const scene::Scene& scene,
-                scene::Navigation& navigation) {
-  const scene::NavigationReport mesh = navigation.report();
+Json makeReport(const RouteCommand& command, const v1::NavigationPath& path,
+                const scene::NavigationReport& mesh) {
   Json report{{"found", path.found()}};
   if (path.found()) {
-    report["length"] = path.length;
-    report["seconds"] = path.seconds;
+    report["length"] = path.length();
+    report["seconds"] = path.seconds();
     report["points"] = Json::array();
-    for (const Vec3& point : path.points) report["points"].push_back(toJson(point));
-    report["legs"] = makeLegs(path, scene);
+    for (const v1::Vec3& point : path.points()) report["points"].push_back(toJson(point));
+    report["legs"] = makeLegs(path);
     report["doors"] = Json::array();
-    for (const scene::DoorOnPath& door : doors)
-      report["doors"].push_back({{"name", scene.model().bodies[door.body].name},
-                                 {"distance", door.distance},
-                                 {"seconds_to_open", door.secondsToOpen}});
-    if (narrowest)
-      report["narrowest"] = {{"at", toJson(narrowest->position)},
-                             {"clear_width", narrowest->clearWidth}};
-    else
-      report["narrowest"] = nullptr;
+    for (const v1::NavigationDoor& door : path.doors())
+      report["doors"].push_back({{"name", door.name()},
+                                 {"distance", door.distance()},
+                                 {"seconds_to_open", door.seconds()}});
+    report["narrowest"] = nullptr;
+    if (path.has_narrowest_at())
+      report["narrowest"] = {{"at", toJson(path.narrowest_at())},
+                             {"clear_width", path.clear_width()}};
   } else {
-    report["reason"] = path.reason;
-    if (path.obstruction)
+    report["reason"] = path.reason();
+    if (path.has_obstacle_at() || path.obstacle() != 0)
       report["obstruction"] = {
-          {"entity", navigation.findEntityName(path.obstruction->entity)},
-          {"at", toJson(path.obstruction->position)},
-          {"clear_width",
-           path.obstruction->clearWidth > 0 ? Json(path.obstruction->clearWidth) : Json(nullptr)}};
+          {"entity", path.obstacle_name()},
+          {"at", path.has_obstacle_at() ? toJson(path.obstacle_at()) : Json(nullptr)},
+          {"clear_width", path.clear_width() > 0 ? Json(path.clear_width()) : Json(nullptr)}};
   }
   report["agent"] = {{"radius", command.agent.radius},
                      {"height", command.agent.height},
@@ -142,58 +140,70 @@ Json makeReport(const RouteCommand& command, const scene::NavigationPath& path,
   return report;
 }
 
-std::string formatText(const RouteCommand& command, const scene::NavigationPath& path,
-                       const std::optional<scene::NarrowPlace>& narrowest,
-                       const std::vector<scene::DoorOnPath>& doors, const scene::Scene& scene) {
+std::string formatText(const RouteCommand& command, const v1::NavigationPath& path) {
   if (!path.found())
-    return fmt::format("no way from {} to {}: {}\n", command.from, command.to, path.reason);
-  std::string text = fmt::format("{:.2f} m from {} to {}, {:.1f} s at {:.1f} m/s\n", path.length,
-                                 command.from, command.to, path.seconds, command.agent.speed);
-  if (narrowest)
-    text += fmt::format("narrowest: {:.3f} m at {:.2f}, {:.2f}, {:.2f}\n", narrowest->clearWidth,
-                        narrowest->position.x(), narrowest->position.y(), narrowest->position.z());
-  for (const scene::PathLeg& leg : path.legs)
-    if (leg.kind == scene::PathLeg::Kind::drop)
-      text += fmt::format("drop: {:.2f} m\n",
-                          path.points[leg.first].y() - path.points[leg.first + 1].y());
-    else if (leg.kind == scene::PathLeg::Kind::lift)
-      text +=
-          fmt::format("lift: {}, from stop {} to {}, {:.1f} s\n",
-                      scene.model().bodies[leg.body].name, leg.fromLevel, leg.toLevel, leg.seconds);
-  for (const scene::DoorOnPath& door : doors)
-    text += fmt::format("door: {}, after {:.2f} m\n", scene.model().bodies[door.body].name,
-                        door.distance);
-  for (const Vec3& point : path.points)
+    return fmt::format("no way from {} to {}: {}\n", command.from, command.to, path.reason());
+  std::string text = fmt::format("{:.2f} m from {} to {}, {:.1f} s at {:.1f} m/s\n", path.length(),
+                                 command.from, command.to, path.seconds(), command.agent.speed);
+  if (path.has_narrowest_at())
+    text += fmt::format("narrowest: {:.3f} m at {:.2f}, {:.2f}, {:.2f}\n", path.clear_width(),
+                        path.narrowest_at().x(), path.narrowest_at().y(), path.narrowest_at().z());
+  for (const v1::NavigationLeg& leg : path.legs()) {
+    const int first = static_cast<int>(leg.first());
+    if (leg.kind() == v1::NavigationLeg::KIND_DROP)
+      text += fmt::format("drop: {:.2f} m\n", path.points(first).y() - path.points(first + 1).y());
+    else if (leg.kind() == v1::NavigationLeg::KIND_LIFT)
+      text += fmt::format("lift: {}, from stop {} to {}, {:.1f} s\n", leg.name(), leg.from_level(),
+                          leg.to_level(), leg.seconds());
+  }
+  for (const v1::NavigationDoor& door : path.doors())
+    text += fmt::format("door: {}, after {:.2f} m, opens in {:.1f} s\n", door.name(),
+                        door.distance(), door.seconds());
+  for (const v1::Vec3& point : path.points())
     text += fmt::format("  {:9.3f} {:9.3f} {:9.3f}\n", point.x(), point.y(), point.z());
   return text;
 }
 
 /// The path as an avatar's positions, dense enough for a map.
-WalkedPath makeWalkedPath(const scene::NavigationPath& path) {
+WalkedPath makeWalkedPath(const v1::NavigationPath& path) {
   constexpr double kSpacing = 0.05;  // metres
   WalkedPath walked{"route", {}, 1};
-  for (std::size_t i = 1; i < path.points.size(); ++i) {
-    const Vec3 leg = path.points[i] - path.points[i - 1];
+  const auto at = [&](int i) { return vectorFromProto(path.points(i)); };
+  for (int i = 1; i < path.points_size(); ++i) {
+    const Vec3 leg = at(i) - at(i - 1);
     const int count = std::max(1, static_cast<int>(leg.norm() / kSpacing));
     for (int k = 0; k < count; ++k)
-      walked.footPositions.push_back(path.points[i - 1] + (static_cast<double>(k) / count) * leg);
+      walked.footPositions.push_back(at(i - 1) + (static_cast<double>(k) / count) * leg);
   }
-  walked.footPositions.push_back(path.points.back());
+  walked.footPositions.push_back(at(path.points_size() - 1));
   return walked;
 }
 
-void writePlan(const std::shared_ptr<const scene::Scene>& scene,
-               const std::shared_ptr<const scene::Snapshot>& snapshot,
-               const scene::NavigationPath& path, const RouteCommand& command) {
-  render::RendererSelector renderer(scene);
+/// The path, or both ends and what is in the way.
+WalkTrace makeTrace(const RouteCommand& command, const v1::NavigationPath& path, const Vec3& from,
+                    const Vec3& to) {
   WalkTrace trace;
-  trace.title = fmt::format("{} to {}: {:.2f} m", command.from, command.to, path.length);
-  trace.paths.push_back(makeWalkedPath(path));
-  trace.floors = {path.points.front().y(), path.points.back().y()};
-  if (const auto image = drawMap(trace, {makePlanRenderer(renderer, snapshot), scene.get()})) {
-    render::writePng(command.plan, *image);
-    logInfo("plan: {}", command.plan.string());
+  trace.floors = {from.y(), to.y()};
+  if (path.found()) {
+    trace.title = fmt::format("{} to {}: {:.2f} m", command.from, command.to, path.length());
+    trace.paths.push_back(makeWalkedPath(path));
+    return trace;
   }
+  trace.title = fmt::format("no way from {} to {}: {}", command.from, command.to, path.reason());
+  trace.paths = {{"start", {from}, 1}, {"goal", {to}, 2}};
+  if (path.has_obstacle_at())
+    trace.blockedWalks.push_back({vectorFromProto(path.obstacle_at()), Vec3::UnitY()});
+  return trace;
+}
+
+void writePlan(const std::shared_ptr<const scene::Scene>& scene,
+               const std::shared_ptr<const scene::Snapshot>& snapshot, const WalkTrace& trace,
+               const std::filesystem::path& file) {
+  render::RendererSelector renderer(scene);
+  const auto image = drawMap(trace, {makePlanRenderer(renderer, snapshot), scene.get()});
+  if (!image) throw std::runtime_error("the plan cannot be drawn: " + file.string());
+  render::writePng(file, *image);
+  logInfo("plan: {}", file.string());
 }
 
 }  // namespace
@@ -203,36 +213,46 @@ ExitCode route(const RouteCommand& command) {
   // Before the meshes, whose building takes long.
   const Place start = parsePlace(command.from, "FROM", *scene, command.agent.radius);
   const Place goal = parsePlace(command.to, "TO", *scene, command.agent.radius);
-  const auto snapshot = command.doorsAsTheyAre
-                            ? scene::World(scene, command.settings).snapshot()
-                            : scene::makeSnapshotWithOpenDoors(scene, command.settings);
+  const auto asFile = scene::World(scene, command.settings).snapshot();
+  const auto opened = scene::makeSnapshotWithOpenDoors(scene, command.settings);
   Progress bar;
   const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  const auto made = makeNavigation(
-      {scene, command.settings, command.agent, !command.doorsAsTheyAre, snapshot, threads},
-      [&](double done) { bar.show(done, "navigation mesh"); });
-  scene::Navigation& navigation = *made;
-  bar.clear();
+  std::unique_ptr<scene::Navigation> meshes[2];  // with doors as they are, and open
+  const auto provide = [&](bool open) -> scene::Navigation& {
+    if (!meshes[open])
+      meshes[open] = makeNavigation(
+          {scene, command.settings, command.agent, open, open ? opened : asFile, threads},
+          [&](double done) { bar.show(done, "navigation mesh"); });
+    bar.clear();
+    return *meshes[open];
+  };
+  const bool doorsOpen = !command.doorsAsTheyAre;
+  scene::Navigation& navigation = provide(doorsOpen);
   const Vec3 from = resolvePlace(start, command.from, "FROM", navigation, std::nullopt);
   const Vec3 to = resolvePlace(goal, command.to, "TO", navigation, from);
-  scene::NavigationPath path = navigation.findPath(from, to, command.links);
-  const auto narrowest =
-      path.found() ? navigation.findNarrowest(path.points) : std::optional<scene::NarrowPlace>();
   scene::EntityIndex index(scene);
-  const std::vector<scene::DoorOnPath> doors =
-      path.found() && !command.doorsAsTheyAre
-          ? scene::findDoorsOnPath(index, command.settings,
-                                   *scene::World(scene, command.settings).snapshot(), command.agent,
-                                   path.points)
-          : std::vector<scene::DoorOnPath>();
-  path.seconds += scene::computeOpeningSeconds(doors);
+  ClosedDoors closedDoors;
+  PathAnswer answer{*scene,
+                    navigation,
+                    *asFile,
+                    command.settings,
+                    doorsOpen,
+                    {},
+                    [&]() -> scene::Navigation& { return provide(false); },
+                    [&]() -> scene::EntityIndex& { return index; },
+                    closedDoors};
+  if (scene::hasDoors(*scene))
+    answer.withOpenDoors = [&]() -> scene::Navigation& { return provide(true); };
+  v1::NavigationPath path;
+  writePath(answer, from, to, command.links, true, path);
   constexpr auto kReplace = Json::error_handler_t::replace;
-  writeToStdout(command.json ? makeReport(command, path, narrowest, doors, *scene, navigation)
-                                       .dump(-1, ' ', false, kReplace) +
-                                   "\n"
-                             : formatText(command, path, narrowest, doors, *scene),
-                "the path was found");
-  if (path.found() && !command.plan.empty()) writePlan(scene, snapshot, path, command);
+  writeToStdout(
+      command.json
+          ? makeReport(command, path, navigation.report()).dump(-1, ' ', false, kReplace) + "\n"
+          : formatText(command, path),
+      path.found() ? "the path was found" : "no path was found");
+  if (!command.plan.empty())
+    writePlan(scene, doorsOpen ? opened : asFile, makeTrace(command, path, from, to), command.plan);
   return path.found() ? ExitCode::success : ExitCode::violations;
 }
 

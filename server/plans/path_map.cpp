@@ -39,11 +39,12 @@ struct MapStorey {
   PlanView view;  ///< once it has a place on the sheet
 };
 
-scene::Aabb computeWalkedBounds(const std::vector<WalkedPath>& paths) {
+scene::Aabb computeShownBounds(const WalkTrace& trace) {
   scene::Aabb bounds;
-  for (const WalkedPath& path : paths) {
+  for (const WalkedPath& path : trace.paths) {
     for (const Vec3& feet : path.footPositions) bounds.include(feet);
   }
+  for (const MapContact& blocked : trace.blockedWalks) bounds.include(blocked.point);
   return collision::inflated(bounds, kMapMargin);
 }
 
@@ -256,8 +257,7 @@ std::optional<Image> drawMap(const WalkTrace& trace, const MapBackground& backgr
   for (const double floor : floors) {
     MapStorey storey;
     storey.floor = floor;
-    storey.camera =
-        makePlanCamera(computeWalkedBounds(trace.paths), floor, kMaxMapWidth, kMaxMapHeight);
+    storey.camera = makePlanCamera(computeShownBounds(trace), floor, kMaxMapWidth, kMaxMapHeight);
     std::optional<PlanPicture> picture = background.renderPlan(storey.camera);
     if (!picture) return std::nullopt;
     storey.picture = std::move(*picture);

@@ -322,6 +322,7 @@ void judge(Bench& bench, const std::vector<Vec3>& places,
         ++result.walked;
         continue;
       }
+      std::printf("  not walked: found %d, %s\n", walked.isFound, walked.text.c_str());
     }
     scene::NavigationAgent agent;
     agent.radius += isFound ? -kNearWidth : kNearWidth;

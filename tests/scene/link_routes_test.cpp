@@ -263,6 +263,7 @@ TEST(Doors, ThoseOnAPathAreFoundOpenOrClosed) {
     const auto doors = findDoorsOnPath(index, {}, *snapshot, {}, points);
     ASSERT_EQ(doors.size(), 1u);
     EXPECT_EQ(doors[0].point, 1u);
+    EXPECT_NEAR(doors[0].distance, 5.98 - 0.3 - 1, 0.02);
     EXPECT_EQ(doors[0].isInTheWay, isClosed);
     EXPECT_NEAR(doors[0].secondsToOpen, isClosed ? kQuarter : 0, 1e-9);
   }

@@ -125,6 +125,48 @@ TEST_F(Route, WithoutAPathItExitsWithThreeAndTheReason) {
   EXPECT_NE(unknown.err.find("inspect --objects"), std::string::npos) << unknown.err;
 }
 
+/// The wall is a gate, which rises by 3.2 m.
+constexpr const char* kGate =
+    R"({"walk":1,"bodies":[{"name":"gate","kind":"sliding","objects":["room_wall"],"axis":[0,1,0],)"
+    R"("limits":[0,3.2],"speed":1.6}]})";
+
+TEST_F(Route, DoorsAreLegsAndStandWhereTheWalkerMeetsThem) {
+  write(path("room.walk.json"), kGate);
+  const Ended ended = run({"route", path("room.obj"), "2,0,0", "8,0,0", "--json"});
+  ASSERT_EQ(ended.code, 0) << ended.err;
+  const auto report = nlohmann::json::parse(ended.out);
+  ASSERT_EQ(report.at("doors").size(), 1u);
+  EXPECT_NEAR(report.at("doors")[0].at("distance").get<double>(), 5 - 0.3 - 2, 0.02);
+  EXPECT_NEAR(report.at("doors")[0].at("seconds_to_open").get<double>(), 2, 1e-6);
+  double seconds = 0;
+  int doors = 0;
+  for (const auto& leg : report.at("legs")) {
+    seconds += leg.at("seconds").get<double>();
+    doors += leg.at("kind") == "door" && leg.at("name") == "gate" ? 1 : 0;
+  }
+  EXPECT_EQ(doors, 1);
+  EXPECT_NEAR(seconds, report.at("seconds").get<double>(), 1e-9);
+  const Ended text = run({"route", path("room.obj"), "2,0,0", "8,0,0"});
+  EXPECT_NE(text.out.find("door: gate, after 2.7"), std::string::npos) << text.out;
+}
+
+TEST_F(Route, ThePlanShowsThePathOrWhatIsInTheWay) {
+  const std::string plan = path("plan.png");
+  EXPECT_EQ(run({"route", path("room.obj"), "2,0,0", "8,0,0", "--plan", plan}).code, 0);
+  const std::string found = readText(plan);
+  EXPECT_EQ(found.substr(1, 3), "PNG");
+  const Ended refused = run({"route", path("room.obj"), "2,0,0", "5.1,3.05,0", "--plan", plan});
+  EXPECT_EQ(refused.code, 3);
+  const std::string none = readText(plan);
+  EXPECT_EQ(none.substr(1, 3), "PNG");
+  EXPECT_NE(none, found);
+  for (const char* wrong : {"plan.svg", "plan", "nowhere/plan.png"}) {
+    const Ended ended = run({"route", path("room.obj"), "2,0,0", "8,0,0", "--plan", path(wrong)});
+    EXPECT_EQ(ended.code, 2) << wrong;
+    EXPECT_NE(ended.err.find("--plan"), std::string::npos) << ended.err;
+  }
+}
+
 TEST_F(Route, AScriptGoesAroundTheWall) {
   write(path("walk.jsonl"),
         "{\"spawn\":\"ann\",\"at\":[2,0,0]}\n{\"go\":\"ann\",\"to\":[8,0,0]}\n"
