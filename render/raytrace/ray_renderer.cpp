@@ -128,7 +128,13 @@ class FrameTracer {
 
  private:
   TraceContext makeTraceContext(const std::vector<const RayTree*>& trees) const {
-    return {trees, rays_, shading_, origin_, options_.hiddenEntity};
+    const Channels& channels = options_.channels;
+    return {trees,
+            rays_,
+            shading_,
+            origin_,
+            options_.hiddenEntity,
+            !channels.rgb && !channels.ids && !channels.normals};
   }
   int endRow(std::size_t tile) const {
     return std::min(rays_.height, static_cast<int>(tile) * kTileSize + kTileSize);

@@ -167,29 +167,34 @@ void intersectPacket(RayPacket& packet, const TraceContext& trace, FilterContext
 /// rounding decides which of them Embree finds.
 HitKey chooseCoplanar(const TraceContext& trace, double x, double y, HitKey hit) {
   const BatchTriangle found = findTriangle(trace, hit);
-  if (found.batch->coplanarRank == 0) return hit;
+  if (found.batch->coplanarRank() == 0) return hit;
   const PrimaryRays& rays = trace.rays;
   const EyeSpaceCorners corners = found.corners(rays.eye);
   const double z = computePlaneDepth(corners, rays).at(x, y);
   const Vec3 direction = rays.directionAt(x, y), point = rays.originAt(x, y) + z * direction;
+  const Vec3 place = rays.eye + point;
+  if (std::ranges::none_of(found.batch->coplanar->lower, [&](const scene::Aabb& box) {
+        return collision::contains(box, {place, place});
+      }))
+    return hit;
   const Vec3 normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]).normalized();
   // Embree's coordinates are floats, relative to the origin of the trees.
-  const double rounding = 1e-6 * (point + rays.eye - trace.origin).cwiseAbs().maxCoeff();
+  const double rounding = 1e-6 * (place - trace.origin).cwiseAbs().maxCoeff();
   const double slack =
       std::min((kCoplanarGap + rounding) / std::abs(normal.dot(direction)), 0.01 * z);
   std::vector<HitKey> keys;
   traceBetween(trace, x, y, z - slack, z + slack, keys);
-  std::uint8_t rank = found.batch->coplanarRank;
+  std::uint8_t rank = found.batch->coplanarRank();
   for (const HitKey key : keys) {
     const BatchTriangle other = findTriangle(trace, key);
-    if (other.batch->coplanarRank >= rank) continue;
+    if (other.batch->coplanarRank() >= rank) continue;
     if (other.batch->material->alpha != scene::Material::Alpha::opaque) continue;
     const std::array<Vec3, 3> c = other.corners(rays.eye);
     const Vec3 otherNormal = (c[1] - c[0]).cross(c[2] - c[0]).normalized();
     if (!(std::abs(otherNormal.dot(point - c[0])) <= kCoplanarGap)) continue;
     if (!(std::abs(otherNormal.dot(normal)) >= kMinCoplanarCosine)) continue;
     hit = key;
-    rank = other.batch->coplanarRank;
+    rank = other.batch->coplanarRank();
   }
   return hit;
 }
@@ -226,10 +231,11 @@ void traceRows(const TraceContext& trace, int y, std::vector<HitKey>& keys) {
       }
     }
   }
+  if (trace.isDepthOnly) return;
   HitKey kept = kNoHit;  // most neighbours have one triangle, of no coplanar surface
   for (std::size_t i = 0; i < keys.size(); ++i) {
     if (keys[i] == kept || keys[i] == kNoHit) continue;
-    if (findTriangle(trace, keys[i]).batch->coplanarRank == 0) {
+    if (findTriangle(trace, keys[i]).batch->coplanarRank() == 0) {
       kept = keys[i];
       continue;
     }

@@ -22,6 +22,7 @@ struct TraceContext {
   const Shading& shading;
   Vec3 origin;                        ///< of the trees (RayScene::origin())
   scene::EntityId ignoredEntity = 0;  ///< rays pass through this entity; 0: none
+  bool isDepthOnly = false;           ///< any of coplanar surfaces will do
 };
 
 BatchTriangle findTriangle(const TraceContext& trace, HitKey key);

@@ -213,13 +213,12 @@ class CoplanarSearch {
   CoplanarSurfaces found_;
 };
 
-/// Metres; 0 without vertices.
-double computeBoxDiagonal(const Model& model, const Object& object) {
+Aabb computeObjectAabb(const Model& model, const Object& object) {
   Aabb box;
   for (const std::uint32_t mesh : object.meshes)
     for (const Eigen::Vector3f& position : model.meshes[mesh].positions)
       box.include(object.worldFromMesh * position.cast<double>());
-  return box.empty() ? 0 : box.size().norm();
+  return box;
 }
 
 std::size_t countTriangles(const Model& model) {
@@ -239,25 +238,32 @@ CoplanarSurfaces findCoplanarSurfaces(const Model& model) {
   return CoplanarSearch(model).run();
 }
 
-std::vector<std::uint8_t> rankCoplanarObjects(const Model& model) {
+std::vector<CoplanarRank> rankCoplanarObjects(const Model& model) {
   constexpr std::uint8_t kMaxRank = 255;
-  std::vector<std::uint8_t> ranks(model.objects.size(), 0);
+  constexpr double kMargin = 1e-3;  // metres
+  std::vector<CoplanarRank> ranks(model.objects.size());
   if (countTriangles(model) > kMaxRankedTriangles) return ranks;
   std::map<std::uint32_t, std::vector<std::uint32_t>> partners;
   for (const CoplanarPair& pair : findCoplanarSurfaces(model).pairs) {
     partners[pair.first].push_back(pair.second);
     partners[pair.second].push_back(pair.first);
   }
-  // Objects from the smallest to the largest: an object yields to its partners before it.
+  std::map<std::uint32_t, Aabb> boxes;
   std::vector<std::pair<double, std::uint32_t>> bySize;
-  for (const auto& [object, others] : partners)
-    bySize.emplace_back(computeBoxDiagonal(model, model.objects[object]), object);
+  for (const auto& [object, others] : partners) {
+    const Aabb& box = boxes[object] = computeObjectAabb(model, model.objects[object]);
+    bySize.emplace_back(box.size().norm(), object);
+  }
+  // An object yields to those of its partners that are smaller.
   std::ranges::sort(bySize);
   std::vector<bool> isRanked(model.objects.size(), false);
   for (const auto& [size, object] : bySize) {
-    for (const std::uint32_t other : partners[object])
-      if (isRanked[other] && ranks[other] < kMaxRank)
-        ranks[object] = std::max<std::uint8_t>(ranks[object], ranks[other] + 1);
+    CoplanarRank& own = ranks[object];
+    for (const std::uint32_t other : partners[object]) {
+      if (!isRanked[other] || ranks[other].rank == kMaxRank) continue;
+      own.rank = std::max<std::uint8_t>(own.rank, ranks[other].rank + 1);
+      own.lower.push_back(collision::inflated(boxes[other], kMargin));
+    }
     isRanked[object] = true;
   }
   return ranks;

@@ -29,9 +29,16 @@ struct CoplanarSurfaces {
 /// Compares drawn opaque triangles of 0.01 m^2 or more.
 CoplanarSurfaces findCoplanarSurfaces(const Model& model);
 
-/// One rank an object. Of coplanar surfaces the one of the lowest rank is visible: that of the
-/// object with the smaller box, because details lie on large surfaces. Models of more than two
-/// million triangles get ranks of 0, since the search would delay their first picture by seconds.
-std::vector<std::uint8_t> rankCoplanarObjects(const Model& model);
+/// Decides which of coplanar surfaces is visible.
+struct CoplanarRank {
+  std::uint8_t rank = 0;  ///< the lowest is visible
+  /// World boxes of the objects of lower rank that it shares planes with, inflated by a millimetre.
+  std::vector<Aabb> lower;
+};
+
+/// One an object. Of coplanar surfaces that of the object with the smaller box has the lower rank,
+/// because details lie on large surfaces. In models of more than two million triangles all ranks
+/// are 0, since the search would delay the first picture by seconds.
+std::vector<CoplanarRank> rankCoplanarObjects(const Model& model);
 
 }  // namespace enfilade::scene

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <tuple>
 
-#include "scene/model/coplanar_surfaces.hpp"
-
 namespace enfilade::scene {
 namespace {
 
@@ -32,13 +30,12 @@ void sortInDrawingOrder(std::vector<DrawItem>& items) {
 
 }  // namespace
 
-std::vector<DrawItem> buildDrawItems(const Model& model) {
+std::vector<DrawItem> buildDrawItems(const Model& model, const std::vector<CoplanarRank>& ranks) {
   std::vector<Aabb> meshBoxes;
   meshBoxes.reserve(model.meshes.size());
   for (const Mesh& mesh : model.meshes) meshBoxes.push_back(computeMeshAabb(mesh));
 
   const std::vector<const BodySpec*> bodyOfObject = mapObjectsToBodies(model);
-  const std::vector<std::uint8_t> ranks = rankCoplanarObjects(model);
   std::vector<DrawItem> items;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o) {
     const Object& object = model.objects[o];
@@ -51,7 +48,7 @@ std::vector<DrawItem> buildDrawItems(const Model& model) {
       const Material& material = findMaterial(model, mesh);
       items.push_back(
           {transformAabb(object.worldFromMesh, meshBoxes[m]), o, m, findTexture(model, material),
-           material.alpha, !mesh.colours.empty(), ranks[o],
+           material.alpha, !mesh.colours.empty(), ranks[o].rank,
            body ? static_cast<std::uint32_t>(body - model.bodies.data()) : DrawItem::kStatic});
     }
   }

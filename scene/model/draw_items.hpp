@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "scene/model/coplanar_surfaces.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
@@ -16,10 +17,9 @@ struct DrawItem {
   std::uint32_t object = 0, mesh = 0;
   std::int32_t texture = -1;  ///< index into Model::textures; -1: none
   Material::Alpha alphaMode = Material::Alpha::opaque;
-  bool coloured = false;  ///< the mesh has vertex colours
-  /// Of surfaces in one plane the lowest rank is visible (coplanar_surfaces.hpp).
-  std::uint8_t coplanarRank = 0;
-  std::uint32_t body = kStatic;  ///< index into Model::bodies
+  bool coloured = false;          ///< the mesh has vertex colours
+  std::uint8_t coplanarRank = 0;  ///< of surfaces in one plane the lowest is visible
+  std::uint32_t body = kStatic;   ///< index into Model::bodies
 
   bool isStatic() const { return body == kStatic; }
 };
@@ -27,7 +27,8 @@ struct DrawItem {
 /// All items of the model except triggers and collision-only objects, in drawing order: by alpha
 /// mode, texture, vertex colours, descending coplanar rank, object. The order never depends on the
 /// camera, so that depth ties are resolved equally in every frame.
-std::vector<DrawItem> buildDrawItems(const Model& model);
+/// `ranks`: as rankCoplanarObjects() returns them.
+std::vector<DrawItem> buildDrawItems(const Model& model, const std::vector<CoplanarRank>& ranks);
 
 /// The mesh's material; a default material if the mesh of a hand-made model has none.
 const Material& findMaterial(const Model& model, const Mesh& mesh);

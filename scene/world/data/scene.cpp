@@ -320,8 +320,13 @@ const std::vector<Aabb>& Scene::objectBoxes() const {
   return objectBoxes_;
 }
 
+const std::vector<CoplanarRank>& Scene::coplanarRanks() const {
+  std::call_once(ranksBuilt_, [this] { coplanarRanks_ = rankCoplanarObjects(model_); });
+  return coplanarRanks_;
+}
+
 const std::vector<DrawItem>& Scene::drawItems() const {
-  std::call_once(itemsBuilt_, [this] { drawItems_ = buildDrawItems(model_); });
+  std::call_once(itemsBuilt_, [this] { drawItems_ = buildDrawItems(model_, coplanarRanks()); });
   return drawItems_;
 }
 

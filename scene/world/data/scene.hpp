@@ -58,8 +58,9 @@ class Scene {
   /// call, from any thread.
   const std::vector<Aabb>& objectBoxes() const;
 
-  /// The drawn meshes. Built at the first call, from any thread.
+  /// The drawn meshes, and the rank of each object. Built at the first call, from any thread.
   const std::vector<DrawItem>& drawItems() const;
+  const std::vector<CoplanarRank>& coplanarRanks() const;
 
   /// The trees for rays, made by the first call, from any thread. Use SceneTrees::of().
   SceneTrees& trees(const std::function<std::shared_ptr<SceneTrees>()>& make) const;
@@ -94,9 +95,10 @@ class Scene {
   std::unique_ptr<LazyArray<Shape>> shapes_;
   std::unique_ptr<LazyArray<CollisionGeometry>> collisionGeometries_;
   std::vector<std::uint32_t> denseIndices_;
-  mutable std::once_flag classesBuilt_, boxesBuilt_, itemsBuilt_, treesMade_;
+  mutable std::once_flag classesBuilt_, boxesBuilt_, ranksBuilt_, itemsBuilt_, treesMade_;
   mutable ObjectClasses classes_;
   mutable std::vector<Aabb> objectBoxes_;
+  mutable std::vector<CoplanarRank> coplanarRanks_;
   mutable std::vector<DrawItem> drawItems_;
   mutable std::shared_ptr<SceneTrees> trees_;
   std::unique_ptr<Prefetcher> prefetcher_;  ///< last: its thread uses all others

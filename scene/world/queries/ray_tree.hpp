@@ -6,6 +6,7 @@
 #include <array>
 #include <vector>
 
+#include "scene/model/coplanar_surfaces.hpp"
 #include "scene/model/model.hpp"
 #include "scene/world/data/snapshot.hpp"
 #include "scene/world/queries/embree.hpp"
@@ -17,13 +18,15 @@ struct TriangleBatch {
   const Mesh* mesh = nullptr;
   const Eigen::Affine3d* worldFromMesh = nullptr;
   const Material* material = nullptr;
-  EntityId id = 0;                ///< of the object or avatar
-  EntityId entity = 0;            ///< of the body to which the object belongs; otherwise as `id`
-  std::int32_t texture = -1;      ///< index into Model::textures
-  std::uint8_t coplanarRank = 0;  ///< as in DrawItem
+  EntityId id = 0;            ///< of the object or avatar
+  EntityId entity = 0;        ///< of the body to which the object belongs; otherwise as `id`
+  std::int32_t texture = -1;  ///< index into Model::textures
+  const CoplanarRank* coplanar = nullptr;  ///< null: rank 0
   /// true: the mesh has its own tree, which can be shared and moved. false: it is copied into this
   /// tree, which is faster to trace.
   bool instanced = false;
+
+  std::uint8_t coplanarRank() const { return coplanar ? coplanar->rank : std::uint8_t{0}; }
 };
 
 /// A triangle of a batch.

@@ -86,7 +86,7 @@ std::vector<TriangleBatch> SceneTrees::collectBatches(const PlacedItems& placed,
     batch.id = item.object + 1;
     batch.entity = (isStatic ? item.object : model.bodies[item.body].objects.front()) + 1;
     batch.texture = item.texture;
-    batch.coplanarRank = item.coplanarRank;
+    batch.coplanar = &scene_.coplanarRanks()[item.object];
     batch.instanced = instanced_[items[k]];
     batches.push_back(batch);
   }
