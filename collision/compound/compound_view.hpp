@@ -15,6 +15,9 @@ struct CompoundView {
   Vec3 translation = Vec3::Zero();   ///< metres
   /// Maps an item of the tree to its part in the world frame.
   std::function<PlacedConvex(std::uint32_t)> part;
+  /// Maps an item of the tree to its world box, for which a rounding error below half of
+  /// computeRoundingPad() is permitted. Null: a search uses the box of the item's leaf.
+  std::function<Aabb(std::uint32_t)> box = nullptr;
 };
 
 /// World box of a branch, rounded. It contains the exact one if inflated by computeRoundingPad().

@@ -40,21 +40,14 @@ double computeGap(const Aabb& a, const Aabb& b, double pad) {
   return std::max(0.0, computeGap(a, b) - pad);
 }
 
-/// A part of a leaf and its world box.
-struct Item {
-  PlacedConvex body;
-  Aabb box;
-};
+/// World box of the i-th item of a leaf.
+Aabb computeItemAabb(const OpenBranch& leaf, std::uint32_t i) {
+  const CompoundView& view = *leaf.view;
+  return view.box ? view.box(leaf.branch->first + i) : computeBranchAabb(view, *leaf.branch);
+}
 
-std::vector<Item> collectItems(const OpenBranch& leaf) {
-  std::vector<Item> items;
-  for (std::uint32_t i = 0; i < leaf.branch->count; ++i) {
-    Item& item = items.emplace_back(Item{leaf.view->part(leaf.branch->first + i), {}});
-    const PlacedConvex& body = item.body;
-    for (const Vec3& v : body.vertices)
-      item.box.include(Vec3((body.rotation ? *body.rotation * v : v) + body.translation));
-  }
-  return items;
+PlacedConvex placeItem(const OpenBranch& leaf, std::uint32_t i) {
+  return leaf.view->part(leaf.branch->first + i);
 }
 
 class BestFirstSearch {
@@ -103,13 +96,16 @@ class BestFirstSearch {
   /// Tests all pairs of parts of two leaves. False if the budget is exhausted.
   bool testLeaves(const OpenPair& pair) {
     const double pad = computeRoundingPad(*pair.a.view) + computeRoundingPad(*pair.b.view);
-    const std::vector<Item> second = collectItems(pair.b);
-    for (const Item& a : collectItems(pair.a)) {
-      for (const Item& b : second) {
+    boxesOfB_.clear();
+    for (std::uint32_t k = 0; k < pair.b.branch->count; ++k)
+      boxesOfB_.push_back(computeItemAabb(pair.b, k));
+    for (std::uint32_t i = 0; i < pair.a.branch->count; ++i) {
+      const Aabb box = computeItemAabb(pair.a, i);
+      for (std::uint32_t k = 0; k < pair.b.branch->count; ++k) {
         if (!spendBudget(1)) return false;
-        if (computeGap(a.box, b.box, pad) > limit_) continue;
+        if (computeGap(box, boxesOfB_[k], pad) > limit_) continue;
         if (!spendBudget(kSeparationCost)) return false;
-        considerParts(a.body, b.body);
+        considerParts(placeItem(pair.a, i), placeItem(pair.b, k));
       }
     }
     return true;
@@ -132,6 +128,7 @@ class BestFirstSearch {
   std::size_t& budget_;
   std::uint64_t count_ = 0;
   std::priority_queue<OpenPair> open_;
+  std::vector<Aabb> boxesOfB_;  ///< scratch of testLeaves()
   NearestParts best_;
 };
 

@@ -132,7 +132,8 @@ std::vector<std::uint32_t> findCandidates(const PlacedConvex& body, const Triang
   const CompoundView bodyView{&bodyTree, *body.rotation, body.translation,
                               [&](std::uint32_t) { return body; }};
   const CompoundView meshView{&tree.boxes(), Mat3::Identity(), Vec3::Zero(),
-                              [&](std::uint32_t i) { return makeConvex(tree.triangles()[i]); }};
+                              [&](std::uint32_t i) { return makeConvex(tree.triangles()[i]); },
+                              [&](std::uint32_t i) { return computeAabb(tree.triangles()[i]); }};
   std::size_t budget = std::numeric_limits<std::size_t>::max();
   const NearestParts nearest = findNearestParts({&bodyView, 1}, {&meshView, 1},
                                                 std::numeric_limits<double>::infinity(), budget);

@@ -18,7 +18,8 @@ class OurMeshQuery : public MeshQuery {
     const CompoundView body{&tree_, at.rotation, at.translation,
                             [&](std::uint32_t) { return bodyAt(at); }};
     const CompoundView mesh{&mesh_.boxes(), Mat3::Identity(), Vec3::Zero(),
-                            [this](std::uint32_t i) { return triangle(i); }};
+                            [this](std::uint32_t i) { return triangle(i); },
+                            [this](std::uint32_t i) { return computeAabb(mesh_.triangles()[i]); }};
     std::size_t budget = std::numeric_limits<std::size_t>::max();
     return findNearestParts({&body, 1}, {&mesh, 1}, std::numeric_limits<double>::infinity(), budget)
         .separation.distance;

@@ -172,14 +172,15 @@ std::vector<collision::CompoundView> makeCompoundViews(const CollisionGeometry& 
   std::vector<collision::CompoundView> views;
   const collision::BoxTree& triangles = geometry.localTriangles.boxes();
   if (!geometry.hullTree.empty())
-    views.push_back({&geometry.hullTree, collision::Mat3::Identity(), Vec3::Zero(),
-                     [&geometry](std::uint32_t item) {
-                       return geometry.convex(geometry.hullTree.order[item]);
-                     }});
+    views.push_back(
+        {&geometry.hullTree, collision::Mat3::Identity(), Vec3::Zero(),
+         [&geometry](std::uint32_t item) { return geometry.convex(geometry.hullTree.order[item]); },
+         [&geometry](std::uint32_t item) { return geometry.box(geometry.hullTree.order[item]); }});
   if (!triangles.empty())
     views.push_back(
         {&triangles, collision::Mat3::Identity(), geometry.origin,
-         [&geometry](std::uint32_t item) { return geometry.convex(geometry.hullCount() + item); }});
+         [&geometry](std::uint32_t item) { return geometry.convex(geometry.hullCount() + item); },
+         [&geometry](std::uint32_t item) { return geometry.box(geometry.hullCount() + item); }});
   return views;
 }
 

@@ -107,8 +107,14 @@ PartPairs findPartPairsInRange(const WorldData& world, const EntityPair& key, do
 }
 
 std::vector<collision::CompoundView> makeCompoundsNow(const WorldData& world, EntityId entity) {
-  if (const Body* body = findKinematicBody(world, entity))
-    return {makeCompoundView(*body->shape, {body->orientation, body->position})};
+  if (const Body* body = findKinematicBody(world, entity)) {
+    collision::CompoundView view =
+        makeCompoundView(*body->shape, {body->orientation, body->position});
+    view.box = [body](std::uint32_t item) {
+      return getPartBox(*body, body->shape->tree.order[item]);
+    };
+    return {std::move(view)};
+  }
   return makeCompoundViews(world.scene->collisionGeometry(entity - 1));
 }
 
@@ -136,6 +142,13 @@ std::set<EntityPair> collectMovedPairs(const WorldData& world) {
     }
   }
   return pairs;
+}
+
+/// Makes the boxes of the parts of both, which computeContact() uses.
+void makePartBoxes(WorldData& world, const EntityPair& key) {
+  for (const EntityId id : {key.first, key.second})
+    if (const auto found = world.bodyIndexById.find(id); found != world.bodyIndexById.end())
+      makePartBoxes(world.bodies[found->second]);
 }
 
 /// Current separation; nullopt if they are farther apart than `within`.
@@ -228,6 +241,7 @@ KinematicContacts findKinematicContacts(WorldData& world, const ContactDistances
     if (isExcluded(world, key, distances.contact)) continue;
     const double travel = computeMaxTravel(world, key.first) + computeMaxTravel(world, key.second);
     const double within = std::max(distances.reportLimit, distances.contact + travel);
+    makePartBoxes(world, key);
     const auto found = computeContact(world, key, lasted ? kAnyDistance : within, count);
     if (!found) continue;
     const double distance = found->separation.distance;
