@@ -93,7 +93,6 @@ class ObjectTraversal {
     if (object_.computedAt[branch] != front_.calls) {
       object_.boxes[branch] = computeBox(branch);
       object_.computedAt[branch] = front_.calls;
-      ++front_.boxesComputed;
     }
     return object_.boxes[branch];
   }

@@ -46,7 +46,7 @@ struct PartFront {
   std::vector<Entry> entries;  ///< in the order of the descent, siblings adjacent
   Object a, b;
   double clock = 0;  ///< metres, upper bound: motions of A and B so far, summed
-  std::uint64_t calls = 0, aabbTests = 0, boxesComputed = 0;  ///< counters
+  std::uint64_t calls = 0, aabbTests = 0;  ///< counters
 };
 
 /// Replaces `pairs` by the pairs of parts whose boxes in `a` and `b` overlap: exactly those for

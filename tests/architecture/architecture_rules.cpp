@@ -186,24 +186,36 @@ std::vector<Include> findIncludes(const std::string& text) {
   return found;
 }
 
+/// Headers that `open` includes, and all that these include in turn; with `withSources`, that the
+/// sources of these headers include, too.
+Names findReachedHeaders(const Sources& sources, std::vector<std::string> open, bool withSources) {
+  Names reached;
+  while (!open.empty()) {
+    const std::string path = open.back();
+    open.pop_back();
+    for (const Include& include : findIncludes(sources.at(path))) {
+      if (!include.quoted || sources.count(include.path) == 0) continue;
+      if (!reached.insert(include.path).second) continue;
+      open.push_back(include.path);
+      const std::string source = include.path.substr(0, include.path.rfind('.')) + ".cpp";
+      if (withSources && sources.count(source) != 0) open.push_back(source);
+    }
+  }
+  return reached;
+}
+
 /// Headers of a folder that code of another one includes, and all that these include in turn.
 Names publicHeaders(const Sources& sources) {
   Names reached;
   std::vector<std::string> open;
-  const auto reach = [&](const std::string& path) {
-    if (sources.count(path) != 0 && reached.insert(path).second) open.push_back(path);
-  };
   for (const auto& [path, text] : sources) {
     if (!isCode(path) || kMayInclude.count(getFolder(path)) == 0) continue;
     for (const Include& include : findIncludes(text))
-      if (include.quoted && getFolder(include.path) != getFolder(path)) reach(include.path);
+      if (include.quoted && getFolder(include.path) != getFolder(path) &&
+          sources.count(include.path) != 0 && reached.insert(include.path).second)
+        open.push_back(include.path);
   }
-  while (!open.empty()) {
-    const std::string path = open.back();
-    open.pop_back();
-    for (const Include& include : findIncludes(sources.at(path)))
-      if (include.quoted) reach(include.path);
-  }
+  reached.merge(findReachedHeaders(sources, std::move(open), false));
   return reached;
 }
 
@@ -398,6 +410,19 @@ Faults sourcesWithoutHeader(const Sources& sources) {
     if (sources.count(path.substr(0, path.size() - 4) + ".hpp") == 0)
       faults.push_back(path + ": no header of the same name");
   }
+  return faults;
+}
+
+Faults unreachedCollisionHeaders(const Sources& sources) {
+  std::vector<std::string> product;
+  for (const auto& [path, text] : sources)
+    if (isCode(path) && getFolder(path) != "collision" && getFolder(path) != "tests")
+      product.push_back(path);
+  const Names reached = findReachedHeaders(sources, std::move(product), true);
+  Faults faults;
+  for (const auto& [path, text] : sources)
+    if (isHeader(path) && getFolder(path) == "collision" && reached.count(path) == 0)
+      faults.push_back(path + ": the product does not use it; use it or delete it");
   return faults;
 }
 

@@ -44,6 +44,10 @@ Faults unfinishedWork(const Sources& sources);
 /// sanitizers have none.
 Faults sourcesWithoutHeader(const Sources& sources);
 
+/// A header of collision/ that no program of the product reaches: neither another folder includes
+/// it, nor a header that one reaches, nor the source of such a header. Tests do not count.
+Faults unreachedCollisionHeaders(const Sources& sources);
+
 /// A folder of the product holds at most `maxFiles` sources directly.
 Faults crowdedFolders(const Sources& sources, int maxFiles);
 

@@ -69,6 +69,11 @@ TEST(Architecture, EverySourceHasAHeader) {
   EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
+TEST(Architecture, TheProductUsesEveryHeaderOfTheCollisionCore) {
+  const Faults faults = unreachedCollisionHeaders(repository());
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
 TEST(Architecture, FoldersAreSmall) {
   const Faults faults = crowdedFolders(repository(), 26);
   EXPECT_EQ(faults, Faults{}) << listed(faults);
@@ -167,6 +172,22 @@ TEST(ArchitectureRules, ASourceWithoutHeaderIsAFault) {
                         {"tests/scene/shape_test.cpp", ""}};
   EXPECT_EQ(sourcesWithoutHeader(sources),
             Faults{"scene/model/shape.cpp: no header of the same name"});
+}
+
+TEST(ArchitectureRules, ACollisionHeaderForTestsAloneIsAFault) {
+  const Sources sources{
+      {"scene/world/world.cpp", "#include \"collision/compound/parts.hpp\"\n"},
+      {"collision/compound/parts.hpp", ""},
+      {"collision/compound/parts.cpp", "#include \"collision/shapes/hull.hpp\"\n"},
+      {"collision/shapes/hull.hpp", ""},
+      {"collision/motion/heap.hpp", "#include \"collision/motion/pair.hpp\"\n"},
+      {"collision/motion/heap.cpp", "#include \"collision/motion/heap.hpp\"\n"},
+      {"collision/motion/pair.hpp", ""},
+      {"tests/collision/heap_test.cpp", "#include \"collision/motion/heap.hpp\"\n"}};
+  EXPECT_EQ(
+      unreachedCollisionHeaders(sources),
+      (Faults{"collision/motion/heap.hpp: the product does not use it; use it or delete it",
+              "collision/motion/pair.hpp: the product does not use it; use it or delete it"}));
 }
 
 TEST(ArchitectureRules, ACrowdedFolderIsAFault) {
