@@ -38,7 +38,7 @@ constexpr double kUnderflow = 0x1p-1000;  // above the loss of a few products to
 
 // Nanoseconds, measured by `./dev bench boxes` (tests/benchmarks/report/boxes.md). A pair is a
 // warm narrow-phase query of two bodies that are clear.
-constexpr double kCubeCost = 6, kScanCost = 9, kScanCostPerVertex = 1.4, kClimbCost = 85;
+constexpr double kCubeCost = 7, kScanCost = 5, kScanCostPerVertex = 1.9, kClimbCost = 80;
 constexpr double kPairCost = 200;
 
 constexpr std::size_t kBlock = 6;  // doubles a block: two vertices

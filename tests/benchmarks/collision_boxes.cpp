@@ -3,11 +3,13 @@
 //
 //   collision_boxes [--quick] [--out FILE] [--only PART_OF_A_METHOD]
 //
-// 1,000 bodies with the same hull, an ellipsoid of 8, 22, 64, 106 or 500 vertices and half axes of
-// 0.2, 0.15 and 0.1 m. Each turns about its own axis by 2 or 10 degrees a tick. In every tick each
-// method computes all boxes; the methods take turns, so that they meet the same machine.
+// 1,000 bodies (250 of 2,000 vertices, 50 of 10,000) with the same hull, an ellipsoid of 8 to
+// 10,000 vertices and half axes of 0.2, 0.15 and 0.1 m. Each turns about its own axis by 2 or 10
+// degrees a tick. In every tick each method computes all boxes; the methods take turns, so that
+// they meet the same machine.
 #include <gmpxx.h>
 
+#include <algorithm>
 #include <numbers>
 
 #include "tests/benchmarks/box_methods.hpp"
@@ -17,7 +19,11 @@
 namespace enfilade::benchmarks {
 namespace {
 
-constexpr std::size_t kBodies = 1000;
+/// Fewer of the largest hulls: a method's turn stays shorter than a time slice of the system.
+std::size_t chooseBodyCount(std::size_t vertices) {
+  return std::min<std::size_t>(1000, 500'000 / vertices);
+}
+
 constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 
 Hull makeEllipsoid(Random& random, std::size_t vertices) {
@@ -30,8 +36,8 @@ Hull makeEllipsoid(Random& random, std::size_t vertices) {
 /// Bodies that turn about their own axes, each by the same angle a tick.
 class Turning {
  public:
-  Turning(Random& random, double degrees) {
-    for (std::size_t k = 0; k < kBodies; ++k) {
+  Turning(Random& random, std::size_t bodies, double degrees) {
+    for (std::size_t k = 0; k < bodies; ++k) {
       const Vec3 axis = direction(random);
       const double x = uniform(random, -50, 50), y = uniform(random, 0, 3),
                    z = uniform(random, -50, 50);
@@ -40,7 +46,7 @@ class Turning {
     }
   }
   const std::vector<TurnedPose>& next() {
-    for (std::size_t k = 0; k < kBodies; ++k) {
+    for (std::size_t k = 0; k < poses_.size(); ++k) {
       poses_[k].orientation = (steps_[k] * poses_[k].orientation).normalized();
       poses_[k].rotation = poses_[k].orientation.toRotationMatrix();
     }
@@ -120,11 +126,12 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
                     Results& results) {
   Random random(vertices);
   const Hull hull = makeEllipsoid(random, vertices);
-  Turning turning(random, degrees);
+  const std::size_t bodies = chooseBodyCount(vertices);
+  Turning turning(random, bodies, degrees);
   std::vector<Contestant> all;
   for (const BoxMethod& method : boxMethods()) {
     if (!arguments.wants(method.name)) continue;
-    all.push_back({method.name, method.make(hull, kBodies), std::vector<Aabb>(kBodies), {}});
+    all.push_back({method.name, method.make(hull, bodies), std::vector<Aabb>(bodies), {}});
   }
   const std::size_t ticks = arguments.quick ? 20 : 200;
   for (std::size_t tick = 0; tick < ticks; ++tick) {
@@ -133,7 +140,7 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
       Contestant& one = all[(tick + turn) % all.size()];
       const auto start = Clock::now();
       one.update->update(poses, one.boxes);
-      one.nanoseconds.push_back(1e9 * secondsSince(start) / kBodies);
+      one.nanoseconds.push_back(1e9 * secondsSince(start) / static_cast<double>(bodies));
       for (const Aabb& box : one.boxes) one.volume += box.size().prod();
       if (tick % 20 == 19) checkBoxes(one, hull, poses, 1 + vertices / 8);
     }
@@ -141,7 +148,7 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
   const std::string chosen = getName(collision::chooseAabbMethod(hull));
   std::size_t wrong = 0;
   for (const Contestant& one : all) {
-    const double boxes = static_cast<double>(ticks * kBodies);
+    const double boxes = static_cast<double>(ticks * bodies);
     const double looked = static_cast<double>(one.update->looked()) / boxes;
     const double time = quantile(one.nanoseconds, 0.5);
     if (isOurs(one.name)) wrong += one.notConservative;
@@ -171,7 +178,7 @@ int main(int argc, char** argv) {
   const Arguments arguments(argc, argv);
   Results results(arguments);
   std::size_t wrong = 0;
-  for (const std::size_t vertices : {8u, 22u, 64u, 106u, 500u})
+  for (const std::size_t vertices : {8u, 22u, 30u, 40u, 50u, 64u, 106u, 500u, 2000u, 10'000u})
     for (const double degrees : {2.0, 10.0})
       wrong += measure(vertices, degrees, arguments, results);
   return wrong == 0 ? 0 : 3;
