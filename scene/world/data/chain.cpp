@@ -26,6 +26,15 @@ double computeMaxRadius(const Chain& chain, std::size_t link) {
   return maxRadius;
 }
 
+/// Poses of all links for the current joint values.
+std::vector<LinkPose> computeLinkPoses(const Chain& chain) {
+  std::vector<LinkPose> poses;
+  poses.reserve(chain.links.size());
+  for (std::size_t i = 0; i < chain.links.size(); ++i)
+    poses.push_back(computeLinkPose(chain, i, poses));
+  return poses;
+}
+
 }  // namespace
 
 Chain makeChain(const Spawn& order, const Mat3& avatarFromBase) {
@@ -48,25 +57,21 @@ Chain makeChain(const Spawn& order, const Mat3& avatarFromBase) {
   return chain;
 }
 
-std::vector<LinkPose> computeLinkPoses(const Chain& chain) {
-  std::vector<LinkPose> poses;
-  poses.reserve(chain.links.size());
-  for (const ChainLink& link : chain.links) {
-    LinkPose parent;
-    parent.rotation = chain.avatarFromBase;
-    if (link.parent >= 0) parent = poses[static_cast<std::size_t>(link.parent)];
-    LinkPose pose;
-    pose.axis = parent.rotation * link.joint.axis;
-    pose.origin = parent.origin + parent.rotation * link.joint.anchor;
-    if (link.joint.kind == LinkJoint::Kind::prismatic) {
-      pose.rotation = parent.rotation;
-      pose.origin += link.value * pose.axis;
-    } else {
-      pose.rotation = collision::integrateRotation(parent.rotation, link.value * pose.axis, 1);
-    }
-    poses.push_back(pose);
+LinkPose computeLinkPose(const Chain& chain, std::size_t link, std::span<const LinkPose> before) {
+  const ChainLink& own = chain.links[link];
+  LinkPose parent;
+  parent.rotation = chain.avatarFromBase;
+  if (own.parent >= 0) parent = before[static_cast<std::size_t>(own.parent)];
+  LinkPose pose;
+  pose.axis = parent.rotation * own.joint.axis;
+  pose.origin = parent.origin + parent.rotation * own.joint.anchor;
+  if (own.joint.kind == LinkJoint::Kind::prismatic) {
+    pose.rotation = parent.rotation;
+    pose.origin += own.value * pose.axis;
+  } else {
+    pose.rotation = collision::integrateRotation(parent.rotation, own.value * pose.axis, 1);
   }
-  return poses;
+  return pose;
 }
 
 std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>& base, Chain& chain,
@@ -89,14 +94,6 @@ std::shared_ptr<const AvatarShape> updateChainShape(const AvatarShape& before, s
       parts[base + i] =
           placeTurningHull(chain.links[i].turning, poses[i].origin, poses[i].rotation, work);
   return makeAvatarShape(std::move(parts));
-}
-
-bool doesJointMoveLink(const Chain& chain, std::size_t joint, std::size_t link) {
-  // Parents have lower indices than their links, so the loop ends at the base.
-  for (auto ancestor = static_cast<std::int32_t>(link); ancestor >= 0;
-       ancestor = chain.links[static_cast<std::size_t>(ancestor)].parent)
-    if (ancestor == static_cast<std::int32_t>(joint)) return true;
-  return false;
 }
 
 double computeLeverArm(const ChainLink& link) {

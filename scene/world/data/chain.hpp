@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "scene/world/data/avatar_shape.hpp"
@@ -40,8 +41,9 @@ struct LinkPose {
 /// Builds the chain of a spawn order that validateCommandFields() accepted.
 Chain makeChain(const Spawn& order, const Mat3& avatarFromBase);
 
-/// Forward kinematics: poses of all links for the current joint values.
-std::vector<LinkPose> computeLinkPoses(const Chain& chain);
+/// Forward kinematics: pose of a link for its current joint value and its parent's pose, which is
+/// one of `before`, the poses of all links before it.
+LinkPose computeLinkPose(const Chain& chain, std::size_t link, std::span<const LinkPose> before);
 
 /// Shape of `base` and the links at their current poses; the parts of the base come first. Of the
 /// chain only the extremal vertices change.
@@ -52,9 +54,6 @@ std::shared_ptr<const AvatarShape> makeChainShape(const std::vector<AvatarPart>&
 /// other parts and their boxes stay.
 std::shared_ptr<const AvatarShape> updateChainShape(const AvatarShape& before, std::uint64_t moved,
                                                     Chain& chain, BoxWork& work);
-
-/// True if joint `joint` moves link `link`: the joint of the link itself or of an ancestor.
-bool doesJointMoveLink(const Chain& chain, std::size_t joint, std::size_t link);
 
 /// Bound on the displacement of any point that the joint moves, metres per unit of its value.
 double computeLeverArm(const ChainLink& link);
