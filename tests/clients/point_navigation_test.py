@@ -6,6 +6,7 @@ import tempfile
 import unittest
 import warnings
 from pathlib import Path
+from unittest import mock
 
 import numpy as np
 
@@ -150,6 +151,9 @@ class PointNavigation(RoomCase):
             _, reward, *_, info = env.step((0, 0))
             self.assertAlmostEqual(reward, 0, places=6)
             self.assertEqual(reward, info["progress"])
+            measured = info["geodesic_distance"]
+            with mock.patch.object(env.navigation, "query", side_effect=AssertionError("it is known")):
+                self.assertEqual(env._post_reset(2, {}) and env.episode.geodesic_distance, measured)
         env = self.environment(goals=None, starts=(), episodes=[
             enfilade.Episode((2, 0, 0), 0, (5.1, 3.1, 0), math.nan, "to the wall")])
         with self.assertRaisesRegex(enfilade.EnfiladeError, "'to the wall': no path leads .*: .+"):
