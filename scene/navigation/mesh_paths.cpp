@@ -26,6 +26,7 @@ constexpr int kQuickProposals = 4;
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less is not tried
 constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
+constexpr double kMaxMeshOffset = 0.1;     // metres, across
 constexpr double kShortPath = 5;  // metres: mesh lines keep some centimetres more than is needed
 
 /// Goes around what stopped the walker on the way from the last place of `path` to `corner`, and
@@ -100,11 +101,11 @@ bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance cl
   return true;
 }
 
-/// Closes portals of a mesh during a search. Those that failed often, and never led to a proved
-/// path meanwhile, stay closed: they are refuted. A quick search refutes nothing.
+/// Closes portals of a mesh during a search. If it refutes, those that failed often, and never led
+/// to a proved path meanwhile, stay closed.
 class PortalClosures {
  public:
-  PortalClosures(NavigationMesh& mesh, bool isQuick) : mesh_(mesh), isQuick_(isQuick) {}
+  PortalClosures(NavigationMesh& mesh, bool refutes) : mesh_(mesh), refutes_(refutes) {}
   ~PortalClosures() {
     for (const auto& [from, to] : closed_) mesh_.openPortal(from, to);
   }
@@ -123,14 +124,14 @@ class PortalClosures {
       if (distance < least) least = distance, at = i;
     }
     mesh_.closePortal(polygons[at], polygons[at + 1]);
-    if (isQuick_ || mesh_.countFailure(polygons[at], polygons[at + 1]) < kRefutations)
+    if (!refutes_ || mesh_.countFailure(polygons[at], polygons[at + 1]) < kRefutations)
       closed_.emplace_back(polygons[at], polygons[at + 1]);
     return true;
   }
 
  private:
   NavigationMesh& mesh_;
-  const bool isQuick_;
+  const bool refutes_;
   std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_;
 };
 
@@ -154,13 +155,20 @@ std::optional<Corridor> findCorridor(const NavigationMesh& mesh, const MeshPoint
   return corridor;
 }
 
+/// Whether a place is where the mesh is. Furniture may be above the floor's mesh, or next to it.
+bool isAt(const MeshPoint& onMesh, const Vec3& place) {
+  return computeGroundDistance(onMesh.point, place) < kMaxMeshOffset &&
+         std::abs(onMesh.point.y() - place.y()) < kMaxMeshHeight;
+}
+
 NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Clearance clearance,
                           const Vec3& from, const Vec3& to, Proof& proof) {
   const Vec3 extent = computeMeshReach(finder);
   const auto start = mesh.findNearest(from, extent), goal = mesh.findNearest(to, extent);
   NavigationPath path;
   if (!start || !goal) return path;
-  PortalClosures closures(mesh, proof.isQuick);
+  // Quick repairs refute nothing, nor does the way off furniture.
+  PortalClosures closures(mesh, !proof.isQuick && isAt(*start, from) && isAt(*goal, to));
   const int maxProposals = proof.isQuick ? kQuickProposals : kMaxProposals;
   for (int proposal = 0; proposal < maxProposals; ++proposal) {
     const auto corridor = findCorridor(mesh, *start, *goal);

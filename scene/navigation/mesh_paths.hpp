@@ -11,6 +11,8 @@
 namespace enfilade::scene {
 
 inline constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  ///< metres, of grids
+inline constexpr double kMaxMeshHeight =
+    0.2;                                 ///< metres between a place and its mesh, also over stairs
 inline constexpr double kSameFloor = 1;  ///< metres between the heights of a mesh and its floor
 
 /// The work and the obstacles of a search so far.

@@ -15,8 +15,7 @@ namespace {
 
 constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
 constexpr int kMaxPassageRoutes = 4;
-constexpr double kOnMesh = 0.1;         // metres
-constexpr double kMaxMeshHeight = 0.2;  // metres between a place and its mesh, also over stairs
+constexpr double kOnMesh = 0.1;  // metres
 constexpr const char* kNotFound = "no way was found within the limits of the search";
 constexpr double kMaxConnection = 3;  // metres between places that are connected without a mesh
 constexpr GridSearch kCoarseConnection{kCoarseSpacing, 2.5, 4000};
