@@ -28,6 +28,13 @@ void placeBody(const collision::Pose& pose, Body& own) {
   own.motionBounds = own.boxes.whole;
 }
 
+/// Reports a part of the work as the shares from `first` to `last`.
+Navigation::Progress scaleProgress(const Navigation::Progress& progress, double first,
+                                   double last) {
+  if (!progress) return {};
+  return [&progress, first, last](double share) { progress(first + (last - first) * share); };
+}
+
 }  // namespace
 
 Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
@@ -46,14 +53,15 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
   std::iota(tiles.begin(), tiles.end(), 0);
   ampleTiles_.resize(tiles.size());
   scarceTiles_.resize(tiles.size());
-  buildTiles(tiles, threads, progress);
-  assembleMeshes();
+  buildTiles(tiles, threads, scaleProgress(progress, 0, kTileShare));
+  assembleMeshes(progress);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   report_.seconds = seconds.count();
 }
 
 Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
-                       const NavigationAgent& agent, std::span<const std::uint8_t> saved)
+                       const NavigationAgent& agent, std::span<const std::uint8_t> saved,
+                       const Progress& progress)
     : agent_(agent),
       world_(std::move(scene), settings),
       grid_(makeTileGrid(world_.scene().bounds(), agent)) {
@@ -64,7 +72,7 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
     placeBody(meshes.bodies[i], world_.data().bodies[i]);
   ampleTiles_ = std::move(meshes.ample);
   scarceTiles_ = std::move(meshes.scarce);
-  assembleMeshes();
+  assembleMeshes(progress);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   report_.seconds = seconds.count();
 }
@@ -89,7 +97,7 @@ void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Pr
   });
 }
 
-void Navigation::assembleMeshes() {
+void Navigation::assembleMeshes(const Progress& progress) {
   walker_.emplace(world_.data(), agent_);
   links_.clear();
   unobstructed_.reset();
@@ -97,7 +105,7 @@ void Navigation::assembleMeshes() {
   ample_.emplace(grid_, ampleTiles_);
   scarce_.emplace(grid_, scarceTiles_);
   islands_ = collectIslands(*ample_, *walker_, world_.scene().bounds());
-  joinIslands();
+  joinIslands(scaleProgress(progress, kTileShare, 1));
   drawn_ = {};
   for (std::uint32_t i = 0; i < ample_->polygonCount(); ++i) {
     const std::uint32_t number = islands_.numberOf[i];
@@ -111,11 +119,12 @@ void Navigation::assembleMeshes() {
   }
   report_.polygons = ample_->polygonCount();
   report_.bytes = 2 * (ample_->memoryBytes() + scarce_->memoryBytes());
+  if (progress) progress(1);
 }
 
-void Navigation::joinIslands() {
+void Navigation::joinIslands(const Progress& progress) {
   passages_ = collectPassages({world_.data(), agent_, *walker_, *ample_, *scarce_, nullptr},
-                              islands_, triedGaps_);
+                              islands_, triedGaps_, progress);
   scene::joinIslands(islands_, passages_);
 }
 
@@ -151,7 +160,7 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
     if (isChanged[i]) tiles.push_back(static_cast<int>(i));
   if (tiles.empty()) return 0;
   buildTiles(tiles, threads, {});
-  assembleMeshes();
+  assembleMeshes({});
   return tiles.size();
 }
 

@@ -69,6 +69,7 @@ struct SnapTarget {
 class Navigation {
  public:
   using Progress = std::function<void(double)>;  ///< share that is done, 0..1
+  static constexpr double kTileShare = 0.8;      ///< of tiles; the rest is of islands and passages
 
   /// Builds the meshes on `threads` threads. `snapshot`: poses of the bodies; null: as authored.
   /// Throws std::runtime_error.
@@ -76,9 +77,11 @@ class Navigation {
              const NavigationAgent& agent, const Snapshot* snapshot = nullptr, int threads = 2,
              const Progress& progress = {});
   /// Takes the meshes of save() instead of building them, with bodies as they were then; update()
-  /// brings them to a later state. Throws MeshFileError if they belong to another scene or size.
+  /// brings them to a later state. Progress begins at kTileShare. Throws MeshFileError if they
+  /// belong to another scene or size.
   Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
-             const NavigationAgent& agent, std::span<const std::uint8_t> saved);
+             const NavigationAgent& agent, std::span<const std::uint8_t> saved,
+             const Progress& progress = {});
   ~Navigation();
 
   /// The meshes as bytes.
@@ -129,8 +132,8 @@ class Navigation {
 
  private:
   void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
-  void assembleMeshes();
-  void joinIslands();
+  void assembleMeshes(const Progress& progress);
+  void joinIslands(const Progress& progress);
   NavigationMesh buildUnobstructed(int threads) const;
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;

@@ -210,18 +210,28 @@ void crossGap(Collection& all, const RimGap& gap) {
 
 }  // namespace
 
-PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedGaps& tried) {
+PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedGaps& tried,
+                            const std::function<void(double)>& progress) {
   finder.maxRepairWalks = kMaxRepairWalks;
   Collection all{finder, islands, tried, finder.scarce.findIslands(), listParts(finder.ample), {}};
   for (std::uint32_t polygon = 0; polygon < islands.numberOf.size(); ++polygon)
     if (all.getIsland(polygon) == kNoIsland) all.list.areas[all.list.partOf[polygon]] = 0;
-  for (const RimGap& gap : findRimGaps(finder.ample, all.list.partOf,
-                                       kWallAndDoor + 2 * finder.agent.radius, kHeightReach))
+  const std::vector<RimGap> gaps = findRimGaps(
+      finder.ample, all.list.partOf, kWallAndDoor + 2 * finder.agent.radius, kHeightReach);
+  const std::size_t count = gaps.size() + islands.islands.size();
+  std::size_t done = 0;
+  const auto report = [&] {
+    if (progress) progress(static_cast<double>(++done) / static_cast<double>(count));
+  };
+  for (const RimGap& gap : gaps) {
     crossGap(all, gap);
+    report();
+  }
   std::set<std::uint32_t> left;  // islands with a way to another one and back
   for (const auto& [from, to] : all.joined)
     if (from != to && all.joined.contains({to, from})) left.insert(from);
   for (std::uint32_t island = 1; island < islands.islands.size(); ++island) {
+    report();
     const Vec3& place = islands.islands[island].place;
     if (left.contains(island) || islands.islands[island].area > kMaxSmallArea) continue;
     const auto key = makeKey(place, place);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <map>
 #include <vector>
 
@@ -20,8 +21,10 @@ struct GapWays {
 /// moves. The exit of a small island has its place twice.
 using TriedGaps = std::map<std::array<double, 6>, GapWays>;
 
-/// All passages of `finder.ample`. `islands`: as collectIslands() returns them.
-PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedGaps& tried);
+/// All passages of `finder.ample`. `islands`: as collectIslands() returns them. `progress`, which
+/// may be empty, gets the share that is done.
+PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedGaps& tried,
+                            const std::function<void(double)>& progress);
 
 /// Forgets gaps across which walks may end otherwise, since a body moved within this box.
 void forgetGaps(TriedGaps& tried, const Aabb& box);

@@ -1,7 +1,11 @@
 #include "server/hosting/query_service.hpp"
 
 #include <chrono>
+#include <list>
+#include <mutex>
 #include <optional>
+#include <utility>
+#include <vector>
 
 #include "collision/assert.hpp"
 #include "server/base/work_thread.hpp"
@@ -21,7 +25,10 @@ struct QueryService::State {
   std::shared_ptr<const scene::Snapshot> casterSnapshot;  ///< state of the caster's moving entities
   std::optional<scene::EntityIndex> index;                ///< built at the first proximity query
   NavigationService navigation;                           ///< used by its thread alone
-  WorkThread thread, navigationThread;                    // last members: they use the others
+  std::mutex pendingMutex;
+  /// Navigation queries without an answer: also those that wait learn the share of meshes.
+  std::list<std::shared_ptr<const SceneQuery>> pending;
+  WorkThread thread, navigationThread;  // last members: they use the others
 
   const scene::RayCaster& casterAt(const std::shared_ptr<const scene::Snapshot>& snapshot);
   scene::SceneAt makeSceneAt(const SceneQuery& query);
@@ -29,6 +36,7 @@ struct QueryService::State {
                                                    std::vector<std::uint8_t>& attachment);
   std::variant<v1::NavigationReply, v1::Error> answerNavigation(
       const SceneQuery& query, std::vector<std::uint8_t>& attachment);
+  void postNavigation(const std::shared_ptr<const SceneQuery>& query, std::function<void()> answer);
   EncodedMessage answerQuery(const SceneQuery& query);
   EncodedMessage answerSafely(const SceneQuery& query);
 };
@@ -64,8 +72,26 @@ std::variant<v1::RayReply, v1::Error> QueryService::State::answerRays(
 
 std::variant<v1::NavigationReply, v1::Error> QueryService::State::answerNavigation(
     const SceneQuery& query, std::vector<std::uint8_t>& attachment) {
-  return navigation.answer(query.message.navigation(),
-                           {query.snapshot, query.settings, query.progress}, attachment);
+  const auto report = [this](double share) {
+    const std::lock_guard lock(pendingMutex);
+    for (const auto& one : pending)
+      if (one->progress) one->progress(share);
+  };
+  return navigation.answer(query.message.navigation(), {query.snapshot, query.settings, report},
+                           attachment);
+}
+
+void QueryService::State::postNavigation(const std::shared_ptr<const SceneQuery>& query,
+                                         std::function<void()> answer) {
+  {
+    const std::lock_guard lock(pendingMutex);
+    pending.push_back(query);
+  }
+  navigationThread.post([this, query, answer = std::move(answer)] {
+    answer();
+    const std::lock_guard lock(pendingMutex);
+    std::erase(pending, query);
+  });
 }
 
 namespace {
@@ -125,17 +151,20 @@ void QueryService::submit(SceneQuery query, std::function<void(EncodedMessage)> 
                   query.message.has_touching() || query.message.has_cannot_touch() ||
                   query.message.has_navigation());
   const auto shared = std::make_shared<const SceneQuery>(std::move(query));
-  WorkThread& thread = shared->message.has_navigation() ? state_->navigationThread : state_->thread;
-  thread.post([state = state_.get(), shared, done = std::move(done)] {
+  auto answer = [state = state_.get(), shared, done = std::move(done)] {
     done(state->answerSafely(*shared));
-  });
+  };
+  if (shared->message.has_navigation())
+    state_->postNavigation(shared, std::move(answer));
+  else
+    state_->thread.post(std::move(answer));
 }
 
 void QueryService::submitPath(
     SceneQuery query, std::function<void(std::variant<v1::NavigationReply, v1::Error>)> done) {
   ENFILADE_ASSERT(query.message.has_navigation());
   const auto shared = std::make_shared<const SceneQuery>(std::move(query));
-  state_->navigationThread.post([state = state_.get(), shared, done = std::move(done)] {
+  state_->postNavigation(shared, [state = state_.get(), shared, done = std::move(done)] {
     std::vector<std::uint8_t> attachment;
     try {
       done(state->answerNavigation(*shared, attachment));

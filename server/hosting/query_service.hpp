@@ -21,8 +21,8 @@ struct SceneQuery {
   v1::ClientMessage message;  ///< a query about the scene at a tick
   scene::WorldSettings settings;
   ServerLimits limits;
-  /// Of a navigation query: the share of the meshes that it has built, 0..1. Called on a thread of
-  /// the service.
+  /// Of a navigation query: the share of the meshes that are built, 0..1, by it or by those before
+  /// it. Called on the thread of navigation queries.
   std::function<void(double)> progress = {};
 };
 

@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <bit>
 #include <chrono>
+#include <condition_variable>
+#include <cstdint>
 #include <list>
 #include <mutex>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "scene/import/cache/model_cache.hpp"
@@ -17,6 +20,9 @@
 namespace enfilade::server {
 namespace {
 
+using Progress = scene::Navigation::Progress;
+using Bytes = std::vector<std::uint8_t>;
+
 constexpr std::size_t kMaxShared = 8;  // sizes
 
 struct SharedMeshes {
@@ -24,9 +30,59 @@ struct SharedMeshes {
   scene::WorldSettings settings;
   scene::NavigationAgent agent;
   bool doorsOpen = false;
-  std::mutex mutex;                 ///< held while they are built
-  std::vector<std::uint8_t> bytes;  ///< empty: not built yet
+  std::mutex mutex;  ///< of the members below
+  std::condition_variable changed;
+  bool isBuilding = false;             ///< a thread builds them; the others wait
+  double share = 0;                    ///< that it has built, 0..1
+  std::shared_ptr<const Bytes> bytes;  ///< null: not built yet
 };
+
+/// Waits while another thread builds the meshes, and reports its progress; then it is the caller's
+/// turn, unless they are built.
+class BuildTurn {
+ public:
+  BuildTurn(SharedMeshes& shared, const Progress& progress) : shared_(shared) {
+    std::unique_lock lock(shared_.mutex);
+    while (shared_.isBuilding) {
+      const double share = shared_.share;
+      lock.unlock();
+      if (progress) progress(scene::Navigation::kTileShare * share);  // then it loads them
+      lock.lock();
+      shared_.changed.wait(lock, [&] { return !shared_.isBuilding || shared_.share != share; });
+    }
+    if (shared_.bytes) return;
+    shared_.isBuilding = isMine_ = true;
+    shared_.share = 0;
+  }
+  ~BuildTurn() {
+    if (!isMine_) return;
+    const std::lock_guard lock(shared_.mutex);
+    shared_.isBuilding = false;
+    shared_.changed.notify_all();
+  }
+  BuildTurn(const BuildTurn&) = delete;
+  BuildTurn& operator=(const BuildTurn&) = delete;
+
+  bool isMine() const { return isMine_; }
+  void report(double share) {
+    const std::lock_guard lock(shared_.mutex);
+    shared_.share = share;
+    shared_.changed.notify_all();
+  }
+  void keep(std::shared_ptr<const Bytes> bytes) {
+    const std::lock_guard lock(shared_.mutex);
+    shared_.bytes = std::move(bytes);
+  }
+
+ private:
+  SharedMeshes& shared_;
+  bool isMine_ = false;
+};
+
+std::shared_ptr<const Bytes> getBytes(SharedMeshes& shared) {
+  const std::lock_guard lock(shared.mutex);
+  return shared.bytes;
+}
 
 /// The meshes of a size in a scene; the oldest ones and those of scenes that ended are forgotten.
 std::shared_ptr<SharedMeshes> findSharedMeshes(const MeshRequest& request, bool doorsOpen) {
@@ -60,10 +116,11 @@ std::string makeCacheKey(const MeshRequest& request) {
 }
 
 std::unique_ptr<scene::Navigation> loadNavigation(const MeshRequest& request,
-                                                  std::span<const std::uint8_t> bytes) {
+                                                  std::span<const std::uint8_t> bytes,
+                                                  const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
-  auto navigation =
-      std::make_unique<scene::Navigation>(request.scene, request.settings, request.agent, bytes);
+  auto navigation = std::make_unique<scene::Navigation>(request.scene, request.settings,
+                                                        request.agent, bytes, progress);
   const std::size_t rebuilt = navigation->update(*request.snapshot, request.threads);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   logInfo("navigation: meshes for radius {} m, height {} m read in {:.2f} s, {} tiles built",
@@ -72,33 +129,31 @@ std::unique_ptr<scene::Navigation> loadNavigation(const MeshRequest& request,
 }
 
 std::unique_ptr<scene::Navigation> readNavigation(const MeshRequest& request,
-                                                  const scene::ModelCache& cache,
-                                                  std::vector<std::uint8_t>& bytes) {
+                                                  const scene::ModelCache& cache, Bytes& bytes,
+                                                  const Progress& progress) {
   std::string damage;
   const auto text = scene::loadCachedText(cache, makeCacheKey(request), &damage);
   if (!damage.empty()) logWarning("cache: {}; the navigation meshes are built again", damage);
   if (!text) return nullptr;
   try {
     bytes.assign(text->begin(), text->end());
-    return loadNavigation(request, bytes);
+    return loadNavigation(request, bytes, progress);
   } catch (const scene::MeshFileError& error) {
     logWarning("cache: {}; the navigation meshes are built again", error.what());
-    bytes.clear();
     return nullptr;
   }
 }
 
 /// From the meshes of the other state of the doors, if these are ready: only tiles with doors
 /// differ.
-std::unique_ptr<scene::Navigation> deriveNavigation(const MeshRequest& request) {
-  const auto other = findSharedMeshes(request, !request.doorsOpen);
-  const std::unique_lock lock(other->mutex, std::try_to_lock);
-  if (!lock || other->bytes.empty()) return nullptr;
-  return loadNavigation(request, other->bytes);
+std::unique_ptr<scene::Navigation> deriveNavigation(const MeshRequest& request,
+                                                    const Progress& progress) {
+  const auto bytes = getBytes(*findSharedMeshes(request, !request.doorsOpen));
+  return bytes ? loadNavigation(request, *bytes, progress) : nullptr;
 }
 
 std::unique_ptr<scene::Navigation> buildNavigation(const MeshRequest& request,
-                                                   const scene::Navigation::Progress& progress) {
+                                                   const Progress& progress) {
   auto navigation =
       std::make_unique<scene::Navigation>(request.scene, request.settings, request.agent,
                                           request.snapshot.get(), request.threads, progress);
@@ -112,19 +167,26 @@ std::unique_ptr<scene::Navigation> buildNavigation(const MeshRequest& request,
 }  // namespace
 
 std::unique_ptr<scene::Navigation> makeNavigation(const MeshRequest& request,
-                                                  const scene::Navigation::Progress& progress) {
+                                                  const Progress& progress) {
   const auto shared = findSharedMeshes(request, request.doorsOpen);
-  const std::lock_guard lock(shared->mutex);
-  if (!shared->bytes.empty()) return loadNavigation(request, shared->bytes);
+  BuildTurn turn(*shared, progress);
+  if (!turn.isMine()) return loadNavigation(request, *getBytes(*shared), progress);
+  const auto report = [&](double share) {
+    turn.report(share);
+    if (progress) progress(share);
+  };
   const auto cache = findCache(request.scene);
-  if (cache)
-    if (auto navigation = readNavigation(request, *cache, shared->bytes)) return navigation;
-  auto navigation = deriveNavigation(request);
-  if (!navigation) navigation = buildNavigation(request, progress);
-  shared->bytes = navigation->save();
-  if (!cache) return navigation;
-  const std::string failure = scene::storeCachedText(
-      *cache, makeCacheKey(request), std::string(shared->bytes.begin(), shared->bytes.end()));
+  Bytes bytes;
+  auto navigation = cache ? readNavigation(request, *cache, bytes, report) : nullptr;
+  const bool isRead = navigation != nullptr;
+  if (!navigation) navigation = deriveNavigation(request, report);
+  if (!navigation) navigation = buildNavigation(request, report);
+  if (!isRead) bytes = navigation->save();
+  const auto kept = std::make_shared<const Bytes>(std::move(bytes));
+  turn.keep(kept);
+  if (!cache || isRead) return navigation;
+  const std::string failure = scene::storeCachedText(*cache, makeCacheKey(request),
+                                                     std::string(kept->begin(), kept->end()));
   if (!failure.empty()) logWarning("cache: the navigation meshes are not kept: {}", failure);
   return navigation;
 }

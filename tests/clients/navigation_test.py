@@ -38,11 +38,15 @@ def build_slowly(listener):
         request = receive()
         for share in range(10):
             time.sleep(0.2)
-            if request.navigation.progress:
+            if request.navigation.progress or request.command.go.progress:
                 send(m.ServerMessage(navigation_progress=m.NavigationProgress(
                     request_id=request.request_id, share=share / 10)))
-        send(m.ServerMessage(reply_to=request.request_id, navigation=m.NavigationReply(
-            spots=[m.NavigationSpot()])))
+        reply = m.ServerMessage(reply_to=request.request_id)
+        if request.HasField("command"):
+            reply.command.accepted = True
+        else:
+            reply.navigation.spots.add()
+        send(reply)
 
 
 class NavigationTest(RoomCase):
@@ -313,13 +317,17 @@ class CompatTest(RoomCase):
         self.assertEqual(shown[-1], 1)
         before = len(shown)
         navigation.snap((2, 0, 0))  # the meshes are there
+        self.client.spawn("ann", at=(2, 0, 0), radius=0.36).go((8, 0, 0))  # for another size
         self.assertEqual(len(shown), before)
 
     def test_progress_restarts_the_wait_for_a_reply(self):
-        with socket.create_server(("127.0.0.1", 0)) as listener:
-            threading.Thread(target=build_slowly, args=(listener,), daemon=True).start()
-            with enfilade.connect(f"127.0.0.1:{listener.getsockname()[1]}", timeout=1.0) as client:
-                self.assertIsNone(client.navigation().snap((0, 0, 0)))
+        asks = {"navigation": lambda client: self.assertIsNone(client.navigation().snap((0, 0, 0))),
+                "go": lambda client: enfilade.Avatar(client, "ann").go((0, 0, 0))}
+        for name, ask in asks.items():
+            with self.subTest(name), socket.create_server(("127.0.0.1", 0)) as listener:
+                threading.Thread(target=build_slowly, args=(listener,), daemon=True).start()
+                with enfilade.connect(f"127.0.0.1:{listener.getsockname()[1]}", timeout=1.0) as client:
+                    ask(client)
 
     def test_meshes_are_saved_and_loaded(self):
         with tempfile.TemporaryDirectory() as folder:

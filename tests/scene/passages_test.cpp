@@ -119,6 +119,23 @@ TEST(Passages, AGapInAnIrregularWallIsFound) {
   }
 }
 
+/// The tiles are the first part of the work, and the passages most of the rest.
+TEST(Passages, TheirSearchReportsProgress) {
+  const auto scene = boxScene(roomsWithFarGap(0.61));
+  std::vector<double> built, loaded;
+  Navigation navigation(scene, {}, {}, nullptr, 2, [&](double share) { built.push_back(share); });
+  EXPECT_TRUE(std::ranges::is_sorted(built));
+  EXPECT_LT(built.front(), 0.5);
+  EXPECT_GT(std::ranges::count_if(built, [](double share) { return share > 0.81 && share < 0.99; }),
+            10);
+  EXPECT_EQ(built.back(), 1);
+  Navigation(scene, {}, {}, navigation.save(), [&](double share) { loaded.push_back(share); });
+  EXPECT_TRUE(std::ranges::is_sorted(loaded));
+  EXPECT_GT(loaded.front(), Navigation::kTileShare);
+  EXPECT_GT(loaded.size(), 10u);
+  EXPECT_EQ(loaded.back(), 1);
+}
+
 Passage makePassage(std::uint32_t from, std::uint32_t to, const Vec3& start, const Vec3& end) {
   return {from, to, {start, end}, (end - start).norm()};
 }

@@ -88,7 +88,11 @@ void handleGo(const RequestContext& context, const v1::Command& command) {
   auto query = makePathQuery(hosted.world, command);
   if (auto* error = std::get_if<v1::Error>(&query))
     return sendCommandReply(context, std::move(*error));
-  SceneQuery sceneQuery{hosted.world.snapshot(), {}, hosted.world.settings(), hosted.limits};
+  SceneQuery sceneQuery{hosted.world.snapshot(),
+                        {},
+                        hosted.world.settings(),
+                        hosted.limits,
+                        makeProgress(context, command.go().progress())};
   *sceneQuery.message.mutable_navigation() = std::get<v1::NavigationQuery>(std::move(query));
   hosted.queries.submitPath(
       std::move(sceneQuery),

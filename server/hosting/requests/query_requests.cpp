@@ -8,20 +8,6 @@
 namespace enfilade::server {
 namespace {
 
-/// Sends a message to the client with each further per cent.
-std::function<void(double)> makeProgress(const RequestContext& context) {
-  return [out = context.client.out, id = context.message.request_id(),
-          last = 0](double share) mutable {
-    const int percent = static_cast<int>(100 * share);
-    if (percent <= last) return;
-    last = percent;
-    v1::ServerMessage message;
-    message.mutable_navigation_progress()->set_request_id(id);
-    message.mutable_navigation_progress()->set_share(share);
-    out->push(encodeShared(message));
-  };
-}
-
 /// Passes the bytes of meshes on, also those of an upload.
 void loadMesh(const RequestContext& context, const v1::NavigationQuery& query) {
   auto mesh = takeBytes(context.client, query.load_mesh().mesh(), query.load_mesh().uploaded(),
@@ -85,8 +71,7 @@ class BoundedNames {
 
 void handleNavigation(const RequestContext& context, const v1::NavigationQuery& query) {
   if (query.has_load_mesh()) return loadMesh(context, query);
-  forwardQuery(context, query, "navigation.tick",
-               query.progress() ? makeProgress(context) : std::function<void(double)>());
+  forwardQuery(context, query, "navigation.tick", makeProgress(context, query.progress()));
 }
 
 void handleDescribe(const RequestContext& context, const v1::DescribeEntities& request) {

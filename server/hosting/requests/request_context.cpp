@@ -50,4 +50,18 @@ std::function<void(EncodedMessage)> deferReply(const RequestContext& context,
   };
 }
 
+std::function<void(double)> makeProgress(const RequestContext& context, bool isWanted) {
+  if (!isWanted) return {};
+  return [out = context.client.out, id = context.message.request_id(),
+          last = 0](double share) mutable {
+    const int percent = static_cast<int>(100 * share);
+    if (percent == last) return;
+    last = percent;
+    v1::ServerMessage message;
+    message.mutable_navigation_progress()->set_request_id(id);
+    message.mutable_navigation_progress()->set_share(share);
+    out->push(encodeShared(message));
+  };
+}
+
 }  // namespace enfilade::server

@@ -1,6 +1,8 @@
 // A request that is being handled, and the ways to reply to it. Tick thread only.
 #pragma once
 
+#include <functional>
+
 #include "server/hosting/hosted_world.hpp"
 
 namespace enfilade::server {
@@ -31,5 +33,9 @@ void replyError(const RequestContext& context, v1::ErrorCode code, std::string r
 std::function<void(EncodedMessage)> deferReply(
     const RequestContext& context,
     void (OutgoingQueue::*deliver)(EncodedMessage) = &OutgoingQueue::push);
+
+/// Sends the share of navigation meshes to the client whenever its per cent changes; empty unless
+/// the request wants it. May be called by one thread at a time.
+std::function<void(double)> makeProgress(const RequestContext& context, bool isWanted);
 
 }  // namespace enfilade::server

@@ -64,7 +64,8 @@ class Avatar:
         place = messages.NavigationPlace(name=to) if isinstance(to, str) else \
             messages.NavigationPlace(point=vec(to))
         return self._client.command(self.name, go=messages.Go(
-            to=place, speed=speed, doors=doors_value(doors), max_drop=max_drop, lifts=lifts))
+            to=place, speed=speed, doors=doors_value(doors), max_drop=max_drop, lifts=lifts,
+            progress=True))  # each message restarts the wait for the reply
 
     def walk_and_wait(self, *along: Point, **options: Any) -> str:
         """walk(), then ticks in lockstep until it ends. Returns "arrived", or "blocked by NAME"."""

@@ -78,7 +78,7 @@ class Client:
         self._subscribed: Any = messages.Subscribe()
         self._sequence = 0  # of the last events
         self._answered = 0  # the request of the last reply taken
-        self._show_progress: Callable[[float], None] = lambda share: None  # of navigation meshes
+        self._show_progress: Optional[Callable[[float], None]] = None  # of navigation meshes
 
     # ---- the server --------------------------------------------------------------------------
 
@@ -187,7 +187,7 @@ class Client:
             self._states.append(results.state(message.state))
         elif body == "replay":
             self._replay = results.replay(message.replay)
-        elif body == "navigation_progress":
+        elif body == "navigation_progress" and self._show_progress:
             self._show_progress(message.navigation_progress.share)
         elif body == "frame":
             if not self._frames or self._frames[-1].message != message.frame:

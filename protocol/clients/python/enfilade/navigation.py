@@ -150,14 +150,17 @@ class Navigation:
         self.height = 1.75 if height is None else height
         self._options = {"radius": radius, "height": height, "speed": speed,
                          "doors": doors_value(doors)}
-        self._progress = progress or (lambda share: None)
+        self._progress = progress
         self.speed, self.doors = speed, doors
         self._report: Any = None  # the last reply
 
     def _ask(self, **query: Any) -> Tuple[Any, memoryview]:
         self._client._show_progress = self._progress
-        reply, attachment = self._client.request(  # each progress restarts the wait for the reply
-            navigation=messages.NavigationQuery(**self._options, progress=True, **query))
+        try:
+            reply, attachment = self._client.request(  # each progress restarts the wait for the reply
+                navigation=messages.NavigationQuery(**self._options, progress=True, **query))
+        finally:
+            self._client._show_progress = None  # that of other requests is not shown
         self._report = reply.navigation
         return reply.navigation, attachment
 
