@@ -12,6 +12,8 @@ namespace enfilade::render {
 /// The requested channels. Other channels cost nothing, and their vectors stay empty.
 struct Channels {
   bool rgb = true, ids = true, depth = true, normals = false;
+
+  bool isDepthOnly() const { return !rgb && !ids && !normals; }
 };
 
 /// Treatment of BLEND materials. `blend`: they tint the colour behind them and do not affect ids,

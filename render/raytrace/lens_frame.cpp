@@ -106,7 +106,12 @@ class LensTracer {
   }
 
   TraceContext makeContext(const Face& face, const std::vector<const RayTree*>& trees) const {
-    return {trees, face.rays, face.shading, origin_, options_.hiddenEntity};
+    return {trees,
+            face.rays,
+            face.shading,
+            origin_,
+            options_.hiddenEntity,
+            options_.channels.isDepthOnly()};
   }
 
   const ShadedTriangle& findShaded(Face& face, const TraceContext& trace, HitKey key) {

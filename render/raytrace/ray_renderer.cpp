@@ -128,13 +128,8 @@ class FrameTracer {
 
  private:
   TraceContext makeTraceContext(const std::vector<const RayTree*>& trees) const {
-    const Channels& channels = options_.channels;
-    return {trees,
-            rays_,
-            shading_,
-            origin_,
-            options_.hiddenEntity,
-            !channels.rgb && !channels.ids && !channels.normals};
+    return {
+        trees, rays_, shading_, origin_, options_.hiddenEntity, options_.channels.isDepthOnly()};
   }
   int endRow(std::size_t tile) const {
     return std::min(rays_.height, static_cast<int>(tile) * kTileSize + kTileSize);

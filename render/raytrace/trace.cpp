@@ -13,6 +13,7 @@ namespace {
 
 constexpr int kPacketSize = kTileSize * kTileSize;  // rays per packet
 constexpr double kCoplanarGap = 2e-5;               // metres, between surfaces in one plane
+constexpr double kMaxCoplanarSlack = 0.1;           // metres along a ray that grazes a surface
 constexpr double kMinCoplanarCosine = 1 - 1e-6;     // of their normals
 
 // A key: 3 bits of tree, 1 of geometry, 28 of instance (all ones: none), 32 of primitive.
@@ -181,7 +182,8 @@ HitKey chooseCoplanar(const TraceContext& trace, double x, double y, HitKey hit)
   // Embree's coordinates are floats, relative to the origin of the trees.
   const double rounding = 1e-6 * (place - trace.origin).cwiseAbs().maxCoeff();
   const double slack =
-      std::min((kCoplanarGap + rounding) / std::abs(normal.dot(direction)), 0.01 * z);
+      std::min((kCoplanarGap + rounding) / std::abs(normal.dot(direction)), kMaxCoplanarSlack);
+  const double meshRounding = 1e-7 * place.cwiseAbs().maxCoeff();  // its positions are floats, too
   std::vector<HitKey> keys;
   traceBetween(trace, x, y, z - slack, z + slack, keys);
   std::uint8_t rank = found.batch->coplanarRank();
@@ -191,7 +193,7 @@ HitKey chooseCoplanar(const TraceContext& trace, double x, double y, HitKey hit)
     if (other.batch->material->alpha != scene::Material::Alpha::opaque) continue;
     const std::array<Vec3, 3> c = other.corners(rays.eye);
     const Vec3 otherNormal = (c[1] - c[0]).cross(c[2] - c[0]).normalized();
-    if (!(std::abs(otherNormal.dot(point - c[0])) <= kCoplanarGap)) continue;
+    if (!(std::abs(otherNormal.dot(point - c[0])) <= kCoplanarGap + meshRounding)) continue;
     if (!(std::abs(otherNormal.dot(normal)) >= kMinCoplanarCosine)) continue;
     hit = key;
     rank = other.batch->coplanarRank();
@@ -371,7 +373,7 @@ HitKey traceFirst(const TraceContext& trace, double x, double y, double from, do
     key = makeHitKey(t, query.hit.instID[0], query.hit.geomID, query.hit.primID);
     query.hit.geomID = query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;  // the next must be nearer
   }
-  return key == kNoHit ? key : chooseCoplanar(trace, x, y, key);
+  return key == kNoHit || trace.isDepthOnly ? key : chooseCoplanar(trace, x, y, key);
 }
 
 bool isInShadow(const TraceContext& trace, double x, double y, double z) {

@@ -7,9 +7,12 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <map>
 #include <utility>
 #include <vector>
+
+#include "scene/model/draw_items.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -105,7 +108,8 @@ bool containsInPlane(const Triangle& of, const Triangle& t) {
 
 class CoplanarSearch {
  public:
-  explicit CoplanarSearch(const Model& model) : model_(model) {}
+  explicit CoplanarSearch(const Model& model)
+      : model_(model), bodyOfObject_(mapObjectsToBodies(model)) {}
 
   CoplanarSurfaces run() {
     for (std::uint32_t i = 0; i < model_.objects.size(); ++i) collectFacets(i);
@@ -124,7 +128,7 @@ class CoplanarSearch {
 
  private:
   const Material& getMaterial(const Facet& facet) const {
-    return model_.materials[model_.meshes[facet.mesh].material];
+    return findMaterial(model_, model_.meshes[facet.mesh]);
   }
 
   Triangle getTriangle(const Facet& facet) const {
@@ -140,8 +144,9 @@ class CoplanarSearch {
   void collectFacets(std::uint32_t index) {
     const Object& object = model_.objects[index];
     if (object.usage == Object::Usage::collisionOnly) return;
+    if (bodyOfObject_[index] && isTrigger(bodyOfObject_[index]->kind)) return;
     for (const std::uint32_t mesh : object.meshes) {
-      if (!isDrawnOpaque(model_.materials[model_.meshes[mesh].material])) continue;
+      if (!isDrawnOpaque(findMaterial(model_, model_.meshes[mesh]))) continue;
       const std::size_t indices = model_.meshes[mesh].indices.size();
       for (std::uint32_t first = 0; first + 2 < indices; first += 3) {
         Facet facet;
@@ -205,6 +210,7 @@ class CoplanarSearch {
   }
 
   const Model& model_;
+  const std::vector<const BodySpec*> bodyOfObject_;
   std::vector<Facet> facets_;
   std::map<ObjectPair, bool> pairs_;  ///< whether they look equal
   ObjectPair largest_;                ///< of those that do not
@@ -239,8 +245,10 @@ CoplanarSurfaces findCoplanarSurfaces(const Model& model) {
 }
 
 std::vector<CoplanarRank> rankCoplanarObjects(const Model& model) {
-  constexpr std::uint8_t kMaxRank = 255;
-  constexpr double kMargin = 1e-3;  // metres
+  constexpr std::uint8_t kMaxRank = 31;  // OpenGL draws by so many steps behind a plane
+  constexpr double kMargin = 1e-3;       // metres
+  constexpr double kEndless = std::numeric_limits<double>::infinity();
+  const Aabb everywhere{Vec3::Constant(-kEndless), Vec3::Constant(kEndless)};
   std::vector<CoplanarRank> ranks(model.objects.size());
   if (countTriangles(model) > kMaxRankedTriangles) return ranks;
   std::map<std::uint32_t, std::vector<std::uint32_t>> partners;
@@ -256,13 +264,15 @@ std::vector<CoplanarRank> rankCoplanarObjects(const Model& model) {
   }
   // An object yields to those of its partners that are smaller.
   std::ranges::sort(bySize);
+  const std::vector<const BodySpec*> bodyOfObject = mapObjectsToBodies(model);
   std::vector<bool> isRanked(model.objects.size(), false);
   for (const auto& [size, object] : bySize) {
     CoplanarRank& own = ranks[object];
     for (const std::uint32_t other : partners[object]) {
       if (!isRanked[other] || ranks[other].rank == kMaxRank) continue;
       own.rank = std::max<std::uint8_t>(own.rank, ranks[other].rank + 1);
-      own.lower.push_back(collision::inflated(boxes[other], kMargin));
+      const bool moves = bodyOfObject[object] || bodyOfObject[other];
+      own.lower.push_back(moves ? everywhere : collision::inflated(boxes[other], kMargin));
     }
     isRanked[object] = true;
   }

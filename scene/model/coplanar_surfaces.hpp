@@ -32,13 +32,14 @@ CoplanarSurfaces findCoplanarSurfaces(const Model& model);
 /// Decides which of coplanar surfaces is visible.
 struct CoplanarRank {
   std::uint8_t rank = 0;  ///< the lowest is visible
-  /// World boxes of the objects of lower rank that it shares planes with, inflated by a millimetre.
+  /// World boxes of the objects of lower rank that it shares planes with, inflated by a millimetre;
+  /// endless if one of both is of a body, which may move.
   std::vector<Aabb> lower;
 };
 
 /// One an object. Of coplanar surfaces that of the object with the smaller box has the lower rank,
 /// because details lie on large surfaces. In models of more than two million triangles all ranks
-/// are 0, since the search would delay the first picture by seconds.
+/// are 0, since the search would delay the first picture, or the first ray, by seconds.
 std::vector<CoplanarRank> rankCoplanarObjects(const Model& model);
 
 }  // namespace enfilade::scene

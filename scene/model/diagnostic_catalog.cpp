@@ -87,8 +87,8 @@ constexpr std::array kCatalog{
                    "points and lines are neither drawn nor solid"},
     DiagnosticKind{
         "coplanar_surfaces", note,
-        "surfaces of two objects in one plane: pictures show the smaller object; move one "
-        "by a millimetre to show the other"},
+        "surfaces of two objects in one plane: pictures show the smaller object, or, above two "
+        "million triangles, flicker; move one by a millimetre"},
     DiagnosticKind{"repeated_object", warning,
                    "the same shape twice in the same place; delete one, they flicker"},
     // appearance

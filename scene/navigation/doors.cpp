@@ -129,15 +129,17 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
           std::ranges::find_if(doors, [&](const DoorOnPath& d) { return d.body == body.index; });
       if (known != doors.end() && known->isInTheWay) continue;
       const bool isInTheWay = touches(snapshot, b);
-      if (known != doors.end()) {
-        known->isInTheWay = isInTheWay;
-      } else if (isInTheWay || touches(closed, b)) {
-        const double rest = findOpenLimit(spec) - body.jointPosition;
-        const double way = measureWay(isInTheWay ? snapshot : closed, b);
-        doors.push_back(
-            {body.index, i - 1, distance + way, computeMotionSeconds(spec, rest), isInTheWay});
-      }
+      if (!isInTheWay && (known != doors.end() || !touches(closed, b))) continue;
+      if (known != doors.end()) doors.erase(known);  // it stood further on than where it closes
+      const double rest = findOpenLimit(spec) - body.jointPosition;
+      const double way = measureWay(isInTheWay ? snapshot : closed, b);
+      doors.push_back(
+          {body.index, i - 1, distance + way, computeMotionSeconds(spec, rest), isInTheWay});
     }
+    const auto ofLeg = std::ranges::find(doors, i - 1, &DoorOnPath::point);
+    std::sort(ofLeg, doors.end(), [](const DoorOnPath& a, const DoorOnPath& b) {
+      return std::pair(a.distance, a.body) < std::pair(b.distance, b.body);
+    });
     distance += leg.norm();
   }
   return doors;
@@ -182,13 +184,6 @@ bool DoorSwing::touches(const Vec3& feet) {
 
 bool isLastOnLine(const std::vector<DoorOnPath>& doors, std::size_t index) {
   return index + 1 == doors.size() || doors[index + 1].point != doors[index].point;
-}
-
-double computeOpeningSeconds(const std::vector<DoorOnPath>& doors) {
-  double seconds = 0;
-  for (std::size_t i = 0; i < doors.size(); ++i)
-    if (isLastOnLine(doors, i)) seconds += doors[i].secondsToOpen;
-  return seconds;
 }
 
 }  // namespace enfilade::scene

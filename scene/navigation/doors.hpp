@@ -32,7 +32,7 @@ struct DoorOnPath {
 };
 
 /// Doors that an agent on the path would touch as they are in `snapshot`, or if they were closed,
-/// in the order of the path; for each line, by body.
+/// in the order of the path.
 std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings& settings,
                                         const Snapshot& snapshot, const NavigationAgent& agent,
                                         const std::vector<Vec3>& points);
@@ -67,8 +67,5 @@ class DoorSwing {
 
 /// False: the next door stands on the same line. Such doors, as the leaves of one, open together.
 bool isLastOnLine(const std::vector<DoorOnPath>& doors, std::size_t index);
-
-/// Seconds that a walk waits for the doors in all: of those on one line the last one counts.
-double computeOpeningSeconds(const std::vector<DoorOnPath>& doors);
 
 }  // namespace enfilade::scene

@@ -178,10 +178,11 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
   }
   path.reason = kNotFound;
   if (std::abs(places.back().y() - to.y()) > kHeightError) return path;
+  const bool hasSteps = finder.walker.takeCrossedSteps();
   rejoinMesh(finder, places);
   std::vector<Vec3> points = shortenPath(finder.walker, places, Shortcuts::all);
   pullTight(finder.walker, points);
-  if (finder.walker.takeCrossedSteps() && !walksOn(finder.walker, points, proof)) {
+  if ((finder.walker.takeCrossedSteps() || hasSteps) && !walksOn(finder.walker, points, proof)) {
     path.obstruction = proof.met.back();
     return path;
   }

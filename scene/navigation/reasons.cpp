@@ -154,7 +154,8 @@ void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& 
     path.reason = explainEnd(finder, stop, direction);
     return;
   }
-  path.reason = finder.world.findEntityName(stop.obstacle) + " is in the way";
+  const std::string name = finder.world.findEntityName(stop.obstacle);
+  path.reason = (name.empty() ? "an object without a name" : name) + " is in the way";
   const double width =
       measureNarrowest(finder.world, finder.agent, line, stop.footPosition, kMaxWidthDistance)
           .clearWidth;

@@ -21,7 +21,7 @@ std::string validateFile(const std::string& text) {
   return text.empty() ? "the file name is empty: give one, for example walk.mcap" : "";
 }
 
-/// Also checks that the file can be created where it is.
+/// A picture's name in a folder that exists.
 std::string validatePng(const std::string& text) {
   const std::filesystem::path file(text);
   if (file.extension() != ".png") return "'" + text + "' must end in .png";

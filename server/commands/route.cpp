@@ -217,14 +217,15 @@ ExitCode route(const RouteCommand& command) {
   const auto opened = scene::makeSnapshotWithOpenDoors(scene, command.settings);
   Progress bar;
   const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  std::unique_ptr<scene::Navigation> meshes[2];  // with doors as they are, and open
+  std::unique_ptr<scene::Navigation> asTheyAre, withOpenDoors;
   const auto provide = [&](bool open) -> scene::Navigation& {
-    if (!meshes[open])
-      meshes[open] = makeNavigation(
+    std::unique_ptr<scene::Navigation>& made = open ? withOpenDoors : asTheyAre;
+    if (!made)
+      made = makeNavigation(
           {scene, command.settings, command.agent, open, open ? opened : asFile, threads},
           [&](double done) { bar.show(done, "navigation mesh"); });
     bar.clear();
-    return *meshes[open];
+    return *made;
   };
   const bool doorsOpen = !command.doorsAsTheyAre;
   scene::Navigation& navigation = provide(doorsOpen);
@@ -240,7 +241,8 @@ ExitCode route(const RouteCommand& command) {
                     {},
                     [&]() -> scene::Navigation& { return provide(false); },
                     [&]() -> scene::EntityIndex& { return index; },
-                    closedDoors};
+                    closedDoors,
+                    "leave out --doors-as-they-are, or open it in the model"};
   if (scene::hasDoors(*scene))
     answer.withOpenDoors = [&]() -> scene::Navigation& { return provide(true); };
   v1::NavigationPath path;

@@ -11,7 +11,8 @@
 
 namespace enfilade::server {
 
-/// Histogram of durations. Buckets are 1/64 octave wide (1.1 %), from 1 ns to about 18 h.
+/// Histogram of durations. Buckets are 64 in each power of two (at most 1.6 % wide), from 1 ns to
+/// about 18 h.
 class DurationHistogram {
  public:
   void record(double seconds);

@@ -205,7 +205,7 @@ struct PathWriter {
     if (!door) return;
     if (isOfIslands) answer.closedDoors.emplace(islands, *door);
     const scene::BodySpec& spec = answer.scene.model().bodies[*door];
-    message.set_reason("the door '" + spec.name + "' is closed: open it, or ask with open doors");
+    message.set_reason("the door '" + spec.name + "' is closed: " + answer.doorRemedy);
     message.set_obstacle(spec.objects.front() + 1);
     message.set_obstacle_name(spec.name);
     message.clear_obstacle_at();  // these are about what an agent meets on other ways

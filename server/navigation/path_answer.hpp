@@ -30,6 +30,7 @@ struct PathAnswer {
   std::function<scene::Navigation&()> asTheyAre;  ///< the same with doors as they are
   std::function<scene::EntityIndex&()> index;     ///< built at the first call
   ClosedDoors& closedDoors;                       ///< those that are known, of `navigation`
+  const char* doorRemedy = "open it, or ask with open doors";  ///< of a closed door
 };
 
 /// The path from one place to another. `measuresWidth`: also its narrowest place.

@@ -205,6 +205,15 @@ class Environments(RoomCase):
                     vector.step(np.ones((3, 2)))
             vector.reset(seed=1)
 
+    def test_a_reward_that_is_set_on_an_environment_counts_in_its_vector(self):
+        vector = self.vector(3, starts=[(4, 0, 0, 0)])
+        vector.reset(seed=1)
+        vector.step(np.ones((3, 2)))
+        vector.envs[1].reward = lambda *given: 42.0
+        _, rewards, *_ = vector.step(np.ones((3, 2)))
+        self.assertEqual(rewards[1], 42)
+        self.assertNotIn(42, rewards[[0, 2]])
+
     def test_a_kept_request_replaces_its_numbers(self):
         m = enfilade.messages
         def drive(x, z):

@@ -6,6 +6,7 @@
 
 #include "render/raytrace/ray_renderer.hpp"
 #include "scene/model/coplanar_surfaces.hpp"
+#include "scene/world/world.hpp"
 #include "tests/render/render_fixtures.hpp"
 
 namespace enfilade::render {
@@ -45,6 +46,9 @@ std::vector<Camera> makeCameras(const scene::Scene& scene) {
   }
   cameras.back().projection = Camera::Projection::orthographic;
   cameras.back().heightY = 11;
+  cameras.push_back(cameras.back());  // the roof is around and behind the eye
+  cameras.back().eye = centre;
+  cameras.back().near = -30;
   return cameras;
 }
 
@@ -103,6 +107,45 @@ std::vector<std::uint8_t> listRanks(const scene::Model& model) {
   for (const scene::CoplanarRank& one : scene::rankCoplanarObjects(model))
     ranks.push_back(one.rank);
   return ranks;
+}
+
+TEST(Coplanar, APanelThatIsFlushWithAMovedLeafStaysVisible) {
+  // A leaf in a frame and a panel on it; both are of a body, and slide.
+  scene::Model model = makeScene({{{0, 0, 0}, {4, 3, 0.2}, coloured(0.2f, 0.2f, 0.8f)},
+                                  {{0, 0, 0.05}, {1, 1, 0.1}, coloured(0.9f, 0.1f, 0.1f)}})
+                           ->model();
+  scene::BodySpec door;
+  door.name = "door";
+  door.kind = scene::BodyKind::sliding;
+  door.objects = {0, 1};
+  door.axis = Vec3::UnitX();
+  door.high = 20;
+  model.bodies = {door};
+  const auto scene = std::make_shared<const scene::Scene>(std::move(model));
+  scene::World world(scene);
+  submitBodyCommand(world, {"door", scene::BodyCommand::Action::open, 0, 0, std::nullopt});
+  for (int tick = 0; tick < 60 * 60; ++tick) tickWorld(world);
+  const auto snapshot = world.snapshot();
+  const Vec3 at = snapshot->bodies->at(0).pose.translation;
+  ASSERT_GT(at.x(), 10);
+  Camera camera;
+  camera.eye = at + Vec3(0.7, 0.9, 3);
+  camera.forward = at - camera.eye;
+  camera.width = 200, camera.height = 150;
+  RayRenderer rays(scene);
+  GlRenderer gl(scene);
+  const Frame traced = rays.render(*snapshot, camera), drawn = gl.render(*snapshot, camera);
+  const auto panel = static_cast<std::size_t>(std::ranges::count(traced.ids, 2u));
+  EXPECT_GT(panel, 1000u);  // of 1162
+  EXPECT_LT(countDifferentIds(traced, drawn), traced.ids.size() / 200);
+  // The panel is a convex figure: no row has a gap in it.
+  for (int y = 0; y < camera.height; ++y) {
+    int changes = 0;
+    for (int x = 1; x < camera.width; ++x)
+      changes += (traced.ids[render::at(traced, x, y)] == 2) !=
+                 (traced.ids[render::at(traced, x - 1, y)] == 2);
+    EXPECT_LE(changes, 2) << y;
+  }
 }
 
 TEST(Coplanar, RanksFollowSizes) {

@@ -271,9 +271,48 @@ TEST(Doors, ThoseOnAPathAreFoundOpenOrClosed) {
 }
 
 TEST(Doors, LeavesOnOneLineOpenTogether) {
-  EXPECT_EQ(computeOpeningSeconds({}), 0);
-  EXPECT_EQ(computeOpeningSeconds({{0, 1, 2, 1.5, true}, {1, 1, 2, 2, true}, {2, 3, 5, 4, true}}),
-            6);
+  const std::vector<DoorOnPath> doors{{0, 1, 2, 1.5, true}, {1, 1, 2, 2, true}, {2, 3, 5, 4, true}};
+  EXPECT_FALSE(isLastOnLine(doors, 0));
+  EXPECT_TRUE(isLastOnLine(doors, 1));
+  EXPECT_TRUE(isLastOnLine(doors, 2));
+}
+
+TEST(Doors, OfOneLineAreListedAsTheyAreMet) {
+  // The second leaf of the model stands 2 m before the first one.
+  Model model = doorModel({});
+  const Model other = boxModel({{"gate", {3.98, 0.01, -2.9}, {4.02, 2, 2.9}}});
+  model.meshes.push_back(other.meshes[0]);
+  model.objects.push_back(other.objects[0]);
+  model.objects.back().meshes = {static_cast<std::uint32_t>(model.meshes.size() - 1)};
+  BodySpec gate = bodySpec("gate", BodyKind::sliding, {4});
+  gate.axis = Vec3::UnitY();
+  gate.high = 2.1;
+  model.bodies.push_back(gate);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  EntityIndex index(scene);
+  const auto doors =
+      findDoorsOnPath(index, {}, *World(scene).snapshot(), {}, {{1, 0, 0}, {11, 0, 0}});
+  ASSERT_EQ(doors.size(), 2u);
+  EXPECT_EQ(doors[0].body, 1u);
+  EXPECT_NEAR(doors[0].distance, 3.98 - 0.3 - 1, 0.02);
+  EXPECT_NEAR(doors[1].distance, 5.98 - 0.3 - 1, 0.02);
+}
+
+TEST(Doors, ADoorAjarIsWhereItStands) {
+  // It has opened by a quarter turn less than half: its closed pose is met before its leaf.
+  Model model = doorModel({});
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  World world(scene);
+  submitBodyCommand(world, {"door", BodyCommand::Action::open, 0, 0, std::nullopt});
+  EntityIndex index(scene);
+  // Walks along the wall, past the closed leaf's hinge side, and then through the open leaf's arc.
+  for (int tick = 0; tick < 600; ++tick) tickWorld(world);
+  const std::vector<Vec3> points{{5, 0, 0}, {6.2, 0, 0}, {8, 0, -0.49}};
+  const auto doors = findDoorsOnPath(index, {}, *world.snapshot(), {}, points);
+  ASSERT_EQ(doors.size(), 1u);
+  EXPECT_TRUE(doors[0].isInTheWay);
+  EXPECT_EQ(doors[0].point, 1u) << "on the second line, though its closed pose is on the first";
+  EXPECT_GT(doors[0].distance, 1.2);
 }
 
 }  // namespace

@@ -50,7 +50,7 @@ TEST_F(MeshProgress, GoReportsItIfItIsAsked) {
     EXPECT_EQ(shares.empty(), !isAsked);
     if (!isAsked) continue;
     EXPECT_TRUE(std::ranges::is_sorted(shares));
-    EXPECT_LT(shares.front(), 0.5);
+    EXPECT_LE(shares.front(), scene::Navigation::kTileShare);
     EXPECT_EQ(shares.back(), 1);
     EXPECT_TRUE(order(ann, orderGo(true)).empty()) << "the meshes are there";
   }
@@ -80,11 +80,11 @@ TEST(QueryService, AQueryReportsTheMeshesOfThoseBeforeIt) {
   ASSERT_GT(before, 2u);
   EXPECT_EQ(shares[before - 1], 1);
   ASSERT_GT(shares.size(), before);
-  EXPECT_LT(shares[before], 0.5) << "its own begin";
+  EXPECT_LE(shares[before], scene::Navigation::kTileShare) << "its own begin";
   EXPECT_EQ(shares.back(), 1);
 }
 
-/// The first world goes on when the second one knows its share.
+/// The first world continues when the second one knows its share.
 TEST(SharedMeshes, AWorldReportsTheMeshesThatAnotherOneBuilds) {
   const auto scene = smallRoom();
   const MeshRequest request{scene, {}, {}, false, scene::World(scene).snapshot()};
@@ -108,7 +108,7 @@ TEST(SharedMeshes, AWorldReportsTheMeshesThatAnotherOneBuilds) {
   EXPECT_EQ(unknown, 0);
   EXPECT_EQ(navigation->islands().size(), 1u);
   EXPECT_TRUE(std::ranges::is_sorted(shares));
-  EXPECT_LT(shares.front(), 0.5);
+  EXPECT_LE(shares.front(), scene::Navigation::kTileShare);
   EXPECT_EQ(shares.back(), 1);
 }
 

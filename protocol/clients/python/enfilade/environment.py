@@ -377,7 +377,8 @@ class WalkEnv(spaces.EnvBase):
         if not path.found:
             raise OrderFailed(f"episode {episode.id!r}: no path leads from {episode.start} to "
                               f"{episode.goal}: {path.reason}")
-        self._reached[(*episode.start, *episode.goal)] = path.length
+        if self.episodes is not None:
+            self._reached[(*episode.start, *episode.goal)] = path.length
         self._set_shortest(path.length)
 
     def _set_shortest(self, length: float) -> None:

@@ -15,12 +15,16 @@ from .world_group import Member, PackedSteps
 Result = Tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Dict[str, Any]]
 
 
+OWN_JUDGEMENTS = {"reward", "is_over"}  # functions that users set on an environment
+
+
 class PlainSteps:
     """The numbers are those of WalkEnv.step(), bit for bit: sines and roots come from math, because
     numpy's differ in the last digits."""
 
     def __init__(self, envs: Sequence[WalkEnv]) -> None:
         self._envs = envs
+        self.at = 0  # the environment that step() is at, or was when it failed
         self._members: List[Member] = [env.client for env in envs]
 
     @staticmethod
@@ -30,14 +34,15 @@ class PlainSteps:
                    (one.goal is None) == (envs[0].goal is None) for one in envs)
 
     def can_post(self) -> bool:
-        return all(env._feet is not None for env in self._envs) and \
+        return all(env._feet is not None and not OWN_JUDGEMENTS & vars(env).keys() for env in self._envs) and \
             not any(one.is_closed() for one in self._members)
 
     def step(self, meanings: Sequence[Tuple[float, float]], kept: Sequence[KeptRequest],
              ) -> Optional[Result]:
         """The result of VectorWalkEnv.step(). None if a step was refused or an avatar is gone: the
         replies are then left to be taken one by one."""
-        for env, member, request, meaning in zip(self._envs, self._members, kept, meanings):
+        for self.at, (env, member, request, meaning) in enumerate(
+                zip(self._envs, self._members, kept, meanings)):
             request.set(*env._turn(meaning))
             member.post_kept(request)
         steps: Optional[PackedSteps] = None
@@ -49,6 +54,7 @@ class PlainSteps:
         before = np.array([env._feet for env in self._envs])
         contacts = []
         for i, (env, member) in enumerate(zip(self._envs, self._members)):
+            self.at = i
             member.reply_to_kept()
             env._feet, env._stopped_by = steps.feet[i], steps.stopped_by[i]
             env._last_stopped = steps.last_stopped[i]

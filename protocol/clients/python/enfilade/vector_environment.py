@@ -165,7 +165,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             made = self._plain.step(meanings, [self._kept_of(i) for i in range(self.num_envs)])
         except Exception as error:
             self._over = np.ones(self.num_envs, bool)
-            raise self._numbered([(0, error)])
+            raise self._numbered([(self._plain.at, error)])
         if made is None:
             return self._step_each(over, lambda i: [])
         self._last = made[0]
