@@ -18,6 +18,7 @@
 namespace enfilade::scene {
 namespace {
 
+constexpr double kMinFloorArea = 5;  // square metres; less may be furniture
 constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile beyond the radius
 constexpr int kMaxRandomTries = 200;
 constexpr std::size_t kMaxLinkSets = 4;
@@ -188,7 +189,12 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
   PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};
   finder.passages = &passages_;
   const auto first = islandAt(from), last = islandAt(to);
-  if (first && last && first != last) finder.refusals = &refusals_[{*first, *last}];
+  // From furniture some places have a way down and others none: there a refusal says nothing.
+  const auto isFloor = [&](std::uint32_t island) {
+    return islands_.islands[island].area >= kMinFloorArea;
+  };
+  if (first && last && first != last && isFloor(*first) && isFloor(*last))
+    finder.refusals = &refusals_[{*first, *last}];
   NavigationPath path = scene::findPath(finder, from, to);
   finder.refusals = nullptr;
   if (path.found()) {

@@ -252,8 +252,8 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
   if (best.found()) return best;
   Refusals* refusals = finder.refusals;
   // From places off the mesh an agent may get farther than from the islands next to them.
-  if (refusals && refusals->count >= kMaxRefusals && findPolygonAt(finder.ample, start) &&
-      findPolygonAt(finder.ample, goal))
+  if (refusals && refusals->count >= kMaxRefusals && isOnMesh(finder, start) &&
+      isOnMesh(finder, goal))
     return refusals->last;
   best = findUnobstructedPath(finder, start, goal, proof);
   if (refusals) *refusals = best.found() ? Refusals() : Refusals{refusals->count + 1, best};

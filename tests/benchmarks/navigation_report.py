@@ -60,7 +60,8 @@ are counted by themselves, too. *Refused*: a closed door stands at the start. *S
 A flood fill tries every place of a grid of 2 cm by standing there (`flood_fill.hpp`): it uses no navigation
 mesh. A pair of places, drawn on all islands or anywhere in the fill, is *wrong* if a path is found and the fill
 does not connect it, or the other way round; what they find differently is judged by a fill of which each step is
-walked. *Walked*: an avatar walks the path to its end, and the grid misses it, as over cushions. *Near*: half a centimetre of radius, or a shift of the grid by one centimetre, changes the answer.
+walked. *Walked*: an avatar walks the path to its end, and the grid misses it, as over cushions. *Near*: half a centimetre
+of radius, or a shift of the grid by one centimetre, changes the answer.
 *Skipped*: an end is at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight, where an avatar can walk that; in brackets those where it cannot, or of
