@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "scene/model/draw_items.hpp"
+#include "scene/model/object_box.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -219,14 +220,6 @@ class CoplanarSearch {
   CoplanarSurfaces found_;
 };
 
-Aabb computeObjectAabb(const Model& model, const Object& object) {
-  Aabb box;
-  for (const std::uint32_t mesh : object.meshes)
-    for (const Eigen::Vector3f& position : model.meshes[mesh].positions)
-      box.include(object.worldFromMesh * position.cast<double>());
-  return box;
-}
-
 std::size_t countTriangles(const Model& model) {
   std::size_t triangles = 0;
   for (const Object& object : model.objects)
@@ -259,7 +252,7 @@ std::vector<CoplanarRank> rankCoplanarObjects(const Model& model) {
   std::map<std::uint32_t, Aabb> boxes;
   std::vector<std::pair<double, std::uint32_t>> bySize;
   for (const auto& [object, others] : partners) {
-    const Aabb& box = boxes[object] = computeObjectAabb(model, model.objects[object]);
+    const Aabb& box = boxes[object] = computeWorldAabb(model, model.objects[object]);
     bySize.emplace_back(box.size().norm(), object);
   }
   // An object yields to those of its partners that are smaller.

@@ -41,6 +41,15 @@ PassageList listParts(const NavigationMesh& mesh) {
   return list;
 }
 
+void forEachRimPlace(const NavigationMesh& mesh, double spacing,
+                     const std::function<void(const BoundaryEdge&, const Vec3&)>& visit) {
+  for (const BoundaryEdge& edge : mesh.collectBoundary()) {
+    const Vec3 along = edge.to - edge.from;
+    const int count = std::max(1, static_cast<int>(std::ceil(along.norm() / spacing)));
+    for (int i = 0; i < count; ++i) visit(edge, edge.from + (i + 0.5) / count * along);
+  }
+}
+
 std::vector<RimGap> findRimGaps(const NavigationMesh& mesh,
                                 const std::vector<std::uint32_t>& partOf, double reach,
                                 double heightReach) {
@@ -74,12 +83,7 @@ std::vector<RimGap> findRimGaps(const NavigationMesh& mesh,
     }
     for (const auto& [part, one] : nearest) add(one.gap, one.length);
   };
-  for (const BoundaryEdge& edge : mesh.collectBoundary()) {
-    const double length = (edge.to - edge.from).norm();
-    const int count = std::max(1, static_cast<int>(std::ceil(length / kSampleSpacing)));
-    for (int i = 0; i < count; ++i)
-      addGapsAt(edge, edge.from + (i + 0.5) / count * (edge.to - edge.from));
-  }
+  forEachRimPlace(mesh, kSampleSpacing, addGapsAt);
   std::vector<Candidate> candidates;
   for (const auto& [key, candidate] : clusters) candidates.push_back(candidate);
   std::ranges::stable_sort(candidates, {}, &Candidate::length);

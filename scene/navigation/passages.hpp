@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -34,6 +35,10 @@ struct PassageList {
 
 /// The parts of a mesh, without passages.
 PassageList listParts(const NavigationMesh& mesh);
+
+/// Calls `visit` for places along the rim of a mesh, at most `spacing` metres apart.
+void forEachRimPlace(const NavigationMesh& mesh, double spacing,
+                     const std::function<void(const BoundaryEdge&, const Vec3&)>& visit);
 
 /// Two places of the rim of a mesh that face each other, on different parts.
 struct RimGap {

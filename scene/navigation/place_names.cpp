@@ -5,6 +5,7 @@
 #include <optional>
 #include <string_view>
 
+#include "scene/model/object_box.hpp"
 #include "scene/model/shapes/space_solid.hpp"
 
 namespace enfilade::scene {
@@ -43,12 +44,6 @@ NamedPlaces findStoreys(const Scene& scene, std::string_view name) {
   return storeys;
 }
 
-void includeObject(const Model& model, const Object& object, Aabb& box) {
-  for (const std::uint32_t mesh : object.meshes)
-    for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
-      box.include(computeWorldPosition(object, model.meshes[mesh], i));
-}
-
 std::uint32_t findBodyOfObject(const Model& model, std::uint32_t object) {
   for (std::uint32_t body = 0; body < model.bodies.size(); ++body)
     if (std::ranges::count(model.bodies[body].objects, object) > 0) return body;
@@ -69,9 +64,7 @@ NamedPlaces findObjects(const Model& model, std::string_view name, double reach)
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
     const Object& object = model.objects[i];
     if (object.path != name && (object.globalId != name || name.empty())) continue;
-    Aabb box;
-    includeObject(model, object, box);
-    addPlaceAround(box, findBodyOfObject(model, i), reach, objects);
+    addPlaceAround(computeWorldAabb(model, object), findBodyOfObject(model, i), reach, objects);
   }
   return objects;
 }
@@ -83,7 +76,7 @@ NamedPlaces findBodies(const Model& model, std::string_view name, double reach) 
     if (body.name != name) continue;
     Aabb box;
     for (const std::uint32_t object : body.objects)
-      includeObject(model, model.objects[object], box);
+      box.include(computeWorldAabb(model, model.objects[object]));
     addPlaceAround(box, i, reach, bodies);
   }
   return bodies;

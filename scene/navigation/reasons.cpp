@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <limits>
 #include <map>
@@ -12,6 +11,7 @@
 #include <utility>
 
 #include "scene/navigation/clear_width.hpp"
+#include "scene/navigation/passages.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -94,11 +94,7 @@ std::vector<PartGap> findClosestGaps(const NavigationMesh& mesh,
       if (!isNew && gap.length() < known->second.length()) known->second = gap;
     }
   };
-  for (const BoundaryEdge& edge : mesh.collectBoundary()) {
-    const Vec3 along = edge.to - edge.from;
-    const int count = std::max(1, static_cast<int>(std::ceil(along.norm() / kRimSpacing)));
-    for (int i = 0; i < count; ++i) addGapsAt(edge, edge.from + (i + 0.5) / count * along);
-  }
+  forEachRimPlace(mesh, kRimSpacing, addGapsAt);
   std::vector<PartGap> gaps;
   for (const auto& [parts, gap] : closest) {
     gaps.push_back(gap);

@@ -214,12 +214,13 @@ ExitCode route(const RouteCommand& command) {
   const Place start = parsePlace(command.from, "FROM", *scene, command.agent.radius);
   const Place goal = parsePlace(command.to, "TO", *scene, command.agent.radius);
   const auto asFile = scene::World(scene, command.settings).snapshot();
-  const auto opened = scene::makeSnapshotWithOpenDoors(scene, command.settings);
+  std::shared_ptr<const scene::Snapshot> opened;  // once it is needed: doors take their time
   Progress bar;
   const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   std::unique_ptr<scene::Navigation> asTheyAre, withOpenDoors;
   const auto provide = [&](bool open) -> scene::Navigation& {
     std::unique_ptr<scene::Navigation>& made = open ? withOpenDoors : asTheyAre;
+    if (open && !opened) opened = scene::makeSnapshotWithOpenDoors(scene, command.settings);
     if (!made)
       made = makeNavigation(
           {scene, command.settings, command.agent, open, open ? opened : asFile, threads},

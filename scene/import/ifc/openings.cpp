@@ -6,6 +6,7 @@
 
 #include "scene/import/assembly/coordinates.hpp"
 #include "scene/model/add_diagnostic.hpp"
+#include "scene/model/object_box.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -228,9 +229,7 @@ bool isLargerThanOpenings(const Model& model, const IfcMetadata& metadata, const
   Aabb box;
   for (const Object& object : model.objects) {
     if (object.globalId != wall.globalId) continue;
-    for (const std::uint32_t mesh : object.meshes)
-      for (std::uint32_t i = 0; i < model.meshes[mesh].positions.size(); ++i)
-        box.include(computeWorldPosition(object, model.meshes[mesh], i));
+    box.include(computeWorldAabb(model, object));
   }
   if (box.empty()) return false;
   double openings = 0;

@@ -13,6 +13,7 @@
 #include <thread>
 
 #include "scene/model/hasher.hpp"
+#include "scene/model/object_box.hpp"
 
 namespace enfilade::scene {
 
@@ -308,14 +309,8 @@ const ObjectClasses& Scene::objectClasses() const {
 const std::vector<Aabb>& Scene::objectBoxes() const {
   std::call_once(boxesBuilt_, [this] {
     objectBoxes_.resize(model_.objects.size());
-    for (std::size_t i = 0; i < objectBoxes_.size(); ++i) {
-      const Object& object = model_.objects[i];
-      for (const std::uint32_t m : object.meshes) {
-        const Mesh& mesh = model_.meshes[m];
-        for (std::uint32_t v = 0; v < mesh.positions.size(); ++v)
-          objectBoxes_[i].include(computeWorldPosition(object, mesh, v));
-      }
-    }
+    for (std::size_t i = 0; i < objectBoxes_.size(); ++i)
+      objectBoxes_[i] = computeWorldAabb(model_, model_.objects[i]);
   });
   return objectBoxes_;
 }
