@@ -275,6 +275,7 @@ GlbJson SceneWriter::makeEntity(std::uint32_t index) const {
   if (!object.operationType.empty()) entity["operation"] = object.operationType;
   if (object.storey) entity["storey"] = model_.storeys[*object.storey].name;
   if (object.partOf) entity["partOf"] = toEntityId(*object.partOf);
+  if (const auto rank = scene_.coplanarRanks()[index].rank; rank > 0) entity["coplanarRank"] = rank;
   if (object.usage != scene::Object::Usage::both)
     entity["only"] = object.usage == scene::Object::Usage::visualOnly ? "drawn" : "solid";
   return entity;

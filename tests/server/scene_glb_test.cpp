@@ -126,6 +126,17 @@ TEST(SceneGlb, TheTableHasEveryObjectOnceWithWhatIsKnown) {
       << "solid shapes are not drawn";
 }
 
+TEST(SceneGlb, TheTableHasTheRanksOfSurfacesInOnePlane) {
+  const Model model = scene::testing::boxModel({{"wall", {0, 0, 0}, {4, 3, 0.3}},
+                                                {"panel", {1, 1, 0.1}, {2, 2, 0.3}},
+                                                {"far", {9, 0, 0}, {10, 1, 1}}});
+  const GlbReader file(writeSceneGlb(Scene(model)).bytes);
+  const auto& table = file.json.at("scenes").at(0).at("extras").at("entities");
+  EXPECT_EQ(table.at(0).at("coplanarRank"), 1) << "the panel is smaller, and visible";
+  EXPECT_FALSE(table.at(1).contains("coplanarRank"));
+  EXPECT_FALSE(table.at(2).contains("coplanarRank"));
+}
+
 TEST(SceneGlb, RepeatedMeshesAreInstancedUnlessMirroredOrSheared) {
   const Model model = repeatedBox();
   const SceneGlb glb = writeSceneGlb(Scene(model));

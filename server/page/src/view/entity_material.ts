@@ -6,6 +6,9 @@ import {
 
 const WIDTH = 1024; // texels in a row of the table
 
+/** Of normalised device depth: an object of coplanar rank r is drawn r steps behind its plane. 4 units of 24 bits. */
+const COPLANAR_STEP = 8 / 2 ** 24;
+
 export class EntityFlags {
   readonly texture: DataTexture;
   readonly #data: Uint8Array;
@@ -36,12 +39,21 @@ export class EntityFlags {
     this.texture.needsUpdate = true;
   }
 
+  setCoplanarRank(id: number, rank: number): void {
+    if (4 * id + 2 >= this.#data.length) return;
+    this.#data[4 * id + 2] = rank;
+    this.texture.needsUpdate = true;
+  }
+
   dispose(): void {
     this.texture.dispose();
   }
 }
 
-/** Parts of a vertex shader that hides and marks entities; `VERTEX_BODY` follows gl_Position. */
+/**
+ * Parts of a vertex shader that hides and marks entities, and decides which of the surfaces in one plane is visible;
+ * `VERTEX_BODY` follows gl_Position.
+ */
 export const VERTEX_HEAD = `
 attribute float entityId;
 uniform sampler2D entityFlags;
@@ -52,6 +64,7 @@ export const VERTEX_BODY = `
 int entity = int(entityId + 0.5);
 vec4 flags = texelFetch(entityFlags, ivec2(entity % ${WIDTH}, entity / ${WIDTH}), 0);
 entityMark = flags.g;
+gl_Position.z += ${COPLANAR_STEP.toExponential()} * floor(255.0 * flags.b + 0.5) * gl_Position.w;
 // All corners of a hidden object fall on one point behind the far plane: the triangle has no pixels.
 if (flags.r > 0.5) gl_Position = vec4(0.0, 0.0, 2.0, 1.0);
 `;

@@ -3,6 +3,7 @@ import {
   DoubleSide, ShaderMaterial, WebGLRenderTarget, type Camera, type Object3D, type PerspectiveCamera, type Scene,
   type WebGLRenderer,
 } from "three";
+import { VERTEX_BODY, VERTEX_HEAD } from "./entity_material";
 import type { SceneModel } from "./scene";
 
 /** Renders one child of a scene with one material. Rows run from the top, 4 bytes per pixel; the background is 0. */
@@ -35,8 +36,7 @@ export function renderOffscreen(
   return pixels;
 }
 
-const IDS_VERTEX = `
-attribute float entityId;
+const IDS_VERTEX = `${VERTEX_HEAD}
 flat varying float id;
 void main() {
   vec4 p = vec4(position, 1.0);
@@ -45,7 +45,7 @@ void main() {
   #endif
   id = entityId;
   gl_Position = projectionMatrix * modelViewMatrix * p;
-}
+${VERTEX_BODY}}
 `;
 const IDS_FRAGMENT = `
 flat varying float id;
@@ -55,14 +55,17 @@ void main() {
 }
 `;
 
-/** The entity of each pixel, rows from the top; 0: background. Transparent objects count as solid. */
+/** The entity of each pixel, rows from the top; 0: background. Transparent objects count as solid, hidden ones not. */
 export function renderIds(
   renderer: WebGLRenderer, model: SceneModel, camera: PerspectiveCamera, width: number, height: number,
 ): Uint32Array {
   const view = camera.clone();
   view.aspect = width / height;
   view.updateProjectionMatrix();
-  const material = new ShaderMaterial({ vertexShader: IDS_VERTEX, fragmentShader: IDS_FRAGMENT, side: DoubleSide });
+  const material = new ShaderMaterial({
+    vertexShader: IDS_VERTEX, fragmentShader: IDS_FRAGMENT, side: DoubleSide,
+    uniforms: { entityFlags: { value: model.flags.texture } },
+  });
   const pixels = renderOffscreen(renderer, model.root, view, material, width, height);
   material.dispose();
   const ids = new Uint32Array(width * height);

@@ -44,6 +44,7 @@ export class SceneModel {
   constructor(gltf: GLTF, table: EntityTable, bodies: Body[], maxId: number) {
     this.table = table;
     this.flags = new EntityFlags(maxId);
+    for (const { id, coplanarRank } of table.byId.values()) this.flags.setCoplanarRank(id, coplanarRank);
     for (const body of bodies) this.#origins.set(body.id, toVector(body.origin));
     const file = sortMeshes(gltf, table);
     this.withoutEntity = file.withoutEntity;

@@ -8,6 +8,7 @@ export interface Entity {
   globalId: string;
   class: string;
   storey: string;
+  coplanarRank: number; // of surfaces in one plane the lowest is visible
 }
 
 const IDS_PER_REQUEST = 20_000; // replies then stay far below 8 MiB
@@ -44,7 +45,10 @@ export class EntityTable {
     const id = Number(fields.entity ?? fields.id);
     if (!Number.isInteger(id) || id <= 0) return;
     const path = toText(fields.path) || toText(fields.name) || `object ${id}`;
-    this.add({ id, path, globalId: toText(fields.globalId), class: toText(fields.class), storey: toText(fields.storey) });
+    const coplanarRank = Math.min(255, Math.max(0, Math.trunc(Number(fields.coplanarRank ?? 0)) || 0));
+    this.add({
+      id, path, globalId: toText(fields.globalId), class: toText(fields.class), storey: toText(fields.storey), coplanarRank,
+    });
   }
 
   /** Takes the storeys and spaces of a scene file. Unknown or wrong fields are left out. */
@@ -68,7 +72,7 @@ export class EntityTable {
       const ids = missing.slice(from, from + IDS_PER_REQUEST);
       const { entities } = await connection.request("describe", { ids });
       for (const { id, kind, name, globalId } of entities) {
-        if (kind === Entity_Kind.OBJECT) this.add({ id, path: name, globalId, class: "", storey: "" });
+        if (kind === Entity_Kind.OBJECT) this.add({ id, path: name, globalId, class: "", storey: "", coplanarRank: 0 });
       }
     }
   }
