@@ -349,10 +349,6 @@ void addWalkOptions(CLI::App& walk, CommandArguments& into) {
   walk.add_option("--token", into.token, "Token, if the server requires one; or ENFILADE_TOKEN")
       ->envname("ENFILADE_TOKEN")
       ->type_name("TOKEN");
-  walk.add_option("--model", into.mapModel,
-                  "The server's model file: its walls and doors are drawn in the map")
-      ->type_name("FILE")
-      ->check(CLI::ExistingFile);
   walk.footer("Example: enfilade walk walk.jsonl --connect 127.0.0.1:7878 --out out");
 }
 

@@ -24,7 +24,7 @@ namespace enfilade::server {
 struct CommandArguments {
   DoctorCommand doctor;
   ModelArguments model;
-  std::string script, out, plan, planFormat = "png", listen = "127.0.0.1:7878", connect, mapModel;
+  std::string script, out, plan, planFormat = "png", listen = "127.0.0.1:7878", connect;
   double planScale = 100, maxMegabytes = 50;
   std::string from, then, run, world, token, samples;
   RecordingChoice record;

@@ -258,8 +258,9 @@ const Verb kVerbs[] = {
      }},
     {"walk", "Run a walk script on a server", addWalkOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
-       return WalkCommand{read.script, read.out,    *parseHostPort(read.connect), read.world,
-                          read.token,  read.strict, parseSamples(read),           read.mapModel};
+       return WalkCommand{read.script,       read.out,   *parseHostPort(read.connect),
+                          read.world,        read.token, read.strict,
+                          parseSamples(read)};
      }},
     {"doctor", "Test all graphics devices and report missing components", addDoctorOptions,
      [](const CLI::App&, const CommandArguments& read) -> ParsedCommand { return read.doctor; }},
@@ -273,7 +274,9 @@ const Verb kVerbs[] = {
        return command;
      }},
     {"inspect", "Report the contents and problems of a scene or a recording", addInspectOptions,
-     [](const CLI::App&, const CommandArguments& read) -> ParsedCommand {
+     [](const CLI::App& verb, const CommandArguments& read) -> ParsedCommand {
+       if (read.planFormat == "png" && verb.count("--plan-scale") > 0)
+         return reportMisuse("inspect", "--plan-scale needs --plan-format svg or pdf");
        return InspectCommand{makeModelOptions(read.model),
                              read.json,
                              read.objects,

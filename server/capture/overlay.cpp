@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "render/image/canvas.hpp"
-#include "server/plans/label_names.hpp"
+#include "server/floors/label_names.hpp"
 #include "server/plans/plan_image.hpp"
 
 namespace enfilade::server {

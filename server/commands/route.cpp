@@ -200,7 +200,8 @@ void writePlan(const std::shared_ptr<const scene::Scene>& scene,
                const std::shared_ptr<const scene::Snapshot>& snapshot, const WalkTrace& trace,
                const std::filesystem::path& file) {
   render::RendererSelector renderer(scene);
-  const auto image = drawMap(trace, {makePlanRenderer(renderer, snapshot), scene.get()});
+  const auto image =
+      drawMap(trace, {makePlanRenderer(renderer, snapshot), makeFloorPlanSource(scene)});
   if (!image) throw std::runtime_error("the plan cannot be drawn: " + file.string());
   render::writePng(file, *image);
   logInfo("plan: {}", file.string());

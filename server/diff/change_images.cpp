@@ -327,7 +327,7 @@ void drawChangeMap(const WalkDifference& difference, const ComparedModels& model
       trace.blockedWalks.push_back({change.after->position, Vec3::UnitX()});
   const PlanRenderer renderPlan =
       makePlanRenderer(*models.afterRenderer, scene::World(models.after).snapshot());
-  const auto map = drawMap(trace, {renderPlan, models.after.get()});
+  const auto map = drawMap(trace, {renderPlan, makeFloorPlanSource(models.after)});
   if (map) render::writePng(folder / "changes" / "map.png", *map);
 }
 

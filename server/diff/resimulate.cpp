@@ -209,7 +209,7 @@ std::vector<RefusedCommand> resimulateWalk(const ResimulateCommand& command,
   summary.maxPairs = std::max(summary.maxPairs, summary.metrics.pairs());
   PlanRenderer renderPlan = [](const render::Camera&) { return std::nullopt; };
   if (renderer) renderPlan = makePlanRenderer(*renderer, world.snapshot());
-  report.writePictures(summary, {std::move(renderPlan), scene.get()});
+  report.writePictures(summary, {std::move(renderPlan), makeFloorPlanSource(scene)});
   report.writeContacts(driver.endContacts());
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - startTime;
   summary.wallSeconds = elapsed.count();

@@ -10,6 +10,7 @@
 #include "collision/assert.hpp"
 #include "server/base/work_thread.hpp"
 #include "server/log/log.hpp"
+#include "server/floors/plan_messages.hpp"
 #include "server/messages/proximity_messages.hpp"
 #include "server/messages/ray_messages.hpp"
 #include "server/messages/world_messages.hpp"
@@ -24,6 +25,7 @@ struct QueryService::State {
   std::optional<scene::RayCaster> caster;                 ///< built at the first ray query
   std::shared_ptr<const scene::Snapshot> casterSnapshot;  ///< state of the caster's moving entities
   std::optional<scene::EntityIndex> index;                ///< built at the first proximity query
+  FloorPlanSource floorPlans;                             ///< built at the first plan
   NavigationService navigation;                           ///< used by its thread alone
   std::mutex pendingMutex;
   /// Navigation queries without an answer: also those that wait learn the share of meshes.
@@ -34,6 +36,7 @@ struct QueryService::State {
   scene::SceneAt makeSceneAt(const SceneQuery& query);
   std::variant<v1::RayReply, v1::Error> answerRays(const SceneQuery& query,
                                                    std::vector<std::uint8_t>& attachment);
+  std::variant<v1::FloorPlan, v1::Error> answerPlan(const SceneQuery& query);
   std::variant<v1::NavigationReply, v1::Error> answerNavigation(
       const SceneQuery& query, std::vector<std::uint8_t>& attachment);
   void postNavigation(const std::shared_ptr<const SceneQuery>& query, std::function<void()> answer);
@@ -68,6 +71,11 @@ std::variant<v1::RayReply, v1::Error> QueryService::State::answerRays(
   if (auto* error = std::get_if<v1::Error>(&resolved)) return std::move(*error);
   return castRays(std::get<ResolvedRayQuery>(resolved), casterAt(query.snapshot), *scene,
                   *query.snapshot, attachment);
+}
+
+std::variant<v1::FloorPlan, v1::Error> QueryService::State::answerPlan(const SceneQuery& query) {
+  if (!floorPlans) floorPlans = makeFloorPlanSource(scene);
+  return answerFloorPlan(query.message.floor_plan(), floorPlans, query.limits);
 }
 
 std::variant<v1::NavigationReply, v1::Error> QueryService::State::answerNavigation(
@@ -122,6 +130,8 @@ EncodedMessage QueryService::State::answerQuery(const SceneQuery& query) {
     setReply(reply,
              answerTouching(message.touching(), makeSceneAt(query), query.settings, query.limits),
              &v1::ServerMessage::mutable_touching);
+  else if (message.has_floor_plan())
+    setReply(reply, answerPlan(query), &v1::ServerMessage::mutable_floor_plan);
   else if (message.has_navigation())
     setReply(reply, answerNavigation(query, attachment), &v1::ServerMessage::mutable_navigation);
   else
@@ -149,7 +159,7 @@ QueryService::~QueryService() {
 void QueryService::submit(SceneQuery query, std::function<void(EncodedMessage)> done) {
   ENFILADE_ASSERT(query.message.has_rays() || query.message.has_distances() ||
                   query.message.has_touching() || query.message.has_cannot_touch() ||
-                  query.message.has_navigation());
+                  query.message.has_floor_plan() || query.message.has_navigation());
   const auto shared = std::make_shared<const SceneQuery>(std::move(query));
   auto answer = [state = state_.get(), shared, done = std::move(done)] {
     done(state->answerSafely(*shared));

@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdio>
 
-#include "server/plans/floor_plan_section.hpp"
+#include "server/floors/floor_plan.hpp"
 #include "server/plans/plan_drawing.hpp"
 #include "server/plans/space_names.hpp"
 
@@ -22,10 +22,11 @@ constexpr double kPointsPerMetre = 72 / 0.0254;        // of a page
 constexpr double kPageUnit = 0.7;                      // points of a thin line
 
 /// The plan shows the bounds of the section, without lawns and roofs; without a section, the scene.
-Aabb computePlanArea(const scene::Scene& scene, double height) {
+Aabb computePlanArea(const scene::Scene& scene, const FloorPlan& plan) {
   Aabb area;
-  for (const ObjectSection& section : cutStatic(scene, height)) {
-    for (const auto* lines : {&section.loops, &section.lines})
+  for (const PlanShape& shape : plan.shapes) {
+    if (shape.kind != PlanShape::Kind::wall && shape.kind != PlanShape::Kind::furniture) continue;
+    for (const auto* lines : {&shape.loops, &shape.lines})
       for (const auto& line : *lines)
         for (const Vec3& point : line) area.include(point);
   }
@@ -40,32 +41,30 @@ Aabb computePlanArea(const scene::Scene& scene, double height) {
 constexpr double kLeft = 64, kRight = 24, kBottom = 82;
 constexpr double kMinWidth = 560;  // thin lines, of a sheet
 
-std::string formatTitle(const scene::Scene& scene, const StoreyFloor& storey) {
+std::string formatTitle(const scene::Scene& scene, const FloorPlan& plan) {
   const std::string& source = scene.model().source;
   const std::string file = source.substr(source.find_last_of('/') + 1);
-  return storey.name.empty() ? file : file + ": " + storey.name;
+  return plan.storey.empty() ? file : file + ": " + plan.storey;
 }
 
-std::string formatNote(const StoreyFloor& storey, const std::string& scale) {
-  return formatFloorAndCut(storey.height) + (scale.empty() ? "" : ", " + scale) +
+std::string formatNote(const FloorPlan& plan, const std::string& scale) {
+  return formatFloorAndCut(plan.floor) + (scale.empty() ? "" : ", " + scale) +
          "; metres of the scene; facing 0 looks right (+x), 90 up (-z)";
 }
 
 /// A plan with its heading, names of rooms and scale bar; their places are known before the canvas.
 class PlanSheet {
  public:
-  PlanSheet(const scene::Scene& scene, const StoreyFloor& storey, const render::Camera& camera,
+  PlanSheet(const scene::Scene& scene, const FloorPlan& plan, const render::Camera& camera,
             double unitsPerMetre, double unit, const std::string& scale)
       : width_(std::max(kMinWidth * unit, (kLeft + kRight) * unit + camera.width * unitsPerMetre *
                                                                         camera.heightY /
                                                                         camera.height)),
-        heading_(
-            makePlanHeading(formatTitle(scene, storey), formatNote(storey, scale), width_, unit)),
-        view_(makePlanView(camera, storey.height, {kLeft * unit, heading_.height}, unitsPerMetre,
-                           unit)),
+        heading_(makePlanHeading(formatTitle(scene, plan), formatNote(plan, scale), width_, unit)),
+        view_(
+            makePlanView(camera, plan.floor, {kLeft * unit, heading_.height}, unitsPerMetre, unit)),
         names_(view_.box(), unit, entries_) {
-    if (storey.storey)
-      placeSpaceNames(names_, Canvas(1, 1, kPlanPaper), view_, scene.model(), *storey.storey);
+    placeSpaceNames(names_, Canvas(1, 1, kPlanPaper), view_, plan.rooms);
   }
 
   double width() const { return width_; }
@@ -74,14 +73,14 @@ class PlanSheet {
            measureEntries(entries_, entriesWidth(), view_.unit);
   }
 
-  void draw(Canvas& canvas, const scene::Scene& scene, const PlanPicture& picture) const {
+  void draw(Canvas& canvas, const FloorPlan& plan, const PlanPicture& picture) const {
     drawPlanPicture(canvas, view_, picture);
     drawGrid(canvas, view_);
-    drawCut(canvas, view_, scene);
+    drawFloorPlan(canvas, view_, plan);
     names_.drawLeaders(canvas);
     names_.drawTexts(canvas);
     const double below = view_.topLeft.y + view_.height();
-    drawScaleBar(canvas, view_, {view_.topLeft.x, below + 42 * view_.unit}, scene.model().north);
+    drawScaleBar(canvas, view_, {view_.topLeft.x, below + 42 * view_.unit}, plan.north);
     drawEntries(canvas, entries_, {view_.topLeft.x, below + (kBottom - 4) * view_.unit},
                 entriesWidth(), view_.unit);
     drawPlanHeading(canvas, heading_, view_.unit);
@@ -102,29 +101,30 @@ class PlanSheet {
 
 std::optional<Image> drawStoreyPlan(const scene::Scene& scene, const StoreyFloor& storey,
                                     const PlanRenderer& renderPlan) {
-  const render::Camera camera = makePlanCamera(
-      computePlanArea(scene, storey.height + kPlanCutHeight), storey.height, kMaxWidth, kMaxHeight);
+  const FloorPlan plan = computeFloorPlan(scene, storey);
+  const render::Camera camera =
+      makePlanCamera(computePlanArea(scene, plan), plan.floor, kMaxWidth, kMaxHeight);
   const std::optional<PlanPicture> picture = renderPlan(camera);
   if (!picture) return std::nullopt;
-  const PlanSheet sheet(scene, storey, camera, camera.height / camera.heightY, 1, "");
+  const PlanSheet sheet(scene, plan, camera, camera.height / camera.heightY, 1, "");
   Canvas canvas(static_cast<int>(sheet.width()), static_cast<int>(sheet.height()), kPlanPaper);
-  sheet.draw(canvas, scene, *picture);
+  sheet.draw(canvas, plan, *picture);
   return canvas.toImage();
 }
 
 bool writeStoreyPage(const scene::Scene& scene, const StoreyFloor& storey,
                      const PlanRenderer& renderPlan, double scale,
                      const std::filesystem::path& file) {
+  const FloorPlan plan = computeFloorPlan(scene, storey);
   const render::Camera camera =
-      makePlanCamera(computePlanArea(scene, storey.height + kPlanCutHeight), storey.height,
-                     2 * kMaxWidth, 2 * kMaxHeight);
+      makePlanCamera(computePlanArea(scene, plan), plan.floor, 2 * kMaxWidth, 2 * kMaxHeight);
   const std::optional<PlanPicture> picture = renderPlan(camera);
   if (!picture) return false;
   std::array<char, 32> text{};
   std::snprintf(text.data(), text.size(), "scale 1:%.10g", scale);
-  const PlanSheet sheet(scene, storey, camera, kPointsPerMetre / scale, kPageUnit, text.data());
+  const PlanSheet sheet(scene, plan, camera, kPointsPerMetre / scale, kPageUnit, text.data());
   Canvas canvas(file, sheet.width(), sheet.height(), {255, 255, 255});
-  sheet.draw(canvas, scene, *picture);
+  sheet.draw(canvas, plan, *picture);
   canvas.finish();
   return true;
 }

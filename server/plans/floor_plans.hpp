@@ -5,8 +5,8 @@
 #include <optional>
 
 #include "scene/world/data/scene.hpp"
+#include "server/floors/storeys.hpp"
 #include "server/plans/plan_image.hpp"
-#include "server/plans/storeys.hpp"
 
 namespace enfilade::server {
 

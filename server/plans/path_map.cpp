@@ -8,7 +8,7 @@
 #include <cmath>
 #include <utility>
 
-#include "server/plans/floor_plans.hpp"
+#include "server/floors/storey_heights.hpp"
 #include "server/plans/path_style.hpp"
 #include "server/plans/plan_drawing.hpp"
 #include "server/plans/storey_marks.hpp"
@@ -23,18 +23,19 @@ using render::TextStyle;
 
 constexpr double kMinTickShare = 0.08;  // minimum share of ticks for a storey with a plan
 constexpr std::size_t kMaxMapStoreys = 3;
-constexpr double kMapMargin = 4.0;                           // metres around the walked area
+constexpr double kMapMargin = 4.0;  // metres around the walked area
+// Metres from the walked area to an order that the map still shows: a Spawn may name any place.
+constexpr double kMaxOrderDistance = 20.0;
 constexpr double kMaxMapWidth = 1600, kMaxMapHeight = 1100;  // pixels of one plan
-constexpr double kMaxStoreyDistance = 0.6;        // metres between a walked floor and a storey's
-constexpr double kBorder = 48, kLineHeight = 26;  // pixels
-constexpr double kTitleSize = 18, kHeadingSize = 14;  // pixels
+constexpr double kBorder = 48, kLineHeight = 26;             // pixels
+constexpr double kTitleSize = 18, kHeadingSize = 14;         // pixels
 constexpr std::size_t kMaxTitleLines = 4;
 
 struct MapStorey {
   double floor = 0;
   render::Camera camera;
   PlanPicture picture;
-  const StoreyFloor* named = nullptr;  ///< the storey of the file; null: none is near
+  FloorPlan plan;  ///< empty: the scene is elsewhere
   std::vector<std::string> heading;
   PlanView view;  ///< once it has a place on the sheet
 };
@@ -44,7 +45,9 @@ scene::Aabb computeShownBounds(const WalkTrace& trace) {
   for (const WalkedPath& path : trace.paths) {
     for (const Vec3& feet : path.footPositions) bounds.include(feet);
   }
-  for (const MapContact& blocked : trace.blockedWalks) bounds.include(blocked.point);
+  const scene::Aabb reach = collision::inflated(bounds, kMaxOrderDistance);
+  for (const MapContact& blocked : trace.blockedWalks)
+    if (collision::contains(reach, {blocked.point, blocked.point})) bounds.include(blocked.point);
   return collision::inflated(bounds, kMapMargin);
 }
 
@@ -127,20 +130,12 @@ void drawLegend(Canvas& canvas, const std::vector<LegendEntry>& entries, Point a
 
 // ---- sheet --------------------------------------------------------------------------------------
 
-/// The storey of the file at this floor; null: none is near.
-const StoreyFloor* findStoreyAt(const std::vector<StoreyFloor>& storeys, double floor) {
-  const auto computeDistance = [&](const StoreyFloor& s) { return std::abs(s.height - floor); };
-  const auto nearest = std::ranges::min_element(storeys, {}, computeDistance);
-  return nearest != storeys.end() && computeDistance(*nearest) < kMaxStoreyDistance ? &*nearest
-                                                                                    : nullptr;
-}
-
 /// The storey's name, if it has any, and its floor; in lines of at most `width` pixels.
 std::vector<std::string> makeHeading(const MapStorey& storey, double width) {
   const std::string text = formatFloorAndCut(storey.floor);
-  const bool isNamed = storey.named != nullptr && !storey.named->name.empty();
+  const std::string& name = storey.plan.storey;
   return Canvas(1, 1, kPlanPaper)
-      .wrap(isNamed ? storey.named->name + ": " + text : text, makeStyle(kHeadingSize), width,
+      .wrap(name.empty() ? text : name + ": " + text, makeStyle(kHeadingSize), width,
             kMaxTitleLines);
 }
 
@@ -186,7 +181,7 @@ struct MapLayout {
 };
 
 void layOutMap(const WalkTrace& trace, std::vector<MapStorey>& storeys,
-               const std::vector<double>& floors, const scene::Scene* scene, MapLayout& layout) {
+               const std::vector<double>& floors, MapLayout& layout) {
   layout.width = computeSheetWidth(storeys);
   layout.title =
       Canvas(1, 1, kPlanPaper)
@@ -194,12 +189,8 @@ void layOutMap(const WalkTrace& trace, std::vector<MapStorey>& storeys,
   for (MapStorey& storey : storeys) storey.heading = makeHeading(storey, layout.inner());
   layout.legendTop =
       placeStoreys(storeys, kBorder + computeHeight(layout.title) + kLineHeight) + 2 * kLineHeight;
-  for (const MapStorey& storey : storeys) {
-    std::optional<PlanStorey> rooms;
-    if (storey.named != nullptr && storey.named->storey)
-      rooms = PlanStorey{&scene->model(), *storey.named->storey};
-    layout.marks.emplace_back(storey.view, floors, trace, rooms, layout.entries);
-  }
+  for (const MapStorey& storey : storeys)
+    layout.marks.emplace_back(storey.view, floors, trace, storey.plan.rooms, layout.entries);
   layout.legend = makeLegend(trace);
   layout.entriesTop =
       layout.legendTop +
@@ -208,11 +199,9 @@ void layOutMap(const WalkTrace& trace, std::vector<MapStorey>& storeys,
 }
 
 Image composeMap(const WalkTrace& trace, std::vector<MapStorey>& storeys,
-                 const std::vector<double>& floors, const scene::Scene* scene) {
-  const std::vector<StoreyFloor> named = scene ? findStoreys(*scene) : std::vector<StoreyFloor>();
-  for (MapStorey& storey : storeys) storey.named = findStoreyAt(named, storey.floor);
+                 const std::vector<double>& floors) {
   MapLayout layout;
-  layOutMap(trace, storeys, floors, scene, layout);
+  layOutMap(trace, storeys, floors, layout);
   Canvas canvas(static_cast<int>(layout.width), static_cast<int>(layout.height), kPlanPaper);
   drawLines(canvas, layout.title, {kBorder, kBorder}, makeStyle(kTitleSize, true));
   for (std::size_t i = 0; i < storeys.size(); ++i) {
@@ -222,11 +211,11 @@ Image composeMap(const WalkTrace& trace, std::vector<MapStorey>& storeys,
               makeStyle(kHeadingSize));
     drawPlanPicture(canvas, view, storeys[i].picture);
     drawGrid(canvas, view);
-    if (scene) drawCut(canvas, view, *scene);
+    drawFloorPlan(canvas, view, storeys[i].plan);
     layout.marks[i].draw(canvas);
   }
   drawScaleBar(canvas, storeys.front().view, {kBorder, layout.legendTop - 1.6 * kLineHeight},
-               scene ? scene->model().north : std::nullopt);
+               storeys.front().plan.north);
   drawLegend(canvas, layout.legend, {kBorder, layout.legendTop}, layout.inner());
   drawEntries(canvas, layout.entries, {kBorder, layout.entriesTop}, layout.inner(), 1);
   reportMissingFont(canvas);
@@ -261,10 +250,12 @@ std::optional<Image> drawMap(const WalkTrace& trace, const MapBackground& backgr
     std::optional<PlanPicture> picture = background.renderPlan(storey.camera);
     if (!picture) return std::nullopt;
     storey.picture = std::move(*picture);
+    if (background.findFloorPlan)
+      storey.plan = background.findFloorPlan(floor).value_or(FloorPlan());
     storeys.push_back(std::move(storey));
   }
   if (storeys.empty()) return std::nullopt;
-  return composeMap(trace, storeys, floors, background.scene);
+  return composeMap(trace, storeys, floors);
 }
 
 }  // namespace enfilade::server

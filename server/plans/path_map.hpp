@@ -4,7 +4,7 @@
 #include <optional>
 #include <vector>
 
-#include "scene/world/data/scene.hpp"
+#include "server/floors/floor_plan.hpp"
 #include "server/plans/plan_image.hpp"
 #include "server/plans/walk_trace.hpp"
 
@@ -16,7 +16,7 @@ std::vector<double> findWalkedStoreys(const std::vector<WalkedPath>& paths);
 /// The background of a map.
 struct MapBackground {
   PlanRenderer renderPlan;
-  const scene::Scene* scene = nullptr;  ///< for walls and doors; null: not in this process
+  FloorPlanSource findFloorPlan = nullptr;  ///< walls, doors and names of rooms; null: none
 };
 
 /// Draws the map; nullopt without paths or without a background.

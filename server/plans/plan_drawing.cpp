@@ -5,7 +5,6 @@
 #include <cstdio>
 
 #include "server/log/log.hpp"
-#include "server/plans/floor_plan_section.hpp"
 
 namespace enfilade::server {
 namespace {
@@ -15,7 +14,6 @@ using render::Colour;
 using render::Point;
 using render::TextStyle;
 
-constexpr double kCutWallBottom = 0.5, kCutWallTop = 2.0;  // metres above a floor that a wall spans
 constexpr double kMinGridSpacing = 70;  // thin lines between two numbers of the frame
 constexpr Colour kWall{52, 54, 62}, kFurniture{206, 210, 220}, kOutline{110, 114, 126},
     kDoor{150, 90, 30}, kGrid{214, 218, 228}, kAxis{180, 60, 40};
@@ -34,98 +32,43 @@ std::vector<std::vector<Point>> toPage(const PlanView& view,
   return page;
 }
 
-void strokeSection(Canvas& canvas, const PlanView& view, const ObjectSection& section,
-                   double thickness, Colour colour) {
-  for (std::vector<Point> loop : toPage(view, section.loops)) {
-    loop.push_back(loop.front());
-    canvas.polyline(loop, thickness, colour);
+/// How the shapes of a kind are drawn.
+struct ShapeStyle {
+  Colour stroke;
+  double thickness = 1;  ///< thin lines
+  std::optional<Colour> fill;
+  double opacity = 1;  ///< of the fill
+  render::LineKind line = render::LineKind::solid;
+};
+
+ShapeStyle makeShapeStyle(PlanShape::Kind kind) {
+  switch (kind) {
+    case PlanShape::Kind::furniture:
+      return {kOutline, 0.8, kFurniture, 0.8};
+    case PlanShape::Kind::wall:
+      return {kWall, 1.2, kWall};
+    case PlanShape::Kind::body:
+      return {kOutline, 1, kFurniture};
+    case PlanShape::Kind::door:
+      return {kDoor, 1, kDoor};
+    case PlanShape::Kind::openDoor:
+      return {kDoor, 1.5, std::nullopt};
+    case PlanShape::Kind::swing:
+      return {kDoor, 1, std::nullopt, 1, render::LineKind::dashed};
+    case PlanShape::Kind::lift:
+      return {kDoor, 1, std::nullopt};
   }
-  for (const auto& line : toPage(view, section.lines)) canvas.polyline(line, thickness, colour);
+  return {kOutline, 1, std::nullopt};
 }
 
-bool isWall(const PlanView& view, const scene::Aabb& box) {
-  return box.min.y() <= view.floor + kCutWallBottom && box.max.y() >= view.floor + kCutWallTop;
-}
-
-// ---- bodies -------------------------------------------------------------------------------------
-
-/// The section of a body's objects in their initial pose.
-ObjectSection cutBody(const scene::Scene& scene, const scene::BodySpec& body, double height) {
-  ObjectSection whole;
-  for (const std::uint32_t object : body.objects) {
-    ObjectSection part = cutObject(scene.model(), object, height);
-    whole.loops.insert(whole.loops.end(), part.loops.begin(), part.loops.end());
-    whole.lines.insert(whole.lines.end(), part.lines.begin(), part.lines.end());
-  }
-  return whole;
-}
-
-/// The point of a door's leaf that is farthest from its hinge.
-Vec3 findLeafEnd(const ObjectSection& section, const Vec3& hinge) {
-  Vec3 end = hinge;
-  double longest = 0;
-  for (const auto* lines : {&section.loops, &section.lines}) {
-    for (const auto& line : *lines) {
-      for (const Vec3& point : line) {
-        const double distance = std::hypot(point.x() - hinge.x(), point.z() - hinge.z());
-        if (distance > longest) longest = distance, end = point;
-      }
-    }
-  }
-  return end;
-}
-
-/// Arcs to the limits of the leaf, and the leaf at each.
-void drawSwing(Canvas& canvas, const PlanView& view, const scene::BodySpec& door,
-               const ObjectSection& section) {
-  const Point hinge = view.at(door.anchor), end = view.at(findLeafEnd(section, door.anchor));
-  const double radius = std::hypot(end.x - hinge.x, end.y - hinge.y);
-  const double closed = std::atan2(end.y - hinge.y, end.x - hinge.x);
-  // A positive turn about +y leads from +z to +x: against the page's angles.
-  const double sign = door.axis.y() > 0 ? -1 : 1;
-  for (const double limit : {door.low, door.high}) {
-    if (limit == 0) continue;
-    const double open = closed + sign * limit;
-    canvas.arc(hinge, radius, closed, open, view.unit, kDoor, render::LineKind::dashed);
-    canvas.line(hinge, {hinge.x + radius * std::cos(open), hinge.y + radius * std::sin(open)},
-                1.5 * view.unit, kDoor);
-  }
-}
-
-/// The leaf where it is open, dashed.
-void drawSlide(Canvas& canvas, const PlanView& view, const scene::BodySpec& door,
-               const ObjectSection& section) {
-  const double limit = std::abs(door.low) > std::abs(door.high) ? door.low : door.high;
-  for (std::vector<Vec3> loop : section.loops) {
-    loop.push_back(loop.front());
-    for (Vec3& point : loop) point += limit * door.axis;
-    canvas.polyline(toPage(view, loop), view.unit, kDoor, render::LineKind::dashed);
-  }
-}
-
-void drawLiftCross(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
-                   const scene::BodySpec& lift) {
-  scene::Aabb box;
-  for (const std::uint32_t object : lift.objects)
-    box.include(cutObject(scene.model(), object, view.floor).box);
-  if (box.empty()) return;
-  const Point a = view.at(box.min), b = view.at(box.max);
-  canvas.rectangle(a, b.x - a.x, b.y - a.y, view.unit, kDoor);
-  canvas.line(a, b, view.unit, kDoor);
-  canvas.line({a.x, b.y}, {b.x, a.y}, view.unit, kDoor);
-}
-
-void drawBody(Canvas& canvas, const PlanView& view, const scene::Scene& scene,
-              const scene::BodySpec& body) {
-  if (body.kind == scene::BodyKind::lift) return drawLiftCross(canvas, view, scene, body);
-  const ObjectSection section = cutBody(scene, body, view.floor + kPlanCutHeight);
-  if (section.empty() || isTrigger(body.kind)) return;
-  const bool isDoor = getTraits(body.kind).isDoor;
-  canvas.fill(toPage(view, section.loops), isDoor ? kDoor : kFurniture);
-  strokeSection(canvas, view, section, view.unit, isDoor ? kDoor : kOutline);
-  if (body.kind == scene::BodyKind::hinged && std::abs(body.axis.y()) > 0.9)
-    drawSwing(canvas, view, body, section);
-  if (body.kind == scene::BodyKind::sliding) drawSlide(canvas, view, body, section);
+void drawShape(Canvas& canvas, const PlanView& view, const PlanShape& shape) {
+  const ShapeStyle style = makeShapeStyle(shape.kind);
+  std::vector<std::vector<Point>> loops = toPage(view, shape.loops);
+  if (style.fill) canvas.fill(loops, *style.fill, style.opacity);
+  for (std::vector<Point>& loop : loops) loop.push_back(loop.front());
+  for (const auto& lines : {loops, toPage(view, shape.lines)})
+    for (const std::vector<Point>& line : lines)
+      canvas.polyline(line, style.thickness * view.unit, style.stroke, style.line);
 }
 
 // ---- grid ---------------------------------------------------------------------------------------
@@ -182,20 +125,9 @@ void drawPlanPicture(Canvas& canvas, const PlanView& view, const PlanPicture& pi
   canvas.image(makePlanBackground(picture), view.topLeft, view.width(), view.height());
 }
 
-void drawCut(Canvas& canvas, const PlanView& view, const scene::Scene& scene) {
+void drawFloorPlan(Canvas& canvas, const PlanView& view, const FloorPlan& plan) {
   canvas.beginClip(view.topLeft, view.width(), view.height());
-  const double height = view.floor + kPlanCutHeight;
-  const std::vector<ObjectSection> sections = cutStatic(scene, height);
-  // Walls come last: their edges stay sharp.
-  for (const bool walls : {false, true}) {
-    for (const ObjectSection& section : sections) {
-      if (isWall(view, section.box) != walls) continue;
-      canvas.fill(toPage(view, section.loops), walls ? kWall : kFurniture, walls ? 1 : 0.8);
-      strokeSection(canvas, view, section, (walls ? 1.2 : 0.8) * view.unit,
-                    walls ? kWall : kOutline);
-    }
-  }
-  for (const scene::BodySpec& body : scene.model().bodies) drawBody(canvas, view, scene, body);
+  for (const PlanShape& shape : plan.shapes) drawShape(canvas, view, shape);
   canvas.endClip();
 }
 

@@ -8,6 +8,7 @@
 
 #include "render/image/canvas.hpp"
 #include "scene/world/data/scene.hpp"
+#include "server/floors/floor_plan.hpp"
 #include "server/plans/captions.hpp"
 #include "server/plans/plan_image.hpp"
 
@@ -37,9 +38,8 @@ PlanView makePlanView(const render::Camera& camera, double floor, render::Point 
 /// Draws the picture as the background of the view.
 void drawPlanPicture(render::Canvas& canvas, const PlanView& view, const PlanPicture& picture);
 
-/// Draws what the cut plane meets. Objects that reach from the floor to above doors are walls and
-/// filled dark; others, as shelves and windows, are filled light.
-void drawCut(render::Canvas& canvas, const PlanView& view, const scene::Scene& scene);
+/// Draws the shapes of a plan: walls filled dark, furniture light, doors with their swing.
+void drawFloorPlan(render::Canvas& canvas, const PlanView& view, const FloorPlan& plan);
 
 /// Draws grid lines and their coordinates outside of the view, and a frame around it.
 void drawGrid(render::Canvas& canvas, const PlanView& view);

@@ -1,16 +1,15 @@
-// Plan views for walk maps and for `inspect --plan`: storey heights, plan cameras and plan
-// backgrounds.
+// Plan views for walk maps and for `inspect --plan`: plan cameras and plan backgrounds.
 #pragma once
 
 #include <functional>
 #include <memory>
 #include <optional>
-#include <span>
 #include <vector>
 
 #include "render/camera.hpp"
 #include "render/image/canvas.hpp"
 #include "scene/world/data/snapshot.hpp"
+#include "server/floors/storeys.hpp"
 
 namespace enfilade::render {
 class RendererSelector;
@@ -33,9 +32,6 @@ using PlanRenderer = std::function<std::optional<PlanPicture>(const render::Came
 PlanRenderer makePlanRenderer(render::RendererSelector& renderer,
                               std::shared_ptr<const scene::Snapshot> snapshot);
 
-inline constexpr double kPlanCutHeight = 1.2;  ///< metres above the floor: storeys are cut through
-                                               ///< the windows, as usual for floor plans
-
 inline constexpr render::Colour kPlanInk{40, 40, 46}, kPlanPaper{250, 249, 246};
 
 /// An avatar's colour in rendered pictures, in sRGB.
@@ -49,16 +45,5 @@ render::Camera makePlanCamera(const scene::Aabb& bounds, double floor, double ma
 /// Makes a background: fades the colours, so that marks stand out, and outlines objects, because
 /// cut walls are hollow and look like the floor.
 render::Image makePlanBackground(const PlanPicture& plan);
-
-/// A weighted height in metres, of feet or floors. `weight` > 0, in any unit.
-struct WeightedHeight {
-  double height = 0;
-  double weight = 1;
-};
-
-/// Finds the heights with most weight: at most `maxCount`, ascending, at least two metres apart.
-/// All but the first need at least `minShare` of the total weight.
-std::vector<double> findStoreyHeights(std::span<const WeightedHeight> heights, double minShare,
-                                      std::size_t maxCount);
 
 }  // namespace enfilade::server

@@ -170,9 +170,9 @@ void placeName(CaptionList& captions, const Canvas& measuring, const PlanView& v
 }  // namespace
 
 void placeSpaceNames(CaptionList& captions, const Canvas& measuring, const PlanView& view,
-                     const scene::Model& model, std::uint32_t storey) {
-  for (const scene::Space& space : model.spaces) {
-    if (space.storey != storey || space.box.empty()) continue;
+                     std::span<const scene::Space> spaces) {
+  for (const scene::Space& space : spaces) {
+    if (space.box.empty()) continue;
     if (space.longName.empty() && space.name.empty()) continue;
     const Vec3 low = space.box.min.cwiseMax(view.area.min),
                high = space.box.max.cwiseMin(view.area.max);

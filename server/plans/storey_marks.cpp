@@ -63,7 +63,7 @@ void drawWedge(Canvas& canvas, const Wedge& wedge) {
 }
 
 StoreyMarks::StoreyMarks(const PlanView& view, const std::vector<double>& floors,
-                         const WalkTrace& trace, const std::optional<PlanStorey>& storey,
+                         const WalkTrace& trace, std::span<const scene::Space> rooms,
                          std::vector<CaptionEntry>& entries)
     : view_(view), floors_(floors), captions_(view.box(), view.unit, entries) {
   const std::vector<PathStyle> styles = makePathStyles(trace.paths);
@@ -79,10 +79,7 @@ StoreyMarks::StoreyMarks(const PlanView& view, const std::vector<double>& floors
       const double radius = dot.radius + kDotBorder;
       captions_.placer.reserve({{dot.at.x - radius, dot.at.y - radius}, 2 * radius, 2 * radius});
     }
-  if (storey) {
-    const Canvas measuring(1, 1, kPlanPaper);
-    placeSpaceNames(captions_, measuring, view_, *storey->model, storey->storey);
-  }
+  placeSpaceNames(captions_, Canvas(1, 1, kPlanPaper), view_, rooms);
   addCaptions(trace, styles);
 }
 

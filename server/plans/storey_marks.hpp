@@ -3,7 +3,7 @@
 #pragma once
 
 #include <array>
-#include <optional>
+#include <span>
 #include <vector>
 
 #include "server/plans/captions.hpp"
@@ -21,19 +21,13 @@ struct Wedge {
 Wedge makeWedge(render::Point eye, double x, double y);
 void drawWedge(render::Canvas& canvas, const Wedge& wedge);
 
-/// The storey of the file that a plan shows.
-struct PlanStorey {
-  const scene::Model* model = nullptr;
-  std::uint32_t storey = 0;
-};
-
 class StoreyMarks {
  public:
   /// Finds the places of all marks and captions. A mark belongs to the storey that is nearest of
-  /// those with plans, at `floors` (metres). With `storey` rooms have their names. Captions
-  /// without space join `entries`.
+  /// those with plans, at `floors` (metres). `rooms` get their names. Captions without space join
+  /// `entries`.
   StoreyMarks(const PlanView& view, const std::vector<double>& floors, const WalkTrace& trace,
-              const std::optional<PlanStorey>& storey, std::vector<CaptionEntry>& entries);
+              std::span<const scene::Space> rooms, std::vector<CaptionEntry>& entries);
 
   void draw(render::Canvas& canvas) const;
 

@@ -13,6 +13,7 @@
 #include "server/base/standard_output.hpp"
 #include "server/log/log.hpp"
 #include "server/messages/frame_messages.hpp"
+#include "server/floors/plan_messages.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/recording/contact_history.hpp"
 #include "server/recording/playback.hpp"
@@ -35,7 +36,7 @@ struct ScriptTarget {
   std::function<std::vector<v1::ContactEvent>()> endContacts;
   v1::Scene scene;
   std::string renderer;
-  const scene::Scene* localScene = nullptr;  ///< for walls in maps; null: none
+  FloorPlanSource findFloorPlan;  ///< for the map
 };
 
 protocol::CaptureFormat makeCaptureFormat(std::uint32_t samples) {
@@ -135,7 +136,7 @@ ExitCode runAndReport(const protocol::Script& script, RunReport& report, bool st
   bar.clear();
   runSummary.metrics = target.metrics();
   runSummary.maxPairs = std::max(runSummary.maxPairs, runSummary.metrics.pairs());
-  report.writePictures(runSummary, {makePlanRenderer(target), target.localScene});
+  report.writePictures(runSummary, {makePlanRenderer(target), target.findFloorPlan});
   report.writeContacts(target.endContacts());
   const std::chrono::duration<double> elapsed = std::chrono::steady_clock::now() - start;
   runSummary.wallSeconds = elapsed.count();
@@ -241,7 +242,7 @@ ExitCode replay(const ReplayCommand& command) {
                             [&] { return driver.endContacts(); },
                             toProto(*scene),
                             renderer ? renderer->deviceName() : std::string(),
-                            scene.get()};
+                            makeFloorPlanSource(scene)};
         const ExitCode code = runAndReport(script, report, command.strict, std::move(target));
         const bool recordingComplete = !world.recorder() || !world.recorder()->close();
         return recordingComplete ? code : ExitCode::runtimeError;
@@ -249,19 +250,14 @@ ExitCode replay(const ReplayCommand& command) {
       kAbortNote);
 }
 
-/// The model of a walk's map; null: none is given, or the server serves another one.
-std::shared_ptr<const scene::Scene> loadMapScene(const std::filesystem::path& file,
-                                                 const v1::Scene& served) {
-  if (file.empty()) return nullptr;
-  ModelOptions model;
-  model.file = file;
-  std::shared_ptr<const scene::Scene> scene = loadScene(model);
-  if (scene->hash() == served.hash()) return scene;
-  logWarning(
-      "{}: the server serves another model or reads it with other options; the map has no "
-      "walls",
-      file.string());
-  return nullptr;
+/// The plan from the server; nullopt, with a warning, if it has none.
+std::optional<FloorPlan> requestFloorPlan(protocol::Client& client, double floor) {
+  try {
+    return floorPlanFromProto(client.floorPlan(floor));
+  } catch (const protocol::ProtocolError& problem) {
+    logWarning("the map has no walls: {}", problem.what());
+    return std::nullopt;
+  }
 }
 
 ExitCode walk(const WalkCommand& command) {
@@ -274,7 +270,6 @@ ExitCode walk(const WalkCommand& command) {
         options.world = command.world;
         options.token = command.token;
         protocol::Client client(command.connect.host, command.connect.port, options);
-        const auto scene = loadMapScene(command.model, client.welcome().scene());
         protocol::SocketDriver driver(client, makeCaptureFormat(command.samples));
         ScriptTarget target{driver,
                             [&](const v1::FrameRequest& request) { return client.frame(request); },
@@ -282,7 +277,7 @@ ExitCode walk(const WalkCommand& command) {
                             [&] { return leaveWorld(driver, report.presentAvatars()); },
                             client.welcome().scene(),
                             client.welcome().renderer(),
-                            scene.get()};
+                            [&](double floor) { return requestFloorPlan(client, floor); }};
         return runAndReport(script, report, command.strict, std::move(target));
       },
       kAbortNote);

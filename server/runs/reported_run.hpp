@@ -43,7 +43,6 @@ struct WalkCommand {
   std::string token;  ///< empty: none
   bool strict = false;
   std::uint32_t samples = kCaptureSamples;
-  std::filesystem::path model = {};  ///< the server's, for walls in the map; empty: none
 };
 
 ExitCode replay(const ReplayCommand& command);

@@ -161,11 +161,13 @@ void RunReport::addContact(const v1::ContactEvent& event) {
 
 void RunReport::addNotice(const v1::Notice& notice) {
   const bool blocked = notice.kind() == v1::Notice::KIND_BLOCKED;
-  if (blocked) trace_.blockedWalks.push_back({vectorFromProto(notice.position()), Vec3::UnitX()});
+  const bool refused = notice.kind() == v1::Notice::KIND_REFUSED;
+  if ((blocked || refused) && notice.has_position())
+    trace_.blockedWalks.push_back({vectorFromProto(notice.position()), Vec3::UnitX()});
   if (notice.kind() == v1::Notice::KIND_SPAWNED) presentAvatars_.insert(notice.avatar());
   if (notice.kind() == v1::Notice::KIND_LEFT) presentAvatars_.erase(notice.avatar());
-  if (blocked || notice.kind() == v1::Notice::KIND_ARRIVED ||
-      notice.kind() == v1::Notice::KIND_REFUSED || notice.kind() == v1::Notice::KIND_LEFT) {
+  if (blocked || refused || notice.kind() == v1::Notice::KIND_ARRIVED ||
+      notice.kind() == v1::Notice::KIND_LEFT) {
     walks_.push_back(notice);
   }
 }

@@ -45,6 +45,8 @@ class RunReport {
   const std::filesystem::path& folder() const { return folder_; }
   /// Ends of walks in order: arrived, blocked, refused or left.
   const std::vector<v1::Notice>& walks() const { return walks_; }
+  /// The content of the map.
+  const WalkTrace& trace() const { return trace_; }
 
  private:
   struct Picture {

@@ -78,6 +78,7 @@ const std::vector<std::string> kRooms{
     "server/base",
     "server/export",
     "server/messages",
+    "server/floors",
     "server/recording/foxglove",
     "server/recording",
     "server/navigation",

@@ -317,6 +317,16 @@ class Seeing(RoomCase):
         self.assertEqual(len(self.client.distances([(WALL, FLOOR)] * 2001)), 2001)
         self.assertEqual(self.client.distances([]), [])
 
+    def test_the_plan_of_a_storey_has_its_walls(self):
+        plan = self.client.floor_plan(0)
+        self.assertEqual({shape.entity: shape.kind for shape in plan.shapes}, {WALL: "wall", COLUMN: "wall"})
+        wall = next(shape for shape in plan.shapes if shape.entity == WALL)
+        self.assertEqual(len(wall.loops), 1)
+        np.testing.assert_allclose([wall.loops[0].min(axis=0), wall.loops[0].max(axis=0)], [(5, -4), (5.2, 4)], atol=1e-6)
+        self.assertEqual((plan.storey, plan.rooms, plan.north), ("", (), None))
+        with self.assertRaisesRegex(enfilade.ServerError, "floor_plan.floor"):
+            self.client.floor_plan(math.nan)
+
     def test_what_is_near_comes_nearest_first(self):
         ann = self.client.spawn("ann", at=(0, 0, 0))
         ann.enter()

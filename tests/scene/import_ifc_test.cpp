@@ -237,6 +237,22 @@ TEST(ImportIfc, StoreysThatAreAllPlacedAtOneHeightLieAtTheirElevations) {
   }
 }
 
+TEST(ImportIfc, AnElevationThatIsNoNumberIsReported) {
+  const TemporaryFolder folder;
+  for (const char* elevation : {"1.E999", "'high'", "$", "3200."}) {
+    IfcHouse house;
+    house.more = house.placement(500, "#15", 0, 0, 3.2) +
+                 "#510=IFCBUILDINGSTOREY('0000000000000000000511',$,'Upper "
+                 "floor',$,$,#502,$,$,.ELEMENT.," +
+                 std::string(elevation) +
+                 ");\n#511=IFCRELAGGREGATES('0000000000000000000512',$,$,$,#40,(#510));\n";
+    const Model model = importModel(folder.write("house.ifc", house.text()), {});
+    const bool isBroken = elevation[0] == '1' || elevation[0] == '\'';
+    EXPECT_EQ(countDiagnostics(model, "broken_elevation"), isBroken ? 1u : 0u) << elevation;
+    EXPECT_NEAR(model.storeys.at(1).elevation, 3.2, 1e-9) << elevation;
+  }
+}
+
 TEST(ImportIfc, AWallIsLargerThanItsDoorAndAFrameIsNot) {
   const TemporaryFolder folder;
   const std::string text = IfcHouse().text();

@@ -48,7 +48,7 @@ struct TwoRooms {
   std::vector<double> floors{0};
   std::vector<CaptionEntry> entries;
 
-  StoreyMarks place() { return {view, floors, trace, PlanStorey{&model, 0}, entries}; }
+  StoreyMarks place() { return {view, floors, trace, model.spaces, entries}; }
 };
 
 bool meetsBox(const CanvasBox& box, render::Point from, render::Point to) {
@@ -158,7 +158,7 @@ TEST(Captions, ANameLiesInItsRoomInTwoLinesOrAsANumberInANarrowOne) {
   const PlanView view = makeRoomView();
   std::vector<CaptionEntry> entries;
   CaptionList captions(view.box(), view.unit, entries);
-  placeSpaceNames(captions, render::Canvas(1, 1, kPlanPaper), view, model, 0);
+  placeSpaceNames(captions, render::Canvas(1, 1, kPlanPaper), view, model.spaces);
   std::set<std::string> texts;
   for (const Caption& caption : captions.captions()) {
     texts.insert(caption.text);

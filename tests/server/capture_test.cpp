@@ -10,7 +10,7 @@
 #include "render/image/image.hpp"
 #include "server/capture/metadata_files.hpp"
 #include "server/capture/overlay.hpp"
-#include "server/plans/label_names.hpp"
+#include "server/floors/label_names.hpp"
 #include "tests/server/body_room.hpp"
 #include "tests/server/program_fixture.hpp"
 

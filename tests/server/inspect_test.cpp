@@ -205,6 +205,7 @@ TEST_F(Inspect, WrongUsageExitsWithTwoAndUnreadableFilesWithOne) {
       {"inspect", path("room.obj"), "--plan-scale", "0"},
       {"inspect", path("room.obj"), "--plan-format", "svg"},
       {"inspect", path("room.obj"), "--plan-scale", "50"},
+      {"inspect", path("room.obj"), "--plan", path("pages"), "--plan-scale", "50"},
       {"inspect", path("room.obj"), "--strict", "--accept", "no_unti"},
       {"inspect", path("room.obj"), "--accept", "no_unit"},
       {"inspect", path("room.obj"), "--html", ""},

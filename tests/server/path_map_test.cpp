@@ -70,7 +70,29 @@ TEST(PathMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
     return ink;
   };
   const auto room = smallRoom();
-  EXPECT_GT(countInk(drawMap(trace, {blank, room.get()}).value()), countInk(*map) + 500);
+  EXPECT_GT(countInk(drawMap(trace, {blank, makeFloorPlanSource(room)}).value()),
+            countInk(*map) + 500);
+}
+
+TEST(PathMap, ARefusedOrderFarAwayDoesNotStretchTheMap) {
+  const auto measureWidth = [](const std::vector<Vec3>& refused) {
+    WalkTrace trace;
+    trace.paths = {pathAt({{0, 50}})};
+    for (const Vec3& at : refused) trace.blockedWalks.push_back({at, Vec3::UnitX()});
+    double width = 0;
+    const auto blank = [&](const render::Camera& camera) -> std::optional<PlanPicture> {
+      width = camera.heightY * camera.width / camera.height;
+      const std::size_t pixels = static_cast<std::size_t>(camera.width * camera.height);
+      PlanPicture plan{{camera.width, camera.height, {}}, std::vector<std::uint32_t>(pixels, 1)};
+      plan.colour.rgb.assign(3 * pixels, 200);
+      return plan;
+    };
+    EXPECT_TRUE(drawMap(trace, {blank}));
+    return width;
+  };
+  const double walked = measureWidth({});  // from 0 to 49 m
+  EXPECT_NEAR(measureWidth({Vec3(60, 0, 0)}), walked + 11, 0.5);
+  EXPECT_EQ(measureWidth({Vec3(5000, 0, 0)}), walked);
 }
 
 }  // namespace

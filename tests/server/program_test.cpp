@@ -318,8 +318,8 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
   const pid_t server =
       start({"serve", path("room.obj"), "--listen", "127.0.0.1:0", "--audit", "10"});
   const std::string port = std::to_string(awaitReady());
-  const Ended walked = run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--model",
-                            path("room.obj"), "--out", path("walked")});
+  const Ended walked =
+      run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--out", path("walked")});
   kill(server, SIGTERM);
   EXPECT_EQ(awaitExitCode(server), 0);
   ASSERT_EQ(walked.code, 0) << walked.err;
@@ -353,20 +353,6 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
     EXPECT_EQ(readText(path("replayed/") + file), readText(path("walked/") + file)) << file;
   }
   EXPECT_GT(countDarkPixels(path("walked/map.png")), 500) << "walls";
-}
-
-TEST_F(Program, AMapOverTheSocketTakesNoOtherModel) {
-  std::string other = readText(path("room.obj"));
-  other += "v 0 9 0\nv 1 9 0\nv 0 9 1\nf -3 -2 -1\n";
-  std::ofstream(path("other.obj")) << other;
-  const pid_t server = start({"serve", path("room.obj"), "--listen", "127.0.0.1:0"});
-  const std::string port = std::to_string(awaitReady());
-  const Ended walked = run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--model",
-                            path("other.obj"), "--out", path("walked")});
-  kill(server, SIGTERM);
-  EXPECT_EQ(awaitExitCode(server), 0);
-  EXPECT_EQ(walked.code, 0) << walked.err;
-  EXPECT_NE(walked.err.find("the server serves another model"), std::string::npos) << walked.err;
 }
 
 TEST_F(Program, ASecondStartReadsTheCacheOfTheFirst) {

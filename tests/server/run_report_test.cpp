@@ -50,5 +50,22 @@ TEST(RunReport, WalksNameTheirObstacleAndItsGlobalId) {
   EXPECT_FALSE(walks[1].contains("obstacle_global_id"));
 }
 
+TEST(RunReport, TheMapShowsBlockedWalksAndRefusedOrders) {
+  const tests::TemporaryFolder folder;
+  RunReport report(folder.path());
+  protocol::StepOutcome outcome;
+  outcome.avatars.emplace_back().set_name("ann");
+  for (const auto kind : {v1::Notice::KIND_BLOCKED, v1::Notice::KIND_REFUSED,
+                          v1::Notice::KIND_ARRIVED, v1::Notice::KIND_REFUSED}) {
+    v1::Notice& notice = outcome.notices.emplace_back();
+    notice.set_kind(kind);
+    notice.mutable_position()->set_x(3);
+  }
+  outcome.notices.back().clear_position();  // a body's order, for example
+  report.add(outcome);
+  EXPECT_EQ(report.trace().blockedWalks.size(), 2u);
+  EXPECT_EQ(report.trace().blockedWalks[1].point.x(), 3);
+}
+
 }  // namespace
 }  // namespace enfilade::server::testing

@@ -26,7 +26,7 @@ TEST(SpaceNames, OfARoomShapedLikeAnLDoNotLieInItsNeighbour) {
   view.unitsPerMetre = kPixelsPerMetre;
   std::vector<CaptionEntry> entries;
   CaptionList captions(view.box(), view.unit, entries);
-  placeSpaceNames(captions, canvas, view, model, 0);
+  placeSpaceNames(captions, canvas, view, model.spaces);
   captions.drawTexts(canvas);
   const render::Image image = canvas.toImage();
   std::size_t inside = 0, outside = 0;

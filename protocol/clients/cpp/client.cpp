@@ -355,6 +355,13 @@ v1::CannotTouchReply Client::cannotTouch(const v1::CannotTouchQuery& query) {
                      &v1::ServerMessage::mutable_cannot_touch);
 }
 
+v1::FloorPlan Client::floorPlan(double floor) {
+  v1::ClientMessage message;
+  message.mutable_floor_plan()->set_floor(floor);
+  return requestBody(*this, std::move(message), v1::ServerMessage::kFloorPlan,
+                     &v1::ServerMessage::mutable_floor_plan);
+}
+
 std::vector<v1::Entity> Client::describe(std::span<const std::uint32_t> ids) {
   v1::ClientMessage message;
   message.mutable_describe()->mutable_ids()->Add(ids.begin(), ids.end());

@@ -80,6 +80,7 @@ class Client {
   v1::DistanceReply distances(const v1::DistanceQuery& query);
   v1::TouchingReply touching(const v1::TouchingQuery& query);
   v1::CannotTouchReply cannotTouch(const v1::CannotTouchQuery& query);
+  v1::FloorPlan floorPlan(double floor);
   std::vector<v1::Entity> describe(std::span<const std::uint32_t> ids);
   v1::Metrics metrics();
 

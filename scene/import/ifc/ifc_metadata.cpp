@@ -290,9 +290,13 @@ class IfcMetadataReader {
     const bool isStorey = type == "IFCBUILDINGSTOREY";
     if (!isStorey && product.role != IfcProduct::Role::space) return;
     product.longName = parseStepString(getArgument(arguments, 7)).value_or("");
-    if (isStorey)
-      product.elevation =
-          parseStepNumber(getArgument(arguments, 9)).value_or(0) * metadata_.metresPerUnit;
+    if (!isStorey) return;
+    const std::string_view stated = getArgument(arguments, 9);
+    const std::optional<double> elevation = parseStepNumber(stated);
+    if (!elevation && stated != "$" && !stated.empty())
+      addDiagnostic(metadata_.diagnostics, "broken_elevation",
+                    product.globalId + " (" + product.name + "): " + std::string(stated));
+    product.elevation = elevation.value_or(0) * metadata_.metresPerUnit;
   }
 
   /// Arguments of every relation: (GlobalId, owner, name, description, one side, other side).

@@ -57,6 +57,7 @@ Role requiredRole(const v1::ClientMessage& message) {
     case v1::ClientMessage::kCannotTouch:
     case v1::ClientMessage::kDescribe:
     case v1::ClientMessage::kMetrics:
+    case v1::ClientMessage::kFloorPlan:
     case v1::ClientMessage::kListWorlds:
     case v1::ClientMessage::kRecordedEvents:
     case v1::ClientMessage::kStepMany:
@@ -143,6 +144,8 @@ void dispatchRequest(const RequestContext& context) {
       return forwardQuery(context, message.touching(), "touching.tick");
     case v1::ClientMessage::kCannotTouch:
       return forwardQuery(context, message.cannot_touch(), "cannot_touch.tick");
+    case v1::ClientMessage::kFloorPlan:
+      return submitQuery(context);
     case v1::ClientMessage::kNavigation:
       return handleNavigation(context, message.navigation());
     case v1::ClientMessage::kDescribe:

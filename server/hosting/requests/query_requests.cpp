@@ -69,6 +69,13 @@ class BoundedNames {
 
 }  // namespace
 
+void submitQuery(const RequestContext& context, std::function<void(double)> progress) {
+  HostedWorld& hosted = context.hosted;
+  hosted.queries.submit({hosted.world.snapshot(), context.message, hosted.world.settings(),
+                         hosted.limits, std::move(progress)},
+                        deferReply(context));
+}
+
 void handleNavigation(const RequestContext& context, const v1::NavigationQuery& query) {
   if (query.has_load_mesh()) return loadMesh(context, query);
   forwardQuery(context, query, "navigation.tick", makeProgress(context, query.progress()));

@@ -8,18 +8,18 @@
 
 namespace enfilade::server {
 
+/// Hands the request to the query service, with the state after the last tick.
+void submitQuery(const RequestContext& context, std::function<void(double)> progress = {});
+
 /// Forwards a query about the last tick to the query service.
 template <class Query>
 void forwardQuery(const RequestContext& context, const Query& query, const char* tickField,
                   std::function<void(double)> progress = {}) {
-  HostedWorld& hosted = context.hosted;
   if (query.has_tick()) {
-    if (auto error = validateTick(hosted, query.tick(), tickField))
+    if (auto error = validateTick(context.hosted, query.tick(), tickField))
       return replyError(context, std::move(*error));
   }
-  hosted.queries.submit({hosted.world.snapshot(), context.message, hosted.world.settings(),
-                         hosted.limits, std::move(progress)},
-                        deferReply(context));
+  submitQuery(context, std::move(progress));
 }
 
 /// Forwards the query, or loads a mesh.

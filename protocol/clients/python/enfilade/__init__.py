@@ -23,6 +23,7 @@ from .episodes import Episode, draw_episode, read_episodes, write_episodes
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
 from .lidar import Lidar, LidarPattern, PointCloud
 from .navigation import Door, Island, Map, Navigation, Obstacle, Path, Spot
+from .plans import FloorPlan, PlanRoom, PlanShape
 from .process import Server, serve
 from .results import (Apart, AvatarState, Contact, Frame, Hits, Horizon, Notice, ObjectInfo, Pair,
                       Replay, Scan, State, Step, Touching, World)
@@ -32,9 +33,10 @@ from .world_group import WorldGroup
 
 __all__ = [
     "Apart", "Avatar", "AvatarState", "Camera", "Client", "ConnectionFailed", "Contact", "Door",
-    "EnfiladeError", "Episode", "Frame", "Hits", "Horizon", "Island", "Lidar", "LidarPattern",
-    "Map", "Navigation", "Notice", "ObjectInfo", "Obstacle", "OrderFailed", "Pair", "Path",
-    "PointCloud", "Replay", "Scan", "Server", "ServerError", "Spot", "StartFailed", "State", "Step",
-    "Touching", "VectorWalkEnv", "Video", "WalkEnv", "World", "WorldGroup", "connect",
-    "draw_episode", "messages", "read_episodes", "serve", "write_episodes",
+    "EnfiladeError", "Episode", "FloorPlan", "Frame", "Hits", "Horizon", "Island", "Lidar",
+    "LidarPattern", "Map", "Navigation", "Notice", "ObjectInfo", "Obstacle", "OrderFailed", "Pair",
+    "Path", "PlanRoom", "PlanShape", "PointCloud", "Replay", "Scan", "Server", "ServerError",
+    "Spot", "StartFailed", "State", "Step", "Touching", "VectorWalkEnv", "Video", "WalkEnv",
+    "World", "WorldGroup", "connect", "draw_episode", "messages", "read_episodes", "serve",
+    "write_episodes",
 ]

@@ -17,6 +17,7 @@ from .avatar import Avatar
 from .connection import Connection, Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError
 from .navigation import Navigation
+from .plans import FloorPlan, floor_plan
 from .questions import Point, avatar_ids, cannot_touch_query, entity, frame_request, points, vec
 from .results import (Apart, Contact, Frame, Hits, Horizon, Notice, Pair, Replay, Scan, State,
                       Step, Touching, World)
@@ -37,8 +38,7 @@ def connect(address: str = "127.0.0.1:7878", *, name: str = "enfilade python", t
     host, colon, port = address.rpartition(":")
     if not colon or not port.isdigit():
         raise ValueError(f"address: give HOST:PORT, as 127.0.0.1:7878, not {address!r}")
-    return Client(host.strip("[]"), int(port), name=name, token=token,
-                  timeout=timeout, world=world)
+    return Client(host.strip("[]"), int(port), name=name, token=token, timeout=timeout, world=world)
 
 
 class Client:
@@ -53,8 +53,7 @@ class Client:
     def __init__(self, host: str, port: int, *, name: str = "enfilade python", token: str = "",
                  timeout: float = 30.0, world: str = "main") -> None:
         self._start(Connection(host, port, timeout))
-        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token,
-                               world=world)
+        hello = messages.Hello(protocol_version=PROTOCOL_VERSION, client_name=name, token=token, world=world)
         try:
             self.welcome: Any = self.request(hello=hello)[0].welcome
         except BaseException:
@@ -205,8 +204,7 @@ class Client:
     def _keep_events(self, received: Received) -> None:
         events = received.message.events
         if received.marks is None:
-            received.marks = (self._sequence + 1, len(self._contacts), len(self._notices),
-                              len(self._horizons))
+            received.marks = (self._sequence + 1, len(self._contacts), len(self._notices), len(self._horizons))
         sequence, contacts, notices, horizons = received.marks
         if events.sequence != sequence:
             raise self._connection._failed(
@@ -528,8 +526,7 @@ class Client:
         packed = "packed_rays" in self.welcome.capabilities
         replies: List[Hits] = []
         for start in range(0, max(1, len(origins)), page):
-            options = messages.RayQuery(through_avatar=through_avatar, through_glass=through_glass,
-                                        packed=packed)
+            options = messages.RayQuery(through_avatar=through_avatar, through_glass=through_glass, packed=packed)
             query = results.RayRequest(next(self._ids), origins[start:start + page],
                                        directions[start:start + page], reach, options)
             self._send([query])
@@ -612,11 +609,13 @@ class Client:
 
     def cannot_touch_before(self, a: Entity, b: Entity, *, assume: str = "present_motion",
                             least: float = 0.0, tick: Optional[int] = None) -> Apart:
-        """Returns a time before which two entities cannot touch: if the "present_motion" continues,
-        or under "any_command" to avatars and bodies. `least`: the shortest useful waiting time
-        (seconds) before the next check."""
-        reply, _ = self.request(cannot_touch=cannot_touch_query(a, b, assume, least, tick))
-        return results.apart(reply.cannot_touch)
+        """Returns a time before which two entities cannot touch: if the "present_motion" continues, or under
+        "any_command" to avatars and bodies. `least`: the shortest useful waiting time (seconds)."""
+        return results.apart(self.request(cannot_touch=cannot_touch_query(a, b, assume, least, tick))[0].cannot_touch)
+
+    def floor_plan(self, floor: float) -> FloorPlan:
+        """Returns the plan of the storey whose floor is at a height (metres): what a plane cuts 1.2 m above."""
+        return floor_plan(self.request(floor_plan=messages.FloorPlanRequest(floor=floor))[0].floor_plan)
 
     def navigation(self, radius: Optional[float] = None, height: Optional[float] = None,
                    step: Optional[float] = None, *, speed: Optional[float] = None, doors: str = "as_they_are",

@@ -1,4 +1,4 @@
-#include "server/plans/label_names.hpp"
+#include "server/floors/label_names.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,7 +1,7 @@
 // A point of a floor is indoors if the next surface above it is as high as a ceiling. A point with
 // a low surface above, such as a lawn below a house, is not; nor is one below the sky. A ray that
 // starts in a wall ends at its top: the floor below walls counts too, also of a house without roof.
-#include "server/plans/indoor_floors.hpp"
+#include "server/floors/indoor_floors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "scene/world/queries/ray_caster.hpp"
+#include "server/floors/storey_heights.hpp"
 
 namespace enfilade::server {
 namespace {

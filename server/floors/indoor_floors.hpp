@@ -5,9 +5,10 @@
 #include <span>
 
 #include "scene/world/data/scene.hpp"
-#include "server/plans/plan_image.hpp"
 
 namespace enfilade::server {
+
+using collision::Vec3;
 
 /// An upward triangle; scene frame, metres.
 struct FloorTriangle {

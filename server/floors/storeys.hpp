@@ -10,6 +10,9 @@
 
 namespace enfilade::server {
 
+/// Metres above the floor: storeys are cut through the windows, as usual for floor plans.
+inline constexpr double kPlanCutHeight = 1.2;
+
 struct StoreyFloor {
   double height = 0;  ///< metres, scene frame
   std::string name;   ///< name in the file, or empty

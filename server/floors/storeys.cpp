@@ -1,7 +1,7 @@
 // Steps: take the storeys of the file at their floors. If it states none: find the heights with
 // much floor and walls, and for each the indoor floor near it. A lawn is larger than the floor of
 // the house on it, but has no ceiling.
-#include "server/plans/storeys.hpp"
+#include "server/floors/storeys.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,10 +9,10 @@
 #include <map>
 #include <set>
 
-#include "server/plans/floor_plan_section.hpp"
-#include "server/plans/indoor_floors.hpp"
-#include "server/plans/label_names.hpp"
-#include "server/plans/plan_image.hpp"
+#include "server/floors/floor_plan_section.hpp"
+#include "server/floors/indoor_floors.hpp"
+#include "server/floors/label_names.hpp"
+#include "server/floors/storey_heights.hpp"
 
 namespace enfilade::server {
 namespace {

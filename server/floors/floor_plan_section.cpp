@@ -1,4 +1,4 @@
-#include "server/plans/floor_plan_section.hpp"
+#include "server/floors/floor_plan_section.hpp"
 
 #include <algorithm>
 #include <array>

@@ -1,0 +1,20 @@
+// Conversion of floor plans to and from messages.
+#pragma once
+
+#include <variant>
+
+#include "protocol/enfilade.pb.h"
+#include "server/base/server_limits.hpp"
+#include "server/floors/floor_plan.hpp"
+
+namespace enfilade::server {
+
+v1::FloorPlan toProto(const FloorPlan& plan);
+FloorPlan floorPlanFromProto(const v1::FloorPlan& message);
+
+/// Returns the plan, or an error if it would be too large for a reply.
+std::variant<v1::FloorPlan, v1::Error> answerFloorPlan(const v1::FloorPlanRequest& request,
+                                                       const FloorPlanSource& source,
+                                                       const ServerLimits& limits);
+
+}  // namespace enfilade::server
