@@ -95,8 +95,8 @@ FileMetadata readColladaMetadata(const std::filesystem::path& file) {
     metadata.problems.push_back(
         {"no_unit", 1, "<asset> has no <unit meter=...>: taken for metres"});
   }
-  if (asset.find("Z_UP") != std::string::npos) metadata.up = metadata.assimpUp = 'z';
-  if (asset.find("X_UP") != std::string::npos) metadata.up = metadata.assimpUp = 'x';
+  if (asset.find("Z_UP") != std::string::npos) metadata.up = metadata.assimpUp = UpAxis::z;
+  if (asset.find("X_UP") != std::string::npos) metadata.up = metadata.assimpUp = UpAxis::x;
   return metadata;
 }
 
@@ -152,7 +152,9 @@ FileMetadata readFbxMetadata(const std::filesystem::path& file) {
     metadata.problems.push_back({"no_unit", 1, "no UnitScaleFactor: taken for centimetres"});
   }
   const double up = findFbxSetting(start, "UpAxis").value_or(1);
-  metadata.up = up == 0 ? 'x' : up == 2 ? 'z' : 'y';  // assimp does not convert the axes
+  metadata.up = up == 0   ? UpAxis::x
+                : up == 2 ? UpAxis::z
+                          : UpAxis::y;  // assimp does not convert the axes
   return metadata;
 }
 
@@ -193,7 +195,7 @@ FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat for
 
 FileMetadata readIfcFileMetadata(const std::string& text) {
   FileMetadata metadata;
-  metadata.up = metadata.assimpUp = 'z';
+  metadata.up = metadata.assimpUp = UpAxis::z;
   bool siUnit = true;
   metadata.metresPerUnit = readIfcMetresPerUnit(StepFile(text), siUnit).value_or(1);
   // assimp knows SI prefixes and takes every other unit as a metre.

@@ -65,9 +65,6 @@ void validateOptions(const ImportOptions& options) {
   }
   if (options.offset && !options.offset->allFinite())
     throw ImportError("offset: must be three finite numbers");
-  if (options.up && (*options.up < 'x' || *options.up > 'z')) {
-    throw ImportError(std::string("up axis: '") + *options.up + "' is neither x, y nor z");
-  }
 }
 
 // ---- messages -----------------------------------------------------------------------------------

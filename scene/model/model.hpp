@@ -10,6 +10,7 @@
 
 #include "collision/types.hpp"
 #include "scene/model/body_spec.hpp"
+#include "scene/model/up_axis.hpp"
 
 namespace enfilade::scene {
 
@@ -142,7 +143,7 @@ struct Model {
   /// Names of the scenes in the file (glTF), of which `fileScene` was read; a name may be empty.
   std::vector<std::string> fileScenes;
   std::uint32_t fileScene = 0;
-  char upAxis = 'y';  ///< the file's up axis; coordinates are already converted to Y up
+  UpAxis upAxis = UpAxis::y;  ///< the file's up axis; coordinates are already converted to Y up
   /// Subtracted from the file's coordinates (metres, Y up) so that the scene lies near its origin;
   /// zero unless the scene lies far from it. file = scene + offset.
   Vec3 offset = Vec3::Zero();

@@ -24,8 +24,8 @@ void addModel(CLI::App& verb, ModelArguments& into) {
       ->required();
   verb.add_option("--unit", into.unit, "Unit of the file: m, mm, cm, ft, in or a number of metres")
       ->check(CLI::Validator(validateUnit, "UNIT"));
-  verb.add_option("--up", into.up, "Up axis of the file")
-      ->check(makeChoiceValidator({"x", "y", "z"}));
+  verb.add_option("--up", into.up, "Up axis of the file; as --up=-z if it hangs upside down")
+      ->check(makeChoiceValidator({"x", "y", "z", "-x", "-y", "-z"}));
   verb.add_option("--offset", into.offset,
                   "Offset (m, Y up) subtracted from the file's coordinates; use one value for all "
                   "versions of a model. Default: 0 near the origin, else the model's position")
@@ -61,7 +61,7 @@ ModelOptions makeModelOptions(const ModelArguments& read) {
   options.file = read.file;
   options.cache = !read.noCache;
   if (!read.unit.empty()) options.import.metresPerUnit = scene::parseMetresPerUnit(read.unit);
-  if (!read.up.empty()) options.import.up = read.up.front();
+  options.import.up = scene::parseUpAxis(read.up);
   if (!read.offset.empty())
     options.import.offset = {read.offset[0], read.offset[1], read.offset[2]};
   options.import.ifcReader =

@@ -19,8 +19,9 @@ void logLoadedScene(const scene::Scene& scene, const std::string& name, const Lo
       scene.bounds().empty() ? scene::Vec3::Zero().eval() : scene.bounds().size();
   logInfo(
       "{}: {} objects, {:.1f} x {:.1f} x {:.1f} m, unit {} m, up {}, read by {}, {} in {:.2f} s",
-      name, model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit, model.upAxis,
-      model.reader, loaded.fromCache ? "from the cache" : "imported", loaded.loadSeconds);
+      name, model.objects.size(), size.x(), size.y(), size.z(), model.metresPerUnit,
+      toString(model.upAxis), model.reader, loaded.fromCache ? "from the cache" : "imported",
+      loaded.loadSeconds);
 }
 
 struct CachedScene {

@@ -195,7 +195,8 @@ void addSummary(const Inspection& inspection, TextTable& table) {
                    high.z() - low.z());
   table.appendLine("  from        %.3f, %.3f, %.3f", low.x(), low.y(), low.z());
   table.appendLine("  to          %.3f, %.3f, %.3f", high.x(), high.y(), high.z());
-  table.appendLine("  unit        %g m; up in the file: %c", model.metresPerUnit, model.upAxis);
+  table.appendLine("  unit        %g m; up in the file: %s", model.metresPerUnit,
+                   toString(model.upAxis).c_str());
   table.appendLine("  offset      %.3f, %.3f, %.3f m subtracted from the file", model.offset.x(),
                    model.offset.y(), model.offset.z());
   if (!model.map.empty())
@@ -362,7 +363,7 @@ std::string formatInspectionJson(const Inspection& inspection,
   all["unique_positions"] = report.uniquePositions;
   all["bounds"] = toJson(scene.bounds());
   all["unit"] = model.metresPerUnit;
-  all["up"] = std::string(1, model.upAxis);
+  all["up"] = toString(model.upAxis);
   all["offset"] = toJson(model.offset);
   all["map"] = model.map;
   all["north"] = northToJson(model.north);

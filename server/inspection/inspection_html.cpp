@@ -28,7 +28,7 @@ void addFacts(const Inspection& inspection, HtmlPage& page) {
   page.addFacts(
       {{"Size", fmt::format("{:.2f} × {:.2f} × {:.2f} m (y is up)", size.x(), size.y(), size.z())},
        {"Unit, up axis",
-        fmt::format("{} m, {}", scene.model().metresPerUnit, std::string(1, scene.model().upAxis))},
+        fmt::format("{} m, {}", scene.model().metresPerUnit, toString(scene.model().upAxis))},
        {"Subtracted from the file", scene::formatPoint(scene.model().offset) + " m"},
        {"Objects", fmt::format("{}, of which {} are solid", report.objects, report.solidObjects)},
        {"Meshes", fmt::format("{}", report.meshes)},

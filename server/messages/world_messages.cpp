@@ -300,7 +300,7 @@ v1::Scene toProto(const scene::Scene& scene) {
   *message.mutable_bounds()->mutable_min() = toProto(scene.bounds().min);
   *message.mutable_bounds()->mutable_max() = toProto(scene.bounds().max);
   message.set_metres_per_unit(model.metresPerUnit);
-  message.set_up(std::string(1, model.upAxis));
+  message.set_up(toString(model.upAxis));
   *message.mutable_offset() = toProto(model.offset);
   for (std::size_t i = 0; i < model.bodies.size(); ++i) *message.add_bodies() = toProto(scene, i);
   return message;

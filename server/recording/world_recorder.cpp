@@ -251,7 +251,7 @@ std::optional<scene::WorldSettings> settingsFromProto(const v1::Lengths& message
 v1::ModelChoices toProto(const ModelOptions& model) {
   v1::ModelChoices message;
   if (model.import.metresPerUnit) message.set_metres_per_unit(*model.import.metresPerUnit);
-  if (model.import.up) message.set_up(std::string(1, *model.import.up));
+  if (model.import.up) message.set_up(toString(*model.import.up));
   if (model.import.offset) *message.mutable_offset() = toProto(*model.import.offset);
   for (const auto& [reader, name] : kIfcReaders)
     if (reader == model.import.ifcReader) message.set_ifc_reader(name);
@@ -265,7 +265,7 @@ v1::ModelChoices toProto(const ModelOptions& model) {
 ModelOptions modelOptionsFromProto(const v1::ModelChoices& message) {
   ModelOptions model;
   if (message.has_metres_per_unit()) model.import.metresPerUnit = message.metres_per_unit();
-  if (!message.up().empty()) model.import.up = message.up().front();
+  model.import.up = scene::parseUpAxis(message.up());
   if (message.has_offset()) model.import.offset = vectorFromProto(message.offset());
   model.import.ifcReader =
       scene::parseIfcReader(message.ifc_reader()).value_or(scene::IfcReader::automatic);

@@ -3,9 +3,9 @@
 #include <string_view>
 
 #include "scene/import/file/import_options.hpp"
+#include "scene/import/scan/guess_up_axis.hpp"
 #include "scene/import/scan/ply_file.hpp"
 #include "scene/import/scan/stl_file.hpp"
-#include "scene/import/scan/up_axis.hpp"
 #include "tests/fuzz/fuzz_target.hpp"
 
 namespace enfilade::fuzz {
@@ -38,8 +38,8 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
     require(error.what()[0] != '\0', "an error has a message");
   }
   for (const scene::ScanMesh& mesh : meshes) requireValidMesh(mesh);
-  const char up = scene::guessUpAxis(scene::computeLevelAreas(meshes)).axis;
-  require(up >= 'x' && up <= 'z', "the up axis is an axis");
+  const scene::UpAxis up = scene::guessUpAxis(scene::computeLevelAreas(meshes)).axis;
+  require(up <= scene::UpAxis::z, "the up axis is an axis");
 }
 
 }  // namespace enfilade::fuzz

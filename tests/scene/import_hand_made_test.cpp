@@ -186,13 +186,13 @@ TEST(ImportHandMade, UnitAndUpOfTheUserWin) {
   const auto file = folder.write("box.gltf", gltf(BoxMesh({1, 2, 3}), "0", kOneNode));
   ImportOptions options;
   options.metresPerUnit = 0.5;
-  options.up = 'z';
+  options.up = UpAxis::z;
   const Model model = importModel(file, options);
   EXPECT_EQ(model.metresPerUnit, 0.5);
-  EXPECT_EQ(model.upAxis, 'z');
+  EXPECT_EQ(model.upAxis, UpAxis::z);
   // A point (x, y, z) with z up is (x, z, -y) with y up.
   expectBounds(Scene{Model(model)}, {0, 0, -1}, {0.5, 1.5, 0});
-  options.up = 'x';
+  options.up = UpAxis::x;
   expectBounds(Scene(importModel(file, options)), {-1, 0, 0}, {0, 0.5, 1.5});
 }
 
@@ -231,12 +231,12 @@ TEST(ImportHandMade, ColladaUnitAndUpAreAppliedOnceOrReplaced) {
       "tip.dae", colladaBox(R"(<unit name="inch" meter="0.0254"/><up_axis>Z_UP</up_axis>)"));
   const Model model = importModel(file);
   EXPECT_EQ(model.metresPerUnit, 0.0254);
-  EXPECT_EQ(model.upAxis, 'z');
+  EXPECT_EQ(model.upAxis, UpAxis::z);
   EXPECT_EQ(getPaths(model), std::vector<std::string>{"tip"});
   expectBounds(Scene{Model(model)}, Vec3(10, 30, -22) * 0.0254, Vec3(11, 33, -20) * 0.0254);
   ImportOptions options;
   options.metresPerUnit = 1;
-  options.up = 'y';
+  options.up = UpAxis::y;
   expectBounds(Scene(importModel(file, options)), {10, 20, 30}, {11, 22, 33}, 1e-5);
   const auto xUp = folder.write("x.dae", colladaBox("<up_axis>X_UP</up_axis>"));
   const Model turned = importModel(xUp);

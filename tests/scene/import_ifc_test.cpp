@@ -55,7 +55,7 @@ TEST(ImportIfc, EachReaderGivesTheSameHouse) {
     ASSERT_EQ(model.objects.size(), 2u);
     expectSize(model, {4, 3, 0.3});
     EXPECT_EQ(model.metresPerUnit, 0.001);
-    EXPECT_EQ(model.upAxis, 'z');
+    EXPECT_EQ(model.upAxis, UpAxis::z);
     const Object& door = objectOfClass(model, "IfcDoor");
     EXPECT_EQ(door.path, "Test house/House/Ground%2Ffloor/Front door");
     EXPECT_EQ(door.globalId, "000000000000000000Door");
@@ -137,7 +137,7 @@ TEST(ImportIfc, UnitAndUpAxisOfTheUserWin) {
   const auto file = folder.write("house.ifc", IfcHouse().text());
   ImportOptions options = by(IfcReader::ifcPlusPlus);
   options.metresPerUnit = 0.002;
-  options.up = 'y';
+  options.up = UpAxis::y;
   const Model model = importModel(file, options);
   expectSize(model, {8, 0.6, 6});
   EXPECT_NEAR(objectOfClass(model, "IfcDoor").overallWidth, 1.8, 1e-9);

@@ -331,7 +331,7 @@ TEST(MalformedFiles, AnFbxInCentimetresIsInMetres) {
   };
   const Model centimetres = importModel(folder.write("cm.fbx", text("1")));
   EXPECT_NEAR(centimetres.metresPerUnit, 0.01, 1e-12);
-  EXPECT_EQ(centimetres.upAxis, 'z');
+  EXPECT_EQ(centimetres.upAxis, UpAxis::z);
   expectSize(centimetres, {1, 3, 2}, 1e-5);
   const Model inches = importModel(folder.write("inch.fbx", text("2.54")));
   EXPECT_NEAR(inches.metresPerUnit, 0.0254, 1e-12);

@@ -86,7 +86,7 @@ TEST_F(CachedModel, AChangeOfTheFileOrOfTheOptionsIsAnotherEntry) {
   EXPECT_TRUE(load(inches).fromCache);
   EXPECT_NEAR(load(inches).model.metresPerUnit, 0.0254, 0);
   ImportOptions up;
-  up.up = 'z';
+  up.up = UpAxis::z;
   EXPECT_FALSE(load(up).fromCache);
   std::string text = readContent(file_);
   text.replace(text.find("\"box\""), 5, "\"cox\"");

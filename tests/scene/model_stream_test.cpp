@@ -49,7 +49,7 @@ Model smallModel() {
   model.fileScenes = {"day", "night"};
   model.fileScene = 1;
   model.metresPerUnit = 0.3048;
-  model.upAxis = 'z';
+  model.upAxis = UpAxis::z;
   model.offset = {459123, 113, -5428311};
   model.diagnostics.push_back({"missing_texture", 3, "wall.png"});
   model.dependencies = {"small.bin", "textures/wall.png"};

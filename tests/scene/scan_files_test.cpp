@@ -135,7 +135,7 @@ TEST_P(ScanFiles, GiveTheBoxWithItsUpAxis) {
   const TemporaryFolder folder;
   const Model model = importModel(folder.write(GetParam().file, GetParam().make(makeRoom())));
   ASSERT_EQ(model.objects.size(), 1u);
-  EXPECT_EQ(model.upAxis, 'z');
+  EXPECT_EQ(model.upAxis, UpAxis::z);
   EXPECT_EQ(countDiagnostics(model, "guessed_up_axis"), 1u);
   EXPECT_EQ(countDiagnostics(model, "no_unit"), 1u);
   EXPECT_EQ(model.meshes.at(0).positions.size(), 8u);
@@ -197,22 +197,22 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(ScanUpAxis, IsThatOfTheLargestLevelAreaAndCanBeSet) {
   const TemporaryFolder folder;
-  const auto importBox = [&](std::array<float, 3> size, std::optional<char> up = {}) {
+  const auto importBox = [&](std::array<float, 3> size, std::optional<UpAxis> up = {}) {
     ImportOptions options;
     options.up = up;
     return importModel(folder.write("a.stl", makeBinaryStl(BoxMesh(size))), options);
   };
-  EXPECT_EQ(importBox({8, 3, 6}).upAxis, 'y');
-  EXPECT_EQ(importBox({3, 8, 6}).upAxis, 'x');
-  EXPECT_EQ(importBox({5, 5, 5}).upAxis, 'z');
-  EXPECT_EQ(
-      diagnosticText(importBox({8, 3, 6}), "guessed_up_axis"),
-      "y is up: the largest levels across x, y, z have 18 48 24 square units; --up sets another");
+  EXPECT_EQ(importBox({8, 3, 6}).upAxis, UpAxis::y);
+  EXPECT_EQ(importBox({3, 8, 6}).upAxis, UpAxis::x);
+  EXPECT_EQ(importBox({5, 5, 5}).upAxis, UpAxis::z);
+  EXPECT_EQ(diagnosticText(importBox({8, 3, 6}), "guessed_up_axis"),
+            "y is up: the largest levels across x, y, z have 18 48 24 of 180 square units; --up "
+            "sets another");
   const Model cube = importBox({5, 5, 5});
   EXPECT_EQ(countDiagnostics(cube, "unclear_up_axis"), 1u);
   EXPECT_EQ(countDiagnostics(cube, "guessed_up_axis"), 0u);
-  const Model set = importBox({8, 3, 6}, 'z');
-  EXPECT_EQ(set.upAxis, 'z');
+  const Model set = importBox({8, 3, 6}, UpAxis::z);
+  EXPECT_EQ(set.upAxis, UpAxis::z);
   EXPECT_EQ(countDiagnostics(set, "guessed_up_axis"), 0u);
 }
 
@@ -236,10 +236,78 @@ TEST(ScanUpAxis, IsThatOfTheFloorOfARoomWithoutACeiling) {
   const TemporaryFolder folder;
   for (std::size_t up = 0; up < 3; ++up) {
     const Model model = importModel(folder.write("room.ply", makeOpenRoom(up)));
-    EXPECT_EQ(model.upAxis, "xyz"[up]);
+    EXPECT_EQ(model.upAxis, static_cast<UpAxis>(up));
     EXPECT_EQ(countDiagnostics(model, "guessed_up_axis"), 1u);
     EXPECT_EQ(diagnosticText(model, "missing_texture"), "room.png: textures of PLY are not read");
   }
+}
+
+/// The floor and walls of a room, from within, with its floor across `up`, and turned about x.
+std::string makeRoomSeenFromWithin(UpAxis up, double tilt) {
+  BoxMesh room(up == UpAxis::z || up == UpAxis::minusZ ? std::array<float, 3>{6, 5, 2.7f}
+                                                       : std::array<float, 3>{6, 2.7f, 5});
+  const std::size_t axis = up == UpAxis::z || up == UpAxis::minusZ ? 2 : 1;
+  const bool isDown = up == UpAxis::minusY || up == UpAxis::minusZ;
+  std::string text =
+      "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 10\nproperty list uchar int vertex_indices\nend_header\n";
+  double low = 1e9, high = -1e9;
+  for (const auto& p : room.positions)
+    low = std::min<double>(low, p[axis]), high = std::max<double>(high, p[axis]);
+  const double ceiling = isDown ? low : high;
+  const double cosine = std::cos(tilt), sine = std::sin(tilt);
+  for (const auto& p : room.positions)
+    text += std::to_string(p[0]) + " " + std::to_string(cosine * p[1] - sine * p[2]) + " " +
+            std::to_string(sine * p[1] + cosine * p[2]) + "\n";
+  for (std::size_t i = 0; i + 2 < room.indices.size(); i += 3) {
+    const auto isAtCeiling = [&](std::size_t k) {
+      return room.positions[room.indices[i + k]][axis] == ceiling;
+    };
+    if (isAtCeiling(0) && isAtCeiling(1) && isAtCeiling(2)) continue;
+    for (const std::size_t k : {0u, 2u, 1u})
+      text += (k == 0 ? "3 " : " ") + std::to_string(room.indices[i + k]);
+    text += "\n";
+  }
+  return text;
+}
+
+TEST(ScanUpAxis, AFloorThatHangsIsReportedAndCanBeTurned) {
+  const TemporaryFolder folder;
+  for (const UpAxis up : {UpAxis::minusZ, UpAxis::minusY}) {
+    const auto file = folder.write("room.ply", makeRoomSeenFromWithin(up, 0));
+    const std::string text = diagnosticText(importModel(file), "unclear_up_axis");
+    EXPECT_NE(text.find("--up=" + toString(up)), std::string::npos) << text;
+    ImportOptions options;
+    options.up = up;
+    const Model model = importModel(file, options);
+    EXPECT_EQ(countDiagnostics(model, "unclear_up_axis"), 0u);
+    // The floor has no triangle above it: the lowest level is the large one, and faces up.
+    double floor = 0;
+    const Mesh& mesh = model.meshes.at(0);
+    const double lowest = Scene(Model(model)).bounds().min.y();
+    for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3) {
+      std::array<Vec3, 3> p;
+      for (std::size_t k = 0; k < 3; ++k)
+        p[k] = computeWorldPosition(model.objects.at(0), mesh, mesh.indices[i + k]);
+      const Vec3 area = (p[1] - p[0]).cross(p[2] - p[0]) / 2;
+      if (std::abs(p[0].y() - lowest) + std::abs(p[1].y() - lowest) + std::abs(p[2].y() - lowest) <
+          1e-5)
+        floor += area.y();
+    }
+    EXPECT_NEAR(floor, 30, 1e-3);
+  }
+  const Model upright = importModel(folder.write("up.ply", makeRoomSeenFromWithin(UpAxis::z, 0)));
+  EXPECT_EQ(countDiagnostics(upright, "guessed_up_axis"), 1u);
+}
+
+TEST(ScanUpAxis, ATiltedRoomIsUnclear) {
+  const TemporaryFolder folder;
+  const auto tilted = [&](double degrees) {
+    return importModel(
+        folder.write("t.ply", makeRoomSeenFromWithin(UpAxis::z, degrees * 0.0174533)));
+  };
+  EXPECT_EQ(countDiagnostics(tilted(5), "guessed_up_axis"), 1u);
+  EXPECT_EQ(countDiagnostics(tilted(15), "unclear_up_axis"), 1u);
 }
 
 TEST(ScanPly, LinesMayEndInCarriageReturnsAlone) {
@@ -540,7 +608,7 @@ TEST(ZippedCollada, IsTheSameAsTheDocument) {
     ASSERT_EQ(zipped.objects.size(), 1u);
     EXPECT_EQ(zipped.objects[0].path, plain.objects.at(0).path);
     EXPECT_EQ(zipped.metresPerUnit, 0.01);
-    EXPECT_EQ(zipped.upAxis, 'z');
+    EXPECT_EQ(zipped.upAxis, UpAxis::z);
     EXPECT_LT((Scene(Model(zipped)).bounds().size() - Vec3(1, 0, 2)).norm(), 1e-6);
   }
 }

@@ -81,7 +81,7 @@ std::string makeGltf() {
 ScenePtr importColoured(const std::string& name, const std::string& text) {
   const tests::TemporaryFolder folder;
   scene::ImportOptions options;
-  options.up = 'y';
+  options.up = scene::UpAxis::y;
   return std::make_shared<const scene::Scene>(
       scene::importModel(folder.write(name, text), options));
 }

@@ -6,10 +6,28 @@
 
 namespace enfilade::scene {
 
-Eigen::Matrix3d makeYUpRotation(char up) {
-  Eigen::Matrix3d rotation = Eigen::Matrix3d::Identity();
-  if (up == 'z') rotation << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  if (up == 'x') rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+Eigen::Matrix3d makeYUpRotation(UpAxis up) {
+  Eigen::Matrix3d rotation;
+  switch (up) {
+    case UpAxis::x:
+      rotation << 0, -1, 0, 1, 0, 0, 0, 0, 1;
+      break;
+    case UpAxis::y:
+      rotation.setIdentity();
+      break;
+    case UpAxis::z:
+      rotation << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+      break;
+    case UpAxis::minusX:
+      rotation << 0, 1, 0, -1, 0, 0, 0, 0, 1;
+      break;
+    case UpAxis::minusY:
+      rotation << 1, 0, 0, 0, -1, 0, 0, 0, -1;
+      break;
+    case UpAxis::minusZ:
+      rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+      break;
+  }
   return rotation;
 }
 

@@ -12,8 +12,8 @@ inline constexpr double kMaxPreciseDistance = 1000;
 /// Metres between neighbouring floats; beyond it, a diagnostic.
 inline constexpr double kMaxFloatSpacing = 1e-4;
 
-/// Rotates the up axis `up` ('x', 'y' or 'z') to Y, by a quarter turn about the third axis.
-Eigen::Matrix3d makeYUpRotation(char up);
+/// Rotates the up axis to Y, by a quarter turn about the third axis; -y by a half turn about x.
+Eigen::Matrix3d makeYUpRotation(UpAxis up);
 
 /// The box of an object's triangles in the frame that `frameFromMesh` leads to.
 Aabb computeObjectAabb(const Model& model, const Object& object,

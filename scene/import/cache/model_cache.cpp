@@ -52,7 +52,7 @@ std::string formatOptions(const ImportOptions& options) {
               ? std::to_string(std::bit_cast<std::uint64_t>(*options.metresPerUnit))
               : "-";
   text += " up ";
-  text += options.up ? std::string(1, *options.up) : "-";
+  text += options.up ? toString(*options.up) : "-";
   text += " offset ";
   for (int i = 0; i < 3; ++i)
     text += options.offset

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "collision/types.hpp"
+#include "scene/model/up_axis.hpp"
 
 namespace enfilade::scene {
 
@@ -21,7 +22,7 @@ enum class IfcReader : std::uint8_t { automatic, webIfc, ifcPlusPlus, assimp };
 struct ImportOptions {
   /// Overrides the file's unit (nullopt: that of the file, or one metre per unit).
   std::optional<double> metresPerUnit;
-  std::optional<char> up;  ///< 'x', 'y' or 'z'
+  std::optional<UpAxis> up;
   /// Metres, Y up: subtracted from the file's coordinates (nullopt: chosen so that the scene lies
   /// near its origin).
   std::optional<Vec3> offset;

@@ -25,10 +25,10 @@ std::span<const std::string_view> importableExtensions();
 /// Statements of a model file about its coordinates.
 struct FileMetadata {
   double metresPerUnit = 1;  ///< metres per unit of the file's coordinates
-  char up = 'y';
+  UpAxis up = UpAxis::y;
   /// Scale and up axis that assimp applies to the root by itself. The import undoes both.
   double assimpScale = 1;
-  char assimpUp = 'y';
+  UpAxis assimpUp = UpAxis::y;
   /// Triangles that the file declares, each mesh once; nullopt: unknown.
   std::optional<std::size_t> triangles;
   std::vector<std::string> scenes;  ///< glTF: names; see Model::fileScenes

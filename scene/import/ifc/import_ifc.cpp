@@ -48,7 +48,7 @@ class NodeBuilder {
         paths_(buildIfcPaths(metadata)),
         storeys_(metadata),
         worldFromFile_(worldFromFile),
-        worldFromReader_(worldFromFile * Eigen::Affine3d(makeYUpRotation('z').transpose())),
+        worldFromReader_(worldFromFile * Eigen::Affine3d(makeYUpRotation(UpAxis::z).transpose())),
         model_(model) {}
 
   /// Moves geometries of these meshes out of them, instead of copying: those of one colour that no
@@ -339,7 +339,7 @@ class IfcImport {
     Model model;
     model.reader = reader;
     model.metresPerUnit = request_.options.metresPerUnit.value_or(metadata_.metresPerUnit);
-    model.upAxis = request_.options.up.value_or('z');
+    model.upAxis = request_.options.up.value_or(UpAxis::z);
     if (request_.options.georeference) model.map = metadata_.mapConversion->crs;
     return model;
   }

@@ -8,9 +8,9 @@
 #include "scene/import/assembly/finish_model.hpp"
 #include "scene/import/assembly/path_names.hpp"
 #include "scene/import/file/read_file.hpp"
+#include "scene/import/scan/guess_up_axis.hpp"
 #include "scene/import/scan/ply_file.hpp"
 #include "scene/import/scan/stl_file.hpp"
-#include "scene/import/scan/up_axis.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
@@ -136,10 +136,14 @@ Material makeScanMaterial(const ScanMesh& scan, const std::string& name,
   return material;
 }
 
-std::string describeLevelAreas(const LevelAreas& areas, char up) {
-  std::string text = std::string(1, up) + " is up: the largest levels across x, y, z have";
-  for (const double area : areas) text += " " + std::to_string(std::llround(area));
-  return text + " square units; --up sets another";
+std::string describeLevelAreas(const LevelAreas& areas, UpAxis up) {
+  std::string text = toString(up) + " is up: the largest levels across x, y, z have";
+  for (const LevelArea& area : areas.axes) text += " " + std::to_string(std::llround(area.largest));
+  text += " of " + std::to_string(std::llround(areas.surface)) + " square units; --up sets another";
+  const bool hangs = areas.axes[static_cast<std::size_t>(up)].hangs;
+  return hangs ? text + "; the largest faces down and is high: if the scan is upside down, --up=-" +
+                     toString(up)
+               : text;
 }
 
 }  // namespace

@@ -405,8 +405,7 @@ Model deserializeModel(std::span<const std::byte> bytes) {
   model.fileScene = in.get<std::uint32_t>("file scene");
   if (model.fileScene > 0 && model.fileScene >= model.fileScenes.size())
     in.fail("file scene", "no such scene");
-  model.upAxis = static_cast<char>(in.get<std::uint8_t>("up axis"));
-  if (model.upAxis < 'x' || model.upAxis > 'z') in.fail("up axis", "neither x, y nor z");
+  model.upAxis = static_cast<UpAxis>(in.getUpTo(5, "up axis"));
   model.offset = in.getMatrix<Vec3>("offset");
   readAll(in, model.diagnostics, 24, "problems", [&] { return readDiagnostic(in); });
   readAll(in, model.dependencies, 8, "dependencies", [&] { return in.getText("dependency"); });

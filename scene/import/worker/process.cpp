@@ -125,7 +125,7 @@ std::array<std::string, kArgumentCount> makeArguments(const ImportRequest& reque
           std::to_string(request.options.memoryLimit),
           formatShortest(request.options.timeLimit),
           request.options.metresPerUnit ? formatShortest(*request.options.metresPerUnit) : "-",
-          request.options.up ? std::string(1, *request.options.up) : "-",
+          request.options.up ? toString(*request.options.up) : "-",
           request.options.offset ? formatVec3(*request.options.offset) : "-",
           std::to_string(static_cast<int>(request.options.ifcReader)),
           request.options.georeference ? "map" : "-",
@@ -303,7 +303,7 @@ std::optional<ImportRequest> parseImportRequest(int argc, char** argv, int& pare
   request.options.timeLimit = parseArgument<double>(argv[5]);
   if (std::string_view(argv[6]) != "-")
     request.options.metresPerUnit = parseArgument<double>(argv[6]);
-  if (std::string_view(argv[7]) != "-") request.options.up = argv[7][0];
+  request.options.up = parseUpAxis(argv[7]);
   if (std::string_view(argv[8]) != "-") request.options.offset = parseVec3(argv[8]);
   request.options.ifcReader = static_cast<IfcReader>(parseArgument<int>(argv[9]));
   request.options.georeference = std::string_view(argv[10]) == "map";
