@@ -21,6 +21,12 @@ def walk(env, seed, steps):
     return results
 
 
+def refused_pictures(env):
+    """While it lasts, the pictures of `env` are larger than the server draws."""
+    large = enfilade.cameras.CameraRequest(enfilade.Camera("", (60000, 60000)), env._name)
+    return unittest.mock.patch.object(env, "cameras", [large])
+
+
 class Environments(RoomCase):
     def environment(self, **options):
         options = {"starts": _STARTS, "size": (16, 12), **options}
@@ -192,6 +198,30 @@ class Environments(RoomCase):
         with self.assertRaisesRegex(enfilade.ServerError, "environment 0"):
             vector.step(np.ones((2, 2)))
         self.assertGreater(vector.envs[1]._steps, 0)
+
+    def test_after_a_refused_picture_an_environment_asks_for_a_reset(self):
+        self.need_pictures()
+        env = self.environment(goals=[(-4, 0, 0)], starts=[(0, 0.01, 0)])
+        expected = env.reset(seed=1)
+        with refused_pictures(env), self.assertRaises(enfilade.ServerError):
+            env.step((1, 0))
+        with self.assertRaisesRegex(RuntimeError, "call reset"):
+            env.step((1, 0))
+        self.assertIsNone(env.render())
+        again = env.reset(seed=1)
+        self.assert_same(again[0], expected[0])
+        self.assertEqual(again[1]["state_hash"], expected[1]["state_hash"])
+        env.step((1, 0))
+
+    def test_a_refused_picture_restarts_one_environment_of_a_vector(self):
+        self.need_pictures()
+        for is_packing in (True, False):
+            vector = self.vector(3, is_packing, cameras=[enfilade.Camera("", (16, 12))])
+            vector.reset(seed=1)
+            with refused_pictures(vector.envs[1]), self.assertRaisesRegex(enfilade.ServerError, "environment 1"):
+                vector.step(np.ones((3, 2)))
+            *_, infos = vector.step(np.ones((3, 2)))
+            self.assertEqual(list(infos["tick"]), [13, 1, 13])
 
     def test_an_interrupted_packed_step_leaves_the_environments_usable(self):
         vector = self.vector(3, starts=[(4, 0, 0, 0)])

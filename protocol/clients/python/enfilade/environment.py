@@ -91,8 +91,9 @@ class WalkEnv(spaces.EnvBase):
     episodes `info` has "geodesic_distance", "success" and "spl", too: the distance that is left counts as
     walked. A fall out of the scene ends the episode, with "fell" in `info` and the observation before it.
 
-    Raises ValueError with the name of the argument before anything is sent. An exception during a
-    step (KeyboardInterrupt) leaves it usable, but the world may have advanced by that step.
+    Raises ValueError with the name of the argument before anything is sent. After an order, a step or a
+    picture that the server refuses, call reset() next. A KeyboardInterrupt during a step leaves it usable,
+    but the world may have advanced by that step.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 10}
@@ -487,8 +488,10 @@ class WalkEnv(spaces.EnvBase):
                 raise OrderFailed("the avatar is no longer in the world: another client commands it")
             self._feet = before
             return self._seen, 0.0, True, False, self._fallen(made, contacts)
+        feet, self._feet = self._feet, None  # in case a picture or the path is refused
         for reply, _ in replies[2:]:
             raise_refusal(reply)
+        self._feet = feet
         path = replies.pop()[0].navigation.paths[0] if self.is_geodesic else None
         info = self._info(made.tick, made.state_hash, contacts, self._has_collided(made.tick, contacts))
         return (self._observation(replies[2:]), *self._judged(before, info, path))
