@@ -129,7 +129,7 @@ void Navigation::joinIslands(const Progress& progress) {
   scene::joinIslands(islands_, passages_);
 }
 
-std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
+std::size_t Navigation::update(const Snapshot& snapshot, int threads, const Progress& progress) {
   const std::lock_guard lock(mutex_);
   bodies_ = std::make_shared<const Snapshot>(snapshot);
   WorldData& world = world_.data();
@@ -160,8 +160,8 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads) {
   for (std::size_t i = 0; i < isChanged.size(); ++i)
     if (isChanged[i]) tiles.push_back(static_cast<int>(i));
   if (tiles.empty()) return 0;
-  buildTiles(tiles, threads, {});
-  assembleMeshes({});
+  buildTiles(tiles, threads, scaleProgress(progress, 0, kTileShare));
+  assembleMeshes(progress);
   return tiles.size();
 }
 
@@ -170,9 +170,9 @@ NavigationReport Navigation::report() {
   return report_;
 }
 
-NavigationMesh Navigation::buildUnobstructed(int threads) const {
+NavigationMesh Navigation::buildUnobstructed(int threads, const Progress& progress) const {
   std::vector<TileMesh> tiles(ampleTiles_.size());
-  parallelFor(tiles.size(), threads, {}, [&](std::size_t i) {
+  parallelFor(tiles.size(), threads, progress, [&](std::size_t i) {
     const int tile = static_cast<int>(i);
     tiles[i] = std::move(buildTileMeshes(world_.data(), agent_, grid_, tile % grid_.tilesX,
                                          tile / grid_.tilesX, {Clearance::none})[0]);
@@ -180,10 +180,11 @@ NavigationMesh Navigation::buildUnobstructed(int threads) const {
   return {grid_, std::move(tiles)};
 }
 
-NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const PathOptions& options) {
+NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const PathOptions& options,
+                                    const Progress& progress) {
   const std::lock_guard lock(mutex_);
-  const auto unobstructed = [this]() -> const UnobstructedMesh& {
-    if (!unobstructed_) unobstructed_.emplace(makeUnobstructedMesh(buildUnobstructed(2)));
+  const auto unobstructed = [&]() -> const UnobstructedMesh& {
+    if (!unobstructed_) unobstructed_.emplace(makeUnobstructedMesh(buildUnobstructed(2, progress)));
     return *unobstructed_;
   };
   PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};

@@ -88,16 +88,18 @@ class Navigation {
   std::vector<std::uint8_t> save();
 
   /// Takes over the poses of bodies, and builds the tiles again in which they changed. Returns the
-  /// number of these tiles.
-  std::size_t update(const Snapshot& snapshot, int threads = 2);
+  /// number of these tiles. Without any it reports no progress.
+  std::size_t update(const Snapshot& snapshot, int threads = 2, const Progress& progress = {});
 
   const NavigationAgent& agent() const { return agent_; }
   NavigationReport report();
   std::string findEntityName(EntityId id) const { return world_.data().findEntityName(id); }
 
   /// A path from where an agent at `from` stands to where it stands at `to`. Both may be up to a
-  /// step above the floor. With jumps and lifts it is the quickest that is found.
-  NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {});
+  /// step above the floor. With jumps and lifts it is the quickest that is found. `progress`: of
+  /// the mesh for reasons, which the first path that is not found needs.
+  NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {},
+                          const Progress& progress = {});
   /// As scene::findWayOut().
   NavigationPath findWayOut(const Vec3& from, const std::function<bool(const Vec3&)>& isWanted);
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
@@ -134,7 +136,7 @@ class Navigation {
   void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
   void assembleMeshes(const Progress& progress);
   void joinIslands(const Progress& progress);
-  NavigationMesh buildUnobstructed(int threads) const;
+  NavigationMesh buildUnobstructed(int threads, const Progress& progress) const;
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;
   /// As findPlaceIn(), on an island, or anywhere.

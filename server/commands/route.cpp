@@ -217,6 +217,7 @@ ExitCode route(const RouteCommand& command) {
   const auto asFile = scene::World(scene, command.settings).snapshot();
   std::shared_ptr<const scene::Snapshot> opened;  // once it is needed: doors take their time
   Progress bar;
+  const auto showProgress = [&](double done) { bar.show(done, "navigation mesh"); };
   const int threads = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   std::unique_ptr<scene::Navigation> asTheyAre, withOpenDoors;
   const auto provide = [&](bool open) -> scene::Navigation& {
@@ -225,7 +226,7 @@ ExitCode route(const RouteCommand& command) {
     if (!made)
       made = makeNavigation(
           {scene, command.settings, command.agent, open, open ? opened : asFile, threads},
-          [&](double done) { bar.show(done, "navigation mesh"); });
+          showProgress);
     bar.clear();
     return *made;
   };
@@ -244,11 +245,13 @@ ExitCode route(const RouteCommand& command) {
                     [&]() -> scene::Navigation& { return provide(false); },
                     [&]() -> scene::EntityIndex& { return index; },
                     closedDoors,
+                    showProgress,
                     "leave out --doors-as-they-are, or open it in the model"};
   if (scene::hasDoors(*scene))
     answer.withOpenDoors = [&]() -> scene::Navigation& { return provide(true); };
   v1::NavigationPath path;
   writePath(answer, from, to, command.links, true, path);
+  bar.clear();
   constexpr auto kReplace = Json::error_handler_t::replace;
   writeToStdout(
       command.json

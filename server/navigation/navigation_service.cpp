@@ -74,7 +74,7 @@ struct Answer {
             *state.snapshot, state.settings,
             doorsOpen,       withOpenDoors,
             asTheyAre,       [this]() -> scene::EntityIndex& { return index(); },
-            closedDoors};
+            closedDoors,     state.progress};
   }
 
   std::optional<v1::Error> operator()(const v1::NavigationQuery::Path& query) const {
@@ -235,7 +235,7 @@ NavigationService::Entry& NavigationService::prepare(const scene::NavigationAgen
   const auto snapshot = makeMeshSnapshot(doorsOpen, state);
   if (known != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, known);
-    if (known->navigation->update(*snapshot) > 0) known->closedDoors.clear();
+    if (known->navigation->update(*snapshot, 2, state.progress) > 0) known->closedDoors.clear();
     known->snapshot = snapshot;
     return *known;
   }
@@ -267,9 +267,9 @@ std::optional<v1::Error> NavigationService::load(const scene::NavigationAgent& a
   try {
     auto navigation = std::make_unique<scene::Navigation>(
         scene_, state.settings, agent,
-        std::span(reinterpret_cast<const std::uint8_t*>(mesh.data()), mesh.size()));
+        std::span(reinterpret_cast<const std::uint8_t*>(mesh.data()), mesh.size()), state.progress);
     const auto snapshot = makeMeshSnapshot(doorsOpen, state);
-    const std::size_t rebuilt = navigation->update(*snapshot);
+    const std::size_t rebuilt = navigation->update(*snapshot, 2, state.progress);
     logInfo("navigation: loaded meshes for radius {} m, height {} m; {} tiles built again",
             agent.radius, agent.height, rebuilt);
     std::erase_if(entries_, [&](const Entry& entry) {

@@ -93,8 +93,9 @@ struct PathWriter {
         });
       if (!aside.reason.empty()) return;  // an agent can be there only when the doors are open
       scene::NavigationPath onwards =
-          aside.found() ? answer.navigation.findPath(aside.points.back(), to, options)
-                        : scene::NavigationPath();
+          aside.found()
+              ? answer.navigation.findPath(aside.points.back(), to, options, answer.progress)
+              : scene::NavigationPath();
       if (!onwards.found()) {
         path = explainSwing(swings.back(), start, aside.found() ? onwards.reason : "");
         return;
@@ -184,7 +185,7 @@ struct PathWriter {
   std::optional<std::uint32_t> findClosedDoor(const Vec3& from, const Vec3& to,
                                               const scene::PathOptions& options) const {
     scene::Navigation& open = answer.withOpenDoors();
-    const scene::NavigationPath through = open.findPath(from, to, options);
+    const scene::NavigationPath through = open.findPath(from, to, options, answer.progress);
     if (!through.found()) return std::nullopt;
     const auto doors = findDoors(open, through.points);
     const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
@@ -218,7 +219,7 @@ struct PathWriter {
 void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
                const scene::PathOptions& options, bool measuresWidth, v1::NavigationPath& message) {
   const PathWriter writer{answer};
-  scene::NavigationPath path = answer.navigation.findPath(from, to, options);
+  scene::NavigationPath path = answer.navigation.findPath(from, to, options, answer.progress);
   std::vector<scene::DoorOnPath> doors;
   if (path.found() && answer.doorsOpen) {
     doors = writer.findDoors(answer.navigation, path.points);

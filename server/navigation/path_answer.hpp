@@ -30,6 +30,7 @@ struct PathAnswer {
   std::function<scene::Navigation&()> asTheyAre;  ///< the same with doors as they are
   std::function<scene::EntityIndex&()> index;     ///< built at the first call
   ClosedDoors& closedDoors;                       ///< those that are known, of `navigation`
+  scene::Navigation::Progress progress = {};      ///< of building meshes; may be empty
   const char* doorRemedy = "open it, or ask with open doors";  ///< of a closed door
 };
 

@@ -121,7 +121,7 @@ std::unique_ptr<scene::Navigation> loadNavigation(const MeshRequest& request,
   const auto start = std::chrono::steady_clock::now();
   auto navigation = std::make_unique<scene::Navigation>(request.scene, request.settings,
                                                         request.agent, bytes, progress);
-  const std::size_t rebuilt = navigation->update(*request.snapshot, request.threads);
+  const std::size_t rebuilt = navigation->update(*request.snapshot, request.threads, progress);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   logInfo("navigation: meshes for radius {} m, height {} m read in {:.2f} s, {} tiles built",
           request.agent.radius, request.agent.height, seconds.count(), rebuilt);

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,25 @@ TEST(Reasons, AreThoseOfTheFirstRoomOnTheWay) {
   EXPECT_EQ(navigation.findPath({2, 0, 2}, {13, 0, 2}).reason,
             "kerb is in the way: a step of 0.500 m, climbs 0.300");
   EXPECT_EQ(navigation.findPath({13, 0, 2}, {2, 0, 2}).reason, "wall is in the way");
+}
+
+TEST(Reasons, TheFirstPathThatIsNotFoundReportsTheirMesh) {
+  Navigation navigation(
+      boxScene({{"floor", {0, -0.2, 0}, {40, 0, 5}}, {"wall", {5, 0, -1}, {5.2, 2.5, 6}}}), {}, {});
+  std::vector<double> shares;
+  const auto find = [&](const Vec3& goal) {
+    shares.clear();
+    return navigation.findPath({2, 0, 2}, goal, {}, [&](double share) { shares.push_back(share); });
+  };
+  EXPECT_TRUE(find({4, 0, 2}).found());
+  EXPECT_TRUE(shares.empty());
+  EXPECT_EQ(find({8, 0, 2}).reason, "wall is in the way");
+  ASSERT_FALSE(shares.empty());
+  EXPECT_LT(shares.front(), 1);
+  EXPECT_TRUE(std::ranges::is_sorted(shares));
+  EXPECT_EQ(shares.back(), 1);
+  EXPECT_EQ(find({9, 0, 2}).reason, "wall is in the way");
+  EXPECT_TRUE(shares.empty());
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <random>
 
 #include "scene/model/hasher.hpp"
@@ -66,9 +67,17 @@ TEST(SavedMeshes, ABodyThatHasMovedSinceIsBuiltAgain) {
   for (int tick = 0; tick < 300; ++tick) tickWorld(world);
   Navigation loaded(scene, {}, {}, saved);
   EXPECT_FALSE(loaded.snap({1.5, 0.1, -2.5}, 0));
-  EXPECT_GT(loaded.update(*world.snapshot()), 0u);
+  std::vector<double> shares;
+  const auto report = [&](double share) { shares.push_back(share); };
+  EXPECT_GT(loaded.update(*world.snapshot(), 2, report), 0u);
+  ASSERT_GT(shares.size(), 2u);
+  EXPECT_TRUE(std::ranges::is_sorted(shares));
+  EXPECT_LE(shares.front(), Navigation::kTileShare);
+  EXPECT_EQ(shares.back(), 1);
+  shares.clear();
   EXPECT_TRUE(loaded.findPath({1.5, 0.1, -2.4}, {7, 0.1, 0}).found());
-  EXPECT_EQ(loaded.update(*world.snapshot()), 0u);
+  EXPECT_EQ(loaded.update(*world.snapshot(), 2, report), 0u);
+  EXPECT_TRUE(shares.empty());
   Navigation moved(scene, {}, {}, loaded.save());
   EXPECT_EQ(moved.update(*world.snapshot()), 0u) << "the file has the places of bodies";
 }

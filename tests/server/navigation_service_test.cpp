@@ -116,6 +116,31 @@ TEST(NavigationService, AClosedDoorIsTheReasonAsLongAsAWayLeadsThroughIt) {
   EXPECT_EQ(askReason(), "door");
 }
 
+/// A share that falls begins the next meshes.
+TEST(NavigationService, MeshesOfReasonsAndOfMovedBodiesReportProgress) {
+  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, true));
+  NavigationService service(scene);
+  scene::World world(scene);
+  v1::NavigationQuery query;
+  query.mutable_path()->mutable_from()->mutable_point()->set_x(2);
+  query.mutable_path()->add_to()->mutable_point()->set_x(9);
+  const auto countMeshes = [&] {
+    std::vector<double> shares;
+    std::vector<std::uint8_t> attachment;
+    const auto report = [&](double share) { shares.push_back(share); };
+    service.answer(query, {world.snapshot(), world.settings(), report}, attachment);
+    int count = 0;
+    for (std::size_t i = 0; i < shares.size(); ++i)
+      if (i == 0 || shares[i] < shares[i - 1]) ++count;
+    return count;
+  };
+  EXPECT_EQ(countMeshes(), 4) << "its own, for the reason, and with open doors: loaded and mended";
+  EXPECT_EQ(countMeshes(), 0);
+  submitBodyCommand(world, {"door", scene::BodyCommand::Action::open, 0, 0, std::nullopt});
+  for (int tick = 0; tick < 300; ++tick) tickWorld(world);
+  EXPECT_EQ(countMeshes(), 1) << "around the door";
+}
+
 TEST(NavigationService, AStoreyIsReachedFromBothSidesOfAClosedDoor) {
   scene::Model model = roomsWithDoor(1, true);
   model.storeys.push_back({"Ground", "", 0});
