@@ -154,7 +154,6 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
     return path;
   }
   std::vector<Vec3> places{from};
-  finder.walker.takeCrossedSteps();
   for (const Vec3& corner : line->corners) {
     const auto place =
         &corner == &line->corners.back() ? std::optional(to) : standNear(finder.walker, corner);
@@ -178,17 +177,10 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
   }
   path.reason = kNotFound;
   if (std::abs(places.back().y() - to.y()) > kHeightError) return path;
-  const bool hasSteps = finder.walker.takeCrossedSteps();
   rejoinMesh(finder, places);
-  std::vector<Vec3> points = shortenPath(finder.walker, places, Shortcuts::all);
-  pullTight(finder.walker, points);
-  if ((finder.walker.takeCrossedSteps() || hasSteps) && !walksOn(finder.walker, points, proof)) {
-    path.obstruction = proof.met.back();
-    return path;
-  }
-  path.reason.clear();
-  path.length = computeLength(points);
-  path.points = std::move(points);
+  NavigationPath proved = proveWay(finder, places, proof);
+  if (proved.found()) return proved;
+  path.obstruction = proof.met.back();
   return path;
 }
 
