@@ -13,14 +13,16 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kHeightReach = 0.6;       // metres between both sides of a gap
-constexpr double kMaxGapDetour = 6;        // metres: a longer way around a gap does not pass it
-constexpr double kSpacing = 0.12;          // metres
-constexpr double kGapMargin = 1.6;         // metres around the beginning of a way across a gap
-constexpr double kNearStart = 0.3;         // metres
-constexpr double kMaxStraightGap = 1;      // metres
-constexpr double kLineSpacing = 0.012;     // metres
-constexpr int kMaxLines = 84;              // 0.5 m to each side: neighbours may be 1 m apart
+constexpr double kHeightReach = 0.6;    // metres between both sides of a gap
+constexpr double kMaxGapDetour = 6;     // metres: a longer way around a gap does not pass it
+constexpr double kSpacing = 0.12;       // metres
+constexpr double kGapMargin = 1.6;      // metres around the beginning of a way across a gap
+constexpr double kNearStart = 0.3;      // metres
+constexpr double kMaxStraightGap = 1;   // metres
+constexpr double kLineSpacing = 0.012;  // metres
+// 0.8 m to each side. Next to the gap the closest places face each other askew, and no parallel of
+// their line passes: it is crossed from places of the next 0.5 m.
+constexpr int kMaxLines = 134;
 constexpr double kSameGap = 0.8;           // metres between ends of passages
 constexpr std::size_t kMaxWalks = 60'000;  // on grids, of all gaps: some tenths of a second
 constexpr std::size_t kGapWalks = 1000;

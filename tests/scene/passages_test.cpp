@@ -63,6 +63,27 @@ TEST(Passages, AGapIsFoundWhereverItLiesOnTheGrid) {
   }
 }
 
+/// The scarce mesh has no gap here, and grids miss it: straight lines alone cross it.
+TEST(Passages, AGapIsFoundAsideOfThePlacesThatFaceEachOther) {
+  const NamedBox floor{"floor", {0, -0.2, 0}, {12, 0, 12}};
+  const NavigationAgent agent;
+  NavigationMesh scarce =
+      makeMesh(World(boxScene({floor, {"wall", {5.97, 0, 0}, {6.03, 2.5, 12}}})), agent);
+  for (int shift = 0; shift < 25; ++shift) {
+    const double gap = 5 + 0.04 * shift;
+    const World world(boxScene({floor,
+                                {"wall/near", {5.97, 0, 0}, {6.03, 2.5, gap}},
+                                {"wall/far", {5.97, 0, gap + 0.62}, {6.03, 2.5, 12}}}));
+    NavigationMesh ample = makeMesh(world, agent);
+    Walker walker(world.data(), agent);
+    const IslandList islands = collectIslands(ample, walker, world.scene().bounds());
+    TriedGaps tried;
+    const PassageList list =
+        collectPassages({world.data(), agent, walker, ample, scarce, nullptr}, islands, tried, {});
+    EXPECT_FALSE(list.passages.empty()) << shift;
+  }
+}
+
 TEST(Passages, AnAnswerDoesNotDependOnEarlierOnes) {
   Navigation navigation(boxScene(roomsWithFarGap(0.61)), {}, {});
   std::mt19937 random(9);
