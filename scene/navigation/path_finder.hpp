@@ -33,7 +33,9 @@ struct PathLeg {
 
 struct NavigationPath {
   std::vector<Vec3> points;  ///< feet, scene frame, metres: way points of a Walk; empty: none found
-  double length = 0;   ///< metres, in space, along `points`; of falls across, of rides nothing
+  /// Metres that the feet move, from point to point in space: a stair between two points counts as
+  /// a slope, a step next to a point with its height. Of falls the way across, of rides nothing.
+  double length = 0;
   double seconds = 0;  ///< expected, without waits for doors
   std::vector<PathLeg> legs;
   std::string reason;  ///< without a path: why

@@ -362,21 +362,33 @@ void judge(Bench& bench, const std::vector<Vec3>& places,
   }
 }
 
-/// Length of the shortest way in the fill, metres; nullopt: none, or it cannot be walked.
-std::optional<double> measureShortest(const Bench& bench, const FloodFill& fill, const Vec3& from,
-                                      const Vec3& to) {
-  const std::vector<Vec3> way = fill.findShortest(from, to);
-  if (way.empty()) return std::nullopt;
-  scene::Walker walker(bench.atRest.data(), {});
-  walker.place(from, FloodFill::kSpacing);
+/// Metres that the feet of an avatar move along a way, tick by tick: a step up or down counts with
+/// its height, wherever the points of the way are. nullopt: it cannot be walked.
+std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& way) {
+  scene::World world(bench.scene);
+  scene::Spawn spawn;
+  spawn.position = way.front();
+  scene::Walk walk;
+  walk.waypoints.assign(way.begin() + 1, way.end());
+  submitAvatarCommand(world, {"walker", spawn, 0});
+  tickWorld(world);
+  submitAvatarCommand(world, {"walker", walk, 0});
   double length = 0;
-  for (std::size_t i = 1; i < way.size(); ++i) {
-    if (walker.walkOn(way[i]).kind != scene::WalkOutcome::Kind::arrived ||
-        std::abs(walker.footPosition().y() - way[i].y()) > scene::kHeightError)
-      return std::nullopt;
-    length += (way[i] - way[i - 1]).norm();
+  Vec3 feet = way.front();
+  for (int tick = 0; tick < kMaxTicks; ++tick) {
+    const scene::TickReport report = tickWorld(world);
+    const auto snapshot = world.snapshot();
+    if (snapshot->avatars.empty()) return std::nullopt;
+    const Vec3 before = std::exchange(feet, snapshot->avatars.front().footPosition);
+    length += (feet - before).norm();
+    for (const scene::Notice& notice : report.notices) {
+      if (notice.kind == scene::Notice::Kind::blocked) return std::nullopt;
+      if (notice.kind != scene::Notice::Kind::arrived) continue;
+      if (std::abs(feet.y() - way.back().y()) > scene::kHeightError) return std::nullopt;
+      return length;
+    }
   }
-  return length;
+  return std::nullopt;
 }
 
 void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
@@ -403,10 +415,20 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
     const v1::NavigationPath path =
         bench.findPath(from, to, v1::NavigationQuery::DOORS_AS_THEY_ARE);
     if (!path.found()) continue;
-    const auto shortest = measureShortest(bench, fill, from, to);
+    const std::vector<Vec3> way = fill.findShortest(from, to);
+    const auto shortest = way.empty() ? std::nullopt : measureWalk(bench, way);
     if (!shortest) ++unwalkable;
     if (!shortest || *shortest < 1) continue;
-    ratios.push_back(path.length() / *shortest);
+    std::vector<Vec3> points;
+    for (const v1::Vec3& point : path.points()) points.push_back(server::vectorFromProto(point));
+    const auto walked = measureWalk(bench, points);
+    if (!walked) {
+      ++result.wrong;
+      std::printf("  not walked: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g)\n", from.x(),
+                  from.y(), from.z(), to.x(), to.y(), to.z());
+      continue;
+    }
+    ratios.push_back(*walked / *shortest);
     if (ratios.back() > 1.02)
       std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f\n", from.x(),
                   from.y(), from.z(), to.x(), to.y(), to.z(), ratios.back());

@@ -65,7 +65,8 @@ of radius, or a shift of the grid by one centimetre, changes the answer.
 *Skipped*: an end is at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight, where an avatar can walk that; in brackets those where it cannot, or of
-which the fill has not both ends.
+which the fill has not both ends. An avatar walks both: the metres that its feet move are compared, tick by tick, so
+a step up or down counts with its height on both.
 
 {table(["scene", "places of the fill", "compared", "wrong", "walked", "near", "skipped", "islands", "lengths", "median share",
         "largest", "above 1.02"], [make_fill_row(row) for row in parts["reach_compared"]])}

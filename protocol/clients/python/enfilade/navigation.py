@@ -30,7 +30,7 @@ class Path:
     the first."""
     found: bool
     points: np.ndarray
-    length: float  # metres walked: of falls those across, of rides none; infinite without a path
+    length: float  # metres along `points`: of falls those across, of rides none; infinite without a path
     reason: str = ""
     obstacle: int = 0  # the entity in the way
     obstacle_name: str = ""
