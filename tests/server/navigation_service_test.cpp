@@ -118,7 +118,8 @@ TEST(NavigationService, AClosedDoorIsTheReasonAsLongAsAWayLeadsThroughIt) {
 
 /// A share that falls begins the next meshes.
 TEST(NavigationService, MeshesOfReasonsAndOfMovedBodiesReportProgress) {
-  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, true));
+  const auto scene = std::make_shared<const scene::Scene>(
+      roomsWithDoor(1, true, {{"yard", {12, -0.2, -3}, {50, 0, 3}}}));  // of several tiles
   NavigationService service(scene);
   scene::World world(scene);
   v1::NavigationQuery query;
