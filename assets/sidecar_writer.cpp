@@ -7,6 +7,7 @@
 #include <stdexcept>
 
 #include "assets/plan.hpp"
+#include "collision/motion/sine_cosine.hpp"
 
 namespace enfilade::assets {
 namespace {
@@ -14,7 +15,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr char kPrefix[] = "building/";
-constexpr double kDegreesPerRadian = 57.29577951308232;
 constexpr double kDecimals = 1e6;
 
 double roundNumber(double value) {
@@ -31,7 +31,7 @@ std::string getBodyName(const std::string& path) {
 
 Json makeDoorBody(const scene::Object& object, const MovingPart& part) {
   const bool turns = part.kind == MovingPart::Kind::hinge;
-  const double scale = turns ? kDegreesPerRadian : 1;
+  const double scale = turns ? collision::kDegreesPerRadian : 1;
   const double low = roundNumber(scale * part.low), high = roundNumber(scale * part.high);
   Json body{{"name", getBodyName(object.path)},
             {"kind", turns ? "hinged" : "sliding"},

@@ -15,6 +15,7 @@ struct SineCosine {
 SineCosine<double> computeSineCosineOfDegrees(double degrees);
 
 inline constexpr double kRadiansPerDegree = 0.017453292519943295;
+inline constexpr double kDegreesPerRadian = 57.29577951308232;
 inline constexpr double kMaxAngle = 1e6;  ///< radians
 /// 0 <= radians <= kMaxAngle. The error is below 8 units of rounding of LongReal.
 SineCosine<LongReal> computeSineCosine(LongReal radians);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <optional>
 #include <random>
 #include <set>
@@ -12,6 +11,7 @@
 #include "scene/navigation/mesh/polygon_sampler.hpp"
 #include "scene/navigation/walk/grid_search.hpp"
 #include "scene/navigation/walk/stand.hpp"
+#include "scene/physics/disjoint_sets.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
 namespace enfilade::scene {
@@ -123,41 +123,35 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
 }
 
 void joinIslands(IslandList& list, const PassageList& passages) {
-  std::vector<std::uint32_t> joinedTo(list.islands.size());  // a smaller number, or itself
-  std::iota(joinedTo.begin(), joinedTo.end(), 0u);
-  const auto findFirst = [&](std::uint32_t number) {
-    while (joinedTo[number] != number) number = joinedTo[number];
-    return number;
-  };
+  DisjointSets joined(list.islands.size());
   std::set<std::pair<std::uint32_t, std::uint32_t>> ways;  // between islands, in one direction
   for (const Passage& passage : passages.passages)
     ways.emplace(list.numberOf[passage.fromPolygon], list.numberOf[passage.toPolygon]);
   for (const auto& [from, to] : ways) {
     if (from >= to || !ways.contains({to, from})) continue;
-    const std::uint32_t a = findFirst(from), b = findFirst(to);
-    joinedTo[std::max(a, b)] = std::min(a, b);
+    joined.unite(from, to);
   }
   std::vector<std::uint32_t> order;  // of the islands that remain, the largest first
-  for (std::uint32_t number = 0; number < joinedTo.size(); ++number) {
-    const std::uint32_t first = findFirst(number);
+  for (std::uint32_t number = 0; number < list.islands.size(); ++number) {
+    const std::uint32_t first = joined.find(number);
     if (first == number) {
       order.push_back(number);
       continue;
     }
-    Island& joined = list.islands[first];
-    joined.area += list.islands[number].area;
-    joined.isRoof = joined.isRoof && list.islands[number].isRoof;
+    Island& whole = list.islands[first];
+    whole.area += list.islands[number].area;
+    whole.isRoof = whole.isRoof && list.islands[number].isRoof;
   }
   std::ranges::stable_sort(order, std::greater(),
                            [&](std::uint32_t number) { return list.islands[number].area; });
   std::vector<Island> islands;
-  std::vector<std::uint32_t> rank(joinedTo.size());
+  std::vector<std::uint32_t> rank(list.islands.size());
   for (const std::uint32_t number : order) {
     rank[number] = static_cast<std::uint32_t>(islands.size());
     islands.push_back(list.islands[number]);
   }
   for (std::uint32_t& number : list.numberOf)
-    if (number != kNoIsland) number = rank[findFirst(number)];
+    if (number != kNoIsland) number = rank[joined.find(number)];
   list.islands = std::move(islands);
   chooseDrawn(list.islands);
 }

@@ -10,6 +10,7 @@
 #include <string>
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "scene/navigation/clear_width.hpp"
 #include "scene/navigation/passages.hpp"
 #include "scene/navigation/walk/stand.hpp"
@@ -114,6 +115,7 @@ std::vector<PartGap> findGapsTo(const UnobstructedMesh& unobstructed, std::uint3
   std::vector<Reached> parts(1 + *std::ranges::max_element(unobstructed.partOf));
   using Entry = std::pair<double, std::uint32_t>;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
+  ENFILADE_ASSERT(std::ranges::is_sorted(unobstructed.gaps, {}, &PartGap::fromPart));
   parts[from].length = 0;
   open.push({0, from});
   while (!open.empty() && open.top().second != to) {

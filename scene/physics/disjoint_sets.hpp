@@ -1,4 +1,4 @@
-// Disjoint sets (union-find), for islands of bodies.
+// Disjoint sets (union-find): islands of bodies, pieces of shapes, joined parts of a mesh.
 #pragma once
 
 #include <algorithm>

@@ -44,6 +44,15 @@ void addPresenceNotices(const scene::Snapshot& one, const scene::Snapshot& other
   }
 }
 
+/// Forgets what belongs to the world before: only the new one's first snapshot remains.
+void clearRunState(HostedWorld& hosted) {
+  resetHorizons(hosted);
+  hosted.owners.clear();
+  hosted.pendingRelease.clear();
+  hosted.activeContacts.clear();
+  hosted.recentSnapshots = {hosted.world.snapshot()};
+}
+
 }  // namespace
 
 void resetWorld(HostedWorld& hosted) {
@@ -52,11 +61,7 @@ void resetWorld(HostedWorld& hosted) {
   broadcastEvents(hosted, events);
   for (auto& [id, client] : hosted.clients) resetSubscriptionTimes(client);
   hosted.world.reset(makeInitialWorld(hosted.scene, hosted.world.settings(), hosted.auditEvery));
-  resetHorizons(hosted);
-  hosted.owners.clear();
-  hosted.pendingRelease.clear();
-  hosted.activeContacts.clear();
-  hosted.recentSnapshots = {hosted.world.snapshot()};
+  clearRunState(hosted);
   hosted.idle = true;
   for (auto& [id, viewer] : hosted.viewers) viewer.onReplaced(hosted.world, hosted.activeContacts);
 }
@@ -73,11 +78,7 @@ void replaceWorld(HostedWorld& hosted, scene::World world, const v1::TickEvents&
     hosted.world.restore(std::move(world), activeContacts);
   else
     hosted.world.switchTo(std::move(world));
-  resetHorizons(hosted);
-  hosted.owners.clear();
-  hosted.pendingRelease.clear();
-  hosted.activeContacts.clear();
-  hosted.recentSnapshots = {hosted.world.snapshot()};
+  clearRunState(hosted);
   updateActiveContacts(hosted, activeContacts);
   publishStatus(hosted);
   TickBroadcast shared{begun};

@@ -10,6 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "server/inspection/report_cache.hpp"
 
 namespace enfilade::server {
@@ -90,8 +91,7 @@ Json spacesToJson(const scene::Model& model) {
 
 /// Degrees in the plane of the floor: 0 looks along +x, 90 along -z.
 double computeFacing(const Eigen::Vector2d& direction) {
-  constexpr double kDegrees = 57.29577951308232;
-  return std::atan2(-direction.y(), direction.x()) * kDegrees;
+  return std::atan2(-direction.y(), direction.x()) * collision::kDegreesPerRadian;
 }
 
 Json northToJson(const std::optional<Eigen::Vector2d>& north) {

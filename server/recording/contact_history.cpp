@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "collision/assert.hpp"
 #include "protocol/recording/recording.hpp"
 #include "scene/world/active_contacts.hpp"
 #include "server/messages/world_messages.hpp"
@@ -61,6 +62,7 @@ v1::RecordedEvents ContactHistory::eventsAfter(std::uint64_t tick, std::size_t m
   v1::RecordedEvents reply;
   reply.set_complete_to(completeTo_);
   std::size_t bytes = 0;
+  ENFILADE_ASSERT(std::ranges::is_sorted(events_, {}, &v1::ContactEvent::tick));
   auto next = std::ranges::upper_bound(events_, tick, {}, &v1::ContactEvent::tick);
   for (; next != events_.end(); ++next) {
     const v1::ContactEvent& event = *next;
@@ -83,6 +85,7 @@ v1::RecordedEvents ContactHistory::eventsAfter(std::uint64_t tick, std::size_t m
 const v1::ContactEvent* ContactHistory::findLastBegin(const Key& key, std::uint64_t tick) const {
   const auto found = begins_.find(key);
   if (found == begins_.end()) return nullptr;
+  ENFILADE_ASSERT(std::ranges::is_sorted(found->second, {}, &v1::ContactEvent::tick));
   const auto firstAfter = std::upper_bound(
       found->second.begin(), found->second.end(), tick,
       [](std::uint64_t wanted, const v1::ContactEvent& event) { return wanted < event.tick(); });

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <vector>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "scene/import/file/import_options.hpp"
 
 namespace enfilade::scene {
@@ -301,13 +302,12 @@ Eigen::Vector3d computeGridNorth(const IfcMapConversion& conversion) {
 }
 
 std::string formatMapConversion(const IfcMapConversion& conversion) {
-  constexpr double kDegrees = 57.29577951308232;
   char text[160];
   std::snprintf(text, sizeof text,
                 "the file's origin is at E %.3f, N %.3f, H %.3f m, its x axis %.6f degrees from "
                 "east to north, scale %.9g",
                 conversion.east, conversion.north, conversion.height,
-                conversion.rotation * kDegrees, conversion.scale);
+                conversion.rotation * collision::kDegreesPerRadian, conversion.scale);
   return (conversion.crs.empty() ? "unnamed map" : conversion.crs) + ": " + text;
 }
 

@@ -13,6 +13,7 @@
 #include <string>
 #include <utility>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "scene/world/data/body.hpp"
 
 namespace enfilade::scene {
@@ -85,8 +86,7 @@ struct TileBuild {
 };
 
 float maxSlopeDegrees(const WorldSettings& settings) {
-  constexpr double kDegrees = 57.29577951308232;
-  return static_cast<float>(std::acos(settings.walkableNormalY) * kDegrees);
+  return static_cast<float>(std::acos(settings.walkableNormalY) * collision::kDegreesPerRadian);
 }
 
 Heightfield rasterize(TileBuild& build, const std::vector<float>& triangles) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <limits>
 
+#include "collision/assert.hpp"
 #include "scene/world/contacts/contacts.hpp"
 
 namespace enfilade::scene {
@@ -101,6 +102,7 @@ void updateTrigger(const WorldData& world, Body& trigger, TickReport& report, Qu
       emitTriggerEvent(world, isInside ? ContactEvent::Kind::enter : ContactEvent::Kind::leave,
                        visitor.id, trigger, separation, report.contacts);
   }
+  ENFILADE_ASSERT(std::ranges::is_sorted(nearby));
   for (const EntityId id : trigger.occupants)  // entities whose motion bounds have left the trigger
     if (!std::binary_search(nearby.begin(), nearby.end(), id))
       emitTriggerEvent(world, ContactEvent::Kind::leave, id, trigger,

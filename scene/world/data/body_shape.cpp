@@ -9,11 +9,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <span>
 #include <stdexcept>
 
 #include "scene/model/shapes/mass_properties.hpp"
+#include "scene/physics/disjoint_sets.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::scene {
@@ -61,25 +61,20 @@ std::vector<PlacedShape> collectShapes(const Model& model, const BodySpec& spec,
 /// Groups the shells that share vertices, in order of the first shell of each group.
 std::vector<std::vector<std::uint32_t>> findConnectedPieces(const Shape& shape) {
   const auto count = static_cast<std::uint32_t>(shape.shells.size());
-  std::vector<std::uint32_t> parent(count), shellOfVertex(shape.vertices.size(), count);
-  std::iota(parent.begin(), parent.end(), 0u);
-  const auto findRoot = [&](std::uint32_t i) {
-    while (parent[i] != i) i = parent[i] = parent[parent[i]];
-    return i;
-  };
+  DisjointSets sets(count);
+  std::vector<std::uint32_t> shellOfVertex(shape.vertices.size(), count);
   for (std::uint32_t s = 0; s < count; ++s) {
     const Shell& shell = shape.shells[s];
     for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
       for (const std::uint32_t vertex : shape.triangles[t]) {
         std::uint32_t& other = shellOfVertex[vertex];
         if (other == count) other = s;
-        const std::uint32_t a = findRoot(other), b = findRoot(s);
-        parent[std::max(a, b)] = std::min(a, b);
+        sets.unite(other, s);
       }
     }
   }
   std::vector<std::vector<std::uint32_t>> pieces(count);
-  for (std::uint32_t s = 0; s < count; ++s) pieces[findRoot(s)].push_back(s);
+  for (std::uint32_t s = 0; s < count; ++s) pieces[sets.find(s)].push_back(s);
   std::erase_if(pieces, [](const auto& piece) { return piece.empty(); });
   return pieces;
 }
