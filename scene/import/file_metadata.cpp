@@ -61,7 +61,6 @@ void rejectGlb(const std::filesystem::path& file) {
 
 // ---- COLLADA ------------------------------------------------------------------------------------
 
-constexpr std::size_t kMaxColladaBytes = std::size_t{2} << 30;  // of the document in an archive
 constexpr std::array<std::string_view, 1> kColladaExtension{".dae"};
 
 bool isZippedCollada(const std::filesystem::path& file) {
@@ -70,10 +69,13 @@ bool isZippedCollada(const std::filesystem::path& file) {
 
 std::string readColladaText(const std::filesystem::path& file, std::size_t limit) {
   if (!isZippedCollada(file)) return readModelFile(file, limit);
-  return readOnlyZipMember(file, kColladaExtension, kMaxColladaBytes).substr(0, limit);
+  // Limited by limitZipMembers().
+  return readOnlyZipMember(file, kColladaExtension, std::string::npos).substr(0, limit);
 }
 
-FileMetadata readColladaMetadata(const std::filesystem::path& file) {
+FileMetadata readColladaMetadata(const std::filesystem::path& file, std::size_t maxUnpacked) {
+  // All files of the archive: assimp unzips pictures, too.
+  if (isZippedCollada(file)) limitZipMembers(file, maxUnpacked);
   // The <asset> of the whole document comes before all libraries.
   const std::string start = readColladaText(file, 1 << 20);
   const std::size_t begin = start.find("<asset");
@@ -169,7 +171,8 @@ bool isBlankBeforeNumber(std::string_view text, std::size_t i) {
 
 }  // namespace
 
-FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat format) {
+FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat format,
+                              std::size_t maxUnpacked) {
   FileMetadata metadata;
   switch (format) {
     case ModelFormat::gltf:
@@ -182,7 +185,7 @@ FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat for
       metadata.problems.push_back({"no_unit", 1, "OBJ has no unit: taken for metres"});
       break;
     case ModelFormat::collada:
-      return readColladaMetadata(file);
+      return readColladaMetadata(file, maxUnpacked);
     case ModelFormat::fbx:
       return readFbxMetadata(file);
     case ModelFormat::ifc:

@@ -2,6 +2,7 @@
 // writer, and whether the file is complete.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
 #include <string>
 
@@ -9,9 +10,10 @@
 
 namespace enfilade::scene {
 
-/// Reads the metadata. Throws ImportError if the file is truncated or is not what its extension
-/// says. Not for IFC, whose text may come from an archive.
-FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat format);
+/// Reads the metadata. Throws ImportError if the file is truncated, is not what its extension says,
+/// or is an archive of more than `maxUnpacked` bytes. Not for IFC, whose text may come from one.
+FileMetadata readFileMetadata(const std::filesystem::path& file, ModelFormat format,
+                              std::size_t maxUnpacked);
 
 /// Reads the metadata of an IFC file's text, for assimp.
 FileMetadata readIfcFileMetadata(const std::string& text);

@@ -167,7 +167,8 @@ Model importByAssimp(const ImportRequest& request) {
     file.text = readDescriptor(kIfcFile);
     input.metadata = readIfcFileMetadata(file.text);
   } else {
-    input.metadata = readFileMetadata(request.file, input.format);
+    input.metadata =
+        readFileMetadata(request.file, input.format, computeMaxTextBytes(request.options));
     if (input.format == ModelFormat::collada)
       file.text = repairCollada(request.file, input.metadata);
     // assimp unzips .zae by itself; a repaired document is no longer in its archive.

@@ -622,5 +622,19 @@ TEST(ZippedCollada, WithoutADocumentOrDamagedIsAnError) {
   EXPECT_NE(damaged.find("b.zae: cannot be unzipped"), std::string::npos) << damaged;
 }
 
+TEST(ZippedCollada, AllFilesTogetherMayTakeAnEighthOfTheMemoryLimit) {
+  const TemporaryFolder folder;
+  ImportOptions options;
+  options.memoryLimit = std::size_t{256} << 20;
+  const std::string half(std::size_t{17} << 20, ' ');
+  const auto fits = folder.write("fits.zae", tests::storedZip({{"a.dae", kTriangleDae + half}}));
+  EXPECT_EQ(importModel(fits, options).objects.size(), 1u);
+  const auto large = folder.write(
+      "large.zae", tests::storedZip({{"a.dae", kTriangleDae}, {"a.png", half}, {"b.png", half}}));
+  const std::string text = catchFailure(large, options);
+  EXPECT_NE(text.find("large.zae: unpacks to more than the 32 MiB allowed"), std::string::npos)
+      << text;
+}
+
 }  // namespace
 }  // namespace enfilade::scene

@@ -5,6 +5,16 @@
 #include <map>
 
 namespace enfilade::scene {
+namespace {
+
+constexpr std::size_t kTextMemoryDivisor = 8;  // the text may take 1/8 of the memory limit
+constexpr std::size_t kMaxTextBytes = std::size_t{4} << 30;  // bytes, without a memory limit
+
+}  // namespace
+
+std::size_t computeMaxTextBytes(const ImportOptions& options) {
+  return options.memoryLimit > 0 ? options.memoryLimit / kTextMemoryDivisor : kMaxTextBytes;
+}
 
 std::optional<IfcReader> parseIfcReader(const std::string& text) {
   static const std::map<std::string, IfcReader> kReaders{{"auto", IfcReader::automatic},

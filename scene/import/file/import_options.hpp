@@ -1,6 +1,7 @@
 // Options, progress and errors of an import.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -37,6 +38,9 @@ struct ImportOptions {
   double timeLimit = 120;                          ///< seconds of wall-clock time
   std::size_t memoryLimit = std::size_t{8} << 30;  ///< bytes, of each reading process
 };
+
+/// Bytes of text that an import takes from a file or an archive: a part of its memory limit.
+std::size_t computeMaxTextBytes(const ImportOptions& options);
 
 /// An import failed. The text names the file, the stage ("open", "parse", "convert", ...) and a
 /// remedy.

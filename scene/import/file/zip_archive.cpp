@@ -3,6 +3,7 @@
 #include <minizip/unzip.h>
 
 #include <algorithm>
+#include <cstdint>
 #include <fstream>
 #include <memory>
 #include <type_traits>
@@ -45,8 +46,14 @@ bool isWantedName(std::string name, Extensions extensions) {
                     std::to_string(others) + " others); zip the " + extension + " file itself");
 }
 
+[[noreturn]] void throwTooLarge(const fs::path& file, std::size_t maxBytes) {
+  throw ImportError(file.string() + ": unpacks to more than the " + std::to_string(maxBytes >> 20) +
+                    " MiB allowed; unzip it yourself if you trust it, or raise the memory limit");
+}
+
 struct ArchiveMember {
   std::string name;
+  std::uint64_t size = 0;  ///< bytes, unpacked
   bool encrypted = false;
 };
 
@@ -62,6 +69,7 @@ ArchiveMember readCurrentMember(unzFile archive, const fs::path& file) {
   member.name.resize(info.size_filename);
   known = known && read();
   if (!known) throwDamaged(file, kDamagedDirectory);
+  member.size = info.uncompressed_size;
   member.encrypted = (info.flag & 1) != 0;  // PKWARE's APPNOTE.TXT, 4.4.4
   return member;
 }
@@ -105,12 +113,7 @@ std::string unpack(unzFile archive, const fs::path& file, const std::string& ext
     if (size < 0) throwDamaged(file, "its " + extension + " file is damaged");
     if (size == 0) break;
     text.append(chunk.data(), static_cast<std::size_t>(size));
-    if (text.size() > maxBytes) {
-      throw ImportError(file.string() + ": unpacks to more than the " +
-                        std::to_string(maxBytes >> 20) +
-                        " MiB allowed; unzip it yourself if you trust it, or raise the "
-                        "memory limit");
-    }
+    if (text.size() > maxBytes) throwTooLarge(file, maxBytes);
   }
   if (unzCloseCurrentFile(archive) != UNZ_OK)
     throwDamaged(file, "its " + extension + " file is damaged");
@@ -124,13 +127,31 @@ bool isEmptyArchive(const fs::path& file) {
   return start == "PK\5\6";
 }
 
+Archive openArchive(const fs::path& file) {
+  Archive archive(unzOpen64(file.c_str()));
+  if (!archive) throwDamaged(file, "it is not a zip archive, or its end is missing");
+  return archive;
+}
+
 }  // namespace
+
+void limitZipMembers(const fs::path& file, std::size_t maxBytes) {
+  if (isEmptyArchive(file)) return;
+  const Archive archive = openArchive(file);
+  std::uint64_t left = maxBytes;
+  int code = unzGoToFirstFile(archive.get());
+  for (; code == UNZ_OK; code = unzGoToNextFile(archive.get())) {
+    const std::uint64_t size = readCurrentMember(archive.get(), file).size;
+    if (size > left) throwTooLarge(file, maxBytes);
+    left -= size;
+  }
+  if (code != UNZ_END_OF_LIST_OF_FILE) throwDamaged(file, kDamagedDirectory);
+}
 
 std::string readOnlyZipMember(const fs::path& file, Extensions extensions, std::size_t maxBytes) {
   // An empty archive starts with its end record; minizip would report it as damaged.
   if (isEmptyArchive(file)) throwNoMember(file, extensions, 0);
-  const Archive archive(unzOpen64(file.c_str()));
-  if (!archive) throwDamaged(file, "it is not a zip archive, or its end is missing");
+  const Archive archive = openArchive(file);
   seekToOnlyMember(archive.get(), file, extensions);
   return unpack(archive.get(), file, std::string(extensions.front()), maxBytes);
 }

@@ -1,4 +1,4 @@
-// Unzips one file of an archive.
+// Unzips one file of an archive, and limits what others unzip.
 #pragma once
 
 #include <cstddef>
@@ -14,5 +14,9 @@ namespace enfilade::scene {
 /// several such files, encrypted, damaged, larger than `maxBytes`.
 std::string readOnlyZipMember(const std::filesystem::path& file,
                               std::span<const std::string_view> extensions, std::size_t maxBytes);
+
+/// Throws ImportError if the archive is damaged, or if all its files together would unpack to more
+/// than `maxBytes` by its directory. Nothing is unpacked: no reader takes more than that states.
+void limitZipMembers(const std::filesystem::path& file, std::size_t maxBytes);
 
 }  // namespace enfilade::scene

@@ -27,11 +27,9 @@ using Clock = std::chrono::steady_clock;
 constexpr double kImportTimeFraction =
     0.95;  // of the time limit; the rest is for sending the result
 constexpr double kReaderTimeFraction = 0.6;  // of the remaining time, if another reader may follow
-constexpr std::size_t kTextMemoryDivisor = 8;  // the text may take 1/8 of the memory limit
-constexpr std::size_t kReaderProcesses = 2;    // of web-ifc for one large file
+constexpr std::size_t kReaderProcesses = 2;  // of web-ifc for one large file
 /// Bytes of text from which a second process, which starts in 0.1 s, pays.
 constexpr std::size_t kMinDividedText = std::size_t{16} << 20;
-constexpr std::size_t kMaxTextBytes = std::size_t{4} << 30;  // bytes, without a memory limit
 
 std::string describeProduct(const IfcProduct& product) {
   std::string text = product.globalId + " (" + product.ifcClass;
@@ -177,9 +175,7 @@ class IfcImport {
 
   Model run() {
     reportProgress("open", 0);
-    const std::size_t maxBytes = request_.options.memoryLimit > 0
-                                     ? request_.options.memoryLimit / kTextMemoryDivisor
-                                     : kMaxTextBytes;
+    const std::size_t maxBytes = computeMaxTextBytes(request_.options);
     std::string text = readIfcFile(request_.file, maxBytes);
     if (isXml(text))
       text = convertIfcXml(request_, text, {maxBytes, remainingTime()}, progress_, diagnostics_);
