@@ -4,6 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cstdint>
 #include <cstdlib>
 
 #include "scene/import/import_model.hpp"
@@ -37,6 +38,23 @@ void expectSize(const Model& model, const Vec3& size, double tolerance = 1e-6) {
 
 // ---- files that fail ----------------------------------------------------------------------------
 
+/// `levels` nodes, each with the next one as its child `times` times, and the mesh below the last.
+/// All but the last have `name`.
+std::string nestedNodes(int levels, int times = 1, const std::string& name = "") {
+  std::string nodes;
+  for (int i = 0; i < levels; ++i) {
+    const std::string next = std::to_string(i + 1);
+    nodes += R"({"name":")" + name + R"(","children":[)" + next;
+    for (int k = 1; k < times; ++k) nodes += "," + next;
+    nodes += "]},";
+  }
+  return nodes + R"({"mesh":0})";
+}
+
+std::string nestedGltf(int levels, int times, const BoxMesh& mesh = BoxMesh({1, 1, 1})) {
+  return tests::gltf(mesh, "0", nestedNodes(levels, times));
+}
+
 struct Damage {
   const char* name;
   const char* file;
@@ -51,9 +69,10 @@ void PrintTo(const Damage& spoilt, std::ostream* to) {
 std::vector<Damage> damagedFiles() {
   const std::string box = boxGltf();
   const std::string glb = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
-  std::string deep = R"({"name":"0","children":[1]})";
-  for (int i = 1; i < 3000; ++i) deep += R"(,{"children":[)" + std::to_string(i + 1) + "]}";
-  deep += R"(,{"mesh":0})";
+  BoxMesh dense({1, 1, 1});
+  const std::vector<std::uint16_t> once = dense.indices;
+  for (int i = 0; i < 1400; ++i)
+    dense.indices.insert(dense.indices.end(), once.begin(), once.end());
   std::string longJson = glb;
   longJson.replace(12, 4, "\xf0\xff\xff\xff");
   return {
@@ -91,10 +110,24 @@ std::vector<Damage> damagedFiles() {
        tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"children":[0],"mesh":0})"),
        {}},
       {"MeshThatIsNotThere", "a.gltf", tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"mesh":3})"), {}},
-      {"TooDeep",
+      {"TooDeep", "a.gltf", nestedGltf(3000, 1), {"2000 levels", "flatter tree"}},
+      {"FarTooDeep", "a.gltf", nestedGltf(20'000, 1), {"2000 levels", "flatter tree"}},
+      {"LongCircle",
        "a.gltf",
-       tests::gltf(BoxMesh({1, 1, 1}), "0", deep),
+       replaced(nestedGltf(20'000, 1), R"({"mesh":0})", R"({"mesh":0,"children":[7]})"),
        {"2000 levels", "flatter tree"}},
+      {"NodesListedTwiceOnEachLevel",
+       "a.gltf",
+       nestedGltf(40, 2),
+       {"such as nodes[19]", "1000000 copied nodes", "list each node once"}},
+      {"NodesListedTwiceAboveManyTriangles",
+       "a.gltf",
+       nestedGltf(18, 2, dense),
+       {"such as nodes[18]", "4000000000 copied triangles"}},
+      {"NodesListedTwiceWithLongNames",
+       "a.gltf",
+       tests::gltf(BoxMesh({1, 1, 1}), "0", nestedNodes(15, 2, std::string(900, 'n'))),
+       {"500000000 bytes of copied paths"}},
       {"GlbCalledGltf", "a.gltf", glb, {"rename it to .glb"}},
       {"GltfCalledGlb", "a.glb", box, {"rename", ".gltf"}},
       {"NoJsonAtAll", "a.gltf", std::string(4000, '['), {"its JSON is damaged (byte 4001)"}},
@@ -259,6 +292,20 @@ TEST(MalformedFiles, FifteenHundredNestedNodesAreOneObject) {
       importModel(folder.write("deep.gltf", tests::gltf(BoxMesh({1, 1, 1}), "0", nodes)));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_NEAR(model.objects[0].worldFromMesh.translation().y(), 1.499, 1e-6);
+}
+
+TEST(MalformedFiles, NodesListedTwiceOnSixteenLevelsAreCopies) {
+  const TemporaryFolder folder;
+  const auto file = folder.write("copies.gltf", nestedGltf(16, 2));
+  EXPECT_EQ(importModel(file).objects.size(), 65536u);
+}
+
+TEST(MalformedFiles, NodesListedTwiceInAnotherSceneAreNotCounted) {
+  const TemporaryFolder folder;
+  const std::string text = tests::gltf(BoxMesh({1, 1, 1}), "40", nestedNodes(40, 2));
+  const std::string other = replaced(text, R"({"nodes":[40]})", R"({"nodes":[40]},{"nodes":[0]})");
+  const Model model = importModel(folder.write("a.gltf", other));
+  EXPECT_EQ(model.objects.size(), 1u);
 }
 
 TEST(MalformedFiles, AZeroScaleOrNonFiniteNodeKeepsTheOthers) {

@@ -92,10 +92,7 @@ class NodeCollector {
   }
 
   void visit(const aiNode& node, const VisitState& state) {
-    if (state.depth > kMaxNodeDepth) {
-      throw ImportError("nodes are nested more than " + std::to_string(kMaxNodeDepth) +
-                        " levels deep; re-export the file with a flatter tree");
-    }
+    if (state.depth > kMaxNodeDepth) refuseDeepNodes("");
     const std::string_view name(node.mName.C_Str(), node.mName.length);
     const GltfNode* const exact = findExact(node);
     const Eigen::Affine3d worldFromNode = state.worldFromParent * parentFromNode(node, exact);

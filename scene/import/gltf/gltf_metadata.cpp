@@ -38,9 +38,10 @@ std::size_t countTrianglesOfMesh(const Json& gltf, const Json& mesh) {
 
 }  // namespace
 
-std::size_t countGltfTriangles(const Json& gltf) {
-  std::size_t triangles = 0;
-  for (const Json& mesh : getArray(gltf, "meshes")) triangles += countTrianglesOfMesh(gltf, mesh);
+std::vector<std::size_t> countTrianglesByMesh(const Json& gltf) {
+  std::vector<std::size_t> triangles;
+  for (const Json& mesh : getArray(gltf, "meshes"))
+    triangles.push_back(countTrianglesOfMesh(gltf, mesh));
   return triangles;
 }
 

@@ -3,13 +3,15 @@
 
 #include <cstddef>
 #include <nlohmann/json.hpp>
+#include <vector>
 
 namespace enfilade::scene {
 
-/// Number of triangles by the accessors of the file's meshes, each mesh counted once. Entries that
-/// are invalid count as none: assimp reports them.
-std::size_t countGltfTriangles(const nlohmann::json& gltf);
-/// As countGltfTriangles(), for the meshes of the default scene alone: assimp reads no others.
+/// Number of triangles of each mesh by its accessors. Entries that are invalid count as none:
+/// assimp reports them.
+std::vector<std::size_t> countTrianglesByMesh(const nlohmann::json& gltf);
+/// As countTrianglesByMesh(), for the meshes of the default scene, each counted once: assimp reads
+/// no others.
 std::size_t countSceneTriangles(const nlohmann::json& gltf);
 
 }  // namespace enfilade::scene

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <numeric>
 #include <string_view>
 
 #include "scene/import/assembly/path_names.hpp"
@@ -12,6 +13,7 @@
 #include "scene/import/gltf/encoding/gltf_binary.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/encoding/missing_references.hpp"
+#include "scene/import/gltf/encoding/node_graph.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
 #include "scene/import/gltf/gltf_extensions.hpp"
 #include "scene/import/gltf/gltf_instances.hpp"
@@ -32,14 +34,16 @@ using Json = nlohmann::json;
   throw ImportError(file.string() + ": its JSON " + fault + "; export it again");
 }
 
-/// Parses only the sections needed here and skips the nodes, of which there may be a million.
+/// Parses only the sections needed here. Of the nodes, of which there may be a million, only the
+/// graph is kept.
 /// Refuses a text whose copies and dumps would need much stack.
 Json parseMeshSections(const std::string& text, const std::filesystem::path& file,
-                       ExtensionNames& extensions, DuplicateKeys& duplicates) {
+                       ExtensionNames& extensions, DuplicateKeys& duplicates, NodeGraph& nodes) {
   int deepest = 0;
   const auto wanted = [&](int depth, Json::parse_event_t event, Json& value) {
     deepest = std::max(deepest, depth);
     duplicates.see(depth, event, value);
+    nodes.see(depth, event, value);
     if (event == Json::parse_event_t::value) extensions.seeValue(value);
     if (event != Json::parse_event_t::key) return true;
     extensions.seeKey(depth, value.get_ref<const std::string&>());
@@ -356,7 +360,8 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   plain.json = readMendedJson(file, format, problems);
   ExtensionNames extensions;
   DuplicateKeys duplicates;
-  Json sections = parseMeshSections(plain.json, file, extensions, duplicates);
+  NodeGraph nodes;
+  Json sections = parseMeshSections(plain.json, file, extensions, duplicates, nodes);
   addDiagnostic(problems, "duplicate_key", duplicates.firstPath(), duplicates.count());
   requireVersion2(sections, file);
   plain.problems = checkGltfExtensions(sections, extensions, file, choice.ignoreAppearance);
@@ -366,9 +371,13 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   if (other || choice.rewrite || duplicates.count() > 0 ||
       needsRewriting(plain.json, sections, file, format)) {
     rewriteGltf(file, format, plain);
-    sections = parseMeshSections(plain.json, file, extensions, duplicates);
+    nodes = {};
+    sections = parseMeshSections(plain.json, file, extensions, duplicates, nodes);
   }
-  plain.triangles = countGltfTriangles(sections);
+  const std::vector<std::size_t> triangles = countTrianglesByMesh(sections);
+  const Json& scenes = getArray(sections, "scenes");
+  nodes.check(getArray(scenes.at(plain.scene), "nodes"), triangles, file);
+  plain.triangles = std::accumulate(triangles.begin(), triangles.end(), std::size_t{0});
   return plain;
 }
 

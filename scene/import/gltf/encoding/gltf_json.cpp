@@ -23,6 +23,11 @@ std::uint32_t readGlbWord(std::ifstream& in, std::size_t at) {
 
 }  // namespace
 
+void refuseDeepNodes(const std::string& file) {
+  throw ImportError(file + "nodes are nested more than " + std::to_string(kMaxNodeDepth) +
+                    " levels deep; re-export the file with a flatter tree");
+}
+
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format) {
   std::ifstream in(file, std::ios::binary);
   if (format == ModelFormat::gltf) return {std::istreambuf_iterator<char>(in), {}};

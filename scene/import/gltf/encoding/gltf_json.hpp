@@ -15,6 +15,9 @@ namespace enfilade::scene {
 /// Levels of nodes that importers follow; more means a broken or malicious file.
 inline constexpr int kMaxNodeDepth = 2000;
 
+/// Throws ImportError for nodes that are nested deeper. `file`: its name and ": ", or "".
+[[noreturn]] void refuseDeepNodes(const std::string& file);
+
 /// Levels of JSON that importers follow: copies and dumps of more would need much stack.
 inline constexpr int kMaxJsonDepth = 512;
 
