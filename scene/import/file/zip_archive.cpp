@@ -153,6 +153,7 @@ std::string readOnlyZipMember(const fs::path& file, Extensions extensions, std::
   if (isEmptyArchive(file)) throwNoMember(file, extensions, 0);
   const Archive archive = openArchive(file);
   seekToOnlyMember(archive.get(), file, extensions);
+  if (readCurrentMember(archive.get(), file).size > maxBytes) throwTooLarge(file, maxBytes);
   return unpack(archive.get(), file, std::string(extensions.front()), maxBytes);
 }
 
