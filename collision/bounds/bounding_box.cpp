@@ -38,8 +38,11 @@ constexpr double kUnderflow = 0x1p-1000;  // above the loss of a few products to
 
 // Nanoseconds, measured by `./dev bench boxes` (tests/benchmarks/report/boxes.md). A pair is a
 // warm narrow-phase query of two bodies that are clear.
-constexpr double kCubeCost = 7, kScanCost = 5, kScanCostPerVertex = 1.9, kClimbCost = 80;
+constexpr double kCubeCost = 7, kScanCost = 5, kScanCostPerVertex = 1.9;
+constexpr double kClimbCost = 63;      // of a body that hardly turns
+constexpr double kClimbTurnCost = 75;  // a radian of turn, times the root of the number of vertices
 constexpr double kPairCost = 200;
+constexpr double kUsualTurn = 0.035;  // radians a tick: 2 degrees
 
 constexpr std::size_t kBlock = 6;  // doubles a block: two vertices
 // Neighbours of a vertex at least, some repeated: most loops over them have one length then, which
@@ -236,6 +239,20 @@ double estimateScanCost(const Hull& hull) {
   return kScanCost + kScanCostPerVertex * static_cast<double>(hull.vertices.size());
 }
 
+/// Of a climb after a turn, per radian.
+double estimateTurnCost(const Hull& hull) {
+  return kClimbTurnCost * std::sqrt(static_cast<double>(hull.vertices.size()));
+}
+
+double estimateClimbCost(const Hull& hull, double turn) {
+  return kClimbCost + estimateTurnCost(hull) * turn;
+}
+
+/// The turn up to which a climb costs no more than a scan: radians, 0 to a half turn.
+double findMaxClimbTurn(const Hull& hull) {
+  return std::clamp((estimateScanCost(hull) - kClimbCost) / estimateTurnCost(hull), 0.0, 3.0);
+}
+
 /// Bodies of its own kind that overlap the cube of a body and not its tight box, if these bodies
 /// lie side by side: an upper bound for what the cube costs.
 double estimateFalsePairs(const Hull& hull) {
@@ -251,6 +268,7 @@ SupportTable buildSupportTable(const Hull& hull, AabbMethod method) {
   ENFILADE_ASSERT(!hull.vertices.empty());
   SupportTable table;
   table.method = method;
+  table.minTurnTrace = 1 + 2 * std::cos(findMaxClimbTurn(hull));
   if (method == AabbMethod::hillClimb) appendFans(hull, table);
   return table;
 }
@@ -267,9 +285,14 @@ Aabb computeAabb(const Hull& hull, const SupportTable& table, const Mat3& rotati
       const Vec3 extent = Vec3::Constant(hull.radius);
       return placeExtents({-extent, extent}, translation, hull.radius, clearance);
     }
-    case AabbMethod::hillClimb:
-      return placeExtents(climbSides(hull, table, rotation, last, looked), translation, hull.radius,
-                          clearance);
+    case AabbMethod::hillClimb: {
+      const double trace = rotation.cwiseProduct(last.rotation).sum();  // of the turn's matrix
+      last.rotation = rotation;
+      if (trace >= table.minTurnTrace)
+        return placeExtents(climbSides(hull, table, rotation, last, looked), translation,
+                            hull.radius, clearance);
+      break;
+    }
     case AabbMethod::vertexScan:
       break;
   }
@@ -284,8 +307,8 @@ Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& transl
 
 AabbMethod chooseAabbMethod(const Hull& hull) {
   const double cube = kCubeCost + kPairCost * estimateFalsePairs(hull);
-  return cube < std::min(estimateScanCost(hull), kClimbCost) ? AabbMethod::sphereCube
-                                                             : chooseTightMethod(hull);
+  const double tight = std::min(estimateScanCost(hull), estimateClimbCost(hull, kUsualTurn));
+  return cube < tight ? AabbMethod::sphereCube : chooseTightMethod(hull);
 }
 
 AabbMethod chooseTightMethod(const Hull& hull) {

@@ -14,13 +14,16 @@ namespace enfilade::collision {
 enum class AabbMethod : std::uint8_t {
   sphereCube,  ///< cube of the bounding sphere about the body's origin
   vertexScan,  ///< tight: looks at all vertices
-  hillClimb    ///< tight: looks at the neighbours of last tick's extremal vertices
+  hillClimb    ///< tight: looks at the neighbours of last tick's extremal vertices, unless the body
+               ///< has turned so far since then that a scan costs less
 };
 
 /// The method that is used for a hull and, for hill climbing, the coordinates of the neighbours of
 /// each vertex, which lie together.
 struct SupportTable {
   AabbMethod method = AabbMethod::vertexScan;
+  /// 1 + 2 cos of the largest turn since the last box after which it climbs; -1: always.
+  double minTurnTrace = 0;
   /// Neighbours of vertex v: blocks fanOffsets[v] to fanOffsets[v + 1] of `fans`, each two
   /// neighbours as x x y y z z, with their indices in `fanVertices`. The blocks of a vertex may
   /// repeat its last neighbour.
@@ -34,10 +37,11 @@ SupportTable buildSupportTable(const Hull& hull, AabbMethod method);
 /// With the method that chooseAabbMethod() returns.
 SupportTable buildSupportTable(const Hull& hull);
 
-/// Extremal vertices of the last tick: vertex indices for -x, +x, -y, +y, -z, +z. They influence
+/// Extremal vertices of the last climb: vertex indices for -x, +x, -y, +y, -z, +z. They influence
 /// cost only: every box is the same to the last bit whatever these indices are.
 struct ExtremalVertices {
   std::array<std::uint32_t, 6> vertex{};
+  Mat3 rotation = Mat3::Zero();  ///< of the last box; zero: none yet
 };
 
 // The boxes below contain the exact box of all vertices at rotation * v + translation, inflated by
@@ -58,7 +62,7 @@ Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& transl
 /// The method that costs least per tick for a body that turns by a few degrees, including the
 /// narrow-phase queries that a larger box causes among bodies of its own size.
 AabbMethod chooseAabbMethod(const Hull& hull);
-/// The cheaper of the two tight methods.
+/// The cheapest of the tight methods.
 AabbMethod chooseTightMethod(const Hull& hull);
 
 }  // namespace enfilade::collision

@@ -1,5 +1,7 @@
 #include "tests/benchmarks/box_methods.hpp"
 
+#include <utility>
+
 namespace enfilade::benchmarks {
 namespace {
 
@@ -9,8 +11,8 @@ using collision::SupportTable;
 
 class OurBoxUpdate : public BoxUpdate {
  public:
-  OurBoxUpdate(const Hull& hull, AabbMethod method, std::size_t bodies)
-      : hull_(hull), table_(collision::buildSupportTable(hull, method)), last_(bodies) {}
+  OurBoxUpdate(const Hull& hull, SupportTable table, std::size_t bodies)
+      : hull_(hull), table_(std::move(table)), last_(bodies) {}
 
   void update(const std::vector<TurnedPose>& poses, std::vector<Aabb>& boxes) override {
     for (std::size_t k = 0; k < poses.size(); ++k)
@@ -54,8 +56,14 @@ std::vector<BoxMethod> boxMethods() {
   std::vector<BoxMethod> all;
   for (const auto method : {AabbMethod::sphereCube, AabbMethod::vertexScan, AabbMethod::hillClimb})
     all.push_back({getName(method), [method](const Hull& hull, std::size_t bodies) {
-                     return std::make_unique<OurBoxUpdate>(hull, method, bodies);
+                     return std::make_unique<OurBoxUpdate>(
+                         hull, collision::buildSupportTable(hull, method), bodies);
                    }});
+  all.push_back({kClimbAlways, [](const Hull& hull, std::size_t bodies) {
+                   SupportTable table = collision::buildSupportTable(hull, AabbMethod::hillClimb);
+                   table.minTurnTrace = -1;
+                   return std::make_unique<OurBoxUpdate>(hull, std::move(table), bodies);
+                 }});
   all.push_back({"recompute", [](const Hull& hull, std::size_t) {
                    return std::make_unique<RecomputeUpdate>(hull);
                  }});

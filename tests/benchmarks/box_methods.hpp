@@ -14,12 +14,15 @@ inline const char* getName(collision::AabbMethod method) {
     case collision::AabbMethod::vertexScan:
       return "vertex scan";
     case collision::AabbMethod::hillClimb:
-      return "hill climb";
+      return "climb or scan";
   }
   return "";
 }
 
-/// Our three methods, "recompute" (every vertex by a matrix product, as before them), the peers.
+inline constexpr const char* kClimbAlways = "hill climb";
+
+/// Our three methods, "hill climb" (after each turn), "recompute" (every vertex by a matrix
+/// product, as before them), the peers.
 std::vector<BoxMethod> boxMethods();
 
 }  // namespace enfilade::benchmarks

@@ -118,7 +118,7 @@ void checkBoxes(Contestant& one, const Hull& hull, const std::vector<TurnedPose>
 bool isOurs(const std::string& name) {
   using collision::AabbMethod;
   return name == getName(AabbMethod::sphereCube) || name == getName(AabbMethod::vertexScan) ||
-         name == getName(AabbMethod::hillClimb);
+         name == getName(AabbMethod::hillClimb) || name == kClimbAlways;
 }
 
 /// Returns the number of our boxes that do not contain their body.

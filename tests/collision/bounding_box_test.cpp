@@ -82,7 +82,10 @@ struct Turning {
   ExtremalVertices last = {};
   std::uint64_t looked = 0;
 
-  Turning(const Hull& h, AabbMethod method) : hull(h), support(buildSupportTable(h, method)) {}
+  /// Of hill climbing: climbs after each turn.
+  Turning(const Hull& h, AabbMethod method) : hull(h), support(buildSupportTable(h, method)) {
+    support.minTurnTrace = -1;
+  }
   Aabb box(const Pose& pose, double clearance = 0) {
     return computeAabb(hull, support, pose.rotation.toRotationMatrix(), pose.translation, last,
                        looked, clearance);
@@ -259,6 +262,26 @@ Hull ellipsoid(std::mt19937& random, int vertices, const Vec3& halfAxes) {
     points.push_back(Vec3(x, y, z).normalized().cwiseProduct(halfAxes));
   }
   return buildHull(points);
+}
+
+TEST(HillClimb, ScansTheFirstTimeAndAfterALargeTurn) {
+  std::mt19937 random(19);
+  const Hull hull = ellipsoid(random, 60, Vec3(0.2, 0.15, 0.1));
+  const SupportTable support = buildSupportTable(hull, AabbMethod::hillClimb);
+  ExtremalVertices last;
+  Pose pose = randomPose(random, 5.0);
+  const auto countLooked = [&](double turn) {
+    pose.rotation = rotateBy(pose.rotation, Vec3(0, turn / 2, 0));
+    std::uint64_t looked = 0;
+    expectSame(computeAabb(hull, support, pose.rotation.toRotationMatrix(), pose.translation, last,
+                           looked),
+               scannedBox(hull, pose));
+    return looked;
+  };
+  EXPECT_EQ(countLooked(0), hull.vertices.size()) << "the first box";
+  for (const double small : {0.01, 0.02}) EXPECT_NE(countLooked(small), hull.vertices.size());
+  EXPECT_EQ(countLooked(0.4), hull.vertices.size());
+  EXPECT_NE(countLooked(0.01), hull.vertices.size());
 }
 
 TEST(AabbMethod, IsTheCubeForTheRoundTheScanForTheSmallTheClimbForTheLarge) {
