@@ -73,7 +73,7 @@ def machine():
             model = line.split(":", 1)[1].strip()
             break
     first = compiler.stdout.splitlines()[0] if compiler.stdout else "unknown compiler"
-    return f"{os.cpu_count()} cores ({model}, {platform.machine()}), {first}, ours at -O3, the peers as Debian built them"
+    return f"{os.cpu_count()} cores ({model}, {platform.machine()}), {first}. Ours at -O3, the peers as Debian built them"
 
 
 def picture(out, name, words):
