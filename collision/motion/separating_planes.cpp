@@ -15,7 +15,9 @@ namespace enfilade::collision {
 namespace {
 
 constexpr double kSlack = 128 * kRoundoff;
-constexpr std::size_t kMaxScannedVertices = 8;  // as a triangle or a box: scanned
+// A scan trades its own time for queries that the box alone does not spare. It is short for
+// triangles and boxes, which have at most this many vertices.
+constexpr std::size_t kMaxScannedVertices = 8;
 
 double sumOfMagnitudes(const Vec3& p) {
   return std::abs(p.x()) + std::abs(p.y()) + std::abs(p.z());

@@ -13,6 +13,8 @@
 namespace enfilade::scene {
 namespace {
 
+// Intervals: some megabytes. A search that needs more ends without a corridor, so that of A* stays.
+// It bounds the time of a query, and paths may be longer.
 constexpr std::size_t kMaxNodes = 50'000;
 constexpr std::uint32_t kNoNode = ~0u;
 constexpr double kSamePlace = 1e-5;  // metres: vertices are binary32

@@ -25,6 +25,8 @@ constexpr double kAheadCosine = 0.7071;       // walks in one direction: within 
 constexpr double kAbreastCosine = -0.1;       // walks to one place: ahead or abreast
 constexpr double kSameDirectionCosine = 0.7;  // of two walks
 constexpr double kSamePlace = 0.5;            // metres between two way points
+// 10 s at 60 ticks a second. The timeout of a walk stands still if the first of its queue was free
+// that recently. Longer jams end walks as blocked.
 constexpr std::uint64_t kMaxQueueTicks = 600;
 
 struct GroundWalk {
