@@ -230,8 +230,8 @@ void BoxTable::makeLevels() {
   }
 }
 
-/// An edge exceeds the largest box by more than all rounding errors of toCoord(), so that the cells
-/// of two overlapping boxes are equal or adjacent.
+/// An edge exceeds the largest box by more than all rounding errors of toCoord(). The cells of two
+/// overlapping boxes are therefore equal or adjacent.
 void BoxTable::sizeGrid(Level& level) {
   std::array<double, 3> wanted, span;
   for (std::size_t axis = 0; axis < 3; ++axis) {

@@ -51,7 +51,7 @@ StaticEndpoint* collectEndpoints(const StaticGrid& staticGrid,
 template <class T>
 void resizeStorage(std::vector<T>& room, std::size_t size) {
   // Entries. Storage is kept while the size varies by less than a factor of eight, and always up to
-  // 16 kB, so that rebuilds, of about 1 µs, rarely allocate.
+  // 16 kB. Rebuilds, of about 1 µs, thus rarely allocate.
   constexpr std::size_t kShrinkFactor = 8, kShrinkSlack = 1024;
   if (room.size() > kShrinkFactor * size + kShrinkSlack) room = std::vector<T>();
   if (room.size() < size) room.resize(size);

@@ -1,8 +1,8 @@
-// Rounding. Let n be a plane's rounded normal, and M the sum of the magnitudes |x| + |y| + |z| of
-// all points that a sum below takes in. A product n . p of a point is off by less than 4u M, a
-// rotated one by less than 8u M (minkowski.hpp), and each of the few sums adds u M. |n| differs
-// from 1 by less than 4u, which moves a distance of at most M by as much. kSlack M = 128u M covers
-// A's share as well as B's.
+// Rounding. Let n be a plane's rounded normal. Let M be the sum of the magnitudes |x| + |y| + |z|
+// of all points that a sum below takes in. A product n . p of a point is off by less than 4u M, a
+// rotated one by less than 8u M (minkowski.hpp). Each of the few sums adds u M. |n| differs from 1
+// by less than 4u, which moves a distance of at most M by as much. kSlack M = 128u M covers A's
+// share as well as B's.
 #include "collision/motion/separating_planes.hpp"
 
 #include <algorithm>

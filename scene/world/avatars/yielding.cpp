@@ -1,8 +1,8 @@
-// A walk yields to another one that is ahead of it within kFollowDistance, is closer to its way
-// point, and walks to the same place or in about the same direction. Among walks to one place
-// that is a strict order, so one of them always goes. Two more rules keep other walks from waiting
-// for ever: rings are opened, and walks that wedge one another step back. Walks in opposite
-// directions do not yield; they slide past each other.
+// A walk yields to another one that is ahead of it within kFollowDistance and closer to its way
+// point. The other one must walk to the same place or in about the same direction. Among walks to
+// one place that is a strict order, so one of them always goes. Two more rules keep other walks
+// from waiting for ever: rings are opened, and walks that wedge one another step back. Walks in
+// opposite directions do not yield; they slide past each other.
 #include "scene/world/avatars/yielding.hpp"
 
 #include <algorithm>
