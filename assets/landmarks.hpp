@@ -31,8 +31,8 @@ inline const Vec3 kStairFoot{49.2, 0, -4.1}, kStairHead{59.9, 4.2, -4.1};
 inline const Vec3 kGalleryView{51.7, 4.2, 6.6}, kHallMiddle{51.7, 0.5, -1.0};
 /// Walking from the first to the second ends at the side of a bench (room4/bench1/seat).
 inline const Vec3 kBeforeBench{28.4, 0, -1.8}, kInBench{24.9, 0, -1.8};
-/// Walking from the first to the second ends at the hall's west wall, from the third to the fourth
-/// at a picture on the north wall of room 4 (room4/picture06/frame).
+/// Walking from the first to the second ends at the hall's west wall. Walking from the third to the
+/// fourth ends at a picture on the north wall of room 4 (room4/picture06/frame).
 inline const Vec3 kBeforeWall{44.0, 0, -1.4}, kInWall{41.5, 0, -1.4};
 inline const Vec3 kBeforePicture{28.6, 0, -1.6}, kInPicture{28.6, 0, -3.6};
 /// An outside camera that sees the whole building, and its view target.

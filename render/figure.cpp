@@ -1,6 +1,6 @@
 // A figure consists of closed surfaces that overlap: limbs between joints, torso and head. Its
-// dimensions are those of a person of 1.75 m (metres, feet at the origin, x ahead, z to the right),
-// and are then scaled to height and radius 1.
+// dimensions are those of a person of 1.75 m (metres, feet at the origin, x ahead, z to the right).
+// They are then scaled to height and radius 1.
 //
 // A crouching person bends the knees and leans forward, down to 0.6 of the height; the figure of a
 // lower avatar is compressed. In deep poses limbs are foreshortened, so that the figure stays

@@ -30,7 +30,8 @@ RendererKind chooseRendererKind(bool softwareGl, const Camera& camera, const Cha
                                 std::size_t triangles) {
   if (!softwareGl) return RendererKind::gl;
   // Measured for depth and ids in four scenes of 146 thousand to 2.4 million triangles: rays took
-  // 0.3 to 0.8 of GL's time at 128 x 128, 0.7 to 1.4 at 256 x 256 and 1.2 to 2.5 at 640 x 480.
+  // 0.3 to 0.8 of GL's time at 128 x 128, and 0.7 to 1.4 at 256 x 256. At 640 x 480 they took 1.2
+  // to 2.5.
   constexpr std::size_t kSmallFrameThreshold = 256 * 256;
   const std::size_t pixels = countPixels(camera);
   if (pixels > kSmallFrameThreshold) return RendererKind::gl;

@@ -30,7 +30,7 @@ const char* toString(RendererKind kind);
 std::optional<RendererKind> parseRendererKind(const std::string& name);
 
 /// The rule for `automatic`. It depends only on device, size, channels and the scene's triangles
-/// and not on time, so that a frame's bytes do not vary between runs, nor its style during a
+/// and not on time. A frame's bytes therefore do not vary between runs, nor its style during a
 /// capture.
 RendererKind chooseRendererKind(bool softwareGl, const Camera& camera, const Channels& channels,
                                 std::size_t triangles);

@@ -2,15 +2,15 @@
 // last tick's vertex and moves to the most extreme neighbour while that is more extreme. A test is
 // one dot product with a row of the rotation matrix; the neighbours of a vertex lie together in
 // memory, two to a SIMD register. Lin stops there. In rounded arithmetic that is not enough: along
-// a face that is nearly perpendicular to the axis, every step may be below the rounding error, and
-// the climb may stop far from the extremal vertex. findHigherVertex() therefore also searches the
+// a face that is nearly perpendicular to the axis, every step may be below the rounding error. The
+// climb may then stop far from the extremal vertex. findHigherVertex() therefore also searches the
 // neighbours of all vertices that rounding cannot distinguish from the highest one (the plateau).
 //
 // Both tight methods return the maximum of the same rounded projections. Let e = 2^-53 and r the
-// radius. A dot product of a computed row errs by at most 3.1e r, and a vertex may have been moved
-// by 2e r since the hull was built. Let v be the last vertex of a climb and t the extremal one of
-// the hull as built. Along some path of edges from v to t the exact projections rise, so every
-// vertex of the path has a computed projection of at least that of v minus 10.2e r. kPlateau = 16e
+// radius. A dot product of a computed row errs by at most 3.1e r. A vertex may have been moved by
+// 2e r since the hull was built. Let v be the last vertex of a climb and t the extremal one of the
+// hull as built. Along some path of edges from v to t the exact projections rise. Every vertex of
+// the path therefore has a computed projection of at least that of v minus 10.2e r. kPlateau = 16e
 // exceeds that: the search of the plateau meets every vertex that may be the maximum.
 //
 // Rounding of a box. The matrix comes from a quaternion whose squared norm is within 16e of 1. An
@@ -134,8 +134,8 @@ struct Climber {
     return top;
   }
 
-  /// The height of the highest neighbour of `vertex`, minus infinity if it has none, with the block
-  /// of its first neighbour in place of a vertex.
+  /// The height of the highest neighbour of `vertex`, or minus infinity if it has none. The result
+  /// has the block of its first neighbour in place of a vertex.
   Top findHighestNeighbour(std::uint32_t vertex) {
     const std::uint32_t from = table.fanOffsets[vertex], to = table.fanOffsets[vertex + 1];
     looked += 2 * (to - from);

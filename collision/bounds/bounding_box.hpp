@@ -1,6 +1,6 @@
 // Bounding boxes of moving convex bodies (Lin 1993, section 5.2.1; Cohen et al. 1995, section 4):
-// the cube of the bounding sphere, and the tight box by hill climbing from the last tick's extremal
-// vertices or by a scan of all vertices.
+// the cube of the bounding sphere, and the tight box. The tight box comes from hill climbing from
+// the last tick's extremal vertices or from a scan of all vertices.
 #pragma once
 
 #include <array>
@@ -45,9 +45,9 @@ struct ExtremalVertices {
 };
 
 // The boxes below contain the exact box of all vertices at rotation * v + translation, inflated by
-// `clearance` (metres, >= 0, finite), of this matrix and of the unit quaternion that it was
-// computed from. `rotation`: from a quaternion with |q|^2 = 1 up to 16 units of rounding; all
-// values finite.
+// `clearance` (metres, >= 0, finite). The rotation is this matrix and also the unit quaternion that
+// it was computed from. `rotation`: from a quaternion with |q|^2 = 1 up to 16 units of rounding;
+// all values finite.
 
 /// Box by the method of `table`, which is that of `hull`. Adds the vertices that it looks at to
 /// `looked`, repeated ones too.
@@ -59,8 +59,8 @@ Aabb computeAabb(const Hull& hull, const SupportTable& table, const Mat3& rotati
 Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& translation,
                       double clearance = 0);
 
-/// The method that costs least per tick for a body that turns by a few degrees, including the
-/// narrow-phase queries that a larger box causes among bodies of its own size.
+/// The method that costs least per tick for a body that turns by a few degrees. The cost includes
+/// the narrow-phase queries that a larger box causes among bodies of its own size.
 AabbMethod chooseAabbMethod(const Hull& hull);
 /// The cheapest of the tight methods.
 AabbMethod chooseTightMethod(const Hull& hull);

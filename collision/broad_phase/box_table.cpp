@@ -15,6 +15,8 @@ namespace enfilade::collision {
 namespace {
 
 constexpr std::size_t kExponents = 2048;  // of a double
+// Cells of a level, at most, for each box. More cells take more memory and more time to clear;
+// fewer wrap more places onto one cell, so that more boxes are compared that are far apart.
 constexpr double kCellsPerBox = 8;
 // Cells on an axis: the neighbours of a cell on both sides must differ.
 constexpr double kMinCells = 5;
@@ -228,8 +230,8 @@ void BoxTable::makeLevels() {
   }
 }
 
-/// An edge exceeds the largest box by more than all rounding errors of toCoord(), so that the cells
-/// of two overlapping boxes are equal or adjacent.
+/// An edge exceeds the largest box by more than all rounding errors of toCoord(). The cells of two
+/// overlapping boxes are therefore equal or adjacent.
 void BoxTable::sizeGrid(Level& level) {
   std::array<double, 3> wanted, span;
   for (std::size_t axis = 0; axis < 3; ++axis) {

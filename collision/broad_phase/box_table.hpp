@@ -3,9 +3,9 @@
 // their endpoints there.
 //
 // The boxes are divided into levels by size. A level is a grid whose cells are as large as its
-// largest box on each axis. A box lies in the cell of its low corner, so that two boxes of a level
-// overlap only if their cells are equal or adjacent. Cell coordinates wrap around at the edge of
-// the grid. Distant boxes may thus share a cell; each candidate is compared exactly.
+// largest box on each axis. A box lies in the cell of its low corner. Two boxes of a level
+// therefore overlap only if their cells are equal or adjacent. Cell coordinates wrap around at the
+// edge of the grid. Distant boxes may thus share a cell; each candidate is compared exactly.
 #pragma once
 
 #include <array>

@@ -5,7 +5,8 @@
 //    which bounds the number of cell lookups per box found. Both are means over samples: they
 //    influence cost, never a result.
 // 2. Each coarser level has cells four times as wide. A box goes to the finest level on which it
-//    lies in at most kMaxCells cells, so a floor slab or a terrain costs no more than a chair.
+//    lies in at most kMaxCells cells. A floor slab or a terrain therefore costs no more than a
+//    chair.
 // 3. The last level is a single cell for boxes that fit no other level.
 
 #include "collision/broad_phase/cell_grid.hpp"

@@ -1,8 +1,8 @@
 // Insertion sort, one proxy after the other. While the first proxies are sorted, the endpoints of
-// the others still have their old positions, so a later step of the same update may undo a swap.
-// The boxes before and after the update therefore decide whether a swap changes an overlap. No
-// change is missed: if the overlap of a pair changed, a lower and an upper endpoint of the two
-// changed their order on some axis, so they were swapped in that direction at least once.
+// the others still have their old positions. A later step of the same update may undo a
+// swap. The boxes before and after the update therefore decide whether a swap changes an overlap.
+// No change is missed: if the overlap of a pair changed, a lower and an upper endpoint of the two
+// changed their order on some axis. They were therefore swapped in that direction at least once.
 
 #include "collision/broad_phase/endpoint_lists.hpp"
 

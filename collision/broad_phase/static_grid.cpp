@@ -72,8 +72,8 @@ std::vector<Row> countingSort(std::span<const std::uint32_t> keys, std::size_t k
   return order;
 }
 
-/// Box indices in the order of the cell of their lower corner, on the finest level with at most as
-/// many cells as there are boxes (the last level has one cell).
+/// Box indices in the order of the cell of their lower corner. The cells are those of the finest
+/// level with at most as many cells as there are boxes (the last level has one cell).
 std::vector<Row> sortSpatially(std::span<const Aabb> boxes, const CellGrid& grid) {
   Aabb bounds;
   for (const Aabb& box : boxes) bounds.include(box);

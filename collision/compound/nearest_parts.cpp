@@ -2,8 +2,8 @@
 // algorithms for spatial databases"). Of all open pairs of branches, the pair with the nearest
 // boxes is expanded: the larger branch is replaced by its children. Two leaves are tested exactly.
 // The search ends when the nearest open boxes are farther apart than the nearest parts so far. Two
-// large meshes that are far apart thus cost a few paths through their trees, and the cost of the
-// search is known while it runs.
+// large meshes that are far apart thus cost a few paths through their trees. The cost of the search
+// is known while it runs.
 //
 // Ties (all overlapping boxes have distance 0) are broken in favour of the last pair. This is a
 // depth-first descent to penetrating parts, which end the search, with few open pairs.

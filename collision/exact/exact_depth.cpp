@@ -1,7 +1,8 @@
-// Every facet of M = B - A is a face of B and a vertex of A, a vertex of B and a face of A, or an
-// edge of each. The depth is therefore the minimum extent of M along the normals of all faces and
-// of all pairs of edges. The extent along any direction is an upper bound of the depth, so edge
-// pairs that form no facet are harmless, and flat bodies need no special case. Steps
+// Every facet of M = B - A comes from A and B. It is a face of B and a vertex of A, a vertex of B
+// and a face of A, or an edge of each. The depth is therefore the minimum extent of M along the
+// normals of all faces and of all pairs of edges. The extent along any direction is an upper bound
+// of the depth. Edge pairs that form no facet are therefore harmless, and flat bodies need no
+// special case. Steps
 //  1. Reject, in doubles, pairs of edges whose plane is farther from the origin than the depth
 //     bound. M extends at least to that plane, so the pair is not the nearest facet.
 //  2. Compute the extents along the other directions in extended precision, with an error bound.
@@ -63,7 +64,8 @@ class CandidateFilter {
     const Vec3 normal = first.cross(second);
     const double length = normal.norm();
     // The normal's error from the errors of the edges. If it is small relative to the normal, the
-    // direction is off by less than 2^-20, and the plane's distance by less than four times that.
+    // direction is off by less than 2^-20. The plane's distance is then off by less than four times
+    // that.
     const double off = 64 * kRoundoff * difference_.reach * (first.norm() + second.norm());
     if (!(off < 0x1p-20 * length)) return true;
     const bool farther =

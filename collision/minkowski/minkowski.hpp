@@ -249,11 +249,11 @@ struct RotatedDirection {
 CertifiedSupport findCertifiedSupport(const MinkowskiDifference& difference,
                                       const LongVec3& direction, LongReal length, VertexPair& hint);
 
-/// Hill climbing over the hull's edges from `start`, or a scan of all vertices if there is no hull,
-/// along the direction and with the slack of `support`; sets the rest of it. A vertex that exceeds
-/// all its neighbours by more than the slack is the unique maximum, because an exact ascent could
-/// continue from any other vertex (see forEachSupportCandidate). With a hull, the climb ends early
-/// at a vertex that exceeds the start by `enough` (the unit of the dot product).
+/// Hill climbing over the hull's edges from `start`, or a scan of all vertices if there is no hull.
+/// The direction and the slack are those of `support`; sets the rest of it. A vertex that exceeds
+/// all its neighbours by more than the slack is the unique maximum. From any other vertex an exact
+/// ascent could continue (see forEachSupportCandidate). With a hull, the climb ends early at a
+/// vertex that exceeds the start by `enough` (the unit of the dot product).
 inline void hillClimb(const BoundedConvex& convex, std::uint32_t start, double enough,
                       SupportVertex& support) {
   const std::span<const Vec3> vertices = convex.shape->vertices;

@@ -95,9 +95,9 @@ struct Polytope {
   }
 };
 
-/// Builds a polytope around the origin from a simplex of two to four points that contains it, on a
-/// face or an edge if only up to rounding. A flat simplex is completed with support points.
-/// `polytope` must be empty. Returns false if enclosure is not certified.
+/// Builds a polytope around the origin from a simplex of two to four points that contains it. On a
+/// face or an edge it may do so only up to rounding. A flat simplex is completed with support
+/// points. `polytope` must be empty. Returns false if enclosure is not certified.
 template <class Real>
 bool encloseOrigin(std::span<const VertexPair> simplex, Polytope<Real>& polytope);
 

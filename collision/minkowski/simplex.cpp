@@ -1,7 +1,7 @@
 // The nearest point of a segment, a triangle and a tetrahedron by the signs of sub-areas and
-// sub-volumes (Ericson, "Real-Time Collision Detection", 2005, sections 5.1.2, 5.1.5, 5.1.6). Only
-// faces and edges with the origin on their outer side are tested, because one of them contains the
-// nearest point.
+// sub-volumes. The tests are those of Ericson 2005 ("Real-Time Collision Detection", sections
+// 5.1.2, 5.1.5, 5.1.6). Only faces and edges with the origin on their outer side are tested,
+// because one of them contains the nearest point.
 // Departures: a triangle's nearest point is computed along its normal, and a segment's is
 // orthogonalised a second time. The direction is then accurate to a few roundoffs even if its
 // length is tiny relative to the coordinates.

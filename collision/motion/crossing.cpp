@@ -11,10 +11,10 @@
 // translation, and the normal.
 //
 // Bounds. A difference of two points departs from the chord between its computed ends by at most
-// 2 delta; delta is the sum of the pose error, of the rounding, and of h^2 / 8 times the bound of
-// the relative acceleration, h the length of the interval. On the chords, side() is quadratic. It
-// departs from the line between its ends by at most |d| |u1 - u0| |q1 - q0| / 4, for the changes of
-// u = xj - xi and q = xk - xi. All signs must hold by more than these bounds.
+// 2 delta; delta is the sum of three bounds: the pose error, the rounding, and h^2 / 8 times the
+// bound of the relative acceleration, h the length of the interval. On the chords, side() is
+// quadratic. It departs from the line between its ends by at most |d| |u1 - u0| |q1 - q0| / 4, for
+// the changes of u = xj - xi and q = xk - xi. All signs must hold by more than these bounds.
 //
 // Where these bounds do not suffice, a uniform translation is decided in exact arithmetic, as a ray
 // against the faces of the Minkowski difference.

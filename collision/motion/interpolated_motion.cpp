@@ -1,8 +1,8 @@
 // Proof for one plane. A plane with normal n separates the bodies by g0 at the start and by g1 at
-// the end. If all vertices moved straight and uniformly, the gap along n would be concave in time
-// (a minimum of linear functions), so at least (1 - t) g0 + t g1. A vertex at radius rho that
-// rotates by theta about the centre departs from its chord by at most rho theta^2 t (1 - t) / 2,
-// since abs(p'') = rho theta^2. With B = (rho_A theta_A^2 + rho_B theta_B^2) / 2 the gap stays
+// the end. Suppose that all vertices move straight and uniformly. The gap along n is then concave
+// in time (a minimum of linear functions), so at least (1 - t) g0 + t g1. Let a vertex at radius
+// rho rotate by theta about the centre. Since abs(p'') = rho theta^2, it departs from its chord by
+// at most rho theta^2 t (1 - t) / 2. With B = (rho_A theta_A^2 + rho_B theta_B^2) / 2 the gap stays
 // positive if
 //   g0 / t + g1 / (1 - t) > B; by its minimum: (sqrt g0 + sqrt g1)^2 > B.
 // Where neither the plane of the start nor that of the end suffices, the motion is halved. The

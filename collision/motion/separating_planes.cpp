@@ -1,8 +1,8 @@
-// Rounding. Let n be a plane's rounded normal, and M the sum of the magnitudes |x| + |y| + |z| of
-// all points that a sum below takes in. A product n . p of a point is off by less than 4u M, a
-// rotated one by less than 8u M (minkowski.hpp), and each of the few sums adds u M. |n| differs
-// from 1 by less than 4u, which moves a distance of at most M by as much. kSlack M = 128u M covers
-// A's share as well as B's.
+// Rounding. Let n be a plane's rounded normal. Let M be the sum of the magnitudes |x| + |y| + |z|
+// of all points that a sum below takes in. A product n . p of a point is off by less than 4u M, a
+// rotated one by less than 8u M (minkowski.hpp). Each of the few sums adds u M. |n| differs from 1
+// by less than 4u, which moves a distance of at most M by as much. kSlack M = 128u M covers A's
+// share as well as B's.
 #include "collision/motion/separating_planes.hpp"
 
 #include <algorithm>
@@ -15,7 +15,9 @@ namespace enfilade::collision {
 namespace {
 
 constexpr double kSlack = 128 * kRoundoff;
-constexpr std::size_t kMaxScannedVertices = 8;  // as a triangle or a box: scanned
+// A scan trades its own time for queries that the box alone does not spare. It is short for
+// triangles and boxes, which have at most this many vertices.
+constexpr std::size_t kMaxScannedVertices = 8;
 
 double sumOfMagnitudes(const Vec3& p) {
   return std::abs(p.x()) + std::abs(p.y()) + std::abs(p.z());

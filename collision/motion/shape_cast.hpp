@@ -31,9 +31,9 @@ MotionResult castShape(const PlacedConvex& a, const Vec3& displacement, const Pl
                        const ContactOffset& offset, FeatureCache& cache);
 
 /// Rotates A against the static B. Up to the resulting fraction, A and B stay at least
-/// min(offset.min, 15/16 of their initial distance) apart, up to the rounding of the rotated poses
-/// and SeparationResult::errorBound. If they start closer than `min`, only rotations that do not
-/// approach initially are allowed. If they overlap, none is allowed.
+/// min(offset.min, 15/16 of their initial distance) apart. This holds up to the rounding of the
+/// rotated poses and SeparationResult::errorBound. If they start closer than `min`, only rotations
+/// that do not approach initially are allowed. If they overlap, none is allowed.
 MotionResult castShape(const PlacedConvex& a, const AxisRotation& rotation, const PlacedConvex& b,
                        const ContactOffset& offset, FeatureCache& cache);
 

@@ -1,19 +1,19 @@
 // Time to contact. For a gap d with maximum closing speed v and maximum acceleration a,
-//   tc = 2 d / (v + sqrt(v^2 + 2 a d)),
-// which equals (sqrt(v^2 + 2 a d) - v) / a (Lin 1993, section 5.1) without its cancellation and its
+//   tc = 2 d / (v + sqrt(v^2 + 2 a d)).
+// It equals (sqrt(v^2 + 2 a d) - v) / a (Lin 1993, section 5.1) without its cancellation and its
 // division by 0.
 //
 // Departures from Lin 1993. There v is the speed of the closest points, which is no bound for
 // rotating bodies: the centre of a rod along a wall is closest and at rest while a tip approaches.
 // Here v is the closing speed of the reference points along the normal of the separating plane,
-// plus |w| rho of each body, which bounds the speed of every vertex. a is the sum of |linear|,
+// plus |w| rho of each body. This bounds the speed of every vertex. a is the sum of |linear|,
 // |alpha| rho and |w|^2 rho, with the maximum |w| in the interval. NextCheck::proved is false if
 // max(tc, tmin) > tc and the gap may close too far; Lin does not make this distinction.
 //
-// Rounding. With u = 2^-53, the relative errors in tc are 3u and 2u for the terms under the root,
-// 4u for their sum, 3u for the root, 4u for the denominator and 5u for the quotient. The result is
-// reduced by 12u. This holds only without underflow. Gap, speed and acceleration are therefore
-// first scaled by the same power of two, which leaves the time unchanged.
+// Rounding. Let u = 2^-53. The relative errors in tc are 3u and 2u for the terms under the root, 4u
+// for their sum, 3u for the root. They are 4u for the denominator and 5u for the quotient. The
+// result is reduced by 12u. This holds only without underflow. Gap, speed and acceleration are
+// therefore first scaled by the same power of two, which leaves the time unchanged.
 #include "collision/motion/time_to_contact.hpp"
 
 #include <algorithm>

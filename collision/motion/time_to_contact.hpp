@@ -35,8 +35,8 @@ double computeTimeToContact(double distance, const ClosingBounds& closing);
 struct NextCheck {
   double after = 0;     ///< max(tc, minInterval), seconds
   bool proved = false;  ///< no contact before `after` is missed: `after` is tc, or the gap closes
-                        ///< by less than 2 * clearance until then, so that a near miss (d < 2 *
-                        ///< clearance) is detected before contact
+                        ///< by less than 2 * clearance until then. A near miss (d < 2 * clearance)
+                        ///< is thus detected before contact
 };
 
 /// Time of the next check of a pair. `distance`: proved lower bound, metres. `minInterval` > 0:

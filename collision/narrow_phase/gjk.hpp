@@ -45,9 +45,9 @@ template <class Real>
 bool warmStart(const MinkowskiDifference& difference, const FeatureCache& cache,
                GjkState<Real>& state);
 
-/// Iterates until the simplex is the closest features or a tetrahedron that contains the origin,
-/// the distance is certified to exceed `limit`, or Real makes no more progress. In the first
-/// `localSteps` steps, climbs stop once they pass the origin.
+/// Iterates until the simplex is the closest features or a tetrahedron that contains the origin. It
+/// also ends if the distance is certified to exceed `limit`, or if Real makes no more progress. In
+/// the first `localSteps` steps, climbs stop once they pass the origin.
 template <class Real>
 void gjkIterate(const MinkowskiDifference& difference, double limit, int localSteps,
                 GjkState<Real>& state);

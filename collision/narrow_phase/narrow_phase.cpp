@@ -9,11 +9,11 @@
 //     features or gives the next one. In a warm start, climbs stop once they pass the origin
 //     (findSupport), so that the simplex stays close to the old features. This step uses doubles
 //     (gjk.cpp).
-//  3. Floating-point filter. The vector between the closest points in extended precision, and its
-//     deviation from GJK's last direction, certify a plane (computeCertifiedExtraDistance) with all
-//     of B - A on its far side. If the plane clears the origin, the bodies are `separated` by at
-//     least that distance. A tetrahedron that contains the origin by more than the rounding bound
-//     certifies `penetrating`.
+//  3. Floating-point filter. A plane with all of B - A on its far side is certified
+//     (computeCertifiedExtraDistance). The certificate takes the vector between the closest points
+//     in extended precision, and its deviation from GJK's last direction. If the plane clears the
+//     origin, the bodies are `separated` by at least that distance. A tetrahedron that contains the
+//     origin by more than the rounding bound certifies `penetrating`.
 //  4. If the origin lies on the simplex: exact sums of doubles may certify `touching`
 //     (touching_certificate.hpp), or a polytope grown from the simplex `penetrating`
 //     (polytope.hpp).
@@ -185,9 +185,9 @@ double computeSupportExcess(const BodyPoint& point, const BoundedConvex& convex,
 /// no point of B - A is less than w by more than the bodies' support excess. And w . d / |d| = |w|
 /// cos(w, d) >= |w| - |w - d|^2 / |w| where that is positive, because cos >= cos^2.
 /// Rounding: w is off by 24 eta reach (WitnessPoints), and by 2u |w| as rounded. The rotated
-/// direction is off by 3 eta |d| S for a vertex, so by twice that for the vector from a body's
-/// point to its vertex. Both products round by 3 eta |d| S, their difference by one, and the point
-/// by 8.1 eta S: together below 24 eta |d| S.
+/// direction is off by 3 eta |d| S for a vertex. For the vector from a body's point to its vertex
+/// it is off by twice that. Both products round by 3 eta |d| S, their difference by one, and the
+/// point by 8.1 eta S: together below 24 eta |d| S.
 double computeCertifiedExtraDistance(const MinkowskiDifference& difference,
                                      const WitnessPoints& witnesses, const SplitLength& length,
                                      const GjkState<double>& state) {

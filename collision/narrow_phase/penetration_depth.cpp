@@ -12,9 +12,9 @@
 //     converge, as for slivers, all steps run in extended precision.
 // Proof of the lower bound: the facets form a closed surface, and all of them face away from the
 // origin (each determinant is positive beyond rounding). The surface therefore winds around the
-// origin at least once, and every ray from the origin meets a facet, at no less than the distance
-// of that facet's plane. M is convex and contains all corners and the origin, so it contains the
-// ball whose radius is the minimum of these distances. The polytope need not be convex.
+// origin at least once. Every ray from the origin meets a facet, at no less than the distance of
+// that facet's plane. M is convex and contains all corners and the origin, so it contains the ball
+// whose radius is the minimum of these distances. The polytope need not be convex.
 // Departures: termination is by the two bounds. A facet that is not certified to face outward is
 // expanded before all others. If that fails, the result is an upper bound, never an exception.
 #include "collision/narrow_phase/penetration_depth.hpp"

@@ -6,7 +6,8 @@
 //     Predicates", 1997). No sign may be negative.
 //  3. Differences with sign zero lie in a plane through the origin. They are projected along an
 //     axis that is not parallel to the plane. They contain the origin if a cycle of left turns
-//     leads around it, if one of them is the origin, or if two lie on opposite sides of it.
+//     leads around it. They also do if one of them is the origin, or if two lie on opposite sides
+//     of it.
 //     Orientations are decided by their rounding bound, or exactly if both points are exact.
 #include "collision/narrow_phase/touching_certificate.hpp"
 

@@ -39,8 +39,8 @@ bool toInteger(double value, double scale, std::int64_t& integer) {
   return static_cast<double>(integer) == scaled && (integer != 0 || value == 0);
 }
 
-/// Sign of u . (v x w) if the nine numbers are multiples of one power of two by less than 2^62, so
-/// that 192 bits hold all sums of triple products; nullopt otherwise.
+/// Sign of u . (v x w) if the nine numbers are multiples of one power of two by less than 2^62, and
+/// nullopt otherwise. 192 bits then hold all sums of triple products.
 std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w, double largest) {
   __extension__ typedef __int128 Int128;
   int exponent = 0;

@@ -1,5 +1,5 @@
 // Runs a script tick by tick. The submission ticks depend only on the script and on `idle`, never
-// on wall-clock time, so that all drivers get the same commands at the same ticks.
+// on wall-clock time. All drivers therefore get the same commands at the same ticks.
 #include <algorithm>
 #include <cmath>
 #include <cstdio>

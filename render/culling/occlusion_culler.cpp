@@ -14,6 +14,8 @@
 namespace enfilade::render {
 namespace {
 
+// Items. With fewer there are more nodes to test; with more, a leaf with one visible item has more
+// items to test one by one.
 constexpr std::uint32_t kLeafSize = 4;
 constexpr std::uint32_t kNoNode = 0xFFFF'FFFFu;
 

@@ -75,8 +75,8 @@ void RenderTarget::begin(const Channels& channels, bool planeDepth) {
   if (channels.normals) glClearNamedFramebufferfv(fbo, GL_COLOR, 2, kNone.data());
   if (planeDepth) glClearNamedFramebufferfv(fbo, GL_COLOR, 3, kNoDepth.data());
   // Not by the framebuffer: NVIDIA's driver 580.159 then culled visible fragments by the depth of
-  // an earlier frame, in blocks of 8 pixels, where a small frame followed another in the same
-  // layer.
+  // an earlier frame, in blocks of 8 pixels. It did so where a small frame followed another in the
+  // same layer.
   glClearTexSubImage(depth_.name(), 0, 0, 0, layer_, width_, height_, 1, GL_DEPTH_COMPONENT,
                      GL_FLOAT, &kFarDepth);
 }

@@ -18,8 +18,8 @@ struct DepthNoise {
   int distortionRows = 0;
 };
 
-/// Replaces depths in metres (NaN: none) by those of a structured-light camera: the model of Choi,
-/// Zhou and Koltun 2015 ("Robust Reconstruction of Indoor Scenes"). Each pixel takes the depth of a
+/// Replaces depths in metres (NaN: none) by those of a structured-light camera: the model of Choi
+/// et al. 2015 ("Robust Reconstruction of Indoor Scenes"). Each pixel takes the depth of a
 /// neighbour, which the distortion divides, and its disparity gets noise and is rounded to an
 /// eighth; depths from 10 m on are lost. The result depends on noise, `frame` and pixel alone.
 void addDepthNoise(std::vector<float>& depth, int width, int height, const DepthNoise& noise,

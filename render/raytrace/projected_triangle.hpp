@@ -1,5 +1,5 @@
 // A triangle projected by a camera, in doubles. Its depth is a quotient of two functions that are
-// affine in the pixel, and so are its barycentric weights (Pineda 1988, "A parallel algorithm for
+// affine in the pixel. So are its barycentric weights (Pineda 1988, "A parallel algorithm for
 // polygon rasterization"): after the set-up, a pixel costs one division.
 //
 // For a ray o + z d and corners r0, r1, r2 with n = (r1 - r0) x (r2 - r0):

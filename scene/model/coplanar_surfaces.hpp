@@ -39,7 +39,7 @@ struct CoplanarRank {
 
 /// One an object. Of coplanar surfaces that of the object with the smaller box has the lower rank,
 /// because details lie on large surfaces. In models of more than two million triangles all ranks
-/// are 0, since the search would delay the first picture, or the first ray, by seconds.
+/// are 0. The search would delay the first picture, or the first ray, by seconds.
 std::vector<CoplanarRank> rankCoplanarObjects(const Model& model);
 
 }  // namespace enfilade::scene

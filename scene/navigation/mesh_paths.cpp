@@ -29,8 +29,8 @@ constexpr double kTight = 1.01;            // of the line of its corridor: a pat
 constexpr double kMaxMeshOffset = 0.1;     // metres, across
 constexpr double kShortPath = 5;  // metres: mesh lines keep some centimetres more than is needed
 
-/// Goes around what stopped the walker on the way from the last place of `path` to `corner`, and
-/// appends places up to where it joins that way again, or up to the corner.
+/// Goes around the obstacle that stopped the walker on the way from the last place of `path` to
+/// `corner`. Appends places up to where it joins that way again, or up to the corner.
 bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corner,
               NavigationPath& path, Proof& proof) {
   const Vec3 legStart = path.points.back();

@@ -25,6 +25,8 @@ constexpr double kLineSpacing = 0.012;  // metres
 constexpr int kMaxLines = 134;
 constexpr double kSameGap = 0.8;           // metres between ends of passages
 constexpr std::size_t kMaxWalks = 60'000;  // on grids, of all gaps: some tenths of a second
+// On the grid of one gap. A gap that takes more is given up, so that one does not use up the walks
+// of all: 60 such gaps do.
 constexpr std::size_t kGapWalks = 1000;
 // Of the exits of small islands. Some hundred find an exit nearby, thousands one through a long
 // narrow way.

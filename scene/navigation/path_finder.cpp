@@ -185,7 +185,7 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
 }
 
 /// Places without a mesh, as narrow ones on furniture, or on a small part of one, are connected
-/// with it by walks on a grid, and with one another if they are near.
+/// with it by walks on a grid. Places that are near are connected with one another.
 NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal) {
   Walker& walker = finder.walker;
   Proof proof(finder.maxRepairWalks);

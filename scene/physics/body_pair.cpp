@@ -7,8 +7,8 @@
 //     collisions on seams).
 //
 // Most pairs need no narrow phase. Either their bounding spheres are apart, or the last separating
-// axis still separates them by a certified distance. A pair that rested on a face keeps that face,
-// as long as the separation along it is about the distance of the nearest facing points.
+// axis still separates them by a certified distance. A pair that rested on a face keeps that face.
+// The separation along it must be about the distance of the nearest facing points.
 #include "scene/physics/body_pair.hpp"
 
 #include <algorithm>

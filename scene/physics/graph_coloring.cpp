@@ -1,5 +1,6 @@
-// Greedy coloring in the order of the constraints. A constraint gets the first color that neither
-// body has. Where the order counts, it gets the first color after all colors of its bodies.
+// Greedy coloring in the order of the constraints, as in Box2D v3 (Catto 2024). A constraint gets
+// the first color that neither body has, or is solved sequentially if all colors are used. Where
+// the order counts, it gets the first color after all colors of its bodies.
 #include "scene/physics/graph_coloring.hpp"
 
 #include <algorithm>
@@ -12,6 +13,8 @@
 namespace enfilade::scene {
 namespace {
 
+// Bits of a body's set of colors. A constraint is left over only if other constraints of its two
+// bodies have all of them.
 constexpr std::uint32_t kMaxColors = 32;
 
 /// Gives a constraint the first color after those of all earlier constraints that share a body.

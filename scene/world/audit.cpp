@@ -2,8 +2,8 @@
 // and bodies. It uses no data of the broad phase except the pairs that it reports.
 //
 // If proxies * (static boxes + proxies) box tests would take too long for one tick, each audit
-// checks as many proxies as the bound allows, but at least one. The next audit continues with the
-// following proxy ids.
+// checks fewer proxies. They are as many as the bound allows, but at least one. The next audit
+// continues with the following proxy ids.
 #include "scene/world/audit.hpp"
 
 #include <algorithm>

@@ -139,8 +139,8 @@ ExitCode serveUntilSignal(const ServeCommand& command) {
 }  // namespace
 
 ExitCode serve(const ServeCommand& command) {
-  // Without it glibc raises the threshold up to 32 MiB as blocks are freed, and keeps the memory of
-  // large pictures and messages of clients that left.
+  // Without it glibc raises the threshold up to 32 MiB as blocks are freed. It then keeps the
+  // memory of large pictures and messages of clients that left.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   try {
     return serveUntilSignal(applyRecording(command));

@@ -2,9 +2,10 @@
 //
 // Steps:
 //   1. Bodies move, so each is drawn on its own. Triggers and collision-only objects are not drawn.
-//   2. Static objects with the same list of meshes are candidates for instancing if at least
-//      kMinInstances of them have a transform of translation, rotation and positive scale. A viewer
-//      that draws instances does not reverse the winding of mirrored ones, and glTF has no shear.
+//   2. Static objects with the same list of meshes are candidates for instancing. At least
+//      kMinInstances of them must have a transform of translation, rotation and positive scale. A
+//      viewer that draws instances does not reverse the winding of mirrored ones, and glTF has no
+//      shear.
 //   3. Candidates that save the most vertices become instance groups, up to kMaxInstancedPrimitives
 //      draw calls.
 //   4. All other static objects are merged by material into batches, in the scene's frame.

@@ -1,7 +1,7 @@
 // Compares the certified distance of computeSeparation() with rationals. Bodies move and queries
-// start warm, so that GJK ends at directions that deviate from the closest points' and at features
-// that others exceed by a rounding. Sheared bodies, slivers, and bodies far from their own origin
-// stress the terms of the bound most.
+// start warm. GJK therefore ends at directions that deviate from the closest points' and at
+// features that others exceed by a rounding. Sheared bodies, slivers, and bodies far from their own
+// origin stress the terms of the bound most.
 #include <gtest/gtest.h>
 
 #include <cmath>

@@ -19,7 +19,7 @@ struct Family {
 
 const std::vector<Family>& getFamilies();
 
-/// Makes a case of the family with its true verdict, distance and depth, and with `near` at a
+/// Makes a case of the family with its true verdict, distance and depth. With `near` the case has a
 /// clearance within a few ulps of half the distance.
 Case makeCase(const Family& family, Random& random, int number);
 

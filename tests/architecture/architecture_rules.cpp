@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <fstream>
 #include <optional>
 #include <regex>
@@ -268,6 +269,18 @@ bool writtenByPeople(const std::filesystem::path& file) {
          names.count(file.filename().string()) != 0;
 }
 
+/// Dashes and signs are no words.
+bool isWord(const std::string& text) {
+  return std::any_of(text.begin(), text.end(),
+                     [](unsigned char c) { return std::isalnum(c) != 0; });
+}
+
+/// A full stop ends a sentence, also before brackets, quotes and stars.
+bool endsSentence(const std::string& word) {
+  const auto last = word.find_last_not_of(")]*_`\"'");
+  return last != std::string::npos && std::string(".!?").find(word[last]) != std::string::npos;
+}
+
 bool onlyLinkedTo(const std::filesystem::path& file) {
   const std::string extension = file.extension().string();
   return extension == ".png" || extension == ".svg" || file.filename() == "LICENSE";
@@ -459,6 +472,36 @@ Faults oddWords(const Sources& sources) {
         faults.push_back(at(name, number) + ": a comment about \"" + match[1].str() +
                          "\"; name the thing");
     });
+  }
+  return faults;
+}
+
+Faults longSentences(const Sources& sources, int maxWords) {
+  static const std::regex code("^\\s*```"), noText("^\\s*([#|].*)?$");
+  static const std::regex item(R"(^\s*([-*+]|\d+\.)\s)");
+  Faults faults;
+  for (const auto& [path, text] : sources) {
+    if (!endsWith(path, ".md")) continue;
+    int words = 0, firstLine = 0;
+    bool inCode = false;
+    const auto endSentence = [&, &name = path] {
+      if (words > maxWords)
+        faults.push_back(at(name, firstLine) + ": a sentence of " + std::to_string(words) +
+                         " words; split it");
+      words = 0;
+    };
+    forEachLine(text, [&](int number, const std::string& line) {
+      const bool fence = std::regex_search(line, code);
+      if (fence) inCode = !inCode;
+      if (fence || inCode || std::regex_search(line, noText)) return endSentence();
+      if (std::regex_search(line, item)) endSentence();
+      std::istringstream rest(line);
+      for (std::string word; rest >> word;) {
+        if (isWord(word) && ++words == 1) firstLine = number;
+        if (endsSentence(word)) endSentence();
+      }
+    });
+    endSentence();
   }
   return faults;
 }

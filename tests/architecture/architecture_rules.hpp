@@ -51,10 +51,14 @@ Faults unreachedCollisionHeaders(const Sources& sources);
 /// A folder of the product holds at most `maxFiles` sources directly.
 Faults crowdedFolders(const Sources& sources, int maxFiles);
 
-/// Words of HOUSE.md's list that do not belong in technical English, one fault a place. Comments,
-/// messages and pages count; identifiers that merely contain such a word do not. Constants are
-/// named kMax.. and kMin.., not kMost.., kLeast.. and kLargest...
+/// Archaic, colloquial and roundabout words, which do not belong in technical English, one fault a
+/// place. Comments, messages and pages count; identifiers that merely contain such a word do not.
+/// Constants are named kMax.. and kMin.., not kMost.., kLeast.. and kLargest...
 Faults oddWords(const Sources& sources);
+
+/// Sentences of the Markdown pages with more than `maxWords` words. A list item ends a sentence,
+/// too. Headings, tables and code do not count.
+Faults longSentences(const Sources& sources, int maxWords);
 
 /// Functions of the product, and of all scripts for browsers and Node.js, that are named by a noun,
 /// as `areaOf()`. The convention is verb + noun: `getArea()`, `findArea()`, `computeArea()`.

@@ -84,6 +84,11 @@ TEST(Architecture, NoOddWordsAreUsed) {
   EXPECT_EQ(faults, Faults{}) << listed(faults);
 }
 
+TEST(Architecture, SentencesOfThePagesAreShort) {
+  const Faults faults = longSentences(repository(), 25);
+  EXPECT_EQ(faults, Faults{}) << listed(faults);
+}
+
 TEST(Architecture, FunctionsAreNamedByVerbs) {
   const Faults faults = nounFunctions(repository());
   EXPECT_EQ(faults, Faults{}) << listed(faults);
@@ -208,6 +213,22 @@ TEST(ArchitectureRules, AnOddWordIsAFault) {
       {"docs/page.md", "The server reports each contact.\n"}};
   EXPECT_EQ(oddWords(sources), (Faults{"scene/model/a.hpp:1: Whoever", "scene/model/a.hpp:1: told",
                                        "scene/model/a.hpp:1: beside"}));
+}
+
+TEST(ArchitectureRules, ALongSentenceOfAPageIsAFault) {
+  const Sources sources{{"docs/page.md",
+                         "# A heading may have five words\n\n"
+                         "A page - is\n50 %. \"Has it (five\nor) more `words`?\" No.\n"
+                         "- A list item is\n- one sentence, without\n  a stop\n\n"
+                         "A paragraph is another\n\none, too.\n"
+                         "| a | table | has | no | sentences |\n"
+                         "```\ncode has no sentences either\n```\n"
+                         "1. The last sentence is long\n"},
+                        {"docs/page.hpp", "// A comment has many more words.\n"}};
+  EXPECT_EQ(longSentences(sources, 4),
+            (Faults{"docs/page.md:4: a sentence of 6 words; split it",
+                    "docs/page.md:7: a sentence of 5 words; split it",
+                    "docs/page.md:17: a sentence of 5 words; split it"}));
 }
 
 TEST(ArchitectureRules, ACommentWithoutASubjectIsAFault) {

@@ -69,9 +69,9 @@ def main():
     parts = [f"""\
 # Boxes of turning bodies
 
-Made by `./dev bench boxes{' --quick' if quick else ''}` on {datetime.date.today()}: {machine()},
-single thread. 1,000 bodies (250 of 2,000 vertices, 50 of 10,000) with the same hull, an ellipsoid
-with half axes of 0.2, 0.15 and 0.1 m, turn about their own axes. The methods take turns in every tick; times are medians.
+Made by `./dev bench boxes{' --quick' if quick else ''}` on {datetime.date.today()}. Machine: {machine()},
+single thread. 1,000 bodies (250 of 2,000 vertices, 50 of 10,000) turn about their own axes. All have the same hull,
+an ellipsoid with half axes of 0.2, 0.15 and 0.1 m. The methods take turns in every tick; times are medians.
 
 - *sphere cube*, *vertex scan* and *climb or scan* are the three methods of `collision/bounds/bounding_box.hpp`. The
   third climbs after a small turn and scans after a large one; *hill climb* always climbs. All but the cube give the

@@ -3,7 +3,7 @@
 //
 //   collision_boxes [--quick] [--out FILE] [--only PART_OF_A_METHOD]
 //
-// 1,000 bodies (250 of 2,000 vertices, 50 of 10,000) with the same hull, an ellipsoid of 8 to
+// 1,000 bodies (250 of 2,000 vertices, 50 of 10,000) have the same hull. It is an ellipsoid of 8 to
 // 10,000 vertices and half axes of 0.2, 0.15 and 0.1 m. Each turns about its own axis by 2 or 10
 // degrees a tick. In every tick each method computes all boxes; the methods take turns, so that
 // they meet the same machine.

@@ -14,9 +14,9 @@ HEAD = """# A crowd
 
 A thousand avatars walk in a district of 100,000 objects, copies of the bundled building, at 1.5 m/s towards places
 that change every two seconds. Times of the stages of a tick are in microseconds of wall-clock time: median, 99th
-percentile and maximum, with one thread and with two; `main CPU` and `all CPUs` are processor time. Penetration is the
+percentile and maximum, with one thread and with two. `main CPU` and `all CPUs` are processor time. Penetration is the
 deepest of all ticks, by the exact verdict. The state hashes are equal: threads do not change a bit.
-Made by `./dev bench crowd` on {date}: {machine}.
+Made by `./dev bench crowd` on {date}. Machine: {machine}.
 
 ```
 {output}

@@ -31,7 +31,7 @@ def main():
     text = f"""# Walkers among dense triangles
 
 Made by `./dev bench dense{" --quick" if "--quick" in sys.argv else ""}` on \
-{datetime.date.today().isoformat()}: {machine()}.
+{datetime.date.today().isoformat()}. Machine: {machine()}.
 Ten avatars walk at 1.5 m/s for {rows[0]["ticks"]} ticks in real scenes, if any are listed, and in those that the benchmark generates:
 
 {scenes}

@@ -40,7 +40,7 @@ class MovingCubes {
   std::vector<Aabb> boxes_;
 };
 
-/// People on the floor of a large hall, 4 m apart on average, who walk straight at up to 1.4 m/s
+/// People on the floor of a large hall, 4 m apart on average. They walk straight at up to 1.4 m/s
 /// and turn back at the walls. `corner`: of the hall, metres.
 class WalkingBoxes {
  public:

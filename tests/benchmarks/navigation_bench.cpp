@@ -308,9 +308,9 @@ void comparePair(Bench& bench, const FloodFill& fill, const Vec3& from, const Ve
 }
 
 /// Counts disagreements. Components have no direction, but an avatar may get down where it does not
-/// get up: an avatar that walks the path decides, or the fill of the start alone, by walks. Near is
-/// a pair of which a thinner avatar passes where a path was found, a wider one does not where none
-/// was, or two shifted grids differ.
+/// get up: an avatar that walks the path decides, or the fill of the start alone, by walks. A pair
+/// is near if a thinner avatar passes where a path was found, or a wider one does not where none
+/// was. It is also near if two shifted grids differ.
 void judge(Bench& bench, const std::vector<Vec3>& places,
            const std::vector<Disagreement>& disagreements, Comparison& result) {
   std::array<std::optional<FloodFill>, 2> others;  // for thinner avatars, and for wider ones

@@ -42,13 +42,13 @@ def main():
     (report / "navigation.md").write_text(f"""# Navigation: paths that are walked
 
 Made by `./dev bench navigation{" --quick" if "--quick" in sys.argv else ""}` on \
-{datetime.date.today().isoformat()}: {machine()}.
+{datetime.date.today().isoformat()}. Machine: {machine()}.
 An agent of 0.3 m radius and 1.75 m height.
 
 ## Walks
 
 An avatar enters at a random place and goes to another one with the order `go`, which opens doors and rides
-lifts; in every sixth pair it may fall by up to 2 m. Doors and lifts are as in the file again after 25 walks. A walk is
+lifts. In every sixth pair it may fall by up to 2 m. Doors and lifts are as in the file again after 25 walks. A walk is
 *wrong* if it is blocked, leaves the scene or penetrates anything. Walks through doors
 are counted by themselves, too. *Refused*: a closed door stands at the start. *Silent*: no path and no reason.
 
@@ -58,15 +58,15 @@ are counted by themselves, too. *Refused*: a closed door stands at the start. *S
 ## Reach and length
 
 A flood fill tries every place of a grid of 2 cm by standing there (`flood_fill.hpp`): it uses no navigation
-mesh. A pair of places, drawn on all islands or anywhere in the fill, is *wrong* if a path is found and the fill
-does not connect it, or the other way round; what they find differently is judged by a fill of which each step is
+mesh. Pairs of places are drawn on all islands or anywhere in the fill. A pair is *wrong* if a path is found and the fill
+does not connect it, or the other way round. What they find differently is judged by a fill of which each step is
 walked. *Walked*: an avatar walks the path to its end, and the grid misses it, as over cushions. *Near*: half a centimetre
 of radius, or a shift of the grid by one centimetre, changes the answer.
 *Skipped*: an end is at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
-shortest way in the fill, pulled straight, where an avatar can walk that; in brackets those where it cannot, or of
-which the fill has not both ends. An avatar walks both: the metres that its feet move are compared, tick by tick, so
-a step up or down counts with its height on both.
+shortest way in the fill, pulled straight, where an avatar can walk that. In brackets are those where it cannot, or of
+which the fill has not both ends. An avatar walks both, and the metres that its feet move are compared, tick by tick. A
+step up or down therefore counts with its height on both.
 
 {table(["scene", "places of the fill", "compared", "wrong", "walked", "near", "skipped", "islands", "lengths", "median share",
         "largest", "above 1.02"], [make_fill_row(row) for row in parts["reach_compared"]])}

@@ -19,8 +19,8 @@ OURS = {"GL renderer", "rays robust (renderer)"}
 MIN_ERROR = 1e-6  # mm, where an error of 0 is drawn
 # About rows measured with Mesa on a busy machine.
 WAITING = """
-Wall-clock time beyond the CPU time is waiting for a busy core: in 12 s of frames of the district, measured
-once by `/proc/PID/task/*/schedstat`, each of Mesa's two threads ran 3.0 s and waited 6.1 s, and the drawing
+Wall-clock time beyond the CPU time is waiting for a busy core. `/proc/PID/task/*/schedstat` measured 12 s of frames
+of the district once. Each of Mesa's two threads ran 3.0 s and waited 6.1 s, and the drawing
 thread ran 2.5 s and waited 2.1 s. An idle machine needs no more than the CPU time.
 """
 
@@ -120,14 +120,14 @@ def main():
     parts = [f"""\
 # Renderers: speed against error
 
-Made by `./dev bench render{' --quick' if quick else ''}` on {datetime.date.today()}: {arguments.machine},
+Made by `./dev bench render{' --quick' if quick else ''}` on {datetime.date.today()}. Machine: {arguments.machine},
 OpenGL by {device}. {'**A quick run: few cameras, one size.** ' if quick else ''}The machine is
-noisy (other load), so only ratios within a table are meaningful: methods take turns at each camera,
-times are medians.
+noisy (other load), so only ratios within a table are meaningful. Methods take turns at each camera,
+and times are medians.
 
-Depth and ids of the same seeded cameras, 1.6 m above a floor and under a roof, near 0.1 m, far 500 m;
-without textures, masks and transparency. Every pixel is compared with a ray in doubles
-(`render/reference/reference_tracer.hpp`); edge pixels, listed separately, have a neighbour that shows another object
+Depth and ids of the same seeded cameras, 1.6 m above a floor and under a roof, near 0.1 m, far 500 m.
+They are without textures, masks and transparency. Every pixel is compared with a ray in doubles
+(`render/reference/reference_tracer.hpp`). Edge pixels, listed separately, have a neighbour that shows another object
 or leaves the pixel's plane by a thousandth of the depth. *GL D24 standard* to *D32F reversed* draw all
 triangles at once into that depth buffer and read it back. *GL renderer* and *rays robust* are the renderers
 of `enfilade`; rays use two threads.

@@ -73,7 +73,7 @@ def machine():
             model = line.split(":", 1)[1].strip()
             break
     first = compiler.stdout.splitlines()[0] if compiler.stdout else "unknown compiler"
-    return f"{os.cpu_count()} cores ({model}, {platform.machine()}), {first}, ours at -O3, the peers as Debian built them"
+    return f"{os.cpu_count()} cores ({model}, {platform.machine()}), {first}. Ours at -O3, the peers as Debian built them"
 
 
 def picture(out, name, words):
@@ -149,8 +149,8 @@ is not timed. A method stops when its time for a size is used up.
               "Bytes are what malloc handed out (Embree: its own count), without the given boxes.\n"]
     reasons = {row["method"]: row["left_out"] for row in rows if "left_out" in row}
     if reasons:
-        parts.append("Left out at the larger sizes: "
-                     + "; ".join(f"{name} ({why})" for name, why in reasons.items()) + ".\n")
+        parts.append("Left out at the larger sizes:\n\n"
+                     + "".join(f"- {name}: {why}\n" for name, why in reasons.items()))
     return "\n".join(parts)
 
 
@@ -188,9 +188,9 @@ minutes to insert 64,000 cubes and is left out there.
     parts.append(f"Wrong frames, all methods: {wrong}. First insertion by ours, slowest motion: {'; '.join(first)}.\n")
     if regions:
         parts.append(f"""\
-A heap does not slow the walkers elsewhere in the same sweep: {regions['cubes']:,} turbulent cubes take
+A heap does not slow the walkers elsewhere in the same sweep. {regions['cubes']:,} turbulent cubes take
 {short(regions['heap_ms'])} ms a frame and {regions['walkers']:,} walkers {short(regions['walkers_ms'])} ms, each in a sweep of
-their own; together in one sweep they take {short(regions['both_ms'])} ms.
+their own. Together in one sweep they take {short(regions['both_ms'])} ms.
 """)
     return "\n".join(parts)
 
@@ -271,8 +271,8 @@ def narrow(rows, out):
         return ""
     sizes = sorted(set(row["vertices"] for row in rows))
     parts = ["## Narrow phase: speed against error\n", """\
-Two polytopes with vertices on unit spheres rotate by about a degree a step while one orbits the other:
-separated by 1 m, near (1 mm), penetrating by at most 10 cm. *Cold* clears all cached state before each
+Two polytopes with vertices on unit spheres rotate by about a degree a step while one orbits the other.
+They are separated by 1 m, near (1 mm), or penetrating by at most 10 cm. *Cold* clears all cached state before each
 query, *warm* starts from the last step's answer; methods with one number cache nothing. Medians over
 pairs and turns; the methods take turns. Each of our rows names its level; time and error are of that
 level. Errors are relative to `refine`, which the next section compares with the truth of files. Touching
@@ -383,7 +383,7 @@ def crossings(rows):
     return "\n".join(["### Crossings\n", """\
 Thin bodies that translate and pass through each other, as a rule at a time that is no double. A hit is
 proved if the result is `contact` and its interval contains the exact time, which rational arithmetic
-gives; it is late if `lo` is above that time. The time is that of the whole query.
+gives. It is late if `lo` is above that time. The time is that of the whole query.
 """, table(["bodies", "hits", "proved", "late", "false hits of misses", "µs a hit, median (99 %)",
             "µs a miss, median"], body)])
 
@@ -398,9 +398,9 @@ def time_to_contact(rows):
             for row in rows]
     return "\n".join(["## Time to contact\n", """\
 Lower bounds on the time to contact of two bodies. Lin (1993, section 5.1) uses the closing speed of the
-closest points; ours is the closing speed of the reference points plus |w| rho of each body, which no
+closest points. Ours is the closing speed of the reference points plus |w| rho of each body, which no
 vertex exceeds. A bound is broken if the bodies provably meet before it. `rod` is a counter-example to the
-former: a rod along a wall rotates about its middle, which is closest and at rest, while its tip approaches.
+former. A rod along a wall rotates about its middle, which is closest and at rest, while its tip approaches.
 The reference is the time of impact itself, by conservative advancement.
 """, table(["bound", "motion", "encounters", "broken", "median share of the true time", "ns"], body),
                       crossings(crossing)])
@@ -418,7 +418,7 @@ def icollide(rows, out):
                     for row in middle])
     parts = ["## I-COLLIDE's five sweeps\n", """\
 The five sweeps of Cohen et al. (1995). Default parameters: 1000 polytopes of 36 faces, 10° and 10 % of the
-radius a frame, density 1 % (bodies' volume relative to the cube that contains them). A frame is boxes,
+radius a frame, density 1 %. The density is the bodies' volume relative to the cube that contains them. A frame is boxes,
 broad phase, and the exact verdict on every pair; peers get fixed cubes. Missed and false contacts are
 counted over all frames of a setting, against all pairs computed cold.
 """, stages]
@@ -454,10 +454,10 @@ def main():
     head = f"""\
 # The collision core compared with its peers
 
-Made by `./dev bench collision{' --quick' if quick else ''}` on {datetime.date.today()}: {machine()},
+Made by `./dev bench collision{' --quick' if quick else ''}` on {datetime.date.today()}. Machine: {machine()},
 single thread. {'**A quick run: few repetitions, smaller sizes.** ' if quick else ''}The machine is
-noisy (other load, shared clocks), so times vary by a factor of two: every table is from one run in
-which the methods take turns, times are medians, and only ratios within a table are meaningful. Peers are Debian's packages; one that is not installed is missing here.
+noisy (other load, shared clocks), so times vary by a factor of two. Every table is from one run in
+which the methods take turns. Times are medians, and only ratios within a table are meaningful. Peers are Debian's packages; one that is not installed is missing here.
 """
     parts = [head, broad(read(results, "broad"), out),
              all_moving(read(results, "moving")),

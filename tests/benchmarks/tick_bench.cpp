@@ -3,8 +3,8 @@
 //
 //   tick_bench [SCENE [AVATARS [TICKS [THREADS]]]]
 //
-// SCENE is a file, district:N for a generated district of N objects, or scan:N, office:N,
-// plant_room:N or terrain:N for a generated scene of some N triangles (dense_scenes.hpp). Avatars
+// SCENE is a file, or district:N for a generated district of N objects. scan:N, office:N,
+// plant_room:N and terrain:N are generated scenes of some N triangles (dense_scenes.hpp). Avatars
 // walk at 1.5 m/s towards seeded places and change direction every two seconds, like visitors of a
 // building. THREADS: at most, of a tick (default: two). Contacts are computed each tick. The
 // maximum penetration is printed with the times, so that no speed is bought with an error.

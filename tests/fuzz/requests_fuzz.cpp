@@ -1,5 +1,5 @@
-// Fuzz target of all requests, answered by a small world. The input is a sequence of messages, each
-// preceded by its sender (a byte, of which the lowest bit counts) and its length (two bytes,
+// Fuzz target of all requests, answered by a small world. The input is a sequence of messages. Each
+// is preceded by its sender (a byte, of which the lowest bit counts) and its length (two bytes,
 // little-endian). Steps run at once, so that the world moves. Images are small and drawn by rays.
 #include <spdlog/spdlog.h>
 

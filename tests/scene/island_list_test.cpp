@@ -1,5 +1,5 @@
-// Islands of navigation: those inside of solids do not count, roofs are found but not drawn, places
-// by name lie on the island of the start, and neighbours are found across a gap.
+// Islands of navigation: those inside of solids do not count, and roofs are found but not drawn.
+// Places by name lie on the island of the start. Neighbours are found across a gap.
 #include "scene/navigation/island_list.hpp"
 
 #include <gtest/gtest.h>

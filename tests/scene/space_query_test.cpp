@@ -27,9 +27,8 @@ std::string roomAt(const Model& model, double x, double y, double z) {
   return space == nullptr ? "" : space->name;
 }
 
-/// A corridor "L" along two sides of a square of 6 m, and a larger hall "H" that begins in the
-/// notch of the L, behind a wall of 0.2 m. In the hall a booth "B" of 1 m, without a wall of its
-/// own.
+/// A corridor "L" along two sides of a square of 6 m. A larger hall "H" begins in the notch of the
+/// L, behind a wall of 0.2 m. In the hall a booth "B" of 1 m, without a wall of its own.
 std::string makeRooms() {
   IfcHouse house;
   const auto space = [&](int id, const std::string& name, const std::string& shape) {
@@ -99,7 +98,7 @@ TEST(SpaceMiddle, OfARoomShapedLikeAnLIsInItsCornerAwayFromTheWalls) {
       }
       EXPECT_EQ(findSpace(model, middle.point, 0), &space);
       // The largest circle in the corner of the corridor touches two walls and the corner of the
-      // hall, and has a radius of 2 - sqrt(2) * 1.17 m. The grid's step is 19 cm.
+      // hall. It has a radius of 2 - sqrt(2) * 1.17 m. The grid's step is 19 cm.
       const Vec3 best(1.172, 1.25, -1.172);
       EXPECT_LT((middle.point - best).norm(), 0.19);
       EXPECT_NEAR(middle.width, 2 * middle.point.x(), 0.2);

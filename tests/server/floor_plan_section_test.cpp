@@ -14,8 +14,8 @@ namespace {
 
 using collision::Vec3;
 
-/// A column, 1 m square and 3 m high at (5, 0, 5), and a wall of one face along x from 0 to 4 m, 2
-/// m high.
+/// A column, 1 m square and 3 m high at (5, 0, 5). A wall of one face along x from 0 to 4 m, 2 m
+/// high.
 scene::Model columnAndSheet() {
   const scene::Mesh column = scene::makeBoxMesh({{4.5, 0, 4.5}, {5.5, 3, 5.5}});
   scene::Mesh sheet;

@@ -3,8 +3,8 @@
 //     frame.
 //  2. Cast a grid of rays through the door's inner area. A surface that stops most rays within
 //     its box is a panel: a leaf or a pane. A frame is hollow in its middle.
-//  3. If a surface surrounds a panel most closely, has a rail below, and lies in a further
-//     surface, it is the leaf that holds the pane.
+//  3. A surface may surround a panel most closely, have a rail below, and lie in a further surface.
+//     It is then the leaf that holds the pane.
 //  4. Panels at different x are separate leaves. Surfaces within a leaf's outline, such as
 //     handles, move with it; the rest is frame.
 //  5. Reject leaves that are too small for the door or too thick. The door then stays static.

@@ -1,5 +1,5 @@
-// Divides the text of a large IFC file into parts, so that several processes can read their
-// products at the same time, each without the geometry of the others.
+// Divides the text of a large IFC file into parts. Several processes can read their products at the
+// same time, each without the geometry of the others.
 #pragma once
 
 #include <cstddef>

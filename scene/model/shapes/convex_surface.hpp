@@ -8,11 +8,11 @@
 //   (|n_x| h_x + |n_y| h_y + |n_z| h_z), n is the face's unit normal, and h_i is half a unit of
 //   rounding of the largest coordinate on axis i. The surface encloses more than half of H's
 //   volume.
-// Then no point of the surface is farther than d from H's boundary (out along n it leaves H), and
-// the solid and H differ by at most d. Every solid whose faces were planar before rounding passes:
+// Then no point of the surface is farther than d from H's boundary (out along n it leaves H). The
+// solid and H differ by at most d. Every solid whose faces were planar before rounding passes:
 // rounding moves a corner by at most e = d/6 along n. At the triangle's centroid H's face lies
-// within e of the plane, at its corners not below -e, so at most 5e above it, and 6e above the
-// stored corner.
+// within e of the plane, at its corners not below -e. It is thus at most 5e above it, and 6e above
+// the stored corner.
 // H contains the surface in either case: a shape that is clear of H is clear of every triangle.
 #pragma once
 

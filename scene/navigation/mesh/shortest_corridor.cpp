@@ -13,6 +13,8 @@
 namespace enfilade::scene {
 namespace {
 
+// Intervals: some megabytes. A search that needs more ends without a corridor, so that of A* stays.
+// It bounds the time of a query, and paths may be longer.
 constexpr std::size_t kMaxNodes = 50'000;
 constexpr std::uint32_t kNoNode = ~0u;
 constexpr double kSamePlace = 1e-5;  // metres: vertices are binary32
@@ -117,8 +119,8 @@ class CorridorSearch {
     nodes_.push_back(interval);
   }
 
-  /// Splits each portal of the polygon into what is seen from the root, and what a line reaches
-  /// that bends at an end of the interval.
+  /// Splits each portal of the polygon into two kinds of parts. One is seen from the root, the
+  /// other reached by a line that bends at an end of the interval.
   void expand(const Interval& interval, std::uint32_t index) {
     const Vec3 root = interval.root;
     const Vec3 toLow = interval.low - root, toHigh = interval.high - root;

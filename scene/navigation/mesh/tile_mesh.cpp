@@ -25,6 +25,8 @@ constexpr int kCellsPerRadius = 6;
 constexpr double kMaxColumns = 1e8;     // of cells: a quarter of a square kilometre of 0.05 m cells
 constexpr double kCellRounding = 1e-6;  // of a number of cells
 constexpr float kMaxContourError = 1.0f;  // cells
+// Cells, of 0.05 m for a radius of 0.3 m. Islands below 0.02 square metres are left out, since no
+// agent stands on them. Regions below a square metre join a neighbour, which makes fewer polygons.
 constexpr int kMinRegionCells = 8, kMergeRegionCells = 400;
 constexpr float kHeightSpacing = 0.5f, kMaxHeightError = 0.1f;  // metres, of the detail mesh
 /// Meshes with more triangles are searched by their trees, not triangle by triangle.

@@ -17,8 +17,8 @@ struct FloorFace {
 /// The level faces of `obstacles` that overlap `box`.
 std::vector<FloorFace> collectFloorFaces(const ObstacleSet& obstacles, const Aabb& box);
 
-/// Returns the distance, at most `length` metres, that the point below the feet can move along the
-/// horizontal unit vector `direction` on faces of the height that it has at `footPosition`.
+/// Returns how far, at most `length` metres, the point below the feet can move along the horizontal
+/// unit vector `direction`. It moves on faces of the height that it has at `footPosition`.
 double computeEvenDistance(const std::vector<FloorFace>& faces, const Vec3& footPosition,
                            const Vec3& direction, double length);
 

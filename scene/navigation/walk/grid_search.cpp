@@ -139,6 +139,7 @@ std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& fro
 }
 
 void pullTight(Walker& walker, std::vector<Vec3>& places) {
+  // A place moves once a pass. More passes make shorter paths, but each walks all legs again.
   constexpr int kMaxPasses = 4;
   constexpr double kMinGain = 0.01;  // metres
   bool isMoved = true;

@@ -1,8 +1,8 @@
-// A walk yields to another one that is ahead of it within kFollowDistance, is closer to its way
-// point, and walks to the same place or in about the same direction. Among walks to one place
-// that is a strict order, so one of them always goes. Two more rules keep other walks from waiting
-// for ever: rings are opened, and walks that wedge one another step back. Walks in opposite
-// directions do not yield; they slide past each other.
+// A walk yields to another one that is ahead of it within kFollowDistance and closer to its way
+// point. The other one must walk to the same place or in about the same direction. Among walks to
+// one place that is a strict order, so one of them always goes. Two more rules keep other walks
+// from waiting for ever: rings are opened, and walks that wedge one another step back. Walks in
+// opposite directions do not yield; they slide past each other.
 #include "scene/world/avatars/yielding.hpp"
 
 #include <algorithm>
@@ -25,6 +25,8 @@ constexpr double kAheadCosine = 0.7071;       // walks in one direction: within 
 constexpr double kAbreastCosine = -0.1;       // walks to one place: ahead or abreast
 constexpr double kSameDirectionCosine = 0.7;  // of two walks
 constexpr double kSamePlace = 0.5;            // metres between two way points
+// 10 s at 60 ticks a second. The timeout of a walk stands still if the first of its queue was free
+// that recently. Longer jams end walks as blocked.
 constexpr std::uint64_t kMaxQueueTicks = 600;
 
 struct GroundWalk {

@@ -174,7 +174,7 @@ struct CheckpointChecker {
 };
 
 bool isRotation(const collision::Mat3& m) {
-  constexpr double kRounding = 1e-6;
+  constexpr double kRounding = 1e-6;  // far above the error of a body's rotation in a world
   return ((m * m.transpose() - collision::Mat3::Identity()).array().abs() <= kRounding).all();
 }
 
@@ -185,7 +185,7 @@ std::size_t countConvexParts(const PhysicsBody& body) {
 }  // namespace
 
 void restoreAvatarShape(const Reader& a, Avatar& avatar) {
-  constexpr double kRounding = 1e-12;
+  constexpr double kRounding = 1e-12;  // relative: a few roundings, far below any step of a crouch
   Spawn order;
   if (avatar.spawnOrder) {
     order = *avatar.spawnOrder;

@@ -18,9 +18,10 @@ inline Aabb computeCore(const Aabb& partBox) {
   return {partBox.centre() - core, partBox.centre() + core};
 }
 
-/// Calls query(PlacedConvex, FeatureCache&) for each part of `object` whose box is `inReach`, and
-/// that `planes` do not prove to be missed by the avatar's part, whose box is `partBox`; near ones
-/// first. `query` may shorten the reach. The axes that it leaves in the caches become planes.
+/// Calls query(PlacedConvex, FeatureCache&) for each part of `object` whose box is `inReach`, near
+/// ones first. Parts that `planes` prove to be missed by the avatar's part, whose box is `partBox`,
+/// are left out. `query` may shorten the reach. The axes that it leaves in the caches become
+/// planes.
 template <class InReach, class Query>
 void forEachNearPart(const DenseObject& object, std::uint32_t avatarPart, const Aabb& partBox,
                      collision::SeparatingPlanes& planes, const InReach& inReach,

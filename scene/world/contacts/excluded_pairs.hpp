@@ -1,7 +1,7 @@
 // Excluded pairs: entities that a kinematic body touches or penetrates (d < 2 contactOffset, exact
-// verdict) in its initial pose, such as a door and its frame, a lift and the shaft's floor, a cart
-// and the ground. Such pairs report no contact and no near miss: the model was built that way. They
-// depend on the scene alone and are computed on first use.
+// verdict) in its initial pose. Examples are a door and its frame, a lift and the shaft's floor, a
+// cart and the ground. Such pairs report no contact and no near miss: the model was built that way.
+// They depend on the scene alone and are computed on first use.
 #pragma once
 
 #include <vector>

@@ -8,9 +8,9 @@
 // 4. Two convex shapes whose present motion is uniform, without such bounds, have a time of impact
 //    (Mirtich 1996): it is the answer, or proves that they pass each other.
 // Ticks: a fall is a parabola sampled at ticks. A tick that begins at speed s covers (s + g dt / 2)
-// dt, so a displacement of `d` in the last tick means a speed of d / dt + g dt / 2 now. Dynamic
-// bodies fall in substeps, each with its speed after the substep: they are early by at most g dt /
-// 2 of speed.
+// dt. A displacement of `d` in the last tick therefore means a speed of d / dt + g dt / 2 now.
+// Dynamic bodies fall in substeps, each with its speed after the substep: they are early by at most
+// g dt / 2 of speed.
 #include "scene/world/queries/time_to_contact_query.hpp"
 
 #include <Eigen/Eigenvalues>

@@ -1,5 +1,5 @@
-// Peer: FCL's dynamic AABB tree and its sweep and prune (SSaP), each with one manager for the
-// static scene and one for the dynamic boxes, so that a tick does not touch static boxes.
+// Peer: FCL's dynamic AABB tree and its sweep and prune (SSaP). Each has one manager for the static
+// scene and one for the dynamic boxes, so that a tick does not touch static boxes.
 #include <fcl/broadphase/broadphase_SSaP.h>
 #include <fcl/broadphase/broadphase_dynamic_AABB_tree.h>
 #include <fcl/geometry/shape/box.h>

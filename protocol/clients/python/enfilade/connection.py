@@ -1,8 +1,8 @@
 """Messages over a TCP connection: magic, lengths, deadlines. See PROTOCOL.md, "Framing".
 
 A signal handler may raise an exception (KeyboardInterrupt) between any two bytecodes. The stream
-stays consistent: the C call that moves bytes also records their number (_Moved), every other change
-of state is one assignment, and a message stays `next` until its reader calls done().
+stays consistent: the C call that moves bytes also records their number (_Moved), and every other
+change of state is one assignment. A message stays `next` until its reader calls done().
 """
 
 from __future__ import annotations

@@ -50,9 +50,9 @@ def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_dis
                  max_distance: float = math.inf, start: Optional[Sequence[float]] = None,
                  goal: Optional[Sequence[float]] = None, starts: Sequence[Sequence[float]] = (),
                  goals: Sequence[Sequence[float]] = ()) -> Episode:
-    """Draws a start and a goal between which there is a path: the one given, or one of those given, or else
-    a place on any island that is no roof, and a goal on the start's island. Distances are geodesic. Raises
-    EnfiladeError with the reason of the last draw if none is found."""
+    """Draws a start and a goal between which there is a path: the one given, or one of those given,
+    or else a place on any island that is no roof. The goal is on the start's island. Distances are
+    geodesic. Raises EnfiladeError with the reason of the last draw if none is found."""
     starts = starts if start is None else [start]
     goals = goals if goal is None else [goal]
 

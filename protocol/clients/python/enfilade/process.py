@@ -131,9 +131,9 @@ def _stop_all() -> None:
 
 
 class Server:
-    """A running server. It is stopped by stop(), at the end of a `with`, when no object refers to it
-    any more, and at the end of this Python process. It also ends if this process is killed: the
-    server ends when its stdin is closed."""
+    """A running server. It is stopped by stop(), or at the end of a `with`. It is also stopped
+    when no object refers to it any more, and at the end of this Python process. It ends, too, if
+    this process is killed: the server ends when its stdin is closed."""
 
     def __init__(self, scene: Union[str, Path], arguments: Sequence[str], program: str,
                  seconds: float) -> None:

@@ -2,10 +2,10 @@
 //
 //   node read_ifc.js FIRST
 //
-// File descriptor 3 receives the messages, 4 is the IFC file, 5 the list of what to read: the number
-// of ranges of the file (64 bits), the first byte and the size of each (64 bits), and the express
-// ids of the requested products (32 bits). Both are complete when the pipe 6 is at its end. Products
-// before index FIRST are done. The contents of the messages are documented in
+// File descriptor 3 receives the messages, 4 is the IFC file, 5 the list of what to read: the
+// number of ranges of the file (64 bits), the first byte and the size of each (64 bits). The
+// express ids of the requested products (32 bits) follow. Both are complete when the pipe 6 is at
+// its end. Products before index FIRST are done. The contents of the messages are documented in
 // scene/import/ifc/ifc_meshes.hpp.
 import { openModel, startEngine } from './engine.js';
 import {
