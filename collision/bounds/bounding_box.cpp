@@ -288,7 +288,7 @@ Aabb computeAabb(const Hull& hull, const SupportTable& table, const Mat3& rotati
     case AabbMethod::hillClimb: {
       const double trace = rotation.cwiseProduct(last.rotation).sum();  // of the turn's matrix
       last.rotation = rotation;
-      if (trace >= table.minTurnTrace)
+      if (!(trace < table.minTurnTrace))
         return placeExtents(climbSides(hull, table, rotation, last, looked), translation,
                             hull.radius, clearance);
       break;

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <vector>
 
 #include "collision/shapes/hull.hpp"
@@ -41,7 +42,8 @@ SupportTable buildSupportTable(const Hull& hull);
 /// cost only: every box is the same to the last bit whatever these indices are.
 struct ExtremalVertices {
   std::array<std::uint32_t, 6> vertex{};
-  Mat3 rotation = Mat3::Zero();  ///< of the last box; zero: none yet
+  /// Of the last box; NaN before the first one, which is climbed, so that the second has a start.
+  Mat3 rotation = Mat3::Constant(std::numeric_limits<double>::quiet_NaN());
 };
 
 // The boxes below contain the exact box of all vertices at rotation * v + translation, inflated by

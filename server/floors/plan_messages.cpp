@@ -1,5 +1,6 @@
 #include "server/floors/plan_messages.hpp"
 
+#include <cmath>
 #include <string>
 
 #include "server/messages/world_messages.hpp"
@@ -134,6 +135,9 @@ FloorPlan floorPlanFromProto(const v1::FloorPlan& message) {
 std::variant<v1::FloorPlan, v1::Error> answerFloorPlan(const v1::FloorPlanRequest& request,
                                                        const FloorPlanSource& source,
                                                        const ServerLimits& limits) {
+  constexpr double kMaxCoordinate = 1e7;  // metres
+  if (!(std::abs(request.floor()) <= kMaxCoordinate))
+    return makeError(v1::ERROR_BAD_MESSAGE, "give a height of at most 1e7 m", "floor_plan.floor");
   v1::FloorPlan plan = toProto(source(request.floor()).value_or(FloorPlan()));
   if (const std::size_t bytes = plan.ByteSizeLong(); bytes > limits.replyBytes)
     return makeError(v1::ERROR_TOO_LARGE,

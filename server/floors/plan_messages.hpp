@@ -12,7 +12,7 @@ namespace enfilade::server {
 v1::FloorPlan toProto(const FloorPlan& plan);
 FloorPlan floorPlanFromProto(const v1::FloorPlan& message);
 
-/// Returns the plan, or an error if it would be too large for a reply.
+/// Returns the plan, or an error: the height cannot be used, or the plan is too large for a reply.
 std::variant<v1::FloorPlan, v1::Error> answerFloorPlan(const v1::FloorPlanRequest& request,
                                                        const FloorPlanSource& source,
                                                        const ServerLimits& limits);

@@ -264,7 +264,7 @@ Hull ellipsoid(std::mt19937& random, int vertices, const Vec3& halfAxes) {
   return buildHull(points);
 }
 
-TEST(HillClimb, ScansTheFirstTimeAndAfterALargeTurn) {
+TEST(HillClimb, ScansAfterALargeTurnAlone) {
   std::mt19937 random(19);
   const Hull hull = ellipsoid(random, 60, Vec3(0.2, 0.15, 0.1));
   const SupportTable support = buildSupportTable(hull, AabbMethod::hillClimb);
@@ -278,8 +278,7 @@ TEST(HillClimb, ScansTheFirstTimeAndAfterALargeTurn) {
                scannedBox(hull, pose));
     return looked;
   };
-  EXPECT_EQ(countLooked(0), hull.vertices.size()) << "the first box";
-  for (const double small : {0.01, 0.02}) EXPECT_NE(countLooked(small), hull.vertices.size());
+  for (const double small : {0.0, 0.01, 0.02}) EXPECT_NE(countLooked(small), hull.vertices.size());
   EXPECT_EQ(countLooked(0.4), hull.vertices.size());
   EXPECT_NE(countLooked(0.01), hull.vertices.size());
 }

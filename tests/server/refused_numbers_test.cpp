@@ -176,6 +176,7 @@ std::vector<v1::ClientMessage> everyRequest(bool frames) {
   for (const v1::NavigationQuery& query : everyNavigationQuery())
     *all.emplace_back().mutable_navigation() = query;
   all.emplace_back().mutable_subscribe()->set_state_rate(10);
+  all.emplace_back().mutable_floor_plan()->set_floor(0.125);
   all.emplace_back().mutable_set_clock()->mutable_free_run()->set_speed(1);
   if (!frames) return all;
   for (const auto& request : everyFrameRequest()) *all.emplace_back().mutable_frame() = request;
