@@ -15,15 +15,15 @@ namespace enfilade::collision {
 enum class AabbMethod : std::uint8_t {
   sphereCube,  ///< cube of the bounding sphere about the body's origin
   vertexScan,  ///< tight: looks at all vertices
-  hillClimb    ///< tight: looks at the neighbours of last tick's extremal vertices, unless the body
-               ///< has turned so far since then that a scan costs less
+  hillClimb    ///< tight: looks at the neighbours of the last climb's extremal vertices, unless the
+               ///< body has turned so far since the last box that a scan costs less
 };
 
 /// The method that is used for a hull and, for hill climbing, the coordinates of the neighbours of
 /// each vertex, which lie together.
 struct SupportTable {
   AabbMethod method = AabbMethod::vertexScan;
-  /// 1 + 2 cos of the largest turn since the last box after which it climbs; -1: always.
+  /// 1 + 2 cos of the largest turn since the last box after which it climbs; -infinity: always.
   double minTurnTrace = 0;
   /// Neighbours of vertex v: blocks fanOffsets[v] to fanOffsets[v + 1] of `fans`, each two
   /// neighbours as x x y y z z, with their indices in `fanVertices`. The blocks of a vertex may
@@ -64,7 +64,7 @@ Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& transl
 /// The method that costs least per tick for a body that turns by a few degrees. The cost includes
 /// the narrow-phase queries that a larger box causes among bodies of its own size.
 AabbMethod chooseAabbMethod(const Hull& hull);
-/// The cheapest of the tight methods.
+/// The tight method that costs less for a body that hardly turns.
 AabbMethod chooseTightMethod(const Hull& hull);
 
 }  // namespace enfilade::collision

@@ -154,9 +154,9 @@ FileMetadata readFbxMetadata(const std::filesystem::path& file) {
     metadata.problems.push_back({"no_unit", 1, "no UnitScaleFactor: taken for centimetres"});
   }
   const double up = findFbxSetting(start, "UpAxis").value_or(1);
-  metadata.up = up == 0   ? UpAxis::x
-                : up == 2 ? UpAxis::z
-                          : UpAxis::y;  // assimp does not convert the axes
+  const bool isDown = findFbxSetting(start, "UpAxisSign").value_or(1) < 0;
+  const UpAxis axis = up == 0 ? UpAxis::x : up == 2 ? UpAxis::z : UpAxis::y;
+  metadata.up = isDown ? negate(axis) : axis;  // assimp does not convert the axes
   return metadata;
 }
 

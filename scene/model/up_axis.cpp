@@ -4,12 +4,19 @@
 #include <array>
 #include <iterator>
 
+#include "collision/assert.hpp"
+
 namespace enfilade::scene {
 namespace {
 
 constexpr std::array<std::string_view, 6> kNames{"x", "y", "z", "-x", "-y", "-z"};  // as UpAxis
 
 }  // namespace
+
+UpAxis negate(UpAxis positive) {
+  ENFILADE_ASSERT(positive <= UpAxis::z);
+  return static_cast<UpAxis>(static_cast<int>(positive) + static_cast<int>(UpAxis::minusX));
+}
 
 std::string toString(UpAxis up) {
   return std::string(kNames[static_cast<std::size_t>(up)]);

@@ -324,7 +324,7 @@ void drawChangeMap(const WalkDifference& difference, const ComparedModels& model
   }
   for (const OrderChange& change : difference.orders)
     if (change.worse && change.after && change.run == 0)
-      trace.blockedWalks.push_back({change.after->position, Vec3::UnitX()});
+      trace.refusedOrders.push_back({change.after->position, Vec3::UnitX()});
   const PlanRenderer renderPlan =
       makePlanRenderer(*models.afterRenderer, scene::World(models.after).snapshot());
   const auto map = drawMap(trace, {renderPlan, makeFloorPlanSource(models.after)});

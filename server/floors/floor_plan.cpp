@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <iterator>
+#include <numbers>
 #include <utility>
 
 #include "server/floors/floor_plan_section.hpp"
@@ -12,7 +14,8 @@ namespace {
 
 constexpr double kCutWallBottom = 0.5, kCutWallTop = 2.0;  // metres above a floor that a wall spans
 constexpr double kMaxStoreyDistance = 0.6;  // metres between a walked floor and a storey's
-constexpr double kArcStep = 0.05;           // radians between two points of an arc
+constexpr double kWholeTurn = 2 * std::numbers::pi;
+constexpr double kArcStep = 0.05;  // radians between two points of an arc
 
 void addStatic(const scene::Scene& scene, FloorPlan& plan) {
   std::vector<PlanShape> walls;
@@ -67,13 +70,15 @@ void addSwing(const scene::BodySpec& door, const PlanShape& leaf, FloorPlan& pla
   const double sign = door.axis.y() > 0 ? -1 : 1;
   for (const double limit : {door.low, door.high}) {
     if (limit == 0) continue;
-    const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(limit) / kArcStep)));
+    const auto at = [&](double turn) -> Vec3 {
+      const double angle = closed + sign * turn;
+      return hinge + radius * Vec3(std::cos(angle), 0, std::sin(angle));
+    };
+    const double shown = std::clamp(limit, -kWholeTurn, kWholeTurn);  // a sidecar may state more
+    const int steps = std::max(1, static_cast<int>(std::ceil(std::abs(shown) / kArcStep)));
     std::vector<Vec3> arc;
-    for (int i = 0; i <= steps; ++i) {
-      const double angle = closed + sign * limit * i / steps;
-      arc.push_back(hinge + radius * Vec3(std::cos(angle), 0, std::sin(angle)));
-    }
-    const std::vector<Vec3> open{hinge, arc.back()};
+    for (int i = 0; i <= steps; ++i) arc.push_back(at(shown * i / steps));
+    const std::vector<Vec3> open{hinge, at(limit)};
     plan.shapes.push_back({PlanShape::Kind::swing, leaf.entity, {}, {std::move(arc)}});
     plan.shapes.push_back({PlanShape::Kind::openDoor, leaf.entity, {}, {open}});
   }
@@ -142,9 +147,10 @@ StoreyFloor findStoreyAt(const std::vector<StoreyFloor>& storeys, double floor) 
 }
 
 FloorPlanSource makeFloorPlanSource(std::shared_ptr<const scene::Scene> scene) {
-  std::vector<StoreyFloor> storeys = findStoreys(*scene);
-  return [scene = std::move(scene), storeys = std::move(storeys)](double floor) {
-    return computeFloorPlan(*scene, findStoreyAt(storeys, floor));
+  return [scene = std::move(scene),
+          storeys = std::optional<std::vector<StoreyFloor>>()](double floor) mutable {
+    if (!storeys) storeys = findStoreys(*scene);  // takes a second in a large scene
+    return computeFloorPlan(*scene, findStoreyAt(*storeys, floor));
   };
 }
 

@@ -50,6 +50,7 @@ StoreyFloor findStoreyAt(const std::vector<StoreyFloor>& storeys, double floor);
 /// Finds the plan at the height of a floor; nullopt without one.
 using FloorPlanSource = std::function<std::optional<FloorPlan>(double floor)>;
 
+/// Plans of a scene in this process: each height has one.
 FloorPlanSource makeFloorPlanSource(std::shared_ptr<const scene::Scene> scene);
 
 }  // namespace enfilade::server

@@ -1,8 +1,12 @@
 #include "server/floors/plan_messages.hpp"
 
 #include <cmath>
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "collision/assert.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {
@@ -138,7 +142,9 @@ std::variant<v1::FloorPlan, v1::Error> answerFloorPlan(const v1::FloorPlanReques
   constexpr double kMaxCoordinate = 1e7;  // metres
   if (!(std::abs(request.floor()) <= kMaxCoordinate))
     return makeError(v1::ERROR_BAD_MESSAGE, "give a height of at most 1e7 m", "floor_plan.floor");
-  v1::FloorPlan plan = toProto(source(request.floor()).value_or(FloorPlan()));
+  const std::optional<FloorPlan> found = source(request.floor());
+  ENFILADE_ASSERT(found);
+  v1::FloorPlan plan = toProto(*found);
   if (const std::size_t bytes = plan.ByteSizeLong(); bytes > limits.replyBytes)
     return makeError(v1::ERROR_TOO_LARGE,
                      "the plan has " + std::to_string(bytes) + " bytes, and a reply at most " +

@@ -1,4 +1,4 @@
-// Conversion of floor plans to and from messages.
+// Floor plans as messages, and the answer to a request for one.
 #pragma once
 
 #include <variant>

@@ -9,8 +9,8 @@
 
 #include "collision/assert.hpp"
 #include "server/base/work_thread.hpp"
-#include "server/log/log.hpp"
 #include "server/floors/plan_messages.hpp"
+#include "server/log/log.hpp"
 #include "server/messages/proximity_messages.hpp"
 #include "server/messages/ray_messages.hpp"
 #include "server/messages/world_messages.hpp"
@@ -19,16 +19,18 @@
 namespace enfilade::server {
 
 struct QueryService::State {
-  explicit State(std::shared_ptr<const scene::Scene> s) : scene(std::move(s)), navigation(scene) {}
+  explicit State(std::shared_ptr<const scene::Scene> s)
+      : scene(std::move(s)), navigation(scene), floorPlans(makeFloorPlanSource(scene)) {}
 
   std::shared_ptr<const scene::Scene> scene;
   std::optional<scene::RayCaster> caster;                 ///< built at the first ray query
   std::shared_ptr<const scene::Snapshot> casterSnapshot;  ///< state of the caster's moving entities
   std::optional<scene::EntityIndex> index;                ///< built at the first proximity query
-  FloorPlanSource floorPlans;                             ///< built at the first plan
-  NavigationService navigation;                           ///< used by its thread alone
+  NavigationService navigation;  ///< used by its thread alone, as the next one
+  FloorPlanSource floorPlans;
   std::mutex pendingMutex;
-  /// Navigation queries without an answer: also those that wait learn the share of meshes.
+  /// Queries of the navigation thread without an answer: also those that wait learn the share of
+  /// meshes.
   std::list<std::shared_ptr<const SceneQuery>> pending;
   WorkThread thread, navigationThread;  // last members: they use the others
 
@@ -74,7 +76,6 @@ std::variant<v1::RayReply, v1::Error> QueryService::State::answerRays(
 }
 
 std::variant<v1::FloorPlan, v1::Error> QueryService::State::answerPlan(const SceneQuery& query) {
-  if (!floorPlans) floorPlans = makeFloorPlanSource(scene);
   return answerFloorPlan(query.message.floor_plan(), floorPlans, query.limits);
 }
 
@@ -164,7 +165,8 @@ void QueryService::submit(SceneQuery query, std::function<void(EncodedMessage)> 
   auto answer = [state = state_.get(), shared, done = std::move(done)] {
     done(state->answerSafely(*shared));
   };
-  if (shared->message.has_navigation())
+  // Plans of a large scene take as long as paths: rays do not wait for them.
+  if (shared->message.has_navigation() || shared->message.has_floor_plan())
     state_->postNavigation(shared, std::move(answer));
   else
     state_->thread.post(std::move(answer));

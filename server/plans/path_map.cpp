@@ -24,7 +24,7 @@ using render::TextStyle;
 constexpr double kMinTickShare = 0.08;  // minimum share of ticks for a storey with a plan
 constexpr std::size_t kMaxMapStoreys = 3;
 constexpr double kMapMargin = 4.0;  // metres around the walked area
-// Metres from the walked area to an order that the map still shows: a Spawn may name any place.
+// Metres from the walked area to a refused order that the map still shows.
 constexpr double kMaxOrderDistance = 20.0;
 constexpr double kMaxMapWidth = 1600, kMaxMapHeight = 1100;  // pixels of one plan
 constexpr double kBorder = 48, kLineHeight = 26;             // pixels
@@ -35,7 +35,7 @@ struct MapStorey {
   double floor = 0;
   render::Camera camera;
   PlanPicture picture;
-  FloorPlan plan;  ///< empty: the scene is elsewhere
+  FloorPlan plan;  ///< empty: none could be had
   std::vector<std::string> heading;
   PlanView view;  ///< once it has a place on the sheet
 };
@@ -46,8 +46,9 @@ scene::Aabb computeShownBounds(const WalkTrace& trace) {
     for (const Vec3& feet : path.footPositions) bounds.include(feet);
   }
   const scene::Aabb reach = collision::inflated(bounds, kMaxOrderDistance);
-  for (const MapContact& blocked : trace.blockedWalks)
-    if (collision::contains(reach, {blocked.point, blocked.point})) bounds.include(blocked.point);
+  for (const MapContact& blocked : trace.blockedWalks) bounds.include(blocked.point);
+  for (const MapContact& refused : trace.refusedOrders)
+    if (collision::contains(reach, {refused.point, refused.point})) bounds.include(refused.point);
   return collision::inflated(bounds, kMapMargin);
 }
 
@@ -74,7 +75,7 @@ std::vector<LegendEntry> makeLegend(const WalkTrace& trace) {
     entries.push_back({trace.paths[i].avatar, Symbol::path, styles[i]});
   if (!trace.contacts.empty())
     entries.push_back({"contact begins (without floors)", Symbol::dot, {kContactColour}});
-  if (!trace.blockedWalks.empty())
+  if (!trace.blockedWalks.empty() || !trace.refusedOrders.empty())
     entries.push_back({"walk blocked, order refused", Symbol::dot, {kBlockedColour}});
   if (!trace.captures.empty())
     entries.push_back({"picture taken, towards the open end", Symbol::wedge, {}});

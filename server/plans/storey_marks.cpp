@@ -68,10 +68,10 @@ StoreyMarks::StoreyMarks(const PlanView& view, const std::vector<double>& floors
     : view_(view), floors_(floors), captions_(view.box(), view.unit, entries) {
   const std::vector<PathStyle> styles = makePathStyles(trace.paths);
   for (std::size_t i = 0; i < trace.paths.size(); ++i) addPath(trace.paths[i], styles[i]);
-  for (const MapContact& blockedWalk : trace.blockedWalks) {
-    if (!isHere(blockedWalk.point.y())) continue;
-    blocked_.push_back({view_.at(blockedWalk.point), kBlockedRadius, kBlockedColour});
-  }
+  for (const auto* marks : {&trace.blockedWalks, &trace.refusedOrders})
+    for (const MapContact& mark : *marks)
+      if (isHere(mark.point.y()))
+        blocked_.push_back({view_.at(mark.point), kBlockedRadius, kBlockedColour});
   for (const MapContact& contact : trace.contacts) addContact(contact);
   for (const MapCapture& capture : trace.captures) addWedge(capture);
   for (const auto* dots : {&starts_, &blocked_, &contacts_})

@@ -30,7 +30,9 @@ struct WalkTrace {
   std::string title;
   std::vector<WalkedPath> paths;
   std::vector<MapContact> contacts;      ///< contacts that began
-  std::vector<MapContact> blockedWalks;  ///< ends of blocked walks, and refused orders
+  std::vector<MapContact> blockedWalks;  ///< ends of blocked walks; what is in the way
+  /// Shown where they are near: a Spawn may name any place.
+  std::vector<MapContact> refusedOrders = {};
   std::vector<MapCapture> captures;
   /// metres: heights that get a plan, however little walking is there
   std::vector<double> floors = {};

@@ -266,6 +266,8 @@ ModelOptions modelOptionsFromProto(const v1::ModelChoices& message) {
   ModelOptions model;
   if (message.has_metres_per_unit()) model.import.metresPerUnit = message.metres_per_unit();
   model.import.up = scene::parseUpAxis(message.up());
+  if (!model.import.up && !message.up().empty())
+    throw protocol::mcap::RecordingError("the recording names an unknown up axis: " + message.up());
   if (message.has_offset()) model.import.offset = vectorFromProto(message.offset());
   model.import.ifcReader =
       scene::parseIfcReader(message.ifc_reader()).value_or(scene::IfcReader::automatic);

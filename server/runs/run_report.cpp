@@ -163,7 +163,8 @@ void RunReport::addNotice(const v1::Notice& notice) {
   const bool blocked = notice.kind() == v1::Notice::KIND_BLOCKED;
   const bool refused = notice.kind() == v1::Notice::KIND_REFUSED;
   if ((blocked || refused) && notice.has_position())
-    trace_.blockedWalks.push_back({vectorFromProto(notice.position()), Vec3::UnitX()});
+    (blocked ? trace_.blockedWalks : trace_.refusedOrders)
+        .push_back({vectorFromProto(notice.position()), Vec3::UnitX()});
   if (notice.kind() == v1::Notice::KIND_SPAWNED) presentAvatars_.insert(notice.avatar());
   if (notice.kind() == v1::Notice::KIND_LEFT) presentAvatars_.erase(notice.avatar());
   if (blocked || refused || notice.kind() == v1::Notice::KIND_ARRIVED ||

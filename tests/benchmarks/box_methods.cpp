@@ -1,5 +1,6 @@
 #include "tests/benchmarks/box_methods.hpp"
 
+#include <limits>
 #include <utility>
 
 namespace enfilade::benchmarks {
@@ -61,7 +62,7 @@ std::vector<BoxMethod> boxMethods() {
                    }});
   all.push_back({kClimbAlways, [](const Hull& hull, std::size_t bodies) {
                    SupportTable table = collision::buildSupportTable(hull, AabbMethod::hillClimb);
-                   table.minTurnTrace = -1;
+                   table.minTurnTrace = -std::numeric_limits<double>::infinity();
                    return std::make_unique<OurBoxUpdate>(hull, std::move(table), bodies);
                  }});
   all.push_back({"recompute", [](const Hull& hull, std::size_t) {

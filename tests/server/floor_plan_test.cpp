@@ -46,6 +46,7 @@ scene::Model makeFurnishedRoom() {
   for (scene::Object& object : model.objects) object.storey = 0;
   model.spaces = {tests::makePrism({{2, 2}, {2, 6}, {0, 6}, {0, 0}, {6, 0}, {6, 2}}, 2.5)};
   model.spaces[0].storey = 0, model.spaces[0].longName = "Corridor", model.spaces[0].name = "017";
+  model.spaces[0].globalId = "2O2Fr$t4X7Zf8NOew3FLOH";
   model.north = Eigen::Vector2d(0.6, -0.8);
   return model;
 }
@@ -89,6 +90,18 @@ TEST(FloorPlan, DoorsHaveTheirSwing) {
   EXPECT_EQ(findShapes(plan, Kind::lift)[0]->lines.size(), 2u) << "diagonals";
 }
 
+TEST(FloorPlan, AHingeThatTurnsOftenHasOneWholeArc) {
+  scene::Model model = bodyRoomModel();
+  model.bodies[0].low = -1e6, model.bodies[0].high = 1e6;
+  const FloorPlan plan = computeFloorPlan(scene::Scene(std::move(model)), {});
+  const auto swings = findShapes(plan, Kind::swing);
+  ASSERT_EQ(swings.size(), 2u);
+  for (const PlanShape* swing : swings) {
+    EXPECT_LT(swing->lines.at(0).size(), 200u);
+    EXPECT_LT((swing->lines[0].front() - swing->lines[0].back()).norm(), 1e-9);
+  }
+}
+
 void expectEqual(const FloorPlan& a, const FloorPlan& b) {
   EXPECT_EQ(a.floor, b.floor);
   EXPECT_EQ(a.storey, b.storey);
@@ -104,6 +117,7 @@ void expectEqual(const FloorPlan& a, const FloorPlan& b) {
   for (std::size_t i = 0; i < a.rooms.size(); ++i) {
     EXPECT_EQ(a.rooms[i].name, b.rooms[i].name);
     EXPECT_EQ(a.rooms[i].longName, b.rooms[i].longName);
+    EXPECT_EQ(a.rooms[i].globalId, b.rooms[i].globalId);
     EXPECT_EQ(a.rooms[i].surface, b.rooms[i].surface);
     EXPECT_EQ(a.rooms[i].box.min, b.rooms[i].box.min);
     EXPECT_EQ(a.rooms[i].box.max, b.rooms[i].box.max);

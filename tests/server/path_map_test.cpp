@@ -78,7 +78,7 @@ TEST(PathMap, ARefusedOrderFarAwayDoesNotStretchTheMap) {
   const auto measureWidth = [](const std::vector<Vec3>& refused) {
     WalkTrace trace;
     trace.paths = {pathAt({{0, 50}})};
-    for (const Vec3& at : refused) trace.blockedWalks.push_back({at, Vec3::UnitX()});
+    for (const Vec3& at : refused) trace.refusedOrders.push_back({at, Vec3::UnitX()});
     double width = 0;
     const auto blank = [&](const render::Camera& camera) -> std::optional<PlanPicture> {
       width = camera.heightY * camera.width / camera.height;

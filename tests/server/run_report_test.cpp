@@ -63,8 +63,9 @@ TEST(RunReport, TheMapShowsBlockedWalksAndRefusedOrders) {
   }
   outcome.notices.back().clear_position();  // a body's order, for example
   report.add(outcome);
-  EXPECT_EQ(report.trace().blockedWalks.size(), 2u);
-  EXPECT_EQ(report.trace().blockedWalks[1].point.x(), 3);
+  EXPECT_EQ(report.trace().blockedWalks.size(), 1u);
+  ASSERT_EQ(report.trace().refusedOrders.size(), 1u);
+  EXPECT_EQ(report.trace().refusedOrders[0].point.x(), 3);
 }
 
 }  // namespace

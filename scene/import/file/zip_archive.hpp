@@ -16,7 +16,7 @@ std::string readOnlyZipMember(const std::filesystem::path& file,
                               std::span<const std::string_view> extensions, std::size_t maxBytes);
 
 /// Throws ImportError if the archive is damaged, or if all its files together would unpack to more
-/// than `maxBytes` by its directory. Nothing is unpacked: no reader takes more than that states.
+/// than `maxBytes` by its directory, which unpacking does not exceed. Nothing is unpacked.
 void limitZipMembers(const std::filesystem::path& file, std::size_t maxBytes);
 
 }  // namespace enfilade::scene

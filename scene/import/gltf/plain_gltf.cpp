@@ -35,8 +35,7 @@ using Json = nlohmann::json;
 }
 
 /// Parses only the sections needed here. Of the nodes, of which there may be a million, only the
-/// graph is kept.
-/// Refuses a text whose copies and dumps would need much stack.
+/// graph is kept. Refuses a text whose copies and dumps would need much stack.
 Json parseMeshSections(const std::string& text, const std::filesystem::path& file,
                        ExtensionNames& extensions, DuplicateKeys& duplicates, NodeGraph& nodes) {
   int deepest = 0;

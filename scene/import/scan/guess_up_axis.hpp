@@ -29,7 +29,8 @@ struct UpAxisGuess {
   UpAxis axis = UpAxis::z;
   /// Its level exceeds those of the other axes by half and does not hang. The level areas are a
   /// tenth of the surface, and those of a second axis a twentieth, as in a room with square walls:
-  /// of one that is tilted, two walls alone are perpendicular to an axis.
+  /// of one that is tilted, two walls alone are perpendicular to an axis. Of a lawn or a table,
+  /// three quarters of the surface are level, and no second axis is needed.
   bool isClear = false;
 };
 

@@ -1,6 +1,8 @@
 #include "scene/import/scan/import_scan.hpp"
 
+#include <array>
 #include <cmath>
+#include <cstdio>
 #include <unordered_map>
 #include <utility>
 
@@ -136,13 +138,19 @@ Material makeScanMaterial(const ScanMesh& scan, const std::string& name,
   return material;
 }
 
+std::string formatArea(double area) {
+  std::array<char, 32> text{};
+  std::snprintf(text.data(), text.size(), "%.3g", area);
+  return text.data();
+}
+
 std::string describeLevelAreas(const LevelAreas& areas, UpAxis up) {
   std::string text = toString(up) + " is up: the largest levels across x, y, z have";
-  for (const LevelArea& area : areas.axes) text += " " + std::to_string(std::llround(area.largest));
-  text += " of " + std::to_string(std::llround(areas.surface)) + " square units; --up sets another";
+  for (const LevelArea& area : areas.axes) text += " " + formatArea(area.largest);
+  text += " of " + formatArea(areas.surface) + " square units; --up sets another";
   const bool hangs = areas.axes[static_cast<std::size_t>(up)].hangs;
-  return hangs ? text + "; the largest faces down and is high: if the scan is upside down, --up=-" +
-                     toString(up)
+  return hangs ? text + "; the largest faces down and is high: if the scan is upside down, --up=" +
+                     toString(negate(up))
                : text;
 }
 

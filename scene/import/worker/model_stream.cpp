@@ -405,7 +405,7 @@ Model deserializeModel(std::span<const std::byte> bytes) {
   model.fileScene = in.get<std::uint32_t>("file scene");
   if (model.fileScene > 0 && model.fileScene >= model.fileScenes.size())
     in.fail("file scene", "no such scene");
-  model.upAxis = static_cast<UpAxis>(in.getUpTo(5, "up axis"));
+  model.upAxis = static_cast<UpAxis>(in.getUpTo(static_cast<std::uint8_t>(kLastUpAxis), "up axis"));
   model.offset = in.getMatrix<Vec3>("offset");
   readAll(in, model.diagnostics, 24, "problems", [&] { return readDiagnostic(in); });
   readAll(in, model.dependencies, 8, "dependencies", [&] { return in.getText("dependency"); });

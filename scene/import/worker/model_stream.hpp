@@ -14,7 +14,7 @@
 namespace enfilade::scene {
 
 /// Increases with every change of the layout; other versions are refused.
-inline constexpr std::uint32_t kModelStreamVersion = 8;
+inline constexpr std::uint32_t kModelStreamVersion = 9;
 
 /// Reports what is wrong and at which byte.
 struct ModelStreamError : std::runtime_error {

@@ -33,7 +33,9 @@ double computeRemainingDistance(const Avatar& avatar, const Vec3& goal) {
 
 /// Suffix of a message; "" for zero orders.
 std::string formatDroppedCount(std::size_t orders) {
-  return orders == 0 ? "" : "; " + std::to_string(orders) + " queued orders are dropped";
+  if (orders == 0) return "";
+  return "; " + std::to_string(orders) +
+         (orders == 1 ? " queued order is dropped" : " queued orders are dropped");
 }
 
 /// Removes all orders but the first `kept` from a queue and reports each with `cause`. The notices

@@ -124,7 +124,10 @@ class CopyCounter {
   void count(std::size_t node) {
     Tally& tally = tallies_[node];
     if (tally.depth > static_cast<std::size_t>(kMaxNodeDepth)) refuseDeepNodes(file_ + ": ");
-    if (tally.places > 1) limit(node, copies_ += tally.places - 1, kMaxCopies, "copied nodes");
+    if (tally.places > 1) {
+      copies_ += tally.places - 1;
+      limit(node, copies_, kMaxCopies, "copied nodes");
+    }
     const std::size_t bytes = nodes_[node].nameBytes + kSegmentBytes;
     tally.pathBytes += tally.places * bytes;
     tally.firstBytes = bytes + (tally.parent == kNoIndex ? 0 : tallies_[tally.parent].firstBytes);
