@@ -19,10 +19,11 @@ import numpy as np
 from . import messages, results, spaces
 from .arguments import UINT32, number, numbers, whole
 from .cameras import Camera, CameraRequest, chosen_cameras
-from .client import Client, Reply, connect
+from .client import Client, connect
 from .connection import raise_refusal
 from .episodes import Episode, check_episode, draw_episode
 from .errors import OrderFailed
+from .exchange import Reply
 from .kept_request import KeptRequest
 from .process import Server, serve
 from .world_group import Member
