@@ -8,7 +8,6 @@ therefore give the same observations, pixel for pixel on the same renderer.
 from __future__ import annotations
 
 import math
-import operator
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -21,46 +20,18 @@ from .arguments import UINT32, number, numbers, whole
 from .cameras import Camera, CameraRequest, chosen_cameras
 from .client import Client, connect
 from .connection import raise_refusal
-from .episodes import Episode, check_episode, draw_episode
+from .episodes import Episode, checked_episodes, checked_places, draw_episode
 from .errors import OrderFailed
-from .exchange import Reply
 from .kept_request import KeptRequest
 from .process import Server, serve
+from .walker import Observation, Walker
 from .world_group import Member
-
-Observation = Dict[str, np.ndarray]
 
 _RADII, _HEIGHTS = (0.05, 5), (0.2, 10)  # metres: those of Spawn
 MAX_STARTS = 32  # that are drawn for one episode
-_DISCRETE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 
 
-def _places(given: Any, name: str, counts: Sequence[int]) -> List[Tuple[float, ...]]:
-    """Returns the places; none for "anywhere"."""
-    if isinstance(given, str):
-        if given != "anywhere":
-            raise ValueError(f"{name}: give places or \"anywhere\", not {given!r}")
-        return []
-    try:
-        given = list(given)
-    except TypeError:
-        raise ValueError(f"{name}: give positions or \"anywhere\", not {given!r}") from None
-    if not given:
-        raise ValueError(f"{name}: give at least one position, or \"anywhere\"")
-    return [numbers(one, f"{name}[{i}]", counts) for i, one in enumerate(given)]
-
-
-def _checked_episodes(given: Sequence[Episode]) -> List[Episode]:
-    if not isinstance(given, (list, tuple)) or not given:
-        raise ValueError("episodes: give at least one")
-    for i, one in enumerate(given):
-        if not isinstance(one, Episode):
-            raise ValueError(f"episodes[{i}]: give an Episode, not {one!r}")
-        check_episode(one, f"episodes[{i}]")
-    return list(given)
-
-
-class WalkEnv(spaces.EnvBase):
+class WalkEnv(Walker, spaces.EnvBase):
     """One avatar in a world of its own.
 
     scene or address: a model, for which a server process is started, or HOST:PORT of a running
@@ -117,20 +88,12 @@ class WalkEnv(spaces.EnvBase):
             raise ValueError("give one of goal, goals and episodes")
         if episodes is not None and not (isinstance(starts, (tuple, list)) and not starts):
             raise ValueError("starts: leave it out, episodes have their own")
-        self.starts = [] if episodes is not None else _places(starts, "starts", (3, 4))
-        self.goals = None if goals is None else _places(goals, "goals", (3,))
-        self.episodes = None if episodes is None else _checked_episodes(episodes)
-        self.goal = None if goal is None else np.array(numbers(goal, "goal", (3,)))
-        self._first_goal = self.goal
+        self.starts = [] if episodes is not None else checked_places(starts, "starts", (3, 4))
+        self.goals = None if goals is None else checked_places(goals, "goals", (3,))
+        self.episodes = None if episodes is None else checked_episodes(episodes)
+        self._first_goal = None if goal is None else np.array(numbers(goal, "goal", (3,)))
         for name, count in (("ticks_per_step", ticks_per_step), ("max_steps", max_steps)):
             whole(count, name, 1, UINT32)
-        self._name = "walker"
-        drive = messages.ClientMessage(command=messages.Command(
-            avatar=self._name, drive=messages.Drive(velocity=messages.Vec3())))
-        velocity = drive.command.drive.velocity
-        self._drive = KeptRequest(drive, (velocity, "x"), (velocity, "z"))
-        self._run = KeptRequest(messages.ClientMessage(
-            step=messages.Step(ticks=ticks_per_step, avatars=True)))
         self.min_distance = number(min_distance, "min_distance", 0)
         self._size = {"radius": None if radius is None else number(radius, "radius", *_RADII),
                       "height": None if height is None else number(height, "height", *_HEIGHTS)}
@@ -144,20 +107,18 @@ class WalkEnv(spaces.EnvBase):
         if sum(one is not None for one in (scene, address or None, client)) != 1:
             raise ValueError("give one of scene, address and client")
         self.goal_radius = number(goal_radius, "goal_radius", above=0)
-        self.cameras = [CameraRequest(one, self._name) for one in chosen_cameras(
-            cameras, size=size, channels=channels, fov_y=fov_y, pitch=pitch, height=eye_height)]
-        self._picture_key = next((one.prefix + "rgb" for one in self.cameras if "rgb" in one.channels),
-                                 "rgb")
-        self.ticks_per_step = ticks_per_step
-        self.speed, self.turn_speed = number(speed, "speed", above=0), number(turn_speed, "turn_speed", 0)
-        self.max_steps, self.discrete = max_steps, discrete
-        self.render_mode = render_mode
-        self.observation_space = self._observation_space()
+        chosen = chosen_cameras(
+            cameras, size=size, channels=channels, fov_y=fov_y, pitch=pitch, height=eye_height)
+        super().__init__(
+            chosen, goal=self._first_goal, ticks_per_step=ticks_per_step,
+            speed=number(speed, "speed", above=0), turn_speed=number(turn_speed, "turn_speed", 0),
+            discrete=discrete, render_mode=render_mode)
+        self.max_steps = max_steps
+        self.observation_space = self._observation_space(self.goal is not None or self.is_geodesic)
         self.action_space = spaces.Discrete(4) if discrete else \
             spaces.Box(-1.0, 1.0, (2,), np.float32)
         if not spaces.HAVE_GYMNASIUM:
             self.np_random = np.random.default_rng()
-        self._face(0.0)
         self._steps = 0
         self._start: Sequence[float] = ()  # of the episode
         self.episode: Optional[Episode] = None  # the present one, with goals or episodes
@@ -166,17 +127,11 @@ class WalkEnv(spaces.EnvBase):
         self._episode_number = 0
         self._walked = 0.0  # metres in this episode
         self._left = math.inf  # geodesic distance to the goal, metres
-        self._tag = 0  # of the last reset()'s spawn
-        self._feet: Optional[np.ndarray] = None  # metres; None: no episode has begun
-        self._stopped_by = ""  # in the last tick
-        self._last_stopped = 0  # the last tick in which an obstacle stopped it; 0: none
-        self._rgb: Optional[np.ndarray] = None
-        self._seen: Observation = {}  # of the last step
         self.server: Optional[Server] = None
         self._own_client = client is None
         try:
-            self.client = client or self._connected(scene, address, server_arguments, world=world,
-                                                    token=token)
+            self._use(client or self._connected(scene, address, server_arguments, world=world,
+                                                token=token))
             self._begin()
         except BaseException:
             self.close()
@@ -184,22 +139,8 @@ class WalkEnv(spaces.EnvBase):
 
     def _begin(self) -> None:
         self.navigation = self.client.navigation(**self._size, speed=self.speed)
-        self._floor = math.cos(self.client.welcome.policies.walkable_slope) - 1e-9
-        limit = self.client.welcome.policies.speed_limit
-        if self.speed > limit:
-            raise ValueError(f"speed: {self.speed:g} m/s exceeds the server's limit of {limit:g}")
-        max_ticks = self.client.limits.max_ticks_per_step
-        if self.ticks_per_step > max_ticks:
-            raise ValueError(f"ticks_per_step: the server runs at most {max_ticks} at a time")
-        widest, highest = self.client.limits.max_picture_width, self.client.limits.max_picture_height
-        for one in self.cameras:
-            width, height = one.camera.size
-            if width > widest or height > highest:
-                raise ValueError(f"size: the server draws at most {widest} x {highest} pixels, "
-                                 f"not {width} x {height}")
         self.client.lockstep()
         self.client.subscribe(contacts=True, notices=True)
-        self._seconds = self.ticks_per_step * self.client.tick_seconds
         self.metadata = {**self.metadata, "render_fps": 1 / self._seconds}
 
     def _connected(self, scene: Union[str, Path, None], address: str,
@@ -208,18 +149,6 @@ class WalkEnv(spaces.EnvBase):
             return connect(address, name="enfilade environment", **options)
         self.server = serve(scene, *arguments)
         return self.server.connect(name="enfilade environment", **options)
-
-    def _observation_space(self) -> Any:
-        box = spaces.Box
-        parts: Dict[str, Any] = {}
-        for camera in self.cameras:
-            parts.update(camera.spaces())
-        parts["position"] = box(-np.inf, np.inf, (3,), np.float64)
-        parts["heading"] = box(-1.0, 1.0, (2,), np.float64)
-        if self.goal is not None or self.is_geodesic:
-            parts["to_goal"] = box(-np.inf, np.inf, (3,), np.float64)
-            parts["goal_polar"] = box(-np.inf, np.inf, (2,), np.float64)
-        return spaces.Dict(parts)
 
     # ---- a task may override these -----------------------------------------------------------
 
@@ -291,7 +220,7 @@ class WalkEnv(spaces.EnvBase):
     def __exit__(self, *_: Any) -> None:
         self.close()
 
-    # ---- in two halves, so that several environments work at the same time --------------------
+    # ---- reset() in two halves, so that several environments work at the same time -----------
 
     def _post_reset(self, seed: Optional[int], options: Dict[str, Any]) -> List[int]:
         self._feet = self._rgb = None  # until the reset succeeds
@@ -416,42 +345,12 @@ class WalkEnv(spaces.EnvBase):
             info["geodesic_distance"] = self._left
         return self._observation(replies[3:]), info
 
-    def _refusals(self) -> List[str]:
-        """Returns the refusals of the spawn, and discards all other notices."""
-        kept = self.client._notices
-        why = [one.text for one in kept if one.kind == "refused" and
-               (one.avatar, one.tag) == (self._name, self._tag)]
-        kept.clear()
-        return why
-
-    def _take_avatar(self, step: Any) -> bool:
-        """Keeps the avatar's state of a StepReply; False if it is not in the world."""
-        for one in step.avatars:
-            if one.name == self._name:
-                feet = one.feet
-                self._feet = np.array((feet.x, feet.y, feet.z))
-                self._stopped_by = one.move.stopped_by_name
-                self._last_stopped = one.last_stopped_tick
-                return True
-        return False
-
-    def _check_begun(self) -> None:
-        if self._feet is None:
-            raise RuntimeError("call reset() first: no episode has begun, the last reset() or step() "
-                               "failed, or the environment was closed")
+    # ---- step() in two halves ---------------------------------------------------------------
 
     def _post_step(self, meaning: Tuple[float, float]) -> List[int]:
         self._drive.set(*self._turn(meaning))
         return self.client._post([self._drive, self._run, *self._pictures(),
                                   *self._distance_query()])
-
-    def _turn(self, meaning: Tuple[float, float]) -> Tuple[float, float]:
-        """Turns the heading. Returns the velocity of the step on the ground, x and z."""
-        self._check_begun()
-        ahead, turn = meaning
-        self._face(math.remainder(self._heading + turn * self.turn_speed * self._seconds, math.tau))
-        cosine, sine = self._direction
-        return ahead * self.speed * cosine, ahead * self.speed * -sine
 
     def _kept_step(self, member: Member) -> KeptRequest:
         """The requests of a step in this episode. The doubles are _step_numbers()."""
@@ -504,27 +403,6 @@ class WalkEnv(spaces.EnvBase):
         contacts = self._contacts_of_step()
         return self._info(tick, state_hash, contacts, self._has_collided(tick, contacts))
 
-    def _contacts_of_step(self) -> List[results.Contact]:
-        """Takes the contacts that came with a packed step."""
-        client = self.client
-        client._notices.clear()
-        return client._kept_contacts() if client._contacts else []
-
-    def _has_collided(self, tick: int, contacts: List[results.Contact]) -> bool:
-        """Whether an obstacle stopped the avatar in any tick of the step that ended at `tick`, or came into
-        contact with it."""
-        return self._last_stopped > tick - self.ticks_per_step or any(map(self._is_collision, contacts))
-
-    def _is_collision(self, contact: results.Contact) -> bool:
-        """Whether a contact event is one of the avatar with something that it cannot stand on."""
-        if self._name not in (contact.a_name, contact.b_name):
-            return False
-        is_first = contact.a_name == self._name
-        if contact.kind == "blocked":
-            return is_first
-        down = -contact.normal[1] if is_first else contact.normal[1]
-        return contact.kind == "begin" and down < self._floor
-
     def _judged(self, before: np.ndarray, info: Dict[str, Any],
                 path: Any) -> Tuple[float, bool, bool, Dict[str, Any]]:
         """The results of step() after the observation. `path`: to the goal; None if it is not geodesic."""
@@ -554,66 +432,3 @@ class WalkEnv(spaces.EnvBase):
         info.update(progress=self._left - left, geodesic_distance=left, success=success,
                     spl=1.0 if success and walked <= shortest else shortest / walked if success else 0.0)
         self._left = left
-
-    def _meaning(self, action: Any) -> Tuple[float, float]:
-        """Returns ahead and turn of an action. Raises ValueError."""
-        if self.discrete:
-            try:
-                return _DISCRETE[range(4).index(operator.index(action))]
-            except (TypeError, ValueError):
-                raise ValueError(f"action: give 0, 1, 2 or 3, not {action!r}") from None
-        try:
-            ahead, turn = map(float, action)
-        except (TypeError, ValueError):
-            raise ValueError(f"action: give two numbers, not {action!r}") from None
-        if math.isnan(ahead) or math.isnan(turn):
-            raise ValueError(f"action: {action!r} is not a number")
-        return min(max(ahead, -1.0), 1.0), min(max(turn, -1.0), 1.0)
-
-    def _face(self, heading: float) -> None:
-        self._heading = heading
-        self._direction = math.cos(heading), math.sin(heading)  # along x and -z
-
-    def _pictures(self) -> List[Any]:
-        """The requests for the cameras' pictures along the present heading."""
-        for camera in self.cameras:
-            camera.aim(self._heading)
-        return [camera.request for camera in self.cameras]
-
-    def _observation(self, pictures: Sequence[Reply]) -> Observation:
-        assert self._feet is not None
-        self._seen = {**self._pictured(pictures), **self._place()}
-        return self._seen
-
-    def _pictured(self, pictures: Sequence[Reply]) -> Observation:
-        """The channels of the pictures that came."""
-        seen: Observation = {}
-        for camera, (reply, attachment) in zip(self.cameras, pictures):
-            frame = results.frame(reply.frame, attachment)
-            for name in camera.channels:
-                seen[camera.prefix + name] = frame.channel(name)
-            for name in {"depth", "range"}.intersection(camera.channels):
-                metres = seen[camera.prefix + name]
-                seen[camera.prefix + name] = np.fmin(metres, np.float32(np.inf))  # NaN: background
-        if self.render_mode is not None and self._picture_key in seen:
-            self._rgb = seen[self._picture_key].copy()  # the observation belongs to its reader
-        return seen
-
-    def _place(self) -> Observation:
-        """Position, heading and goal, as seen by the avatar."""
-        assert self._feet is not None
-        seen = {"position": self._feet.copy(), "heading": np.array(self._direction)}
-        if self.goal is not None:
-            seen["to_goal"] = self.goal - seen["position"]
-            seen["goal_polar"] = np.array(self._polar(seen["to_goal"][0], seen["to_goal"][2]))
-        return seen
-
-    def _polar(self, x: float, z: float) -> Tuple[float, float]:
-        """The distance of a place relative to the feet, and its angle from the heading."""
-        angle = math.atan2(-z, x) - self._heading
-        return math.hypot(x, z), math.remainder(angle, math.tau)
-
-    def _info(self, tick: int, state_hash: int, contacts: List[results.Contact],
-              collided: bool) -> Dict[str, Any]:
-        return {"tick": tick, "state_hash": state_hash, "contacts": contacts,
-                "stopped_by": self._stopped_by, "collided": collided}

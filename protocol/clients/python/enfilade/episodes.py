@@ -46,6 +46,31 @@ def check_episode(one: Episode, name: str) -> None:
         number(one.goal_radius, f"{name}.goal_radius", 0)
 
 
+def checked_places(given: Any, name: str, counts: Sequence[int]) -> List[Tuple[float, ...]]:
+    """Returns the places; none for "anywhere"."""
+    if isinstance(given, str):
+        if given != "anywhere":
+            raise ValueError(f"{name}: give places or \"anywhere\", not {given!r}")
+        return []
+    try:
+        given = list(given)
+    except TypeError:
+        raise ValueError(f"{name}: give positions or \"anywhere\", not {given!r}") from None
+    if not given:
+        raise ValueError(f"{name}: give at least one position, or \"anywhere\"")
+    return [numbers(one, f"{name}[{i}]", counts) for i, one in enumerate(given)]
+
+
+def checked_episodes(given: Sequence[Episode]) -> List[Episode]:
+    if not isinstance(given, (list, tuple)) or not given:
+        raise ValueError("episodes: give at least one")
+    for i, one in enumerate(given):
+        if not isinstance(one, Episode):
+            raise ValueError(f"episodes[{i}]: give an Episode, not {one!r}")
+        check_episode(one, f"episodes[{i}]")
+    return list(given)
+
+
 def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_distance: float = 1.0,
                  max_distance: float = math.inf, start: Optional[Sequence[float]] = None,
                  goal: Optional[Sequence[float]] = None, starts: Sequence[Sequence[float]] = (),

@@ -8,8 +8,9 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .environment import Observation, WalkEnv
+from .environment import WalkEnv
 from .kept_request import KeptRequest
+from .walker import Observation
 from .world_group import Member, PackedSteps
 
 Result = Tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Dict[str, Any]]

@@ -11,10 +11,11 @@ import numpy as np
 
 from . import spaces
 from .client import Client, connect
-from .environment import Observation, WalkEnv
+from .environment import WalkEnv
 from .kept_request import KeptRequest
 from .plain_steps import PlainSteps, Result
 from .process import Server, serve
+from .walker import Observation
 from .world_group import Member, WorldGroup
 
 
