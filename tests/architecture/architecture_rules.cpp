@@ -390,14 +390,16 @@ Faults headersWithoutComment(const Sources& sources) {
   return faults;
 }
 
-Faults longFiles(const Sources& sources, int maxLines) {
+Faults longFiles(const Sources& sources, int maxOfProduct, int maxOfOthers) {
+  constexpr int kMaxSchemaLines = 1450;
   Faults faults;
   for (const auto& [path, text] : sources) {
+    const bool isProduct =
+        getFolder(path) != "tests" && (isCode(path) || isScript(path) || endsWith(path, ".py"));
+    const bool isSchema = endsWith(path, ".proto");  // one document, compiled as a whole
+    const int limit = isProduct ? maxOfProduct : isSchema ? kMaxSchemaLines : maxOfOthers;
     const auto lines = std::count(text.begin(), text.end(), '\n');
-    constexpr int kMaxSchemaLines = 1450;
-    const bool schema = endsWith(path, ".proto");  // one document, compiled as a whole
-    if (lines > (schema ? kMaxSchemaLines : maxLines))
-      faults.push_back(path + ": " + std::to_string(lines) + " lines");
+    if (lines > limit) faults.push_back(path + ": " + std::to_string(lines) + " lines");
   }
   return faults;
 }

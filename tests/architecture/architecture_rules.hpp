@@ -36,8 +36,9 @@ Faults roomsWithoutDescription(const Sources& sources);
 Faults headersWithoutPragmaOnce(const Sources& sources);
 /// A header of the product begins with a comment.
 Faults headersWithoutComment(const Sources& sources);
-/// A schema (.proto) may be twice as long: it is read as one document.
-Faults longFiles(const Sources& sources, int maxLines);
+/// Code of the product has at most `maxOfProduct` lines; tests and documents have `maxOfOthers`. A
+/// schema (.proto) may be twice as long as these: it is read as one document.
+Faults longFiles(const Sources& sources, int maxOfProduct, int maxOfOthers);
 Faults unfinishedWork(const Sources& sources);
 
 /// A .cpp file in a room has a .hpp file of the same name. Mains, modules and the options of

@@ -376,6 +376,11 @@ TEST(MalformedFiles, AnFbxInCentimetresIsInMetres) {
            "\t\tShading: T\n\t\tCulling: \"CullingOff\"\n\t}\n}\n"
            "Connections:  {\n\tC: \"OO\",2001,0\n\tC: \"OO\",1001,2001\n}\n";
   };
+  std::string hanging = text("1");
+  const std::string upright = "UpAxisSign\", \"int\", \"Integer\", \"\",1";
+  hanging.replace(hanging.find(upright), upright.size(),
+                  "UpAxisSign\", \"int\", \"Integer\", \"\",-1");
+  EXPECT_EQ(importModel(folder.write("hanging.fbx", hanging)).upAxis, UpAxis::minusZ);
   const Model centimetres = importModel(folder.write("cm.fbx", text("1")));
   EXPECT_NEAR(centimetres.metresPerUnit, 0.01, 1e-12);
   EXPECT_EQ(centimetres.upAxis, UpAxis::z);
