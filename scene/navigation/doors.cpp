@@ -88,7 +88,8 @@ Snapshot closeDoors(const Scene& scene, Snapshot snapshot) {
 
 std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings& settings,
                                         const Snapshot& snapshot, const NavigationAgent& agent,
-                                        const std::vector<Vec3>& points) {
+                                        const std::vector<Vec3>& points,
+                                        std::span<const PathLeg> legs) {
   std::vector<DoorOnPath> doors;
   const std::vector<BodySpec>& bodies = index.scene().model().bodies;
   if (!hasDoors(index.scene()) || points.size() < 2) return doors;
@@ -140,7 +141,12 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
     std::sort(ofLeg, doors.end(), [](const DoorOnPath& a, const DoorOnPath& b) {
       return std::pair(a.distance, a.body) < std::pair(b.distance, b.body);
     });
-    distance += leg.norm();
+    // Of a fall or a ride, which are one line, the leg has the metres walked.
+    const auto jump = std::ranges::find_if(legs, [&](const PathLeg& one) {
+      return one.first == i - 1 &&
+             (one.kind == PathLeg::Kind::drop || one.kind == PathLeg::Kind::lift);
+    });
+    distance += jump == legs.end() ? leg.norm() : jump->length;
   }
   return doors;
 }

@@ -3,9 +3,11 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "scene/navigation/mesh/agent.hpp"
+#include "scene/navigation/path_finder.hpp"
 #include "scene/world/data/scene.hpp"
 #include "scene/world/data/snapshot.hpp"
 #include "scene/world/data/world_settings.hpp"
@@ -32,10 +34,11 @@ struct DoorOnPath {
 };
 
 /// Doors that an agent on the path would touch as they are in `snapshot`, or if they were closed,
-/// in the order of the path.
+/// in the order of the path. `legs`: of the path; their distances are metres walked, as its length.
 std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings& settings,
                                         const Snapshot& snapshot, const NavigationAgent& agent,
-                                        const std::vector<Vec3>& points);
+                                        const std::vector<Vec3>& points,
+                                        std::span<const PathLeg> legs = {});
 
 /// The space that a door sweeps over while it opens from where it is in a snapshot.
 class DoorSwing {

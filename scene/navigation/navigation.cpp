@@ -187,7 +187,8 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
                                     const Progress& progress) {
   const std::lock_guard lock(mutex_);
   const auto unobstructed = [&]() -> const UnobstructedMesh& {
-    if (!unobstructed_) unobstructed_.emplace(makeUnobstructedMesh(buildUnobstructed(2, progress)));
+    if (!unobstructed_)
+      unobstructed_.emplace(makeUnobstructedMesh(buildUnobstructed(2, progress), *scarce_));
     return *unobstructed_;
   };
   PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};

@@ -23,6 +23,7 @@ constexpr double kMaxWidthDistance = 1.5;  // metres from where the walker stopp
 constexpr double kMaxGap = 2.1;            // metres: a thick wall, and the agent on both sides
 constexpr double kMaxGapHeight = 3;        // metres: a storey
 constexpr double kMinAcross = 0.05;        // metres: less has no direction
+constexpr double kRoomReach = 0.5;         // metres from an end of a gap to where an agent fits
 constexpr double kRimSpacing = 0.5;        // metres along the rim
 constexpr double kMaxRise = 1.2;           // metres: higher obstacles are walls, not steps
 constexpr double kMaxDepth = 10;           // metres: deeper falls have no number
@@ -68,6 +69,13 @@ std::optional<double> measureHeadroom(const PathFinder& finder, const WalkOutcom
   return low + 2 * finder.world.settings.contactOffset;  // below the feet and above the head
 }
 
+/// A place for the agent at the end of a gap.
+std::optional<Vec3> standAtEnd(const PathFinder& finder, const Vec3& end) {
+  if (const auto place = standNear(finder.walker, end)) return place;
+  const auto room = finder.scarce.findNearest(end, Vec3::Constant(kRoomReach));
+  return room ? standNear(finder.walker, room->point) : std::nullopt;
+}
+
 /// The walker has fallen by about a step.
 std::string explainEnd(const PathFinder& finder, const WalkOutcome& stop, const Vec3& direction) {
   const double step = finder.world.settings.stepHeight;
@@ -82,8 +90,16 @@ std::string explainEnd(const PathFinder& finder, const WalkOutcome& stop, const 
 
 /// Of each two parts of a mesh that are near each other, the places that are closest.
 std::vector<PartGap> findClosestGaps(const NavigationMesh& mesh,
-                                     const std::vector<std::uint32_t>& partOf) {
+                                     const std::vector<std::uint32_t>& partOf,
+                                     const NavigationMesh& walkable) {
   std::map<std::pair<std::uint32_t, std::uint32_t>, PartGap> closest;
+  const auto hasRoomOn = [&](std::uint32_t part, const Vec3& place) {
+    const auto polygons = walkable.findPolygons(place, Vec3::Constant(kRoomReach));
+    return std::ranges::any_of(polygons, [&](std::uint32_t polygon) {
+      const auto below = findPolygonAt(mesh, walkable.closestPoint(polygon, place));
+      return below && partOf[*below] == part;
+    });
+  };
   const auto addGapsAt = [&](const BoundaryEdge& edge, const Vec3& from) {
     for (const std::uint32_t other : mesh.findPolygons(from, {kMaxGap, kMaxGapHeight, kMaxGap})) {
       PartGap gap{partOf[edge.polygon], partOf[other], from, mesh.closestPoint(other, from),
@@ -91,8 +107,14 @@ std::vector<PartGap> findClosestGaps(const NavigationMesh& mesh,
       if (gap.fromPart == gap.toPart) continue;
       const Vec3 across = projectToGround(gap.to - from);
       if (across.norm() > kMinAcross) gap.across = across.normalized();
-      const auto [known, isNew] = closest.try_emplace(std::minmax(gap.fromPart, gap.toPart), gap);
-      if (!isNew && gap.length() < known->second.length()) known->second = gap;
+      const auto parts = std::minmax(gap.fromPart, gap.toPart);
+      const auto known = closest.find(parts);
+      if (known != closest.end() && gap.cost() >= known->second.cost()) continue;
+      gap.hasRoom = hasRoomOn(gap.fromPart, gap.from) && hasRoomOn(gap.toPart, gap.to);
+      if (known == closest.end())
+        closest.emplace(parts, gap);
+      else if (gap.cost() < known->second.cost())
+        known->second = gap;
     }
   };
   forEachRimPlace(mesh, kRimSpacing, addGapsAt);
@@ -124,7 +146,7 @@ std::vector<PartGap> findGapsTo(const UnobstructedMesh& unobstructed, std::uint3
     if (length > parts[part].length) continue;
     const auto first = std::ranges::lower_bound(unobstructed.gaps, part, {}, &PartGap::fromPart);
     for (auto gap = first; gap != unobstructed.gaps.end() && gap->fromPart == part; ++gap) {
-      const double sum = length + gap->length();
+      const double sum = length + gap->cost();
       if (!(sum < parts[gap->toPart].length)) continue;
       parts[gap->toPart] = {sum, &*gap};
       open.push({sum, gap->toPart});
@@ -139,9 +161,14 @@ std::vector<PartGap> findGapsTo(const UnobstructedMesh& unobstructed, std::uint3
 
 }  // namespace
 
-UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh) {
+double PartGap::cost() const {
+  constexpr double kWithoutRoom = 10;  // metres: a way along the gaps of rooms is no longer
+  return (to - from).norm() + (hasRoom ? 0 : kWithoutRoom);
+}
+
+UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh, const NavigationMesh& walkable) {
   std::vector<std::uint32_t> partOf = mesh.findIslands();
-  std::vector<PartGap> gaps = findClosestGaps(mesh, partOf);
+  std::vector<PartGap> gaps = findClosestGaps(mesh, partOf, walkable);
   return {std::move(mesh), std::move(partOf), std::move(gaps)};
 }
 
@@ -171,9 +198,13 @@ void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& 
 bool explainGaps(const PathFinder& finder, const MeshPoint& from, const MeshPoint& to,
                  NavigationPath& path) {
   const UnobstructedMesh& unobstructed = finder.unobstructed();
-  for (const PartGap& gap : findGapsTo(unobstructed, unobstructed.partOf[from.polygon],
-                                       unobstructed.partOf[to.polygon])) {
-    const auto start = standNear(finder.walker, gap.from);
+  for (PartGap gap : findGapsTo(unobstructed, unobstructed.partOf[from.polygon],
+                                unobstructed.partOf[to.polygon])) {
+    auto start = standAtEnd(finder, gap.from);
+    if (!start) {  // the other side has the same obstacle
+      gap = gap.reversed();
+      start = standAtEnd(finder, gap.from);
+    }
     if (!start) continue;
     const double way = (gap.to - *start).dot(gap.across) + 2 * finder.agent.radius;
     const Vec3 goal = *start + way * gap.across;

@@ -15,19 +15,22 @@ struct PartGap {
   std::uint32_t fromPart = 0, toPart = 0;
   Vec3 from = Vec3::Zero(), to = Vec3::Zero();  ///< scene frame, metres
   Vec3 across = Vec3::UnitX();                  ///< horizontal, unit: the way out of `fromPart`
+  bool hasRoom = true;  ///< an agent fits near both ends: not on a ledge, say
 
-  double length() const { return (to - from).norm(); }
-  PartGap reversed() const { return {toPart, fromPart, to, from, -across}; }
+  /// metres; gaps between places with room come first
+  double cost() const;
+  PartGap reversed() const { return {toPart, fromPart, to, from, -across, hasRoom}; }
 };
 
 /// The mesh of Clearance::none, its parts, and the closest places of those that are near each
-/// other.
+/// other, with room for an agent if there are any.
 struct UnobstructedMesh {
   NavigationMesh mesh;
   std::vector<std::uint32_t> partOf;  ///< by polygon
   std::vector<PartGap> gaps;  ///< at most one from a part to another; ascending by `fromPart`
 };
-UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh);
+/// `walkable`: the mesh where agents fit.
+UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh, const NavigationMesh& walkable);
 
 /// The end of a walk that did not arrive, as the reason of `path`: the entity, and its clear width
 /// or height, the step or the drop. `direction`: of the walk, horizontal, unit. `line`: the places

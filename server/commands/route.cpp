@@ -59,10 +59,12 @@ Place parsePlace(const std::string& text, const char* argument, const scene::Sce
 /// A point of the place, on the island of `from` if it has any. Throws std::runtime_error, which
 /// names the argument.
 Vec3 resolvePlace(const Place& place, const std::string& text, const char* argument,
-                  scene::Navigation& navigation, const std::optional<Vec3>& from) {
+                  scene::Navigation& navigation,
+                  const std::function<scene::Navigation&()>& withOpenDoors,
+                  const std::optional<Vec3>& from) {
   if (const auto* point = std::get_if<Vec3>(&place)) return *point;
-  if (const auto free =
-          navigation.findPlaceIn(std::get<std::vector<scene::NamedPlace>>(place), from))
+  if (const auto free = findPlaceIn(navigation, withOpenDoors,
+                                    std::get<std::vector<scene::NamedPlace>>(place), from))
     return *free;
   throw std::runtime_error(
       fmt::format("{}: there is no free place to stand at '{}'", argument, text));
@@ -191,8 +193,10 @@ WalkTrace makeTrace(const RouteCommand& command, const v1::NavigationPath& path,
   }
   trace.title = fmt::format("no way from {} to {}: {}", command.from, command.to, path.reason());
   trace.paths = {{"start", {from}, 1}, {"goal", {to}, 2}};
-  if (path.has_obstacle_at())
+  if (path.has_obstacle_at()) {
+    trace.floors.push_back(path.obstacle_at().y());
     trace.blockedWalks.push_back({vectorFromProto(path.obstacle_at()), Vec3::UnitY()});
+  }
   return trace;
 }
 
@@ -232,8 +236,11 @@ ExitCode route(const RouteCommand& command) {
   };
   const bool doorsOpen = !command.doorsAsTheyAre;
   scene::Navigation& navigation = provide(doorsOpen);
-  const Vec3 from = resolvePlace(start, command.from, "FROM", navigation, std::nullopt);
-  const Vec3 to = resolvePlace(goal, command.to, "TO", navigation, from);
+  std::function<scene::Navigation&()> open;
+  if (scene::hasDoors(*scene)) open = [&]() -> scene::Navigation& { return provide(true); };
+  const auto onlyIfClosed = doorsOpen ? nullptr : open;
+  const Vec3 from = resolvePlace(start, command.from, "FROM", navigation, nullptr, std::nullopt);
+  const Vec3 to = resolvePlace(goal, command.to, "TO", navigation, onlyIfClosed, from);
   scene::EntityIndex index(scene);
   ClosedDoors closedDoors;
   PathAnswer answer{*scene,
@@ -241,14 +248,12 @@ ExitCode route(const RouteCommand& command) {
                     *asFile,
                     command.settings,
                     doorsOpen,
-                    {},
+                    open,
                     [&]() -> scene::Navigation& { return provide(false); },
                     [&]() -> scene::EntityIndex& { return index; },
                     closedDoors,
                     showProgress,
                     "leave out --doors-as-they-are, or open it in the model"};
-  if (scene::hasDoors(*scene))
-    answer.withOpenDoors = [&]() -> scene::Navigation& { return provide(true); };
   v1::NavigationPath path;
   writePath(answer, from, to, command.links, true, path);
   bar.clear();

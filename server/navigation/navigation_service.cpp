@@ -54,8 +54,8 @@ struct Answer {
                                         const std::string& field,
                                         const std::optional<Vec3>& start = std::nullopt) const {
     if (const auto* point = std::get_if<Vec3>(&place)) return *point;
-    if (const auto found =
-            navigation.findPlaceIn(std::get<std::vector<scene::NamedPlace>>(place), start))
+    if (const auto found = findPlaceIn(navigation, doorsOpen ? nullptr : withOpenDoors,
+                                       std::get<std::vector<scene::NamedPlace>>(place), start))
       return *found;
     return makeNavigationError(field + ".name", "there is no free place at '" + given.name() + "'",
                                v1::ERROR_REFUSED_COMMAND);

@@ -30,9 +30,9 @@ struct PathWriter {
   const PathAnswer& answer;
 
   std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& ways,
-                                           const std::vector<Vec3>& points) const {
+                                           const scene::NavigationPath& path) const {
     return scene::findDoorsOnPath(answer.index(), answer.settings, answer.snapshot, ways.agent(),
-                                  points);
+                                  path.points, path.legs);
   }
 
   /// The closed doors that stand on a path through open ones.
@@ -100,7 +100,7 @@ struct PathWriter {
         path = explainSwing(swings.back(), start, aside.found() ? onwards.reason : "");
         return;
       }
-      doors = findDoors(answer.navigation, onwards.points);
+      doors = findDoors(answer.navigation, onwards);
       more = findSwings(doors, aside.points.back());
       for (scene::DoorOnPath& door : doors) {
         door.point += aside.points.size() - 1;
@@ -187,7 +187,7 @@ struct PathWriter {
     scene::Navigation& open = answer.withOpenDoors();
     const scene::NavigationPath through = open.findPath(from, to, options, answer.progress);
     if (!through.found()) return std::nullopt;
-    const auto doors = findDoors(open, through.points);
+    const auto doors = findDoors(open, through);
     const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
     return first == doors.end() ? std::nullopt : std::optional(first->body);
   }
@@ -216,13 +216,25 @@ struct PathWriter {
 
 }  // namespace
 
+std::optional<Vec3> findPlaceIn(scene::Navigation& navigation,
+                                const std::function<scene::Navigation&()>& withOpenDoors,
+                                std::span<const scene::NamedPlace> named,
+                                const std::optional<Vec3>& start) {
+  const auto place = navigation.findPlaceIn(named, start);
+  if (!place || !start || !withOpenDoors) return place;
+  if (navigation.findIsland(*place) == navigation.findIsland(*start)) return place;
+  scene::Navigation& open = withOpenDoors();
+  const auto behind = open.findPlaceIn(named, start);
+  return behind && open.findIsland(*behind) == open.findIsland(*start) ? behind : place;
+}
+
 void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
                const scene::PathOptions& options, bool measuresWidth, v1::NavigationPath& message) {
   const PathWriter writer{answer};
   scene::NavigationPath path = answer.navigation.findPath(from, to, options, answer.progress);
   std::vector<scene::DoorOnPath> doors;
   if (path.found() && answer.doorsOpen) {
-    doors = writer.findDoors(answer.navigation, path.points);
+    doors = writer.findDoors(answer.navigation, path);
     writer.stepAside(to, options, path, doors);
   }
   message.set_found(path.found());

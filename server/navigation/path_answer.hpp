@@ -6,6 +6,7 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <span>
 #include <utility>
 
 #include "protocol/enfilade.pb.h"
@@ -25,7 +26,7 @@ struct PathAnswer {
   const scene::Snapshot& snapshot;  ///< of the world at the tick of the reply
   const scene::WorldSettings& settings;
   bool doorsOpen = false;  ///< of `navigation`
-  /// The same with open doors; builds meshes at the first call. Only if there are doors.
+  /// The same with open doors; builds meshes at the first call. Null without doors.
   std::function<scene::Navigation&()> withOpenDoors;
   std::function<scene::Navigation&()> asTheyAre;  ///< the same with doors as they are
   std::function<scene::EntityIndex&()> index;     ///< built at the first call
@@ -33,6 +34,13 @@ struct PathAnswer {
   scene::Navigation::Progress progress = {};      ///< of building meshes; may be empty
   const char* doorRemedy = "open it, or ask with open doors";  ///< of a closed door
 };
+
+/// A standing place in one of some named places: on the island of `start` if there is any, else one
+/// that is on it once doors are open, else the closest. nullopt: without room.
+std::optional<scene::Vec3> findPlaceIn(scene::Navigation& navigation,
+                                       const std::function<scene::Navigation&()>& withOpenDoors,
+                                       std::span<const scene::NamedPlace> named,
+                                       const std::optional<scene::Vec3>& start);
 
 /// The path from one place to another. `measuresWidth`: also its narrowest place.
 void writePath(const PathAnswer& answer, const scene::Vec3& from, const scene::Vec3& to,

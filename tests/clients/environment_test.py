@@ -218,8 +218,10 @@ class Environments(RoomCase):
         for is_packing in (True, False):
             vector = self.vector(3, is_packing, cameras=[enfilade.Camera("", (16, 12))])
             vector.reset(seed=1)
-            with refused_pictures(vector.envs[1]), self.assertRaisesRegex(enfilade.ServerError, "environment 1"):
-                vector.step(np.ones((3, 2)))
+            with refused_pictures(vector.envs[1]), self.assertWarnsRegex(UserWarning, "environment 1"):
+                *_, truncated, infos = vector.step(np.ones((3, 2)))
+            self.assertEqual(list(truncated), [False, True, False])
+            self.assertEqual(list(infos["_error"]), [False, True, False])
             *_, infos = vector.step(np.ones((3, 2)))
             self.assertEqual(list(infos["tick"]), [13, 1, 13])
 
@@ -359,19 +361,34 @@ class Environments(RoomCase):
             make=lambda number, client: enfilade.WalkEnv(
                 client=client, channels=(), starts=[(0, 0, 6) if number == 1 else _STARTS[0]]))
         self.addCleanup(vector.close)
-        with self.assertRaisesRegex(enfilade.OrderFailed, r"environment 1: .*\(0, 0, 6\).*column"):
-            vector.reset(seed=1)
+        with self.assertWarnsRegex(UserWarning, r"environment 1: .*\(0, 0, 6\).*column") as warned:
+            _, infos = vector.reset(seed=1)
+        self.assertEqual(warned.filename, __file__)
+        self.assertEqual(infos["error"][1], str(warned.warning))
 
     def test_a_refused_start_leaves_the_other_environments_usable(self):
         vector = self.vector(3)
         vector.envs[1].starts = [(0, 0, 6)]
-        with self.assertRaisesRegex(enfilade.OrderFailed, "^environment 1: "):
-            vector.reset(seed=1)
-        with self.assertRaisesRegex(enfilade.OrderFailed, "^environment 1: "):
-            vector.step(np.zeros((3, 2)))
+        with self.assertWarnsRegex(UserWarning, "^environment 1: "):
+            _, infos = vector.reset(seed=1)
+        self.assertEqual(list(infos["tick"]), [1, None, 1])
+        with self.assertWarnsRegex(UserWarning, "^environment 1: "):
+            seen, rewards, terminated, truncated, infos = vector.step(np.zeros((3, 2)))
+        self.assertEqual(list(infos["tick"]), [7, None, 7])
+        self.assertEqual((rewards[1], list(terminated), list(truncated)), (0, [False] * 3, [False, True, False]))
+        self.assertTrue(all(not one[1].any() for one in seen.values()))
         vector.envs[1].starts = _STARTS
         seen, *_, infos = vector.step(np.zeros((3, 2)))
         self.assertEqual(list(infos["tick"]), [13, 1, 13])
+        for env in vector.envs:
+            env.starts = [(0, 0, 6)]
+        with self.assertRaisesRegex(enfilade.OrderFailed, "^environment 0: "):  # none remains
+            vector.reset(seed=1)
+        with self.assertRaisesRegex(RuntimeError, "call reset"):
+            vector.step(np.zeros((3, 2)))
+        for env in vector.envs:
+            env.starts = _STARTS
+        vector.reset(seed=1)
         self.assertTrue(vector.single_observation_space.contains({name: one[1] for name, one in seen.items()}))
         with self.assertRaisesRegex(ValueError, "options"):
             vector.reset(options={"goal": (0, 0, 0)})

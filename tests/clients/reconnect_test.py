@@ -145,8 +145,10 @@ class Vectors(RoomCase):
         vector.reset(seed=1)
         for number in range(2):
             vector.envs[number].client.restart()  # without the environment: the world is empty
-            with self.assertRaisesRegex(enfilade.EnfiladeError, f"environment {number}: "):
-                vector.step(np.zeros((2, 2)))
+            with self.assertWarnsRegex(UserWarning, f"environment {number}: "):
+                *_, truncated, infos = vector.step(np.zeros((2, 2)))
+            self.assertEqual(truncated.tolist(), [number == 0, number == 1])
+            self.assertEqual(infos["_error"].tolist(), truncated.tolist())
             ticks = vector.step(np.zeros((2, 2)))[4]["tick"]
             self.assertEqual(ticks[number], 1)
             self.assertGreater(ticks[1 - number], 6)

@@ -141,7 +141,8 @@ TEST(PathFinder, PlacesWithoutAMeshAreConnectedWithIt) {
     return NavigationMesh(grid, std::move(tiles));
   };
   NavigationMesh ample = makeMesh(Clearance::ample), scarce = makeMesh(Clearance::scarce);
-  const UnobstructedMesh unobstructed = makeUnobstructedMesh(makeMesh(Clearance::none));
+  const UnobstructedMesh unobstructed =
+      makeUnobstructedMesh(makeMesh(Clearance::none), makeMesh(Clearance::scarce));
   Walker walker(whole.data(), agent);
   const PathFinder finder{whole.data(), agent,
                           walker,       ample,

@@ -268,6 +268,13 @@ TEST(Doors, ThoseOnAPathAreFoundOpenOrClosed) {
     EXPECT_NEAR(doors[0].secondsToOpen, isClosed ? kQuarter : 0, 1e-9);
   }
   EXPECT_TRUE(findDoorsOnPath(index, {}, *open, {}, {{1, 0, 0}, {4, 0, 2}}).empty());
+  // After a fall of 5 m, 1 m of it across, the distance counts the metre.
+  const std::vector<Vec3> fall{{0, 5, 0}, {1, 0, 0}, {4, 0, 0}, {8, 0, 0}};
+  const std::vector<PathLeg> legs{{PathLeg::Kind::drop, 0, 1, 1, kNoBody},
+                                  {PathLeg::Kind::walk, 1, 7, 5, kNoBody}};
+  const auto doors = findDoorsOnPath(index, {}, *open, {}, fall, legs);
+  ASSERT_EQ(doors.size(), 1u);
+  EXPECT_NEAR(doors[0].distance, 1 + 5.98 - 0.3 - 1, 0.02);
 }
 
 TEST(Doors, LeavesOnOneLineOpenTogether) {

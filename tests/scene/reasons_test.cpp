@@ -40,6 +40,19 @@ TEST(Reasons, AreThoseOfTheFirstRoomOnTheWay) {
   EXPECT_EQ(navigation.findPath({13, 0, 2}, {2, 0, 2}).reason, "wall is in the way");
 }
 
+/// A strip of floor belongs to the other room and runs behind a panel of this one: no agent fits.
+TEST(Reasons, AreOfPlacesWhereAnAgentFits) {
+  Navigation navigation(boxScene({{"floor", {0, -0.2, -1}, {10, 0, 5}},
+                                  {"facade", {-1, 0, -1}, {11, 2.5, 0}},
+                                  {"panel", {-1, 0, 0.15}, {5, 2.5, 0.2}},
+                                  {"party", {5, 0, 0.15}, {5.4, 2.5, 6}}}),
+                        {}, {});
+  for (const auto& [from, to] : {std::pair(2, 8), std::pair(8, 2)}) {
+    const std::string reason = navigation.findPath(Vec3(from, 0, 2), Vec3(to, 0, 2)).reason;
+    EXPECT_TRUE(reason.starts_with("party is in the way")) << reason;
+  }
+}
+
 TEST(Reasons, TheFirstPathThatIsNotFoundReportsTheirMesh) {
   Navigation navigation(
       boxScene({{"floor", {0, -0.2, 0}, {40, 0, 5}}, {"wall", {5, 0, -1}, {5.2, 2.5, 6}}}), {}, {});

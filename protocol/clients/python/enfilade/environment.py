@@ -316,7 +316,7 @@ class WalkEnv(Walker, spaces.EnvBase):
         assert self.episode is not None
         if not math.isfinite(self.episode.geodesic_distance):
             self.episode = replace(self.episode, geodesic_distance=length)
-            self._left = length
+        self._left = length  # that of a file may be of another agent: the first reward would jump
 
     def _anywhere(self) -> Sequence[float]:
         spot = self.navigation.random_place(int(self.np_random.integers(0, 2 ** 63)))

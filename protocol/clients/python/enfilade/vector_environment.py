@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import operator
+import warnings
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
@@ -12,6 +13,7 @@ import numpy as np
 from . import spaces
 from .client import Client, connect
 from .environment import WalkEnv
+from .errors import OrderFailed, ServerError
 from .kept_request import KeptRequest
 from .plain_steps import PlainSteps, Result
 from .process import Server, serve
@@ -30,6 +32,17 @@ class _Batch:
     def add(self, i: int, seen: Observation) -> None:
         for name, one in seen.items():
             self.observations[name][i] = one
+
+    def clear(self, i: int) -> None:
+        for all_ in self.observations.values():
+            all_[i] = 0
+
+
+def _is_refusal(error: Exception) -> bool:
+    """Whether the environment can restart: of a start, or of a picture."""
+    if isinstance(error, ServerError):
+        return not error.fatal and error.code != "ERROR_WORLD_DROPPED"
+    return isinstance(error, OrderFailed)
 
 
 class VectorWalkEnv(spaces.VectorEnvBase):
@@ -52,9 +65,10 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     A start that the world refuses is drawn again, as by WalkEnv, while the others wait.
 
     A wrong number of actions or seeds, or an invalid action, is a ValueError before anything is sent.
-    If an environment fails later, all replies are awaited and its error is raised with its number.
-    The next step() restarts that environment, and the others go on: also after a reset() in which
-    some started. If none did, call reset(). If the server ended, create all environments again.
+    If the server refuses a start or a picture later, that environment alone is truncated: its observation
+    is zero, and `info` has "error". There is a warning, too. The next step() restarts it, and the others
+    go on. Other errors are raised with the number of the environment, after all replies, and so is the
+    first refusal if none remains: call reset() then. If the server ended, create all environments again.
     """
 
     metadata: Dict[str, Any] = {"render_modes": ["rgb_array"], "autoreset_mode": spaces.NEXT_STEP}
@@ -136,11 +150,12 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
         infos, failures = self._each(
             lambda i: self.envs[i]._post_reset(seeds[i], options), take)
-        self._last = batch.observations  # those that failed restart: theirs are not read
+        self._last = batch.observations
         over = np.array([info is None for info in infos])
         self._over = None if over.all() else over
-        if failures:
-            raise self._numbered(failures)
+        for i, text in self._tolerate(failures, batch):
+            warnings.warn(text, stacklevel=2)
+            infos[i] = {"error": text}
         return batch.observations, self._gathered(infos)
 
     def _seeds(self, seed: Any) -> List[Optional[int]]:
@@ -193,12 +208,12 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             return self._take_step(i, ids, batch)
 
         taken, failures = self._each(post, take)
-        self._last = batch.observations  # those that failed restart: theirs are not read
-        if failures:
-            self._over = np.array([one is None or one[1] or one[2] for one in taken])
-            raise self._numbered(failures)
+        self._last = batch.observations
+        self._over = np.array([one is None or one[1] or one[2] for one in taken])
+        for i, text in self._tolerate(failures, batch):
+            warnings.warn(text, stacklevel=3)
+            taken[i] = (0.0, False, True, {"error": text})
         rewards, terminated, truncated, infos = zip(*taken)
-        self._over = np.array(terminated, bool) | np.array(truncated, bool)
         return (batch.observations, np.array(rewards), np.array(terminated),
                 np.array(truncated), self._gathered(infos))
 
@@ -274,6 +289,17 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                 taken.append(None)
                 failures.append((i, error))
         return taken, failures
+
+    def _tolerate(self, failures: List[Tuple[int, Exception]], batch: _Batch) -> List[Tuple[int, str]]:
+        """Returns the texts of refusals, by environment, and clears their observations. Raises the first failure
+        of another kind, or if all environments failed."""
+        others = [one for one in failures if not _is_refusal(one[1])]
+        if others or len(failures) == self.num_envs:
+            raise self._numbered(others or failures)
+        texts = [(i, str(self._numbered([(i, failure)]))) for i, failure in failures]
+        for i, text in texts:
+            batch.clear(i)
+        return texts
 
     @staticmethod
     def _numbered(failures: List[Tuple[int, Exception]]) -> Exception:
