@@ -156,6 +156,22 @@ TEST(NavigationService, AStoreyIsReachedFromBothSidesOfAClosedDoor) {
   }
 }
 
+/// Of two halls the closer one is outside, where no door leads.
+TEST(NavigationService, ANamedGoalBehindAClosedDoorHasTheDoorAsReason) {
+  scene::Model model = roomsWithDoor(1, true, {{"terrace", {-6, -0.3, -2}, {-2, 0, 2}}});
+  for (const double x : {-4.0, 8.5}) {
+    scene::Space& hall = model.spaces.emplace_back();
+    hall.name = "Hall";
+    hall.box = {scene::Vec3(x - 1, 0, -1), scene::Vec3(x + 1, 2.5, 1)};
+  }
+  v1::NavigationQuery query;
+  query.mutable_path()->mutable_from()->mutable_point()->set_x(2);
+  query.mutable_path()->add_to()->set_name("room:Hall");
+  const Answered answered = ask(std::make_shared<const scene::Scene>(std::move(model)), query);
+  ASSERT_EQ(answered.reply.paths_size(), 1) << answered.error.message();
+  EXPECT_EQ(answered.reply.paths(0).obstacle_name(), "door") << answered.reply.paths(0).reason();
+}
+
 TEST(NavigationService, MapsAreBytesBitsOrAPicture) {
   const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, false));
   v1::NavigationQuery query;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "server/plans/path_style.hpp"
 #include "tests/server/small_room.hpp"
 
 namespace enfilade::server::testing {
@@ -72,6 +73,34 @@ TEST(PathMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
   const auto room = smallRoom();
   EXPECT_GT(countInk(drawMap(trace, {blank, makeFloorPlanSource(room)}).value()),
             countInk(*map) + 500);
+}
+
+TEST(PathMap, BlockedWalksAndRefusedOrdersAreDrawn) {
+  const auto countMarks = [](const WalkTrace& trace) {
+    const auto blank = [](const render::Camera& camera) -> std::optional<PlanPicture> {
+      const std::size_t pixels = static_cast<std::size_t>(camera.width * camera.height);
+      PlanPicture plan{{camera.width, camera.height, {}}, std::vector<std::uint32_t>(pixels, 1)};
+      plan.colour.rgb.assign(3 * pixels, 200);
+      return plan;
+    };
+    const render::Image map = drawMap(trace, {blank}).value();
+    std::size_t marked = 0;
+    for (std::size_t i = 0; i < map.rgb.size(); i += 3) {
+      bool isMark = true;
+      for (std::size_t k = 0; k < 3; ++k) isMark = isMark && map.rgb[i + k] == kBlockedColour[k];
+      marked += isMark ? 1 : 0;
+    }
+    return marked;
+  };
+  WalkTrace trace;
+  trace.paths = {pathAt({{0, 50}})};
+  EXPECT_EQ(countMarks(trace), 0u);
+  // The legend has one mark for both kinds; the map has one for each.
+  trace.blockedWalks = {{Vec3(10, 0, 2), Vec3::UnitX()}};
+  const std::size_t one = countMarks(trace);
+  trace.refusedOrders = {{Vec3(20, 0, 2), Vec3::UnitX()}};
+  EXPECT_GT(one, 50u);
+  EXPECT_GT(countMarks(trace), one + 20);
 }
 
 TEST(PathMap, ARefusedOrderFarAwayDoesNotStretchTheMap) {
