@@ -1,6 +1,7 @@
 # Precompiles the headers of the standard library and of third parties, which take half of a file's
 # compile time. There are four sets: computation; code with messages (protobuf, JSON); and both with
-# GoogleTest. Each file still includes all its headers: the clang build does not precompile them.
+# GoogleTest. gcc takes the level of optimisation from the precompiled header, so each set has one.
+# Each file still includes all its headers: the clang build does not precompile them.
 
 set(ENFILADE_PRECOMPILED_HEADERS
   <Eigen/Core> <Eigen/Geometry>
@@ -53,20 +54,21 @@ function(enfilade_precompile_headers root)
                LIBRARIES protobuf::libprotobuf nlohmann_json::nlohmann_json)
   enfilade_precompiled(enfilade_precompiled_code)
   enfilade_precompiled(enfilade_precompiled_messages ${messages})
+  target_compile_options(enfilade_precompiled_messages PRIVATE ${ENFILADE_UNHURRIED})
   if(ENFILADE_TESTS)
     find_package(GTest REQUIRED)
     enfilade_precompiled(enfilade_precompiled_tests HEADERS <gtest/gtest.h> LIBRARIES GTest::gtest)
     enfilade_precompiled(enfilade_precompiled_message_tests
       HEADERS ${ENFILADE_PRECOMPILED_MESSAGES} <gtest/gtest.h>
       LIBRARIES protobuf::libprotobuf nlohmann_json::nlohmann_json GTest::gtest)
-    target_compile_options(enfilade_precompiled_tests PRIVATE ${ENFILADE_TEST_OPTIONS})
-    target_compile_options(enfilade_precompiled_message_tests PRIVATE ${ENFILADE_TEST_OPTIONS})
+    target_compile_options(enfilade_precompiled_tests PRIVATE ${ENFILADE_UNHURRIED})
+    target_compile_options(enfilade_precompiled_message_tests PRIVATE ${ENFILADE_UNHURRIED})
   endif()
   set(with_messages enfilade_server enfilade_protocol protocol_tests server_tests replay_tests
                     difference_tests export_tests)
   set(unhurried "")
-  if(ENFILADE_UNHURRIED)
-    set(unhurried enfilade_import enfilade_server)  # compiled with the flags of tests
+  if(ENFILADE_IMPORT_OPTIONS)
+    set(unhurried enfilade_import)  # compiled with the flags of tests
   endif()
   foreach(target ${targets})
     get_target_property(type ${target} TYPE)

@@ -80,7 +80,8 @@ struct Frame {
   std::vector<std::uint32_t> ids;  ///< scene::EntityId of the visible surface; 0: background
   std::vector<float> depth;        ///< z-distance along `forward` in metres; NaN: background
   std::vector<float> range;        ///< with a lens: distance along the ray in metres; else empty
-  /// 3 floats per pixel, unit length, world frame, facing the eye; background: 0, 0, 0.
+  /// 3 floats per pixel, unit length, world frame, on the side of the surface that faces the eye;
+  /// background: 0, 0, 0.
   std::vector<float> normals;
 };
 

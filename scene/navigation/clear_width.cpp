@@ -1,8 +1,10 @@
 #include "scene/navigation/clear_width.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "scene/world/avatars/walk_velocity.hpp"
 #include "scene/world/contacts/obstacles.hpp"
@@ -13,23 +15,31 @@ namespace {
 /// metres. Places are measured that are closer than the prism is wide.
 constexpr double kThinRadius = 0.05, kWidthSpacing = 0.08;
 
-/// Distance that a thin prism at `position` can be moved across `direction`, and its own width,
-/// metres.
-double measureClearWidth(const WorldData& world, const AvatarShape& shape, const Vec3& position,
-                         const Vec3& direction) {
+// A thin prism that cannot move to either side stands in an obstacle.
+constexpr double kMinMeasuredWidth = 2.5 * kThinRadius;
+
+Vec3 turnToSide(const Vec3& direction) {
+  return {-direction.z(), 0, direction.x()};
+}
+
+/// Distances that a thin prism at `position` can be moved to both sides of `direction`, a
+/// horizontal unit vector, each up to `maxWidth`; metres from its middle.
+std::array<double, 2> measureSides(const WorldData& world, const AvatarShape& shape,
+                                   const Vec3& position, const Vec3& direction, double maxWidth) {
   const WorldSettings& settings = world.settings;
   const Vec3 feet = position + Vec3(0, settings.stepHeight, 0);
-  const Vec3 side = Vec3(-direction.z(), 0, direction.x()).normalized();
-  double width = 2 * kThinRadius;
-  for (const Vec3& move : {Vec3(kMaxSideWidth * side), Vec3(-kMaxSideWidth * side)}) {
+  const Vec3 side = turnToSide(direction);
+  std::array<double, 2> widths{};
+  for (std::size_t i = 0; i < 2; ++i) {
+    const Vec3 move = (i == 0 ? maxWidth : -maxWidth) * side;
     const Aabb box = inflated(collision::sweptAabb(placeBox(shape.box, feet), move), 0.1);
     ObstacleSet obstacles = collectObstaclesInBox(world, box, 0);
     QueryCount count;
     const ShapeCastHit hit =
         castAvatarShape(shape, feet, move, obstacles, makeContactOffset(settings), count);
-    width += hit.fraction * kMaxSideWidth + (hit.entity != 0 ? hit.distance : 0);
+    widths[i] = kThinRadius + hit.fraction * maxWidth + (hit.entity != 0 ? hit.distance : 0);
   }
-  return width;
+  return widths;
 }
 
 }  // namespace
@@ -47,12 +57,33 @@ NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agen
     for (int k = 0; k <= count; ++k) {
       const Vec3 place = points[i - 1] + (static_cast<double>(k) / count) * leg;
       if ((place - near).norm() > maxDistance) continue;
-      const double width = measureClearWidth(world, *shape, place, direction);
-      // A thin prism that cannot move to either side stands in an obstacle.
-      if (width > 2.5 * kThinRadius && width < narrowest.clearWidth) narrowest = {place, width};
+      const auto [left, right] =
+          measureSides(world, *shape, place, direction.normalized(), kMaxSideWidth);
+      const double width = left + right;
+      if (width > kMinMeasuredWidth && width < narrowest.clearWidth) narrowest = {place, width};
     }
   }
   return narrowest;
+}
+
+std::optional<GapAxis> measureGapAxis(const WorldData& world, const NavigationAgent& agent,
+                                      const Vec3& place, const Vec3& direction) {
+  constexpr double kMaxWidth = 1;  // metres to each side: a wider gap needs no axis
+  const auto shape = makeThinShape(world.settings, agent);
+  GapAxis axis{place, direction, std::numeric_limits<double>::infinity()};
+  // Ever closer around the best angle so far: 30 degrees in steps of 10, then a third of each.
+  for (double step = std::numbers::pi / 18; step > 1e-3; step /= 3) {
+    const Vec3 middle = axis.direction;
+    for (int i = -3; i <= 3; ++i) {
+      const double cosine = std::cos(i * step), sine = std::sin(i * step);
+      const Vec3 turned = cosine * middle + sine * turnToSide(middle);
+      const auto [left, right] = measureSides(world, *shape, place, turned, kMaxWidth);
+      if (left + right < 2 * agent.radius) return std::nullopt;
+      if (left + right < axis.clearWidth)
+        axis = {place + 0.5 * (left - right) * turnToSide(turned), turned, left + right};
+    }
+  }
+  return axis.clearWidth < 2 * kMaxWidth ? std::optional(axis) : std::nullopt;
 }
 
 std::shared_ptr<const AvatarShape> makeThinShape(const WorldSettings& settings,

@@ -1,6 +1,7 @@
 // The free space around places, measured with a thin prism above the step height.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "scene/navigation/mesh/agent.hpp"
@@ -14,6 +15,13 @@ inline constexpr double kMaxSideWidth = 3;  ///< metres to each side: larger is 
 struct NarrowPlace {
   Vec3 position = Vec3::Zero();  ///< feet, scene frame, metres
   double clearWidth = 0;         ///< metres, measured across the path above the step height
+};
+
+/// The line through the middle of a gap, on which its width is least.
+struct GapAxis {
+  Vec3 centre = Vec3::Zero();     ///< feet, scene frame, metres
+  Vec3 direction = Vec3::Zero();  ///< horizontal unit vector: the way through the gap
+  double clearWidth = 0;          ///< metres, measured across the direction
 };
 
 /// Distance of a standing agent from the closest thing that it could walk into.
@@ -34,6 +42,11 @@ inline Vec3 placeThinShape(const WorldSettings& settings, const Vec3& footPositi
 /// Infinite width: none was measured.
 NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agent,
                              const std::vector<Vec3>& points, const Vec3& near, double maxDistance);
+
+/// The axis of the gap at `place`, within 30 degrees of the horizontal unit vector `direction`.
+/// nullopt: the gap is narrower than the agent, or nothing bounds it.
+std::optional<GapAxis> measureGapAxis(const WorldData& world, const NavigationAgent& agent,
+                                      const Vec3& place, const Vec3& direction);
 
 /// The closest obstacle of an agent that stands at `footPosition`, up to `maxDistance` metres.
 ObstacleDistance measureObstacle(const WorldData& world, const NavigationAgent& agent,

@@ -6,6 +6,7 @@
 #include <set>
 #include <utility>
 
+#include "scene/navigation/clear_width.hpp"
 #include "scene/navigation/walk/grid_search.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -23,6 +24,10 @@ constexpr double kLineSpacing = 0.012;  // metres
 // 0.8 m to each side. Next to the gap the closest places face each other askew, and no parallel of
 // their line passes: it is crossed from places of the next 0.5 m.
 constexpr int kMaxLines = 134;
+// Axes are measured at the middle of the gap and up to 0.3 m aside: a thin prism finds a gap that
+// admits an agent from any place within it.
+constexpr double kAxisSpacing = 0.1;  // metres
+constexpr int kMaxAxes = 6;
 constexpr double kSameGap = 0.8;           // metres between ends of passages
 constexpr std::size_t kMaxWalks = 60'000;  // on grids, of all gaps: some tenths of a second
 // On the grid of one gap. A gap that takes more is given up, so that one does not use up the walks
@@ -113,22 +118,46 @@ GapWays crossOnScarceMesh(const Collection& all, const RimGap& gap) {
       {kSpacing, kGapMargin, kGapWalks});
 }
 
-/// Walks straight across, along lines that are close together: a gap may be wider than the
-/// agent by less than any grid sees.
-GapWays crossStraight(Walker& walker, const RimGap& gap) {
-  const Vec3 across = projectToGround(gap.to - gap.from);
-  const Vec3 aside = Vec3(-across.z(), 0, across.x()).normalized();
-  const Vec3 up(0, kHeightError, 0);
-  for (int i = 0; i <= kMaxLines; ++i) {
-    const double offset = (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * kLineSpacing;
-    const auto from = standAt(walker, gap.from + offset * aside + up, 2 * kHeightError);
-    if (!from) continue;
-    walker.returnTo(*from);
-    if (!walker.isPathClear(gap.to + offset * aside)) continue;
-    const Vec3 to = walker.footPosition();
-    if (walks(walker, to, *from, kHeightError)) return {{*from, to}, {to, *from}};
+GapWays crossAlong(Walker& walker, const Vec3& start, const Vec3& end) {
+  const auto from = standAt(walker, start + Vec3(0, kHeightError, 0), 2 * kHeightError);
+  if (!from) return {};
+  walker.returnTo(*from);
+  if (!walker.isPathClear(end)) return {};
+  const Vec3 to = walker.footPosition();
+  if (!walks(walker, to, *from, kHeightError)) return {};
+  return {{*from, to}, {to, *from}};
+}
+
+/// Walks through the middle of the gap: it may be wider than the agent by a centimetre, and the
+/// rims of the mesh do not face each other along its walls.
+GapWays crossAlongAxis(const PathFinder& finder, const RimGap& gap, const Vec3& across,
+                       const Vec3& aside) {
+  if (across.isZero(0)) return {};
+  const double half = 0.5 * across.norm();
+  for (int i = 0; i <= kMaxAxes; ++i) {
+    const double offset = (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * kAxisSpacing;
+    const Vec3 place = 0.5 * (gap.from + gap.to) + offset * aside;
+    const auto axis = measureGapAxis(finder.world, finder.agent, place, across.normalized());
+    if (!axis) continue;
+    Vec3 start = axis->centre - half * axis->direction, end = axis->centre + half * axis->direction;
+    start.y() = gap.from.y(), end.y() = gap.to.y();
+    GapWays ways = crossAlong(finder.walker, start, end);
+    if (!ways.there.empty()) return ways;
   }
   return {};
+}
+
+/// Walks straight across, along the axis of the gap or along lines that are close together: a gap
+/// may be wider than the agent by less than any grid sees.
+GapWays crossStraight(const PathFinder& finder, const RimGap& gap) {
+  const Vec3 across = projectToGround(gap.to - gap.from);
+  const Vec3 aside = Vec3(-across.z(), 0, across.x()).normalized();
+  GapWays ways = crossAlongAxis(finder, gap, across, aside);
+  for (int i = 0; i <= kMaxLines && ways.there.empty(); ++i) {
+    const double offset = (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * kLineSpacing;
+    ways = crossAlong(finder.walker, gap.from + offset * aside, gap.to + offset * aside);
+  }
+  return ways;
 }
 
 /// Searches on a grid off the mesh, from the higher side, since some ways lead down alone: the way
@@ -206,7 +235,7 @@ void crossGap(Collection& all, const RimGap& gap) {
                    : all.walksLeft == 0 || width > kGapMargin)
       return;
     GapWays ways = isOnScarce ? crossOnScarceMesh(all, gap) : crossOnGrid(all, gap);
-    if (ways.there.empty() && width < kMaxStraightGap) ways = crossStraight(all.finder.walker, gap);
+    if (ways.there.empty() && width < kMaxStraightGap) ways = crossStraight(all.finder, gap);
     known = all.tried.emplace(key, std::move(ways)).first;
   }
   addPassages(all, known->second);

@@ -2,6 +2,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cmath>
+#include <limits>
 
 #include "collision/motion/sine_cosine.hpp"
 #include "server/app/validators.hpp"
@@ -208,6 +209,11 @@ void addFiles(CLI::App& verb, CaptureArguments& into) {
   verb.add_option("--depth-scale", into.depthScale,
                   "Steps per metre of 16-bit depth (1000; 5000 in the TUM layout)")
       ->check(makeRangeValidator(1e-3, 1e6, "STEPS"));
+  verb.add_option(
+          "--depth-noise", into.depthNoise,
+          "Noise of a structured-light camera in depth, from this seed. The same seed gives "
+          "the same noise to a frame in each shard; depths from 10 m on are lost")
+      ->check(makeWholeRangeValidator(0, std::numeric_limits<std::uint64_t>::max(), "SEED"));
   verb.add_option("--too-far", into.tooFar,
                   "Depth beyond 16 bits. refuse: error; clamp: write 65535 and report it")
       ->capture_default_str()
@@ -309,6 +315,7 @@ PictureOptions makePictureOptions(const CaptureArguments& read) {
                                              : DepthFile::npy;
   options.depthStepsPerMetre = tum ? kTumStepsPerMetre : kDefaultStepsPerMetre;
   if (!read.depthScale.empty()) options.depthStepsPerMetre = *parseNumber<double>(read.depthScale);
+  if (!read.depthNoise.empty()) options.depthNoise = parseNumber<std::uint64_t>(read.depthNoise);
   options.tooFar = read.tooFar == "clamp" ? TooFar::clamp : TooFar::refuse;
   options.ids = read.ids == "png" ? IdsFile::png : IdsFile::npy;
   options.overlay = *parseOverlay(read.overlay);

@@ -14,7 +14,7 @@ namespace enfilade::server {
 struct CaptureArguments {
   std::string path, out;
   std::string size, fov, intrinsics, near = "0.05", far = "1000", channels = "rgb,depth,ids";
-  std::string rgb = "png", quality = "95", depth = "npy", depthScale, tooFar = "refuse";
+  std::string rgb = "png", quality = "95", depth = "npy", depthScale, tooFar = "refuse", depthNoise;
   std::string ids = "npy", layout = "plain", axes = "opengl", fps = "30", every = "0", avatar;
   std::string camera, shard = "0/1", limit = "0", progress = "bar", glass = "clear",
                       renderer = "auto", overlay, avatars = "people", samples = "1";

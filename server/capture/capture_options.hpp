@@ -59,6 +59,8 @@ struct PictureOptions {
   DepthFile depth = DepthFile::npy;
   double depthStepsPerMetre = 1000;  ///< for DepthFile::png and zst
   TooFar tooFar = TooFar::refuse;
+  /// Seed of render::addDepthNoise() for the channel depth; nullopt: no noise.
+  std::optional<std::uint64_t> depthNoise;
   IdsFile ids = IdsFile::npy;
   FolderLayout layout = FolderLayout::plain;
   OverlayChoice overlay;

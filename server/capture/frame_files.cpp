@@ -5,6 +5,7 @@
 #include <string>
 
 #include "render/image/atomic_file.hpp"
+#include "render/image/depth_noise.hpp"
 #include "render/image/encode.hpp"
 
 namespace enfilade::server {
@@ -87,12 +88,24 @@ Bytes encodeIds(const render::Frame& frame, const std::vector<std::uint32_t>& id
   return render::encodePng(makeRaster(frame, 1, narrow));
 }
 
-Bytes encodeChannel(const std::string& channel, const render::Frame& frame,
+/// The depth of frame `index`. Its noise depends on the index, so it is the same in each shard.
+std::vector<float> measureDepth(const render::Frame& frame, const PictureOptions& options,
+                                std::size_t index) {
+  std::vector<float> depth = frame.depth;
+  if (options.depthNoise)
+    render::addDepthNoise(depth, frame.camera.width, frame.camera.height, {*options.depthNoise},
+                          index);
+  return depth;
+}
+
+Bytes encodeChannel(const std::string& channel, std::size_t index, const render::Frame& frame,
                     const PictureOptions& options, const scene::ObjectClasses& classes,
                     const DrawOverlay& overlay, FrameFaults& faults) {
   if (channel == "overlay") return render::encodePng(overlay(frame));
   if (channel == "rgb") return encodeRgb(frame, options);
-  if (channel == "depth") return encodeDepth(frame, frame.depth, options, faults);
+  if (channel == "depth") {
+    return encodeDepth(frame, measureDepth(frame, options, index), options, faults);
+  }
   if (channel == "ids") return encodeIds(frame, frame.ids, options);
   if (channel == "class") return encodeIds(frame, classes.getClasses(frame.ids), options);
   if (channel == "thing") return encodeIds(frame, classes.getThings(frame.ids), options);
@@ -137,7 +150,7 @@ FrameFaults writeFrame(const fs::path& folder, const PictureOptions& options, st
     const fs::path file = folder / makeFilePath(channel, index);
     Bytes bytes;
     try {
-      bytes = encodeChannel(channel.folder, frame, options, classes, overlay, faults);
+      bytes = encodeChannel(channel.folder, index, frame, options, classes, overlay, faults);
     } catch (const std::runtime_error& error) {
       throw std::runtime_error(file.string() + ": " + error.what());
     }

@@ -4,6 +4,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "protocol/recording/recording.hpp"
 #include "render/camera_basis.hpp"
 #include "scene/import/file/content_hash.hpp"
 #include "server/base/camera_rotation.hpp"
@@ -33,15 +34,17 @@ Json channelNames(const CaptureChannels& channels) {
 }
 
 std::string describeDepth(const PictureOptions& options) {
+  const char* noise = options.depthNoise ? "; with the noise of a structured-light camera" : "";
   if (options.depth == DepthFile::npy)
-    return "float32 metres, z-distance along the camera's axis (not range); NaN: nothing is seen";
+    return std::string("float32 metres, z-distance along the camera's axis (not range); NaN: ") +
+           "nothing is seen" + noise;
   std::array<char, 200> text{};
   std::snprintf(text.data(), text.size(),
                 "16 bit, %g steps per metre, z-distance along the camera's axis (not range); 0: "
                 "nothing is seen%s",
                 options.depthStepsPerMetre,
                 options.tooFar == TooFar::clamp ? "; 65535: that far or farther" : "");
-  return text.data();
+  return text.data() + std::string(noise);
 }
 
 /// Rows of worldFromCamera with nerfstudio's axes: x right, y up, looks along -z.
@@ -213,11 +216,9 @@ std::string makeTumGroundTruth(const std::vector<CaptureFrame>& captureFrames) {
 std::string makeManifest(const scene::Scene& scene, const std::filesystem::path& path,
                          const PictureOptions& options, const std::string& renderer) {
   Json all;
-  std::array<char, 24> hash{};
-  std::snprintf(hash.data(), hash.size(), "%016llx", static_cast<unsigned long long>(scene.hash()));
   all["enfilade"] = kServerVersion;
   all[kNamesKey] = {{"scene", fileName(scene.model().source)}, {"path", fileName(path)}};
-  all["scene"] = hash.data();
+  all["scene"] = protocol::toHex(scene.hash());
   all["scene_file"] = makeFileHash(scene.model().source);
   all["path"] = makeFileHash(path);
   all["renderer"] = renderer;
@@ -233,6 +234,7 @@ std::string makeManifest(const scene::Scene& scene, const std::filesystem::path&
       options.rgb == RgbFile::png ? Json("png") : Json("jpeg " + std::to_string(options.quality));
   all["depth"] = toString(options.depth);
   all["depth_scale"] = options.depthStepsPerMetre;
+  all["depth_noise"] = options.depthNoise ? Json(*options.depthNoise) : Json(nullptr);
   all["too_far"] = options.tooFar == TooFar::clamp ? "clamp" : "refuse";
   all["ids"] = options.ids == IdsFile::png ? "png" : "npy";
   all["layout"] = options.layout == FolderLayout::tum ? "tum" : "plain";

@@ -51,8 +51,8 @@ Place parsePlace(const std::string& text, const char* argument, const scene::Sce
   if (auto named = scene::findNamedPlaces(scene, text, radius + kNextTo); !named.empty())
     return named;
   throw std::runtime_error(fmt::format(
-      "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey, an object or a body; "
-      "`enfilade inspect --objects` lists the names",
+      "{}: '{}' is neither a point X,Y,Z nor the name of a room, a storey, an object or a body "
+      "of known extent; `enfilade inspect --objects` lists the names",
       argument, text));
 }
 
@@ -169,7 +169,7 @@ std::string formatText(const RouteCommand& command, const v1::NavigationPath& pa
 /// The path as an avatar's positions, dense enough for a map.
 WalkedPath makeWalkedPath(const v1::NavigationPath& path) {
   constexpr double kSpacing = 0.05;  // metres
-  WalkedPath walked{"route", {}, 1};
+  WalkedPath walked{"start", {}, 1};
   const auto at = [&](int i) { return vectorFromProto(path.points(i)); };
   for (int i = 1; i < path.points_size(); ++i) {
     const Vec3 leg = at(i) - at(i - 1);
@@ -188,7 +188,7 @@ WalkTrace makeTrace(const RouteCommand& command, const v1::NavigationPath& path,
   trace.floors = {from.y(), to.y()};
   if (path.found()) {
     trace.title = fmt::format("{} to {}: {:.2f} m", command.from, command.to, path.length());
-    trace.paths.push_back(makeWalkedPath(path));
+    trace.paths = {makeWalkedPath(path), {"goal", {to}, 2}};
     return trace;
   }
   trace.title = fmt::format("no way from {} to {}: {}", command.from, command.to, path.reason());

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <csignal>
-#include <cstdio>
 #include <ctime>
 #include <nlohmann/json.hpp>
 
@@ -23,14 +22,12 @@ namespace enfilade::server {
 namespace {
 
 void printReady(const Server& server, const scene::Scene& scene, const ServeCommand& command) {
-  char hash[17];
-  std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(scene.hash()));
   nlohmann::ordered_json ready{
       {"ready", true},
       {"port", server.port()},
       {"address", command.listen.host},
       {"scene", std::filesystem::path(scene.model().source).filename().string()},
-      {"scene_hash", hash},
+      {"scene_hash", protocol::toHex(scene.hash())},
       {"objects", scene.model().objects.size()},
       {"worlds", server.worldNames()}};
   if (!command.recording.empty()) ready["recording"] = command.recording.filename().string();

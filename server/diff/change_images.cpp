@@ -282,8 +282,8 @@ void drawMoments(std::vector<Moment>& moments, const WalkDifference& difference,
   }
 }
 
-/// Reads the paths of a walk's first run, thinned out.
-std::vector<WalkedPath> readPaths(const RecordedWalk& walk, bool isEarlier) {
+/// Reads the paths of a walk's first run, thinned out, by the names of the avatars.
+std::map<std::string, WalkedPath> readPaths(const RecordedWalk& walk, bool isEarlier) {
   std::map<std::string, WalkedPath> paths;
   protocol::RecordingReader reader(walk.file, walk.run);
   std::uint64_t last = 0;
@@ -304,9 +304,7 @@ std::vector<WalkedPath> readPaths(const RecordedWalk& walk, bool isEarlier) {
         path.footPositions.push_back(feet);
     }
   }
-  std::vector<WalkedPath> list;
-  for (auto& [name, path] : paths) list.push_back(std::move(path));
-  return list;
+  return paths;
 }
 
 void drawChangeMap(const WalkDifference& difference, const ComparedModels& models,
@@ -314,9 +312,13 @@ void drawChangeMap(const WalkDifference& difference, const ComparedModels& model
   WalkTrace trace;
   trace.title = "regressions in " + difference.after.runs.front().start.scene().source();
   // Later paths are drawn over earlier ones and have the avatars' colours of the pictures.
-  trace.paths = readPaths(difference.before, true);
-  for (WalkedPath& path : readPaths(difference.after, false))
-    trace.paths.push_back(std::move(path));
+  std::map<std::string, WalkedPath> before = readPaths(difference.before, true);
+  std::map<std::string, WalkedPath> after = readPaths(difference.after, false);
+  // Ids depend on the number of objects: an avatar may have another one in the changed model.
+  for (auto& [name, path] : before)
+    if (const auto later = after.find(name); later != after.end()) path.id = later->second.id;
+  for (auto* paths : {&before, &after})
+    for (auto& [name, path] : *paths) trace.paths.push_back(std::move(path));
   for (const WalkEventChange& change : difference.events) {
     if (!change.worse || change.run != 0) continue;
     auto& marks = change.kind == WalkEventKind::contact ? trace.contacts : trace.blockedWalks;

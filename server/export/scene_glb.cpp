@@ -1,11 +1,11 @@
 #include "server/export/scene_glb.hpp"
 
-#include <cstdio>
 #include <map>
 #include <stdexcept>
 #include <string>
 #include <utility>
 
+#include "protocol/recording/recording.hpp"
 #include "server/export/draw_groups.hpp"
 #include "server/export/glb_file.hpp"
 #include "server/export/glb_materials.hpp"
@@ -285,8 +285,6 @@ GlbJson SceneWriter::makeSceneExtras() const {
   if (model_.objects.size() >= kMaxEntities)
     throw std::runtime_error("the scene has " + std::to_string(model_.objects.size()) +
                              " objects, and a GLB file holds ids below 16777216: split the model");
-  char hash[17];
-  std::snprintf(hash, sizeof hash, "%016llx", static_cast<unsigned long long>(scene_.hash()));
   GlbJson entities = GlbJson::array();
   for (std::uint32_t i = 0; i < model_.objects.size(); ++i) entities.push_back(makeEntity(i));
   for (const scene::BodySpec& body : model_.bodies)
@@ -302,7 +300,7 @@ GlbJson SceneWriter::makeSceneExtras() const {
                         {"globalId", space.globalId},
                         {"min", toArray(space.box.min)},
                         {"max", toArray(space.box.max)}});
-  return {{"sceneHash", hash},
+  return {{"sceneHash", protocol::toHex(scene_.hash())},
           {"offset", toArray(model_.offset)},
           {"storeys", storeys},
           {"spaces", spaces},

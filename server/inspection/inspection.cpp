@@ -91,7 +91,7 @@ Json spacesToJson(const scene::Model& model) {
 
 /// Degrees in the plane of the floor: 0 looks along +x, 90 along -z.
 double computeFacing(const Eigen::Vector2d& direction) {
-  return std::atan2(-direction.y(), direction.x()) * collision::kDegreesPerRadian;
+  return std::atan2(-direction.y(), direction.x()) * collision::kDegreesPerRadian + 0.0;  // no -0
 }
 
 Json northToJson(const std::optional<Eigen::Vector2d>& north) {

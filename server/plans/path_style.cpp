@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <map>
 #include <set>
@@ -32,7 +33,23 @@ Colour makePale(Colour colour) {
   return colour;
 }
 
+double toLinear(std::uint8_t part) {
+  const double s = part / 255.0;
+  return s <= 0.04045 ? s / 12.92 : std::pow((s + 0.055) / 1.055, 2.4);
+}
+
+double computeLuminance(const Colour& colour) {
+  return 0.2126 * toLinear(colour[0]) + 0.7152 * toLinear(colour[1]) + 0.0722 * toLinear(colour[2]);
+}
+
 }  // namespace
+
+Colour makeReadable(Colour colour) {
+  constexpr double kContrast = 4.5, kFlare = 0.05;
+  const double brightest = (computeLuminance(kPlanPaper) + kFlare) / kContrast - kFlare;
+  while (computeLuminance(colour) > brightest) colour = darken(colour, 0.95);
+  return colour;
+}
 
 std::vector<PathStyle> makePathStyles(const std::vector<WalkedPath>& paths) {
   std::map<Colour, std::set<scene::EntityId>> avatars;  // in the order of their ids

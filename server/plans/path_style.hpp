@@ -18,4 +18,7 @@ struct PathStyle {
 /// differ in lightness and dashes. Earlier paths are pale and dashed.
 std::vector<PathStyle> makePathStyles(const std::vector<WalkedPath>& paths);
 
+/// The colour, darkened as far as text of it needs on the paper of a plan: contrast 4.5 (WCAG 2.1).
+render::Colour makeReadable(render::Colour colour);
+
 }  // namespace enfilade::server

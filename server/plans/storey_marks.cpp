@@ -141,7 +141,8 @@ void StoreyMarks::addCaptions(const WalkTrace& trace, const std::vector<PathStyl
     if (!startsHere(path)) continue;
     const Vec3& start = path.footPositions.front();
     captions_.add(measuring, {view_.at(start)}, path.avatar,
-                  makeCaptionStyle(13, true, styles[i].colour), formatMarkPlace(start));
+                  makeCaptionStyle(13, true, makeReadable(styles[i].colour)),
+                  formatMarkPlace(start));
   }
   for (const MapCapture& capture : trace.captures) {
     if (!isHere(capture.eye.y() - kEyeHeight)) continue;

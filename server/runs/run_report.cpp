@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <cmath>
 #include <fstream>
 #include <nlohmann/json.hpp>
 
@@ -213,11 +214,13 @@ void RunReport::writePictures(const RunSummary& runSummary, const MapBackground&
   const std::string title = runSummary.script + " in " + runSummary.scene.source();
   if (!pictures_.empty()) {
     std::vector<render::CaptionedImage> captioned;
+    const auto tenths = [](double metres) { return std::round(10 * metres) / 10 + 0.0; };  // no -0
     for (const Picture& picture : pictures_) {
       captioned.push_back(
-          {picture.image, fmt::format("{}  {}  tick {}  ({:.1f}, {:.1f}, {:.1f})", picture.name,
-                                      picture.avatar, picture.tick, picture.footPosition.x(),
-                                      picture.footPosition.y(), picture.footPosition.z())});
+          {picture.image,
+           fmt::format("{}  {}  tick {}  ({:.1f}, {:.1f}, {:.1f})", picture.name, picture.avatar,
+                       picture.tick, tenths(picture.footPosition.x()),
+                       tenths(picture.footPosition.y()), tenths(picture.footPosition.z()))});
     }
     render::writePng(folder_ / "sheet.png",
                      render::makeContactSheet(captioned, title, kSheetColumns));

@@ -203,15 +203,15 @@ class CaseAnswerer {
   CaseAnswerer(const NarrowPhaseMethod& method, int repeats) : method_(method), repeats_(repeats) {}
 
   TimedAnswer answer(const accuracy::Case& asked) {
-    const bool goesOn = asked.sequence && sequence_ == asked.sequence &&
-                        asked.a.points == pointsA_ && asked.b.points == pointsB_;
-    if (!goesOn) {
+    const bool continuesSequence = asked.sequence && sequence_ == asked.sequence &&
+                                   asked.a.points == pointsA_ && asked.b.points == pointsB_;
+    if (!continuesSequence) {
       pair_ = method_.make(asked.a.points, asked.b.points);
       sequence_ = asked.sequence;
       pointsA_ = asked.a.points;
       pointsB_ = asked.b.points;
     }
-    return goesOn ? ask(asked) : askCold(asked);
+    return continuesSequence ? ask(asked) : askCold(asked);
   }
 
  private:

@@ -128,7 +128,7 @@ class Difference(unittest.TestCase):
     # ---- a recorded walk in another model
 
     def test_a_recorded_walk_in_its_own_model_has_no_difference(self):
-        out = self.folder / "rewalk"
+        out = self.folder / "walked_again"
         code, text, errors = self.run_program("replay", self.room, self.before, "--out", out)
         self.assertEqual(code, 0, errors)
         self.assertIn("no difference", text)
@@ -138,7 +138,7 @@ class Difference(unittest.TestCase):
 
     def test_a_recorded_walk_in_a_changed_model_reports_the_changes(self):
         full = self.model("full.obj", obj() + box("table", *TABLE))
-        out = self.folder / "rewalk"
+        out = self.folder / "walked_again"
         code, text, errors = self.run_program("replay", full, self.before, "--out", out)
         self.assertEqual(code, 3, errors)
         self.assertEqual((out / "diff.txt").read_text(), text)
@@ -146,7 +146,7 @@ class Difference(unittest.TestCase):
         # It is the walk that the script makes there, to the last bit, as far as it goes.
         direct = self.record("direct", full)
         contacts = {}
-        for which, folder in (("direct", "direct"), ("again", "rewalk")):
+        for which, folder in (("direct", "direct"), ("again", "walked_again")):
             lines = (self.folder / folder / "contacts.jsonl").read_text().splitlines()
             contacts[which] = [line for line in lines if json.loads(line)["event"] == "begin"]
         self.assertEqual(contacts["direct"], contacts["again"])
@@ -169,9 +169,9 @@ class Difference(unittest.TestCase):
         (self.folder / "door.walk.json").write_text(json.dumps(sidecar))
         before = self.record("door", scene, WALK + [{"body": "gate", "do": "open"}])
         code, text, errors = self.run_program("replay", self.room, before, "--out",
-                                              self.folder / "rewalk")
+                                              self.folder / "walked_again")
         self.assertIn(code, (0, 3), errors)
-        report = json.loads((self.folder / "rewalk" / "diff.json").read_text())
+        report = json.loads((self.folder / "walked_again" / "diff.json").read_text())
         self.assertEqual([r["who"] for r in report["refused_commands"]], ["gate"])
         self.assertIn("Commands that the model refused: 1", text)
 

@@ -25,10 +25,10 @@ std::vector<std::uint8_t> computeLight(const std::function<double(double, double
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
       depths.push_back(static_cast<float>(depth((x + 0.5 - 80) / 100, (y + 0.5 - 60) / 100)));
-  const AmbientOcclusion hollows(depths, camera());
+  const AmbientOcclusion occlusion(depths, camera());
   std::vector<std::uint8_t> left(depths.size());
   for (int y = 0; y < kHeight; ++y)
-    hollows.computeRow(y, std::span(left).subspan(static_cast<std::size_t>(y) * kWidth, kWidth));
+    occlusion.computeRow(y, std::span(left).subspan(static_cast<std::size_t>(y) * kWidth, kWidth));
   return left;
 }
 

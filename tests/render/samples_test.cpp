@@ -91,7 +91,7 @@ double toLinear(std::uint8_t byte) {
 }
 
 /// The mean difference of linear light from a picture of eight times the size.
-double differenceFrom(const Frame& large, const Frame& frame) {
+double computeMeanDifference(const Frame& large, const Frame& frame) {
   constexpr int kScale = 8;
   double sum = 0;
   for (int y = 0; y < frame.camera.height; ++y) {
@@ -133,7 +133,7 @@ TEST_P(Samples, ApproachThePictureOfEightTimesTheSize) {
     for (const std::uint32_t samples : {1u, 4u, 16u}) {
       const Frame frame = renderer->render({}, camera, {.samples = samples});
       EXPECT_EQ(frame.samples, samples);
-      const double difference = differenceFrom(large, frame);
+      const double difference = computeMeanDifference(large, frame);
       EXPECT_LT(difference, 0.7 * previous) << samples << " samples";
       previous = difference;
     }
@@ -180,8 +180,9 @@ TEST(SamplesOfALens, SmoothItsEdges) {
     enlarged.width *= 8;
     enlarged.height *= 8;
     const Frame large = renderer.render({}, enlarged);
-    const double one = differenceFrom(large, renderer.render({}, camera));
-    EXPECT_LT(differenceFrom(large, renderer.render({}, camera, {.samples = 16})), 0.4 * one);
+    const double one = computeMeanDifference(large, renderer.render({}, camera));
+    EXPECT_LT(computeMeanDifference(large, renderer.render({}, camera, {.samples = 16})),
+              0.4 * one);
   }
 }
 

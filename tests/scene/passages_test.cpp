@@ -84,6 +84,29 @@ TEST(Passages, AGapIsFoundAsideOfThePlacesThatFaceEachOther) {
   }
 }
 
+/// A wall of 15 cm at any angle to the grid, with a gap. Its rims face each other askew.
+std::shared_ptr<const Scene> roomWithTurnedWall(double angle, double at, double gap) {
+  Model model = boxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}},
+                          {"wall/a", {-8, 0, -0.075}, {at - gap / 2, 2.5, 0.075}},
+                          {"wall/b", {at + gap / 2, 0, -0.075}, {8, 2.5, 0.075}}});
+  for (std::size_t wall = 1; wall < 3; ++wall)
+    model.objects[wall].worldFromMesh.rotate(Eigen::AngleAxisd(angle, Vec3::UnitY()));
+  return std::make_shared<const Scene>(std::move(model));
+}
+
+TEST(Passages, AGapInATurnedWallIsFoundIfItIsACentimetreWiderThanTheAgent) {
+  for (const double angle : {0.02, 0.08, 0.35, 0.785, 1.45}) {
+    for (const double at : {-0.4, 1.31}) {
+      const Vec3 side = Eigen::AngleAxisd(angle, Vec3::UnitY()) * Vec3(0, 0, 2.5);
+      for (const double gap : {0.61, 0.58}) {  // across its flat sides an agent is narrower
+        Navigation navigation(roomWithTurnedWall(angle, at, gap), {}, {});
+        EXPECT_EQ(navigation.findPath(side, -side).found(), gap > 0.6)
+            << angle << " " << at << " " << gap;
+      }
+    }
+  }
+}
+
 TEST(Passages, AnAnswerDoesNotDependOnEarlierOnes) {
   Navigation navigation(boxScene(roomsWithFarGap(0.61)), {}, {});
   std::mt19937 random(9);

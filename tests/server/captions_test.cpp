@@ -207,5 +207,18 @@ TEST(PathStyles, DifferInColourOrDashesAndAreNoMarkOfAContact) {
   EXPECT_GT(again[2].colour[0], again[0].colour[0]);
 }
 
+TEST(PathStyles, TextInTheColourOfAPathIsReadable) {
+  const render::Colour dark{40, 60, 120};
+  EXPECT_EQ(makeReadable(dark), dark);
+  for (const render::Colour& pale : {render::Colour{255, 238, 170}, render::Colour{255, 255, 255},
+                                     render::Colour{170, 255, 170}}) {
+    const render::Colour text = makeReadable(pale);
+    EXPECT_LT(*std::ranges::max_element(text), 130) << "a grey of 118 has the contrast 4.5";
+    for (std::size_t k = 1; k < 3; ++k)  // its hue is kept
+      EXPECT_NEAR(static_cast<double>(text[k]) / text[0], static_cast<double>(pale[k]) / pale[0],
+                  0.1);
+  }
+}
+
 }  // namespace
 }  // namespace enfilade::server

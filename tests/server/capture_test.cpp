@@ -1,110 +1,15 @@
-// Tests of the program `enfilade capture` in the small room: content of the output folder.
-#include <sys/resource.h>
-
+// Tests of the program `enfilade capture` in the small room: what its files show.
 #include <cmath>
-#include <cstdlib>
-#include <cstring>
-#include <map>
 
-#include "render/gl/gl_renderer.hpp"
 #include "render/image/image.hpp"
 #include "server/capture/metadata_files.hpp"
 #include "server/capture/overlay.hpp"
 #include "server/floors/label_names.hpp"
 #include "tests/server/body_room.hpp"
-#include "tests/server/program_fixture.hpp"
+#include "tests/server/capture_fixture.hpp"
 
 namespace enfilade::server::testing {
 namespace {
-
-namespace fs = std::filesystem;
-using nlohmann::json;
-
-/// An array of a .npy file, as stored.
-template <class Value>
-struct Array {
-  int height = 0, width = 0;
-  std::vector<Value> values;
-
-  const Value& at(int x, int y) const {
-    return values.at(static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-                     static_cast<std::size_t>(x));
-  }
-};
-
-template <class Value>
-Array<Value> readNpy(const fs::path& file) {
-  const std::string bytes = readText(file);
-  Array<Value> array;
-  const std::size_t shape = bytes.find("'shape': (");
-  if (shape == std::string::npos) return array;
-  std::sscanf(bytes.c_str() + shape, "'shape': (%d, %d", &array.height, &array.width);
-  const std::size_t start = bytes.find('\n') + 1;
-  array.values.resize((bytes.size() - start) / sizeof(Value));
-  std::memcpy(array.values.data(), bytes.data() + start, bytes.size() - start);
-  return array;
-}
-
-/// Content of every file below the folder, by name.
-std::map<std::string, std::string> readTree(const fs::path& folder) {
-  std::map<std::string, std::string> tree;
-  for (const auto& entry : fs::recursive_directory_iterator(folder)) {
-    if (entry.is_regular_file())
-      tree[entry.path().lexically_relative(folder).generic_string()] = readText(entry.path());
-  }
-  return tree;
-}
-
-std::vector<std::string> getNames(const std::map<std::string, std::string>& tree) {
-  std::vector<std::string> names;
-  for (const auto& [name, text] : tree) names.push_back(name);
-  return names;
-}
-
-bool picturesCanBeHad() {
-  static const bool can = [] {
-    try {
-      render::GlRenderer renderer(smallRoom());
-      return true;
-    } catch (const render::RenderError&) {
-      return false;
-    }
-  }();
-  return can;
-}
-
-/// A path of `poses` poses along +x from x = 0, 0.2 m apart, at eye height, looking along +x; 30 a
-/// second.
-std::string ahead(int poses) {
-  std::ostringstream text;
-  for (int i = 0; i < poses; ++i)
-    text << i / 30.0 << " " << 0.2 * i << " 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n";
-  return text.str();
-}
-
-class Capture : public ProgramFixture {
- protected:
-  void SetUp() override {
-    if (!picturesCanBeHad()) {
-      ASSERT_EQ(std::getenv("CI"), nullptr) << "no EGL device: install libegl-mesa0";
-      GTEST_SKIP() << "no EGL device: install libegl-mesa0";
-    }
-    ProgramFixture::SetUp();
-  }
-
-  Ended captured(const std::string& pathFile, const std::string& out,
-                 std::vector<std::string> options = {}) const {
-    std::vector<std::string> arguments{"capture", path("room.obj"), path(pathFile), "--out",
-                                       path(out)};
-    if (!film_) options.push_back("--no-mp4");
-    if (std::find(options.begin(), options.end(), "--size") == options.end())
-      options.insert(options.end(), {"--size", "64x48"});
-    arguments.insert(arguments.end(), options.begin(), options.end());
-    return run(arguments);
-  }
-
-  bool film_ = false;  ///< whether ffmpeg is available
-};
 
 TEST_F(Capture, FilesFollowTheLayoutAndHoldTheImages) {
   write(folder_ / "path.txt", ahead(2));
@@ -197,68 +102,6 @@ TEST_F(Capture, TransformsSayWhereAPixelLies) {
   EXPECT_GT(agreeing, seen * 97 / 100);
 }
 
-TEST_F(Capture, ShardsMergeToExactlyTheUnshardedSet) {
-  write(folder_ / "path.txt", ahead(5));
-  ASSERT_EQ(captured("path.txt", "whole").code, 0);
-  ASSERT_EQ(captured("path.txt", "first", {"--shard", "0/2"}).code, 0);
-  ASSERT_EQ(captured("path.txt", "second", {"--shard", "1/2"}).code, 0);
-  EXPECT_EQ(readTree(folder_ / "first").size(), 3 + 3 * 3U);
-  EXPECT_EQ(readTree(folder_ / "second").size(), 3 + 3 * 2U);
-  fs::copy(folder_ / "first", folder_ / "merged", fs::copy_options::recursive);
-  fs::copy(folder_ / "second", folder_ / "merged",
-           fs::copy_options::recursive | fs::copy_options::overwrite_existing);
-  EXPECT_EQ(readTree(folder_ / "merged"), readTree(folder_ / "whole"));
-}
-
-TEST_F(Capture, OnlyAnEqualRunResumesAStoppedOne) {
-  write(folder_ / "path.txt", ahead(4));
-  ASSERT_EQ(captured("path.txt", "out").code, 0);
-  const auto whole = readTree(folder_ / "out");
-  fs::remove(folder_ / "out/rgb/000001.png");
-  fs::remove(folder_ / "out/depth/000003.npy");
-  const Ended again = captured("path.txt", "out");
-  ASSERT_EQ(again.code, 0) << again.err;
-  EXPECT_EQ(json::parse(again.out).at("written"), 2);
-  EXPECT_EQ(json::parse(again.out).at("already_there"), 2);
-  EXPECT_EQ(readTree(folder_ / "out"), whole);
-  const Ended other = captured("path.txt", "out", {"--size", "32x24"});
-  EXPECT_EQ(other.code, 1);
-  EXPECT_NE(other.err.find("contains another capture (lens: "), std::string::npos) << other.err;
-  EXPECT_NE(other.err.find("--out"), std::string::npos);
-  write(folder_ / "path.txt", ahead(4) + "9 0 1.6 0 0 0 0 1\n");
-  EXPECT_EQ(captured("path.txt", "out").code, 1);
-  EXPECT_EQ(readTree(folder_ / "out"), whole);
-  fs::remove(folder_ / "out/capture.json");
-  EXPECT_NE(captured("path.txt", "out").err.find("that identifies them"), std::string::npos);
-}
-
-TEST_F(Capture, ALimitedRunContinuesWithoutLimit) {
-  write(folder_ / "path.txt", ahead(4));
-  ASSERT_EQ(captured("path.txt", "out", {"--limit", "2"}).code, 0);
-  const Ended all = captured("path.txt", "out");
-  ASSERT_EQ(all.code, 0) << all.err;
-  EXPECT_EQ(json::parse(all.out).at("already_there"), 2);
-  ASSERT_EQ(captured("path.txt", "fresh").code, 0);
-  EXPECT_EQ(readTree(folder_ / "out"), readTree(folder_ / "fresh"));
-  const json made = json::parse(readText(folder_ / "out/capture.json"));
-  EXPECT_EQ(made.at("names").at("scene"), "room.obj");
-  EXPECT_EQ(made.at("names").at("path"), "path.txt");
-}
-
-TEST_F(Capture, ARunWithoutFramesReleasesTheFolder) {
-  write(folder_ / "path.txt", ahead(1));
-  // 16 bits of the finest unit hold 7 cm, and everything visible is farther away.
-  const std::vector<std::string> fine{"--channels", "depth",         "--depth",
-                                      "png",        "--depth-scale", "1000000"};
-  const Ended refused = captured("path.txt", "out", fine);
-  EXPECT_EQ(refused.code, 1);
-  EXPECT_NE(refused.err.find("--too-far clamp"), std::string::npos) << refused.err;
-  std::vector<std::string> clamped = fine;
-  clamped.insert(clamped.end(), {"--too-far", "clamp"});
-  EXPECT_EQ(captured("path.txt", "out", clamped).code, 0);
-  EXPECT_EQ(captured("path.txt", "out", fine).code, 1) << "the folder now holds a frame";
-}
-
 TEST_F(Capture, AnEmptyFrameIsReportedAndIsAViolationWithStrict) {
   write(folder_ / "path.json",
         R"([{"eye":[0,1.6,0],"look_at":[5,1,0]},{"eye":[1e6,0,0],"look_at":[2e6,0,0]}])");
@@ -281,45 +124,6 @@ TEST_F(Capture, AFrameInsideAWallIsReportedByNameAndIsAViolationWithStrict) {
   EXPECT_EQ(captured("path.txt", "strict", {"--strict"}).code, 3);
 }
 
-TEST_F(Capture, PicturesAreTheSameForAnyNumberOfThreadsOfGl) {
-  write(folder_ / "path.txt", ahead(3));
-  std::map<std::string, std::string> first;
-  for (const char* threads : {"0", "1", "2"}) {
-    ::setenv("LP_NUM_THREADS", threads, 1);  // only for Mesa's llvmpipe; other drivers ignore it
-    const std::string out = std::string("out") + threads;
-    const Ended ended = captured("path.txt", out,
-                                 {"--size", "320x240", "--renderer", "gl", "--overlay", "boxes",
-                                  "--channels", "rgb,depth,ids,normals"});
-    EXPECT_EQ(ended.code, 0) << ended.err;
-    const auto tree = readTree(folder_ / out);
-    EXPECT_GE(tree.size(), 3 * 5U);
-    if (first.empty()) first = tree;
-    EXPECT_EQ(tree, first) << threads << " threads";
-  }
-  ::unsetenv("LP_NUM_THREADS");
-}
-
-TEST_F(Capture, TimeOfThePathPassesInTheWorldAndShardsShowTheSame) {
-  write(folder_ / "room.walk.json",
-        R"({"walk":1,"bodies":[{"name":"wall","kind":"path","objects":["room_wall"],
-            "keys":[{"time":0},{"time":2,"offset":[2,0,0]}]}]})");
-  const std::string pose = " 0 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n";
-  write(folder_ / "path.txt", "100" + pose + "100.5" + pose + "101" + pose);
-  ASSERT_EQ(captured("path.txt", "whole").code, 0);
-  ASSERT_EQ(captured("path.txt", "still", {"--still"}).code, 0);
-  const auto ahead = [&](const std::string& out, int frame) {
-    const std::string file = out + "/depth/00000" + std::to_string(frame) + ".npy";
-    return readNpy<float>(folder_ / file).at(32, 24);
-  };
-  for (int frame = 0; frame < 3; ++frame) {
-    EXPECT_NEAR(ahead("whole", frame), 5 + 0.5 * frame, 0.02) << frame;  // a tick is 1/60 s
-    EXPECT_NEAR(ahead("still", frame), 5, 1e-3) << frame;
-  }
-  for (const char* shard : {"0/2", "1/2"})
-    ASSERT_EQ(captured("path.txt", "shards", {"--shard", shard}).code, 0);
-  EXPECT_EQ(readTree(folder_ / "shards"), readTree(folder_ / "whole"));
-}
-
 TEST_F(Capture, AFailedScriptIsCountedAndIsAViolationWithStrict) {
   write(folder_ / "path.jsonl", R"({"spawn":"ann","at":[0,0,0],"facing":0}
 {"walk":"bob","to":[1,0,0]}
@@ -329,50 +133,6 @@ TEST_F(Capture, AFailedScriptIsCountedAndIsAViolationWithStrict) {
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(json::parse(run.out).at("went_wrong"), 1);
   EXPECT_EQ(captured("path.jsonl", "strict", {"--strict"}).code, 3);
-}
-
-TEST_F(Capture, AFullDiskLeavesOnlyCompleteFilesAndIsReported) {
-  write(folder_ / "path.txt", ahead(3));
-  // A .npy of 64 x 48 floats has 12,416 bytes; the .png of the same image and all else fit.
-  rlimit before{};
-  getrlimit(RLIMIT_FSIZE, &before);
-  const rlimit little{8192, before.rlim_max};
-  setrlimit(RLIMIT_FSIZE, &little);
-  const pid_t child = start({"capture", path("room.obj"), path("path.txt"), "--out", path("out"),
-                             "--size", "64x48", "--no-cache", "--no-mp4"});
-  setrlimit(RLIMIT_FSIZE, &before);
-  EXPECT_EQ(awaitExitCode(child), 1);
-  EXPECT_NE(readText(path("stderr")).find("cannot write " + path("out") + "/depth/00000"),
-            std::string::npos)
-      << readText(path("stderr"));
-  for (const auto& [name, text] : readTree(folder_ / "out")) {
-    EXPECT_EQ(name.find(".part"), std::string::npos) << name;
-    EXPECT_FALSE(text.empty()) << name;
-  }
-  EXPECT_FALSE(fs::exists(folder_ / "out/depth/000000.npy"));
-  EXPECT_EQ(captured("path.txt", "out").code, 0);
-  ASSERT_EQ(captured("path.txt", "fresh").code, 0);
-  EXPECT_EQ(readTree(folder_ / "out"), readTree(folder_ / "fresh"));
-}
-
-TEST_F(Capture, AnInterruptEndsItWith130AndWholeFiles) {
-  write(folder_ / "path.txt", ahead(4000));
-  for (const int signal : {SIGINT, SIGTERM}) {
-    fs::remove_all(folder_ / "out");
-    const pid_t child = start({"capture", path("room.obj"), path("path.txt"), "--out", path("out"),
-                               "--size", "64x48", "--progress", "json"});
-    for (int i = 0; i < 3000 && !fs::exists(folder_ / "out/ids/000003.npy"); ++i)
-      std::this_thread::sleep_for(std::chrono::milliseconds(10));
-    kill(child, signal);
-    EXPECT_EQ(awaitExitCode(child), 130);
-    const auto tree = readTree(folder_ / "out");
-    EXPECT_GT(tree.size(), 3 + 3 * 3U);
-    EXPECT_LT(tree.size(), 3 + 3 * 4000U);
-    for (const auto& [name, text] : tree) EXPECT_EQ(name.find(".part"), std::string::npos) << name;
-    EXPECT_EQ(readText(path("stdout")), "");
-    EXPECT_NE(readText(path("stderr")).find("continues from there"), std::string::npos);
-    EXPECT_NE(readText(path("stderr")).find("{\"frames\":"), std::string::npos);
-  }
 }
 
 TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
@@ -639,57 +399,6 @@ TEST_F(Capture, DepthReportsAreNextToTheFramesAndAddedIfMissing) {
   EXPECT_GT(whole["depth"]["away_from_edges"]["pixels"], 64 * 48);
   EXPECT_LT(whole["depth"]["away_from_edges"]["max_mm"], 3);
   EXPECT_EQ(json::parse(after.at("depth_report/000002.json"))["frames"], 1);
-}
-
-TEST_F(Capture, FfmpegMakesTheFilmWhenAllFramesAreThere) {
-  fs::create_directories(folder_ / "bin");
-  write(folder_ / "bin/ffmpeg", "#!/bin/sh\nfor last; do :; done\necho \"$@\" > \"$last\"\n");
-  fs::permissions(folder_ / "bin/ffmpeg", fs::perms::owner_all);
-  const std::string before = getenv("PATH") ? getenv("PATH") : "";
-  setenv("PATH", (path("bin") + ":" + before).c_str(), 1);
-  write(folder_ / "path.txt", ahead(4));
-  film_ = true;
-  const Ended half = captured("path.txt", "out", {"--shard", "0/2", "--channels", "rgb"});
-  EXPECT_TRUE(json::parse(half.out).at("video").is_null());
-  const Ended all = captured("path.txt", "out", {"--channels", "rgb"});
-  setenv("PATH", before.c_str(), 1);
-  EXPECT_EQ(json::parse(all.out).at("video"), "video.mp4") << all.err;
-  EXPECT_NE(readText(folder_ / "out/video.mp4").find("-framerate 30 "), std::string::npos)
-      << readText(folder_ / "out/video.mp4");
-}
-
-TEST_F(Capture, ADryRunReportsAndWritesNothing) {
-  write(folder_ / "path.txt", ahead(5));
-  const Ended ended = captured("path.txt", "out", {"--dry-run", "--shard", "1/2", "--limit", "4"});
-  ASSERT_EQ(ended.code, 0) << ended.err;
-  EXPECT_EQ(json::parse(ended.out).at("frames"), 4);
-  EXPECT_EQ(json::parse(ended.out).at("shard_frames"), 2);
-  EXPECT_FALSE(fs::exists(folder_ / "out"));
-}
-
-TEST_F(Capture, ErrorsAreReportedBeforeAnyOutput) {
-  write(folder_ / "path.txt", ahead(1));
-  for (const std::vector<std::string>& wrong : {std::vector<std::string>{"--size", "0x10"},
-                                                {"--size", "100000x10"},
-                                                {"--size", "64"},
-                                                {"--fov", "180"},
-                                                {"--intrinsics", "1,2,3"},
-                                                {"--shard", "2/2"},
-                                                {"--channels", "rgb,foo"},
-                                                {"--channels", ""},
-                                                {"--fov", "60", "--intrinsics", "9,9,9,9"},
-                                                {"--quality", "0"},
-                                                {"--near", "nan"}}) {
-    const Ended ended = captured("path.txt", "out", wrong);
-    EXPECT_EQ(ended.code, 2) << wrong[0] << " " << wrong[1] << ended.err;
-  }
-  write(folder_ / "nan.txt", "0 nan 0 0 0 0 0 1\n");
-  const Ended ended = captured("nan.txt", "out");
-  EXPECT_EQ(ended.code, 1);
-  EXPECT_NE(ended.err.find("nan.txt:1: 'nan'"), std::string::npos) << ended.err;
-  EXPECT_EQ(captured("missing.txt", "out").code, 1);
-  EXPECT_EQ(captured("path.txt", "out", {"--near", "5", "--far", "4"}).code, 1);
-  EXPECT_TRUE(readTree(folder_ / "out").empty());
 }
 
 }  // namespace

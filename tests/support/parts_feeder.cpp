@@ -167,7 +167,7 @@ Feeder::Feeder(const FeederPlan& plan, int threads)
     broadPhase_.insert(inflated(Aabb{plan.tray[i][0], plan.tray[i][1]}, moves));
   }
   for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i)
-    movers_.push_back(broadPhase_.insert({Vec3::Zero(), Vec3::Zero()}));
+    partProxies_.push_back(broadPhase_.insert({Vec3::Zero(), Vec3::Zero()}));
   // A new broad phase assigns consecutive ids: the tray's boxes first, then the parts.
   for (std::uint32_t i = 0; i < trayHulls.size(); ++i)
     solidOfMover_.push_back(0), partOfMover_.push_back(i);
@@ -192,7 +192,7 @@ void Feeder::moveBoxes(double lookout) {
   for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i) {
     if (contains(boxes_[i], needed_[i])) continue;
     boxes_[i] = inflated(needed_[i], kSpareBox);
-    broadPhase_.move(movers_[i - 1], boxes_[i]);
+    broadPhase_.move(partProxies_[i - 1], boxes_[i]);
   }
   broadPhase_.update();
 }
@@ -200,7 +200,7 @@ void Feeder::moveBoxes(double lookout) {
 /// Parts after part `i` that it may touch.
 void Feeder::findMet(std::size_t i, double lookout) {
   met_[i].clear();
-  for (const auto& partner : broadPhase_.getOverlaps(movers_[i - 1])) {
+  for (const auto& partner : broadPhase_.getOverlaps(partProxies_[i - 1])) {
     const std::uint32_t other = solidOfMover_[partner.id];
     if (other > i && scene::mayMeet(spheres_[i], spheres_[other], lookout))
       met_[i].push_back(other);
@@ -213,7 +213,7 @@ void Feeder::findPairs() {
   const std::uint32_t size = static_cast<std::uint32_t>(dynamics_.bodies.size());
   std::vector<scene::PartPairKey> keys;
   for (std::uint32_t i = 1; i < size; ++i)
-    for (const auto& partner : broadPhase_.getOverlaps(movers_[i - 1]))
+    for (const auto& partner : broadPhase_.getOverlaps(partProxies_[i - 1]))
       if (solidOfMover_[partner.id] == 0) keys.push_back({0, i, partOfMover_[partner.id], 0});
   met_.resize(size), spheres_.clear();
   for (const scene::PhysicsBody& solid : dynamics_.bodies)

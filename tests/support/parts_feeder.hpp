@@ -90,7 +90,7 @@ class Feeder {
   scene::StepSettings settings_;
   scene::StepReport report_;
   collision::SortAndSweep broadPhase_;
-  std::vector<collision::ProxyId> movers_;       ///< proxies of the parts
+  std::vector<collision::ProxyId> partProxies_;  ///< proxies of the parts
   std::vector<collision::Aabb> boxes_;           ///< of the parts, in the broad phase
   std::vector<collision::Aabb> needed_;          ///< of the parts, exact in this tick
   std::vector<scene::MotionSphere> spheres_;     ///< of all bodies

@@ -1,5 +1,8 @@
 #include "scene/import/worker/model_stream.hpp"
 
+#include <sys/mman.h>
+#include <unistd.h>
+
 #include <array>
 
 #include "scene/import/worker/stream_bytes.hpp"
@@ -9,6 +12,7 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffff;   // an absent index
 constexpr std::uint32_t kMagic = 0x4d464e45;  // "ENFM"
+constexpr std::size_t kHugePageBytes = 2 << 20;
 
 // ---- one pair of functions per type -------------------------------------------------------------
 
@@ -300,12 +304,25 @@ void writeAll(StreamWriter& out, const std::vector<T>& values) {
   for (const T& value : values) write(out, value);
 }
 
+/// Asks for huge pages behind the reserved memory. A million objects take 130,000 small pages, and
+/// their faults a fifth of the time. Advice alone: without huge pages nothing else changes.
+template <class T>
+void adviseHugePages(const std::vector<T>& reserved) {
+  const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  const auto begin = (reinterpret_cast<std::uintptr_t>(reserved.data()) + page - 1) / page * page;
+  const auto end =
+      reinterpret_cast<std::uintptr_t>(reserved.data() + reserved.capacity()) / page * page;
+  if (begin + kHugePageBytes <= end)
+    madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+}
+
 /// `smallest`: minimum size of an item in bytes, so that a false count cannot allocate much.
 template <class T, class Read>
 void readAll(StreamReader& in, std::vector<T>& values, std::size_t smallest, const char* field,
              const Read& read) {
   const std::size_t n = in.count(smallest, field);
   values.reserve(n);  // a small multiple of the remaining bytes
+  adviseHugePages(values);
   for (std::size_t i = 0; i < n; ++i) values.push_back(read());
 }
 

@@ -5,6 +5,7 @@
 #include <atomic>
 #include <condition_variable>
 #include <deque>
+#include <future>
 #include <map>
 #include <mutex>
 #include <set>
@@ -223,6 +224,8 @@ bool hasManyTriangles(const Model& model, std::uint32_t object) {
 Scene::Scene(Model model) : model_(std::move(model)) {
   requireValidIndices(model_);
   if (const auto error = validateBodies(model_)) throw std::invalid_argument(*error);
+  auto hash =
+      std::async(std::launch::async | std::launch::deferred, [this] { return hashModel(model_); });
   std::vector<bool> isBodyObject(model_.objects.size());
   MeshShapeCache meshShapes;
   for (const BodySpec& body : model_.bodies) {
@@ -232,7 +235,7 @@ Scene::Scene(Model model) : model_(std::move(model)) {
   }
   assignShapeIndices();
   computeObjectBounds(isBodyObject);
-  hash_ = hashModel(model_);
+  hash_ = hash.get();
   shapes_ = std::make_unique<LazyArray<Shape>>(meshesOfShape_.size());
   collisionGeometries_ = std::make_unique<LazyArray<CollisionGeometry>>(model_.objects.size());
   for (std::uint32_t i = 0; i < solidObjects_.size(); ++i)
