@@ -58,14 +58,14 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
   ampleTiles_.resize(tiles.size());
   scarceTiles_.resize(tiles.size());
   buildTiles(tiles, threads, scaleProgress(progress, 0, kTileShare));
-  assembleMeshes(progress);
+  assembleMeshes(threads, progress);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   report_.seconds = seconds.count();
 }
 
 Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
                        const NavigationAgent& agent, std::span<const std::uint8_t> saved,
-                       const Progress& progress)
+                       int threads, const Progress& progress)
     : agent_(agent),
       world_(std::move(scene), settings),
       grid_(makeTileGrid(world_.scene().bounds(), agent)) {
@@ -76,7 +76,9 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
     placeBody(meshes.bodies[i], world_.data().bodies[i]);
   ampleTiles_ = std::move(meshes.ample);
   scarceTiles_ = std::move(meshes.scarce);
-  assembleMeshes(progress);
+  for (SavedGap& gap : meshes.gaps)
+    triedGaps_[gap.key] = {std::move(gap.there), std::move(gap.back)};
+  assembleMeshes(threads, progress);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   report_.seconds = seconds.count();
 }
@@ -85,9 +87,10 @@ Navigation::~Navigation() = default;
 
 std::vector<std::uint8_t> Navigation::save() {
   const std::lock_guard lock(mutex_);
-  SavedMeshes meshes{ampleTiles_, scarceTiles_, {}};
+  SavedMeshes meshes{ampleTiles_, scarceTiles_, {}, {}};
   for (const Body& body : world_.data().bodies)
     meshes.bodies.push_back({body.orientation, body.position});
+  for (const auto& [key, ways] : triedGaps_) meshes.gaps.push_back({key, ways.there, ways.back});
   return saveMeshes(world_.data(), agent_, meshes);
 }
 
@@ -101,7 +104,7 @@ void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Pr
   });
 }
 
-void Navigation::assembleMeshes(const Progress& progress) {
+void Navigation::assembleMeshes(int threads, const Progress& progress) {
   walker_.emplace(world_.data(), agent_);
   links_.clear();
   unobstructed_.reset();
@@ -109,7 +112,7 @@ void Navigation::assembleMeshes(const Progress& progress) {
   ample_.emplace(grid_, ampleTiles_);
   scarce_.emplace(grid_, scarceTiles_);
   islands_ = collectIslands(*ample_, *walker_, world_.scene().bounds());
-  joinIslands(scaleProgress(progress, kTileShare, 1));
+  joinIslands(threads, scaleProgress(progress, kTileShare, 1));
   drawn_ = {};
   for (std::uint32_t i = 0; i < ample_->polygonCount(); ++i) {
     const std::uint32_t number = islands_.numberOf[i];
@@ -126,9 +129,9 @@ void Navigation::assembleMeshes(const Progress& progress) {
   if (progress) progress(1);
 }
 
-void Navigation::joinIslands(const Progress& progress) {
+void Navigation::joinIslands(int threads, const Progress& progress) {
   passages_ = collectPassages({world_.data(), agent_, *walker_, *ample_, *scarce_, nullptr},
-                              islands_, triedGaps_, progress);
+                              islands_, triedGaps_, threads, progress);
   scene::joinIslands(islands_, passages_);
 }
 
@@ -164,7 +167,7 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads, const Prog
     if (isChanged[i]) tiles.push_back(static_cast<int>(i));
   if (tiles.empty()) return 0;
   buildTiles(tiles, threads, scaleProgress(progress, 0, kTileShare));
-  assembleMeshes(progress);
+  assembleMeshes(threads, progress);
   return tiles.size();
 }
 

@@ -76,15 +76,15 @@ class Navigation {
   Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
              const NavigationAgent& agent, const Snapshot* snapshot = nullptr, int threads = 2,
              const Progress& progress = {});
-  /// Takes the meshes of save() instead of building them, with bodies as they were then; update()
-  /// brings them to a later state. Progress begins at kTileShare. Throws MeshFileError if they
-  /// belong to another scene or size.
+  /// Takes meshes and gaps of save() instead of building them, with bodies as they were then;
+  /// update() brings them to a later state. Progress begins at kTileShare. Throws MeshFileError if
+  /// they belong to another scene or size.
   Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
-             const NavigationAgent& agent, std::span<const std::uint8_t> saved,
+             const NavigationAgent& agent, std::span<const std::uint8_t> saved, int threads = 2,
              const Progress& progress = {});
   ~Navigation();
 
-  /// The meshes as bytes.
+  /// The meshes and the gaps that were tried, as bytes.
   std::vector<std::uint8_t> save();
 
   /// Takes over the poses of bodies, and builds the tiles again in which they changed. Returns the
@@ -134,8 +134,8 @@ class Navigation {
 
  private:
   void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
-  void assembleMeshes(const Progress& progress);
-  void joinIslands(const Progress& progress);
+  void assembleMeshes(int threads, const Progress& progress);
+  void joinIslands(int threads, const Progress& progress);
   NavigationMesh buildUnobstructed(int threads, const Progress& progress) const;
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;

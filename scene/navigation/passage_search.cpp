@@ -1,12 +1,16 @@
 #include "scene/navigation/passage_search.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
+#include <deque>
 #include <optional>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "scene/navigation/clear_width.hpp"
+#include "scene/navigation/mesh/parallel_for.hpp"
 #include "scene/navigation/walk/grid_search.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -37,6 +41,7 @@ constexpr std::size_t kGapWalks = 1000;
 // narrow way.
 constexpr std::size_t kMaxExitWalks = 50'000, kMinExitWalks = 300, kMaxWalksOfExit = 4000;
 constexpr std::size_t kMaxRepairWalks = 2000;  // of a way on the scarce mesh
+constexpr std::size_t kGapsAtOnce = 32;  // more are tried in vain: passages of some join others
 
 std::array<double, 6> makeKey(const Vec3& from, const Vec3& to) {
   return {from.x(), from.y(), from.z(), to.x(), to.y(), to.z()};
@@ -130,18 +135,18 @@ GapWays crossAlong(Walker& walker, const Vec3& start, const Vec3& end) {
 
 /// Walks through the middle of the gap: it may be wider than the agent by a centimetre, and the
 /// rims of the mesh do not face each other along its walls.
-GapWays crossAlongAxis(const PathFinder& finder, const RimGap& gap, const Vec3& across,
-                       const Vec3& aside) {
+GapWays crossAlongAxis(const WorldData& world, Walker& walker, const RimGap& gap,
+                       const Vec3& across, const Vec3& aside) {
   if (across.isZero(0)) return {};
   const double half = 0.5 * across.norm();
   for (int i = 0; i <= kMaxAxes; ++i) {
     const double offset = (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * kAxisSpacing;
     const Vec3 place = 0.5 * (gap.from + gap.to) + offset * aside;
-    const auto axis = measureGapAxis(finder.world, finder.agent, place, across.normalized());
+    const auto axis = measureGapAxis(world, walker.agent(), place, across.normalized());
     if (!axis) continue;
     Vec3 start = axis->centre - half * axis->direction, end = axis->centre + half * axis->direction;
     start.y() = gap.from.y(), end.y() = gap.to.y();
-    GapWays ways = crossAlong(finder.walker, start, end);
+    GapWays ways = crossAlong(walker, start, end);
     if (!ways.there.empty()) return ways;
   }
   return {};
@@ -149,26 +154,26 @@ GapWays crossAlongAxis(const PathFinder& finder, const RimGap& gap, const Vec3& 
 
 /// Walks straight across, along the axis of the gap or along lines that are close together: a gap
 /// may be wider than the agent by less than any grid sees.
-GapWays crossStraight(const PathFinder& finder, const RimGap& gap) {
+GapWays crossStraight(const WorldData& world, Walker& walker, const RimGap& gap) {
   const Vec3 across = projectToGround(gap.to - gap.from);
   const Vec3 aside = Vec3(-across.z(), 0, across.x()).normalized();
-  GapWays ways = crossAlongAxis(finder, gap, across, aside);
+  GapWays ways = crossAlongAxis(world, walker, gap, across, aside);
   for (int i = 0; i <= kMaxLines && ways.there.empty(); ++i) {
     const double offset = (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * kLineSpacing;
-    ways = crossAlong(finder.walker, gap.from + offset * aside, gap.to + offset * aside);
+    ways = crossAlong(walker, gap.from + offset * aside, gap.to + offset * aside);
   }
   return ways;
 }
 
 /// Searches on a grid off the mesh, from the higher side, since some ways lead down alone: the way
-/// soon comes to an end at a wall.
-GapWays crossOnGrid(Collection& all, RimGap gap) {
+/// soon comes to an end at a wall. Subtracts the walks from `maxWalks`.
+GapWays crossOnGrid(const Collection& all, Walker& walker, RimGap gap, std::size_t& maxWalks) {
   if (gap.from.y() < gap.to.y()) {
     std::swap(gap.from, gap.to);
     std::swap(gap.fromPolygon, gap.toPolygon);
   }
   const NavigationMesh& mesh = all.finder.ample;
-  const auto start = standNear(all.finder.walker, gap.from);
+  const auto start = standNear(walker, gap.from);
   if (!start) return {};
   const auto isWanted = [&](const Vec3& feet) {
     const auto polygon = findPolygonAt(mesh, feet);
@@ -180,19 +185,35 @@ GapWays crossOnGrid(Collection& all, RimGap gap) {
     return !polygon || all.getIsland(*polygon) == kNoIsland ||
            computeGroundDistance(feet, *start) < kNearStart;
   };
-  const std::size_t limit = std::min(kGapWalks, all.walksLeft);
-  const GridSearch limits{kSpacing, kGapMargin, limit};
+  const GridSearch limits{kSpacing, kGapMargin, maxWalks};
   GridSearch search = limits;
-  auto way = findGridPathOut(all.finder.walker, *start, {isWanted, isOpen, gap.to}, search);
-  all.walksLeft -= limit - search.maxWalks;
+  auto way = findGridPathOut(walker, *start, {isWanted, isOpen, gap.to}, search);
+  maxWalks = search.maxWalks;
   if (!way) return {};
-  std::vector<Vec3> back = findWayBack(all.finder.walker, *way, limits);
+  std::vector<Vec3> back = findWayBack(walker, *way, limits);
   return {std::move(*way), std::move(back)};
+}
+
+/// The result of a gap that was tried off the scarce mesh.
+struct GapTrial {
+  GapWays ways;
+  std::size_t walks = 0;  ///< on the grid
+};
+
+/// Depends on the gap alone, so several may be tried at once, each with its own walker.
+GapTrial tryGap(const Collection& all, Walker& walker, const RimGap& gap, std::size_t maxWalks) {
+  GapTrial trial;
+  std::size_t left = maxWalks;
+  trial.ways = crossOnGrid(all, walker, gap, left);
+  trial.walks = maxWalks - left;
+  if (trial.ways.there.empty() && computeGroundDistance(gap.from, gap.to) < kMaxStraightGap)
+    trial.ways = crossStraight(all.finder.world, walker, gap);
+  return trial;
 }
 
 /// Searches on a grid from a small island, where this comes to an end soon, for a way to another
 /// one and back.
-GapWays leaveIsland(const Collection& all, std::uint32_t island) {
+GapWays leaveIsland(const Collection& all, Walker& walker, std::uint32_t island) {
   const Vec3& place = all.islands.islands[island].place;
   const std::size_t share = kMaxExitWalks / all.islands.islands.size();
   const GridSearch limits{kSpacing, kMaxGapDetour,
@@ -203,9 +224,9 @@ GapWays leaveIsland(const Collection& all, std::uint32_t island) {
     return other != kNoIsland && other != island;
   };
   GridSearch out = limits;
-  auto way = findGridPathOut(all.finder.walker, place, {isOther}, out);
+  auto way = findGridPathOut(walker, place, {isOther}, out);
   if (!way) return {};
-  std::vector<Vec3> back = findWayBack(all.finder.walker, *way, limits);
+  std::vector<Vec3> back = findWayBack(walker, *way, limits);
   return {std::move(*way), std::move(back)};
 }
 
@@ -222,55 +243,116 @@ void addPassages(Collection& all, const GapWays& ways) {
   add(*to, *from, ways.back);
 }
 
-void crossGap(Collection& all, const RimGap& gap) {
+/// Whether ways across a gap are sought: those of joined islands are found by searches on the
+/// scarce mesh, and wide gaps lead nowhere off it.
+bool isSought(const Collection& all, const RimGap& gap, bool isOnScarce) {
   const std::uint32_t a = all.getIsland(gap.fromPolygon), b = all.getIsland(gap.toPolygon);
-  if (a == kNoIsland || b == kNoIsland || hasPassageAt(all.list, gap)) return;
+  if (a == kNoIsland || b == kNoIsland || hasPassageAt(all.list, gap)) return false;
+  return isOnScarce ? !(all.joined.contains({a, b}) && all.joined.contains({b, a}))
+                    : computeGroundDistance(gap.from, gap.to) <= kGapMargin;
+}
+
+/// `trial`: with kGapWalks walks; nullopt: not made.
+void crossGap(Collection& all, const RimGap& gap, std::optional<GapTrial> trial) {
   const auto key = makeKey(gap.from, gap.to);
-  auto known = all.tried.find(key);
-  if (known == all.tried.end()) {
-    const double width = computeGroundDistance(gap.from, gap.to);
-    const bool isOnScarce = isOnScarceMesh(all, gap);
-    // The other gaps of joined islands are found by searches on the scarce mesh.
-    if (isOnScarce ? all.joined.contains({a, b}) && all.joined.contains({b, a})
-                   : all.walksLeft == 0 || width > kGapMargin)
-      return;
-    GapWays ways = isOnScarce ? crossOnScarceMesh(all, gap) : crossOnGrid(all, gap);
-    if (ways.there.empty() && width < kMaxStraightGap) ways = crossStraight(all.finder, gap);
-    known = all.tried.emplace(key, std::move(ways)).first;
+  const auto known = all.tried.find(key);
+  const bool isOnScarce = known == all.tried.end() && isOnScarceMesh(all, gap);
+  if (!isSought(all, gap, isOnScarce)) return;
+  if (known != all.tried.end()) return addPassages(all, known->second);
+  Walker& walker = all.finder.walker;
+  GapWays ways;
+  if (isOnScarce) {
+    ways = crossOnScarceMesh(all, gap);
+    if (ways.there.empty() && computeGroundDistance(gap.from, gap.to) < kMaxStraightGap)
+      ways = crossStraight(all.finder.world, walker, gap);
+  } else if (all.walksLeft > 0) {  // a gap that is given up counts as tried
+    if (!trial || trial->walks > all.walksLeft)
+      trial = tryGap(all, walker, gap, std::min(kGapWalks, all.walksLeft));
+    all.walksLeft -= trial->walks;
+    ways = std::move(trial->ways);
   }
-  addPassages(all, known->second);
+  addPassages(all, all.tried.emplace(key, std::move(ways)).first->second);
+}
+
+/// Walkers of threads that work at once.
+using Walkers = std::deque<Walker>;
+
+Walkers makeWalkers(const PathFinder& finder, int threads) {
+  Walkers walkers;
+  for (int i = 0; i < threads; ++i) walkers.emplace_back(finder.world, finder.agent);
+  return walkers;
+}
+
+/// Calls `work` with each number below `count` and a walker that no other call has meanwhile.
+template <class Work>
+void forEachWithWalker(Walkers& walkers, std::size_t count, const Work& work) {
+  std::atomic<std::size_t> next{0};
+  parallelFor(walkers.size(), static_cast<int>(walkers.size()), {}, [&](std::size_t lane) {
+    for (std::size_t i = next++; i < count; i = next++) work(i, walkers[lane]);
+  });
+}
+
+/// Crosses all gaps in their order. The next ones are tried at once on several threads; passages
+/// and the walks that are left decide afterwards, so that threads change no result.
+void crossGaps(Collection& all, std::span<const RimGap> gaps, Walkers& walkers,
+               const std::function<void()>& report) {
+  for (std::size_t first = 0; first < gaps.size(); first += kGapsAtOnce) {
+    const auto block = gaps.subspan(first, std::min(kGapsAtOnce, gaps.size() - first));
+    std::vector<std::optional<GapTrial>> trials(block.size());
+    if (all.walksLeft > 0 && walkers.size() > 1)
+      forEachWithWalker(walkers, block.size(), [&](std::size_t i, Walker& walker) {
+        const RimGap& gap = block[i];
+        if (!all.tried.contains(makeKey(gap.from, gap.to)) && !isOnScarceMesh(all, gap) &&
+            isSought(all, gap, false))
+          trials[i] = tryGap(all, walker, gap, kGapWalks);
+      });
+    for (std::size_t i = 0; i < block.size(); ++i) {
+      crossGap(all, block[i], std::move(trials[i]));
+      report();
+    }
+  }
+}
+
+/// Small islands without a way to another one and back.
+std::vector<std::uint32_t> listClosedIslands(const Collection& all) {
+  std::set<std::uint32_t> left;
+  for (const auto& [from, to] : all.joined)
+    if (from != to && all.joined.contains({to, from})) left.insert(from);
+  std::vector<std::uint32_t> closed;
+  for (std::uint32_t island = 1; island < all.islands.islands.size(); ++island)
+    if (!left.contains(island) && all.islands.islands[island].area <= kMaxSmallArea)
+      closed.push_back(island);
+  return closed;
 }
 
 }  // namespace
 
 PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedGaps& tried,
-                            const std::function<void(double)>& progress) {
+                            int threads, const std::function<void(double)>& progress) {
   finder.maxRepairWalks = kMaxRepairWalks;
   Collection all{finder, islands, tried, finder.scarce.findIslands(), listParts(finder.ample), {}};
   for (std::uint32_t polygon = 0; polygon < islands.numberOf.size(); ++polygon)
     if (all.getIsland(polygon) == kNoIsland) all.list.areas[all.list.partOf[polygon]] = 0;
   const std::vector<RimGap> gaps = findRimGaps(
       finder.ample, all.list.partOf, kWallAndDoor + 2 * finder.agent.radius, kHeightReach);
-  const std::size_t count = gaps.size() + islands.islands.size();
-  std::size_t done = 0;
+  Walkers walkers = makeWalkers(finder, threads);
+  std::size_t done = 0, count = gaps.size() + islands.islands.size();
   const auto report = [&] {
     if (progress) progress(static_cast<double>(++done) / static_cast<double>(count));
   };
-  for (const RimGap& gap : gaps) {
-    crossGap(all, gap);
-    report();
-  }
-  std::set<std::uint32_t> left;  // islands with a way to another one and back
-  for (const auto& [from, to] : all.joined)
-    if (from != to && all.joined.contains({to, from})) left.insert(from);
-  for (std::uint32_t island = 1; island < islands.islands.size(); ++island) {
-    report();
-    const Vec3& place = islands.islands[island].place;
-    if (left.contains(island) || islands.islands[island].area > kMaxSmallArea) continue;
-    const auto key = makeKey(place, place);
-    if (!tried.contains(key)) tried.emplace(key, leaveIsland(all, island));
-    addPassages(all, tried.at(key));
-  }
+  crossGaps(all, gaps, walkers, report);
+  const std::vector<std::uint32_t> closed = listClosedIslands(all);
+  std::vector<GapWays> exits(closed.size());
+  const auto makeExitKey = [&](std::size_t i) {
+    const Vec3& place = islands.islands[closed[i]].place;
+    return makeKey(place, place);
+  };
+  forEachWithWalker(walkers, closed.size(), [&](std::size_t i, Walker& walker) {
+    if (!tried.contains(makeExitKey(i))) exits[i] = leaveIsland(all, walker, closed[i]);
+  });
+  for (std::size_t i = 0; i < closed.size(); ++i)
+    addPassages(all, tried.emplace(makeExitKey(i), std::move(exits[i])).first->second);
+  if (progress) progress(1);
   std::ranges::stable_sort(all.list.passages, {}, &Passage::fromPolygon);
   return std::move(all.list);
 }

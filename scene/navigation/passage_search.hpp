@@ -12,7 +12,7 @@
 
 namespace enfilade::scene {
 
-/// The ways across a gap, in both directions; empty: none was found.
+/// The ways across a gap, in both directions; empty: none was found, or the gap was given up.
 struct GapWays {
   std::vector<Vec3> there, back;
 };
@@ -21,10 +21,10 @@ struct GapWays {
 /// moves. The exit of a small island has its place twice.
 using TriedGaps = std::map<std::array<double, 6>, GapWays>;
 
-/// All passages of `finder.ample`. `islands`: as collectIslands() returns them. `progress`, which
-/// may be empty, gets the share that is done.
+/// All passages of `finder.ample`, the same for any number of threads. `islands`: as
+/// collectIslands() returns them. `progress`, which may be empty, gets the share that is done.
 PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedGaps& tried,
-                            const std::function<void(double)>& progress);
+                            int threads, const std::function<void(double)>& progress);
 
 /// Forgets gaps across which walks may end otherwise, since a body moved within this box.
 void forgetGaps(TriedGaps& tried, const Aabb& box);

@@ -220,6 +220,7 @@ void addReport(scene::Navigation& navigation, v1::NavigationReply& reply) {
   const scene::NavigationReport report = navigation.report();
   reply.set_navigable_area(report.area);
   reply.set_build_seconds(report.seconds);
+  reply.set_mesh_bytes(report.bytes);
   const std::size_t count = std::min(report.islandAreas.size(), kMaxIslandAreas);
   reply.mutable_island_areas()->Add(
       report.islandAreas.begin(), report.islandAreas.begin() + static_cast<std::ptrdiff_t>(count));
@@ -267,7 +268,8 @@ std::optional<v1::Error> NavigationService::load(const scene::NavigationAgent& a
   try {
     auto navigation = std::make_unique<scene::Navigation>(
         scene_, state.settings, agent,
-        std::span(reinterpret_cast<const std::uint8_t*>(mesh.data()), mesh.size()), state.progress);
+        std::span(reinterpret_cast<const std::uint8_t*>(mesh.data()), mesh.size()), 2,
+        state.progress);
     const auto snapshot = makeMeshSnapshot(doorsOpen, state);
     const std::size_t rebuilt = navigation->update(*snapshot, 2, state.progress);
     logInfo("navigation: loaded meshes for radius {} m, height {} m; {} tiles built again",

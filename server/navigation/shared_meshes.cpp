@@ -108,7 +108,7 @@ std::shared_ptr<SharedMeshes> findSharedMeshes(const MeshRequest& request, bool 
 
 /// The meshes themselves say for which poses of bodies they are: update() builds the rest.
 std::string makeCacheKey(const MeshRequest& request) {
-  std::string key = "navigation mesh 1 scene " + std::to_string(request.scene->hash());
+  std::string key = "navigation mesh 2 scene " + std::to_string(request.scene->hash());
   for (const double number : {request.agent.radius, request.agent.height,
                               request.settings.stepHeight, request.settings.walkableNormalY})
     key += " " + std::to_string(std::bit_cast<std::uint64_t>(number));
@@ -119,8 +119,8 @@ std::unique_ptr<scene::Navigation> loadNavigation(const MeshRequest& request,
                                                   std::span<const std::uint8_t> bytes,
                                                   const Progress& progress) {
   const auto start = std::chrono::steady_clock::now();
-  auto navigation = std::make_unique<scene::Navigation>(request.scene, request.settings,
-                                                        request.agent, bytes, progress);
+  auto navigation = std::make_unique<scene::Navigation>(
+      request.scene, request.settings, request.agent, bytes, request.threads, progress);
   const std::size_t rebuilt = navigation->update(*request.snapshot, request.threads, progress);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   logInfo("navigation: meshes for radius {} m, height {} m read in {:.2f} s, {} tiles built",

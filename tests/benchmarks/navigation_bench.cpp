@@ -453,6 +453,7 @@ void measureMeshes(Bench& bench, const Effort&, nlohmann::json& row) {
   query.mutable_islands()->set_count(1);
   const v1::NavigationReply islands = bench.ask(query, bench.atRest);
   row["build_seconds"] = islands.build_seconds();
+  row["mesh_bytes"] = islands.mesh_bytes();
   row["area"] = islands.navigable_area();
   row["islands"] = islands.island_areas_size();
 }

@@ -27,7 +27,7 @@ def make_fill_row(row):
 
 
 def make_time_row(row):
-    return [row["scene"], short(row["area"]), row["islands"], short(row["build_seconds"]),
+    return [row["scene"], short(row["area"]), row["islands"], short(row["build_seconds"]), short(row["mesh_bytes"] / 1e6),
             short(row["mesh_us"]), short(row["median_us"]), short(row["p99_us"]), short(row["not_found_p99_us"])]
 
 
@@ -76,7 +76,7 @@ step up or down therefore counts with its height on both.
 Of a query for a path, with its proof, doors as they are, answered in process on one thread. *On the mesh*: the corridor
 and the corners of its line alone, without a proof.
 
-{table(["scene", "navigable m²", "islands", "build s", "µs on the mesh, median", "µs a path, median", "99 %", "µs without a path, 99 %"],
+{table(["scene", "navigable m²", "islands", "build s", "MB", "µs on the mesh, median", "µs a path, median", "99 %", "µs without a path, 99 %"],
        [make_time_row(row) for row in parts["median_us"]])}
 """)
 

@@ -129,6 +129,7 @@ class NavigationTest(RoomCase):
         self.assertTrue(top.cells[row(0), column(2)])
         self.assertFalse(top.cells[row(0), column(5.1)])
         self.assertAlmostEqual(top.cells.sum() * 0.01, self.navigation.navigable_area, delta=8)
+        self.assertGreater(self.navigation.mesh_bytes, 10_000)
 
     def test_a_map_is_a_picture(self):
         png = self.navigation.top_down_png(0.0, 0.1)

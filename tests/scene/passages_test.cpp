@@ -78,8 +78,8 @@ TEST(Passages, AGapIsFoundAsideOfThePlacesThatFaceEachOther) {
     Walker walker(world.data(), agent);
     const IslandList islands = collectIslands(ample, walker, world.scene().bounds());
     TriedGaps tried;
-    const PassageList list =
-        collectPassages({world.data(), agent, walker, ample, scarce, nullptr}, islands, tried, {});
+    const PassageList list = collectPassages({world.data(), agent, walker, ample, scarce, nullptr},
+                                             islands, tried, 2, {});
     EXPECT_FALSE(list.passages.empty()) << shift;
   }
 }
@@ -163,6 +163,16 @@ TEST(Passages, AGapInAnIrregularWallIsFound) {
   }
 }
 
+/// The bytes have the meshes and the ways across all gaps that were tried.
+TEST(Passages, ThreadsChangeNoResult) {
+  for (const auto& scene : {roomWithTurnedWall(0.35, -0.4, 0.61), roomWithTurnedWall(0.35, 1, 0.58),
+                            boxScene(roomsWithFarGap(0.62)), boxScene(roomsWithFarGap(0.59))}) {
+    const auto one = Navigation(scene, {}, {}, nullptr, 1).save();
+    EXPECT_EQ(Navigation(scene, {}, {}, nullptr, 3).save(), one);
+    EXPECT_EQ(Navigation(scene, {}, {}, one, 3).save(), one);
+  }
+}
+
 /// The tiles are the first part of the work, and the passages most of the rest.
 TEST(Passages, TheirSearchReportsProgress) {
   const auto scene = boxScene(roomsWithFarGap(0.61));
@@ -173,7 +183,7 @@ TEST(Passages, TheirSearchReportsProgress) {
   EXPECT_GT(std::ranges::count_if(built, [](double share) { return share > 0.81 && share < 0.99; }),
             10);
   EXPECT_EQ(built.back(), 1);
-  Navigation(scene, {}, {}, navigation.save(), [&](double share) { loaded.push_back(share); });
+  Navigation(scene, {}, {}, navigation.save(), 2, [&](double share) { loaded.push_back(share); });
   EXPECT_TRUE(std::ranges::is_sorted(loaded));
   EXPECT_GT(loaded.front(), Navigation::kTileShare);
   EXPECT_GT(loaded.size(), 10u);

@@ -12,12 +12,20 @@
 #include "scene/world/checkpoint/archive.hpp"
 
 namespace enfilade::scene {
+
+template <class A>
+void archiveMembers(A& a, MaybeConst<A, SavedGap>& gap) {
+  auto& [key, there, back] = gap;
+  a(key, there, back);
+}
+
 namespace {
 
-constexpr std::string_view kMagic = "EnfMesh3";
+constexpr std::string_view kMagic = "EnfMesh4";
 constexpr std::size_t kWordBytes = 8;
 constexpr int kMaxCount = 1 << 22;             // of anything in a tile
 constexpr float kMaxCoordinate = 1e8f;         // metres: Detour's squares do not overflow
+constexpr std::size_t kMaxWayPoints = 5000;    // searches for ways end before
 constexpr unsigned kBoundaryEdges = 0b010101;  // flags of a triangle of the detail mesh
 
 std::uint64_t computeMeshChecksum(std::span<const std::uint8_t> bytes) {
@@ -148,7 +156,7 @@ std::vector<std::uint8_t> saveMeshes(const WorldData& world, const NavigationAge
   for (const collision::Pose& pose : meshes.bodies)
     bodies.emplace_back(pose.translation, pose.rotation);
   file(collectSizes(world.settings, agent), bodies, toStrings(meshes.ample),
-       toStrings(meshes.scarce));
+       toStrings(meshes.scarce), meshes.gaps);
   file.writeFixed64(computeMeshChecksum(file.bytes));
   return std::move(file.bytes);
 }
@@ -177,7 +185,7 @@ SavedMeshes loadMeshes(const WorldData& world, const NavigationAgent& agent, con
                             std::to_string(sizes[i]) + ", not " + std::to_string(own[i]));
     Poses bodies;
     std::vector<std::string> ample, scarce;
-    file(bodies, ample, scarce);
+    file(bodies, ample, scarce, meshes.gaps);
     for (const auto& [position, rotation] : bodies) meshes.bodies.push_back({rotation, position});
     meshes.ample = toTiles(ample);
     meshes.scarce = toTiles(scarce);
@@ -186,6 +194,9 @@ SavedMeshes loadMeshes(const WorldData& world, const NavigationAgent& agent, con
     if (file.remaining() > 0 || meshes.bodies.size() != world.bodies.size() ||
         meshes.ample.size() != tiles || meshes.scarce.size() != tiles)
       file.refuse("its lists do not fit the scene");
+    for (const SavedGap& gap : meshes.gaps)
+      if (std::max(gap.there.size(), gap.back.size()) > kMaxWayPoints)
+        file.refuse("a way across a gap is too long");
     for (const auto* list : {&meshes.ample, &meshes.scarce})
       for (const TileMesh& tile : *list)
         if (!tile.empty() && !isTileSafe(tile, grid)) file.refuse("a tile is invalid");

@@ -1,6 +1,8 @@
-// Navigation meshes as bytes: the tiles of an agent's size in a scene, and where its bodies stood.
+// Navigation meshes as bytes: the tiles of an agent's size in a scene, where its bodies stood, and
+// the gaps that were tried.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <stdexcept>
@@ -14,10 +16,17 @@ struct MeshFileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// The ways across a gap of the rim that was tried: a TriedGaps entry.
+struct SavedGap {
+  std::array<double, 6> key{};  ///< coordinates of both places
+  std::vector<Vec3> there, back;
+};
+
 struct SavedMeshes {
   std::vector<TileMesh> ample, scarce;  ///< by tile of the grid
   std::vector<collision::Pose>
       bodies;  ///< in the order of Model::bodies: where the tiles have them
+  std::vector<SavedGap> gaps;
 };
 
 /// `world`: what the meshes belong to. The bytes depend on the machine's byte order alone.
@@ -25,7 +34,8 @@ std::vector<std::uint8_t> saveMeshes(const WorldData& world, const NavigationAge
                                      const SavedMeshes& meshes);
 
 /// Reads meshes of this scene, these settings and this size. Throws MeshFileError if they belong to
-/// others, or are damaged. A tile that was read is safe to use, whatever the bytes are.
+/// others, or are damaged. A tile that was read is safe to use, whatever the bytes are; a
+/// way across a gap may be none that can be walked.
 SavedMeshes loadMeshes(const WorldData& world, const NavigationAgent& agent, const TileGrid& grid,
                        std::span<const std::uint8_t> bytes);
 

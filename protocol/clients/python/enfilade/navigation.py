@@ -315,3 +315,8 @@ class Navigation:
     def build_seconds(self) -> float:
         """How long the server built the meshes of this size."""
         return self._meshes().build_seconds
+
+    @property
+    def mesh_bytes(self) -> int:
+        """Memory of the navigation meshes."""
+        return self._meshes().mesh_bytes
