@@ -5,8 +5,9 @@
 // at most rho theta^2 t (1 - t) / 2. With B = (rho_A theta_A^2 + rho_B theta_B^2) / 2 the gap stays
 // positive if
 //   g0 / t + g1 / (1 - t) > B; by its minimum: (sqrt g0 + sqrt g1)^2 > B.
-// Where neither the plane of the start nor that of the end suffices, the motion is halved. The
-// middle of a uniform rotation from q0 to q1 is q0 + q1, normalised, up to rounding.
+// Where neither the plane of the start nor that of the end suffices, the motion is halved: the
+// advancement continues from the position reached to the end of the longest part that is proved.
+// The middle of a uniform rotation from q0 to q1 is q0 + q1, normalised, up to rounding.
 //
 // Where the bodies move by less than their distance, no plane is needed.
 //
@@ -15,10 +16,12 @@
 #include "collision/motion/interpolated_motion.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "collision/assert.hpp"
 #include "collision/floating_point.hpp"
+#include "collision/motion/conservative_advancement.hpp"
 #include "collision/narrow_phase/axis_separation.hpp"
 
 namespace enfilade::collision {
@@ -110,25 +113,64 @@ bool isProvenClear(const MovingPair& pair, const Sample& start, const Sample& en
          isSeparatedByPlane(separationAlong(pair, end.cache, false), end.axisLowerBound, deviation);
 }
 
-/// Returns the fraction of the motion that is proved clear. The end may be unseparated.
-double searchClearFraction(const MovingPair& pair, const Sample& start, const Sample& end,
-                           int halvings, MotionResult& result) {
-  if (end.lowerBound > 0 && isProvenClear(pair, start, end)) return 1;
-  if (halvings == 0) return 0;
-  const InterpolatedMotion &a = pair.a.motion, &b = pair.b.motion;
-  const CentrePose middleA = computeMiddlePose(a.from, a.to);
-  const CentrePose middleB = computeMiddlePose(b.from, b.to);
-  const InterpolatedMotion firstA = replaceEnds(a, a.from, middleA),
-                           firstB = replaceEnds(b, b.from, middleB);
-  const MovingPair firstHalf{{pair.a.shape, firstA}, {pair.b.shape, firstB}};
-  const Sample middle = querySample(firstHalf, true, start.cache, result);
-  const double first = searchClearFraction(firstHalf, start, middle, halvings - 1, result);
-  if (first < 1) return 0.5 * first;
-  const InterpolatedMotion secondA = replaceEnds(a, middleA, a.to),
-                           secondB = replaceEnds(b, middleB, b.to);
-  const MovingPair secondHalf{{pair.a.shape, secondA}, {pair.b.shape, secondB}};
-  return 0.5 + 0.5 * searchClearFraction(secondHalf, middle, end, halvings - 1, result);
-}
+/// A position of both motions.
+struct Position {
+  double fraction = 0;  ///< a multiple of 2^-kMaxHalvings
+  CentrePose a, b;
+  Sample sample;
+};
+
+/// The parts of two motions: the whole, its halves, and so on.
+class ClearanceSearch {
+ public:
+  ClearanceSearch(const MovingPair& whole, const Sample& start, const Sample& end)
+      : whole_(whole),
+        partA_(whole.a.motion),
+        partB_(whole.b.motion),
+        start_{0, partA_.from, partB_.from, start} {
+    ends_[0] = {1, partA_.to, partB_.to, end};
+  }
+
+  /// Advances to the end of the longest part from the position reached that is proved clear, and
+  /// returns it; kArrived if none is.
+  double certify(MotionResult& result) {
+    while (!(getEnd().sample.lowerBound > 0 &&
+             isProvenClear(getPart(), start_.sample, getEnd().sample))) {
+      if ((getEnd().fraction - start_.fraction) * kFractionSteps <= 1) return kArrived;
+      halvePart(result);
+    }
+    start_ = getEnd();
+    if (--endCount_ > 0) takePart();
+    return start_.fraction;
+  }
+
+ private:
+  const Position& getEnd() const { return ends_[endCount_ - 1]; }
+  MovingPair getPart() const { return {{whole_.a.shape, partA_}, {whole_.b.shape, partB_}}; }
+
+  /// Makes the part from start_ to the next end.
+  void takePart() {
+    partA_ = replaceEnds(whole_.a.motion, start_.a, getEnd().a);
+    partB_ = replaceEnds(whole_.b.motion, start_.b, getEnd().b);
+  }
+
+  void halvePart(MotionResult& result) {
+    const Position& end = getEnd();
+    Position& middle = ends_[endCount_];
+    middle.fraction = 0.5 * (start_.fraction + end.fraction);
+    middle.a = computeMiddlePose(start_.a, end.a);
+    middle.b = computeMiddlePose(start_.b, end.b);
+    ++endCount_;
+    takePart();
+    middle.sample = querySample(getPart(), true, start_.sample.cache, result);
+  }
+
+  const MovingPair& whole_;
+  InterpolatedMotion partA_, partB_;  ///< from start_ to the next end
+  Position start_;
+  std::array<Position, kMaxHalvings + 1> ends_;  ///< of the parts that remain, the next one last
+  std::size_t endCount_ = 1;
+};
 
 }  // namespace
 
@@ -225,9 +267,13 @@ MotionResult computeClearance(const InterpolatedShape& a, const InterpolatedShap
                            : querySample(pair, false, cache, result);
   if (!(start.lowerBound > 0)) return result;
   const Sample end = querySample(pair, true, start.cache, result);
-  result.lo = searchClearFraction(pair, start, end, kMaxHalvings, result);
-  ENFILADE_ASSERT(result.lo >= 0 && result.lo <= 1);
-  if (result.lo == 1) result.outcome = MotionOutcome::clear;
+  ClearanceSearch search(pair, start, end);
+  constexpr double kWhole = 1;
+  const MotionOutcome outcome =
+      advance(result.lo, kWhole, 1 << kMaxHalvings, [&](double) { return search.certify(result); });
+  if (outcome != MotionOutcome::clear) return result;
+  result.outcome = outcome;
+  result.lo = kWhole;
   return result;
 }
 
