@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <numbers>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 
@@ -68,14 +68,15 @@ NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agen
 
 std::optional<GapAxis> measureGapAxis(const WorldData& world, const NavigationAgent& agent,
                                       const Vec3& place, const Vec3& direction) {
-  constexpr double kMaxWidth = 1;  // metres to each side: a wider gap needs no axis
+  constexpr double kMaxWidth = 1;      // metres to each side: a wider gap needs no axis
+  constexpr double kSameWidth = 0.01;  // metres
   const auto shape = makeThinShape(world.settings, agent);
   GapAxis axis{place, direction, std::numeric_limits<double>::infinity()};
   // Ever closer around the best angle so far: 30 degrees in steps of 10, then a third of each.
-  for (double step = std::numbers::pi / 18; step > 1e-3; step /= 3) {
+  for (double degrees = 10; degrees > 0.06; degrees /= 3) {
     const Vec3 middle = axis.direction;
     for (int i = -3; i <= 3; ++i) {
-      const double cosine = std::cos(i * step), sine = std::sin(i * step);
+      const auto [sine, cosine] = collision::computeSineCosineOfDegrees(i * degrees);
       const Vec3 turned = cosine * middle + sine * turnToSide(middle);
       const auto [left, right] = measureSides(world, *shape, place, turned, kMaxWidth);
       if (left + right < 2 * agent.radius) return std::nullopt;
@@ -83,7 +84,17 @@ std::optional<GapAxis> measureGapAxis(const WorldData& world, const NavigationAg
         axis = {place + 0.5 * (left - right) * turnToSide(turned), turned, left + right};
     }
   }
-  return axis.clearWidth < 2 * kMaxWidth ? std::optional(axis) : std::nullopt;
+  if (!(axis.clearWidth < 2 * kMaxWidth)) return std::nullopt;
+  // The width changes little with the angle: the middle at another place of a long gap is better.
+  for (const double along : {1.0, -1.0, 0.5, -0.5, 0.25, -0.25}) {
+    const Vec3 other = axis.centre + along * axis.direction;
+    const auto [left, right] = measureSides(world, *shape, other, axis.direction, kMaxWidth);
+    if (std::abs(left + right - axis.clearWidth) > kSameWidth) continue;
+    const Vec3 middle = other + 0.5 * (left - right) * turnToSide(axis.direction);
+    axis.direction = (middle - axis.centre).normalized() * (along > 0 ? 1 : -1);
+    break;
+  }
+  return axis;
 }
 
 std::shared_ptr<const AvatarShape> makeThinShape(const WorldSettings& settings,

@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "scene/navigation/clear_width.hpp"
 #include "scene/navigation/mesh/shortest_corridor.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -15,6 +16,8 @@ namespace {
 
 constexpr int kMaxProposals = 12;  // corridors to try on a mesh
 constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way around it begins
+constexpr double kNarrowGap =
+    0.1;  // metres: a gap that is wider than the agent by more needs no axis
 constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
 // Failures at a portal, without a proved path through it meanwhile, after which it is not tried
 // again.
@@ -28,6 +31,53 @@ constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less
 constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
 constexpr double kMaxMeshOffset = 0.1;     // metres, across
 constexpr double kShortPath = 5;  // metres: mesh lines keep some centimetres more than is needed
+
+/// The axis of a gap that the walker stopped before, or in.
+std::optional<GapAxis> findNarrowGap(const PathFinder& finder, const Vec3& stop,
+                                     const Vec3& direction) {
+  for (int i = 0; i < 3; ++i) {
+    const Vec3 place = stop + i * finder.agent.radius * direction;
+    const auto axis = measureGapAxis(finder.world, finder.agent, place, direction);
+    if (axis && axis->clearWidth < 2 * finder.agent.radius + kNarrowGap) return axis;
+  }
+  return std::nullopt;
+}
+
+/// Walks along the axis of the gap that stopped the walker before `corner`: a corridor that is just
+/// wide enough admits no other line. Appends the place before the gap and the one level with the
+/// corner, or else one within the gap.
+bool passGap(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corner,
+             NavigationPath& path, Proof& proof) {
+  const Vec3 from = path.points.back();
+  const Vec3 way = projectToGround(corner - from);
+  if (!(way.norm() > kStandOff)) return false;
+  const auto axis = findNarrowGap(finder, stop.footPosition, way.normalized());
+  if (!axis) return false;
+  const auto onAxis = [&](const Vec3& place) {
+    const double along = projectToGround(place - axis->centre).dot(axis->direction);
+    Vec3 projected = axis->centre + along * axis->direction;
+    projected.y() = place.y();
+    return projected;
+  };
+  const double stopped = computeGroundDistance(from, stop.footPosition);
+  const Vec3 before = from + std::max(0.0, stopped - kStandOff) * way.normalized();
+  finder.walker.returnTo(from);
+  if (finder.walker.walkTo(onAxis(before)).kind != WalkOutcome::Kind::arrived) return false;
+  const Vec3 start = finder.walker.footPosition();
+  std::vector<Vec3> targets{corner};
+  for (const double beyond : kRejoinDistances)
+    targets.push_back(stop.footPosition + beyond * way.normalized());
+  for (const Vec3& target : targets) {
+    finder.walker.returnTo(start);
+    const WalkOutcome outcome = finder.walker.walkTo(onAxis(target));
+    if (!isThere(outcome, target, kSameFloor)) continue;
+    path.points.push_back(start);
+    path.points.push_back(outcome.footPosition);
+    proof.isRepaired = true;
+    return true;
+  }
+  return false;
+}
 
 /// Goes around the obstacle that stopped the walker on the way from the last place of `path` to
 /// `corner`. Appends places up to where it joins that way again, or up to the corner.
@@ -92,6 +142,10 @@ bool proveLegs(const PathFinder& finder, std::vector<Vec3> corners, Clearance cl
         const auto place = standNear(finder.walker, corners[i]);
         if (!place) break;  // the next corner may be reached without this one
         corners[i] = *place;
+      }
+      if (repairs < kMaxRepairs && passGap(finder, outcome, corners[i], path, proof)) {
+        if (!isLast && computeGroundDistance(path.points.back(), corners[i]) < kNarrowGap) break;
+        continue;
       }
       if (repairs < kMaxRepairs && goAround(finder, outcome, corners[i], path, proof)) continue;
       proof.met.push_back({outcome.obstacle, outcome.footPosition, 0});

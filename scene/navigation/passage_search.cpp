@@ -4,6 +4,8 @@
 #include <atomic>
 #include <cmath>
 #include <deque>
+#include <limits>
+#include <map>
 #include <optional>
 #include <set>
 #include <span>
@@ -41,6 +43,7 @@ constexpr std::size_t kGapWalks = 1000;
 // narrow way.
 constexpr std::size_t kMaxExitWalks = 50'000, kMinExitWalks = 300, kMaxWalksOfExit = 4000;
 constexpr std::size_t kMaxRepairWalks = 2000;  // of a way on the scarce mesh
+constexpr double kMaxCorridor = 20;            // metres between islands
 constexpr std::size_t kGapsAtOnce = 32;  // more are tried in vain: passages of some join others
 
 std::array<double, 6> makeKey(const Vec3& from, const Vec3& to) {
@@ -243,22 +246,30 @@ void addPassages(Collection& all, const GapWays& ways) {
   add(*to, *from, ways.back);
 }
 
-/// Whether ways across a gap are sought: those of joined islands are found by searches on the
-/// scarce mesh, and wide gaps lead nowhere off it.
-bool isSought(const Collection& all, const RimGap& gap, bool isOnScarce) {
+bool isOpen(const Collection& all, const RimGap& gap) {
+  return all.getIsland(gap.fromPolygon) != kNoIsland && all.getIsland(gap.toPolygon) != kNoIsland &&
+         !hasPassageAt(all.list, gap);
+}
+
+/// Other gaps of joined islands are found by searches on the scarce mesh.
+bool isJoined(const Collection& all, const RimGap& gap) {
   const std::uint32_t a = all.getIsland(gap.fromPolygon), b = all.getIsland(gap.toPolygon);
-  if (a == kNoIsland || b == kNoIsland || hasPassageAt(all.list, gap)) return false;
-  return isOnScarce ? !(all.joined.contains({a, b}) && all.joined.contains({b, a}))
-                    : computeGroundDistance(gap.from, gap.to) <= kGapMargin;
+  return all.joined.contains({a, b}) && all.joined.contains({b, a});
+}
+
+/// Whether a gap off the scarce mesh is so narrow that a way may lead across it.
+bool isNarrow(const RimGap& gap) {
+  return computeGroundDistance(gap.from, gap.to) <= kGapMargin;
 }
 
 /// `trial`: with kGapWalks walks; nullopt: not made.
 void crossGap(Collection& all, const RimGap& gap, std::optional<GapTrial> trial) {
+  if (!isOpen(all, gap)) return;
   const auto key = makeKey(gap.from, gap.to);
-  const auto known = all.tried.find(key);
-  const bool isOnScarce = known == all.tried.end() && isOnScarceMesh(all, gap);
-  if (!isSought(all, gap, isOnScarce)) return;
-  if (known != all.tried.end()) return addPassages(all, known->second);
+  if (const auto known = all.tried.find(key); known != all.tried.end())
+    return addPassages(all, known->second);
+  const bool isOnScarce = isOnScarceMesh(all, gap);
+  if (isOnScarce ? isJoined(all, gap) : !isNarrow(gap)) return;
   Walker& walker = all.finder.walker;
   GapWays ways;
   if (isOnScarce) {
@@ -302,8 +313,8 @@ void crossGaps(Collection& all, std::span<const RimGap> gaps, Walkers& walkers,
     if (all.walksLeft > 0 && walkers.size() > 1)
       forEachWithWalker(walkers, block.size(), [&](std::size_t i, Walker& walker) {
         const RimGap& gap = block[i];
-        if (!all.tried.contains(makeKey(gap.from, gap.to)) && !isOnScarceMesh(all, gap) &&
-            isSought(all, gap, false))
+        if (isOpen(all, gap) && isNarrow(gap) && !all.tried.contains(makeKey(gap.from, gap.to)) &&
+            !isOnScarceMesh(all, gap))
           trials[i] = tryGap(all, walker, gap, kGapWalks);
       });
     for (std::size_t i = 0; i < block.size(); ++i) {
@@ -311,6 +322,70 @@ void crossGaps(Collection& all, std::span<const RimGap> gaps, Walkers& walkers,
       report();
     }
   }
+}
+
+/// The way from a polygon of the scarce mesh to the closest island.
+struct IslandReach {
+  double distance = std::numeric_limits<double>::infinity();  ///< metres
+  std::uint32_t source = 0;                                   ///< polygon of the ample mesh there
+};
+
+double measureStep(const NavigationMesh& mesh, std::uint32_t from, std::uint32_t to) {
+  return (mesh.centre(to) - mesh.centre(from)).norm();
+}
+
+/// By polygon of the scarce mesh, by Dijkstra's algorithm from all islands at once. Portals that
+/// searches closed count as open: the result does not depend on earlier searches.
+std::vector<IslandReach> reachFromIslands(const Collection& all) {
+  const NavigationMesh &ample = all.finder.ample, &scarce = all.finder.scarce;
+  std::vector<IslandReach> reached(scarce.polygonCount());
+  std::set<std::pair<double, std::uint32_t>> queue;
+  for (std::uint32_t polygon = 0; polygon < ample.polygonCount(); ++polygon) {
+    if (all.getIsland(polygon) == kNoIsland) continue;
+    const auto at = findPolygonAt(scarce, ample.centre(polygon));
+    if (!at || reached[*at].distance == 0) continue;
+    reached[*at] = {0, polygon};
+    queue.emplace(0, *at);
+  }
+  while (!queue.empty()) {
+    const auto [distance, polygon] = *queue.begin();
+    queue.erase(queue.begin());
+    for (const Portal& portal : scarce.portals(polygon)) {
+      const double next = distance + measureStep(scarce, polygon, portal.to);
+      if (next > kMaxCorridor || !(next < reached[portal.to].distance)) continue;
+      queue.erase({reached[portal.to].distance, portal.to});
+      reached[portal.to] = {next, reached[polygon].source};
+      queue.emplace(next, portal.to);
+    }
+  }
+  return reached;
+}
+
+/// Pairs of islands that a corridor of the scarce mesh joins, as gaps between polygons of the ample
+/// mesh at its ends; the shortest first. Ends of a long corridor do not face each other as a gap.
+std::vector<RimGap> findLongGaps(const Collection& all) {
+  const NavigationMesh &ample = all.finder.ample, &scarce = all.finder.scarce;
+  const std::vector<IslandReach> reached = reachFromIslands(all);
+  struct LongGap {
+    double length = std::numeric_limits<double>::infinity();
+    RimGap gap;
+  };
+  std::map<std::pair<std::uint32_t, std::uint32_t>, LongGap> shortest;  // by islands
+  for (std::uint32_t polygon = 0; polygon < scarce.polygonCount(); ++polygon)
+    for (const Portal& portal : scarce.portals(polygon)) {
+      const IslandReach &from = reached[polygon], &to = reached[portal.to];
+      const double length = from.distance + to.distance + measureStep(scarce, polygon, portal.to);
+      const std::uint32_t a = all.getIsland(from.source), b = all.getIsland(to.source);
+      if (!(length < kMaxCorridor) || a >= b || !(length < shortest[{a, b}].length)) continue;
+      shortest[{a, b}] = {
+          length, {from.source, to.source, ample.centre(from.source), ample.centre(to.source)}};
+    }
+  std::vector<LongGap> sorted;
+  for (const auto& [islands, one] : shortest) sorted.push_back(one);
+  std::ranges::stable_sort(sorted, {}, &LongGap::length);
+  std::vector<RimGap> gaps;
+  for (const LongGap& one : sorted) gaps.push_back(one.gap);
+  return gaps;
 }
 
 /// Small islands without a way to another one and back.
@@ -336,11 +411,13 @@ PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedG
   const std::vector<RimGap> gaps = findRimGaps(
       finder.ample, all.list.partOf, kWallAndDoor + 2 * finder.agent.radius, kHeightReach);
   Walkers walkers = makeWalkers(finder, threads);
-  std::size_t done = 0, count = gaps.size() + islands.islands.size();
+  const std::size_t count = gaps.size() + islands.islands.size();
+  std::size_t done = 0;
   const auto report = [&] {
     if (progress) progress(static_cast<double>(++done) / static_cast<double>(count));
   };
   crossGaps(all, gaps, walkers, report);
+  for (const RimGap& gap : findLongGaps(all)) crossGap(all, gap, std::nullopt);
   const std::vector<std::uint32_t> closed = listClosedIslands(all);
   std::vector<GapWays> exits(closed.size());
   const auto makeExitKey = [&](std::size_t i) {

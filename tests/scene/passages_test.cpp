@@ -163,13 +163,34 @@ TEST(Passages, AGapInAnIrregularWallIsFound) {
   }
 }
 
+/// Walls that are 3 m thick, with a corridor.
+std::shared_ptr<const Scene> roomsWithCorridor(double width, double at) {
+  return boxScene({{"floor", {-1, -0.2, 0}, {11, 0, 6}},
+                   {"wall/near", {3.5, 0, 0}, {6.5, 2.5, at}},
+                   {"wall/far", {3.5, 0, at + width}, {6.5, 2.5, 6}}});
+}
+
+TEST(Passages, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
+  const Vec3 left(1, 0, 3), right(9, 0, 3);
+  for (const double at : {3.0, 3.017, 3.031})
+    for (const double width : {0.611, 0.58, 0.62, 0.66}) {
+      Navigation navigation(roomsWithCorridor(width, at), {}, {});
+      const bool isWide = width > 0.6;
+      EXPECT_EQ(navigation.findPath(left, right).found(), isWide) << width << " " << at;
+      EXPECT_EQ(navigation.findIsland(left) == navigation.findIsland(right), isWide) << width;
+    }
+}
+
 /// The bytes have the meshes and the ways across all gaps that were tried.
 TEST(Passages, ThreadsChangeNoResult) {
   for (const auto& scene : {roomWithTurnedWall(0.35, -0.4, 0.61), roomWithTurnedWall(0.35, 1, 0.58),
-                            boxScene(roomsWithFarGap(0.62)), boxScene(roomsWithFarGap(0.59))}) {
+                            boxScene(roomsWithFarGap(0.62)), boxScene(roomsWithFarGap(0.59)),
+                            roomsWithCorridor(0.62, 3)}) {
     const auto one = Navigation(scene, {}, {}, nullptr, 1).save();
     EXPECT_EQ(Navigation(scene, {}, {}, nullptr, 3).save(), one);
-    EXPECT_EQ(Navigation(scene, {}, {}, one, 3).save(), one);
+    Navigation loaded(scene, {}, {}, one, 3);
+    EXPECT_EQ(loaded.save(), one);
+    EXPECT_EQ(loaded.report().islandAreas, Navigation(scene, {}, {}).report().islandAreas);
   }
 }
 
