@@ -1,5 +1,5 @@
 // The Minkowski difference B - A of two convex bodies in exact integers: slow, but correct for
-// every input. Internal to the narrow phase.
+// every input. Internal to collision/.
 #pragma once
 
 #include <gmpxx.h>

@@ -1,5 +1,5 @@
 // The Minkowski difference B - A of two placed convex bodies: its points in extended precision and
-// its support points with certified bounds. Internal to the narrow phase.
+// its support points with certified bounds. Internal to collision/.
 //
 // Rounding analysis. LongReal is long double; eta is its unit roundoff (2^-64 on x86-64). The
 // bounds are written in eta, so they hold for any long double. S_A is the radius of A's vertices

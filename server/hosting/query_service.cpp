@@ -4,6 +4,7 @@
 #include <list>
 #include <mutex>
 #include <optional>
+#include <stdexcept>
 #include <utility>
 #include <vector>
 
@@ -122,22 +123,32 @@ EncodedMessage QueryService::State::answerQuery(const SceneQuery& query) {
   std::vector<std::uint8_t> attachment;
   v1::ServerMessage reply;
   reply.set_reply_to(message.request_id());
-  if (message.has_rays())
-    setReply(reply, answerRays(query, attachment), &v1::ServerMessage::mutable_rays);
-  else if (message.has_distances())
-    setReply(reply, answerDistances(message.distances(), makeSceneAt(query), query.limits),
-             &v1::ServerMessage::mutable_distances);
-  else if (message.has_touching())
-    setReply(reply,
-             answerTouching(message.touching(), makeSceneAt(query), query.settings, query.limits),
-             &v1::ServerMessage::mutable_touching);
-  else if (message.has_floor_plan())
-    setReply(reply, answerPlan(query), &v1::ServerMessage::mutable_floor_plan);
-  else if (message.has_navigation())
-    setReply(reply, answerNavigation(query, attachment), &v1::ServerMessage::mutable_navigation);
-  else
-    setReply(reply, answerCannotTouch(message.cannot_touch(), makeSceneAt(query), query.settings),
-             &v1::ServerMessage::mutable_cannot_touch);
+  switch (message.body_case()) {
+    case v1::ClientMessage::kRays:
+      setReply(reply, answerRays(query, attachment), &v1::ServerMessage::mutable_rays);
+      break;
+    case v1::ClientMessage::kDistances:
+      setReply(reply, answerDistances(message.distances(), makeSceneAt(query), query.limits),
+               &v1::ServerMessage::mutable_distances);
+      break;
+    case v1::ClientMessage::kTouching:
+      setReply(reply,
+               answerTouching(message.touching(), makeSceneAt(query), query.settings, query.limits),
+               &v1::ServerMessage::mutable_touching);
+      break;
+    case v1::ClientMessage::kFloorPlan:
+      setReply(reply, answerPlan(query), &v1::ServerMessage::mutable_floor_plan);
+      break;
+    case v1::ClientMessage::kNavigation:
+      setReply(reply, answerNavigation(query, attachment), &v1::ServerMessage::mutable_navigation);
+      break;
+    case v1::ClientMessage::kCannotTouch:
+      setReply(reply, answerCannotTouch(message.cannot_touch(), makeSceneAt(query), query.settings),
+               &v1::ServerMessage::mutable_cannot_touch);
+      break;
+    default:
+      throw std::logic_error("the query thread has no answer to this request");
+  }
   return encodeShared(reply, std::move(attachment));
 }
 

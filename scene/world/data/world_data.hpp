@@ -1,4 +1,4 @@
-// The state of a World as plain data. Private to scene/.
+// The state of a World as plain data, changed by the tick alone.
 #pragma once
 
 #include <map>

@@ -9,6 +9,7 @@
 #include <numbers>
 #include <string>
 
+#include "collision/motion/sine_cosine.hpp"
 #include "collision/shapes/triangle_tree.hpp"
 #include "scene/world/queries/scene_trees.hpp"
 
@@ -309,15 +310,17 @@ std::vector<Ray> makeScanRays(const RangeScan& scan) {
   const double down = step(scan.height, scan.rows, false);
   const double left = scan.columns > 1 ? -scan.width / 2 : 0,
                top = scan.rows > 1 ? scan.height / 2 : 0;
+  const auto sineCosine = [](double radians) {
+    return collision::computeSineCosineOfDegrees(radians * collision::kDegreesPerRadian);
+  };
   std::vector<Ray> rays;
   rays.reserve(std::size_t{scan.columns} * scan.rows);
   for (std::uint32_t row = 0; row < scan.rows; ++row) {
-    const double pitch = top - row * down;
+    const auto [sinePitch, cosinePitch] = sineCosine(top - row * down);
     for (std::uint32_t column = 0; column < scan.columns; ++column) {
-      const double yaw = left + column * across;
-      const Vec3 level = std::cos(yaw) * ahead + std::sin(yaw) * right;
-      rays.push_back(
-          {scan.origin, std::cos(pitch) * level + std::sin(pitch) * up, scan.maxDistance});
+      const auto [sineYaw, cosineYaw] = sineCosine(left + column * across);
+      const Vec3 level = cosineYaw * ahead + sineYaw * right;
+      rays.push_back({scan.origin, cosinePitch * level + sinePitch * up, scan.maxDistance});
     }
   }
   return rays;
