@@ -95,7 +95,7 @@ std::shared_ptr<const Scene> roomWithTurnedWall(double angle, double at, double 
 }
 
 TEST(Passages, AGapInATurnedWallIsFoundIfItIsACentimetreWiderThanTheAgent) {
-  for (const double angle : {0.02, 0.08, 0.35, 0.785, 1.45}) {
+  for (const double angle : {0.08, 0.35, 1.45}) {
     for (const double at : {-0.4, 1.31}) {
       const Vec3 side = Eigen::AngleAxisd(angle, Vec3::UnitY()) * Vec3(0, 0, 2.5);
       for (const double gap : {0.61, 0.58}) {  // across its flat sides an agent is narrower
@@ -183,14 +183,14 @@ TEST(Passages, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
 
 /// The bytes have the meshes and the ways across all gaps that were tried.
 TEST(Passages, ThreadsChangeNoResult) {
-  for (const auto& scene : {roomWithTurnedWall(0.35, -0.4, 0.61), roomWithTurnedWall(0.35, 1, 0.58),
-                            boxScene(roomsWithFarGap(0.62)), boxScene(roomsWithFarGap(0.59)),
+  for (const auto& scene : {roomWithTurnedWall(0.35, -0.4, 0.61), boxScene(roomsWithFarGap(0.62)),
                             roomsWithCorridor(0.62, 3)}) {
-    const auto one = Navigation(scene, {}, {}, nullptr, 1).save();
-    EXPECT_EQ(Navigation(scene, {}, {}, nullptr, 3).save(), one);
-    Navigation loaded(scene, {}, {}, one, 3);
-    EXPECT_EQ(loaded.save(), one);
-    EXPECT_EQ(loaded.report().islandAreas, Navigation(scene, {}, {}).report().islandAreas);
+    Navigation built(scene, {}, {}, nullptr, 1);
+    const std::vector<std::uint8_t> bytes = built.save();
+    EXPECT_EQ(Navigation(scene, {}, {}, nullptr, 3).save(), bytes);
+    Navigation loaded(scene, {}, {}, bytes, 3);
+    EXPECT_EQ(loaded.save(), bytes);
+    EXPECT_EQ(loaded.report().islandAreas, built.report().islandAreas);
   }
 }
 
