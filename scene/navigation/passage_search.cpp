@@ -126,6 +126,11 @@ GapWays crossOnScarceMesh(const Collection& all, const RimGap& gap) {
       {kSpacing, kGapMargin, kGapWalks});
 }
 
+/// 0, then ever farther to both sides in turn, metres.
+double computeOffset(int i, double spacing) {
+  return (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * spacing;
+}
+
 GapWays crossAlong(Walker& walker, const Vec3& start, const Vec3& end) {
   const auto from = standAt(walker, start + Vec3(0, kHeightError, 0), 2 * kHeightError);
   if (!from) return {};
@@ -143,7 +148,7 @@ GapWays crossAlongAxis(const WorldData& world, Walker& walker, const RimGap& gap
   if (across.isZero(0)) return {};
   const double half = 0.5 * across.norm();
   for (int i = 0; i <= kMaxAxes; ++i) {
-    const double offset = (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * kAxisSpacing;
+    const double offset = computeOffset(i, kAxisSpacing);
     const Vec3 place = 0.5 * (gap.from + gap.to) + offset * aside;
     const auto axis = measureGapAxis(world, walker.agent(), place, across.normalized());
     if (!axis) continue;
@@ -157,12 +162,14 @@ GapWays crossAlongAxis(const WorldData& world, Walker& walker, const RimGap& gap
 
 /// Walks straight across, along the axis of the gap or along lines that are close together: a gap
 /// may be wider than the agent by less than any grid sees.
+/// Nothing for gaps that are too wide.
 GapWays crossStraight(const WorldData& world, Walker& walker, const RimGap& gap) {
+  if (!(computeGroundDistance(gap.from, gap.to) < kMaxStraightGap)) return {};
   const Vec3 across = projectToGround(gap.to - gap.from);
   const Vec3 aside = Vec3(-across.z(), 0, across.x()).normalized();
   GapWays ways = crossAlongAxis(world, walker, gap, across, aside);
   for (int i = 0; i <= kMaxLines && ways.there.empty(); ++i) {
-    const double offset = (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * kLineSpacing;
+    const double offset = computeOffset(i, kLineSpacing);
     ways = crossAlong(walker, gap.from + offset * aside, gap.to + offset * aside);
   }
   return ways;
@@ -209,8 +216,7 @@ GapTrial tryGap(const Collection& all, Walker& walker, const RimGap& gap, std::s
   std::size_t left = maxWalks;
   trial.ways = crossOnGrid(all, walker, gap, left);
   trial.walks = maxWalks - left;
-  if (trial.ways.there.empty() && computeGroundDistance(gap.from, gap.to) < kMaxStraightGap)
-    trial.ways = crossStraight(all.finder.world, walker, gap);
+  if (trial.ways.there.empty()) trial.ways = crossStraight(all.finder.world, walker, gap);
   return trial;
 }
 
@@ -274,8 +280,7 @@ void crossGap(Collection& all, const RimGap& gap, std::optional<GapTrial> trial)
   GapWays ways;
   if (isOnScarce) {
     ways = crossOnScarceMesh(all, gap);
-    if (ways.there.empty() && computeGroundDistance(gap.from, gap.to) < kMaxStraightGap)
-      ways = crossStraight(all.finder.world, walker, gap);
+    if (ways.there.empty()) ways = crossStraight(all.finder.world, walker, gap);
   } else if (all.walksLeft > 0) {  // a gap that is given up counts as tried
     if (!trial || trial->walks > all.walksLeft)
       trial = tryGap(all, walker, gap, std::min(kGapWalks, all.walksLeft));

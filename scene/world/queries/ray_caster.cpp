@@ -313,15 +313,17 @@ std::vector<Ray> makeScanRays(const RangeScan& scan) {
   const auto sineCosine = [](double radians) {
     return collision::computeSineCosineOfDegrees(radians * collision::kDegreesPerRadian);
   };
+  std::vector<Vec3> levels;  // by column
+  for (std::uint32_t column = 0; column < scan.columns; ++column) {
+    const auto [sine, cosine] = sineCosine(left + column * across);
+    levels.push_back(cosine * ahead + sine * right);
+  }
   std::vector<Ray> rays;
   rays.reserve(std::size_t{scan.columns} * scan.rows);
   for (std::uint32_t row = 0; row < scan.rows; ++row) {
     const auto [sinePitch, cosinePitch] = sineCosine(top - row * down);
-    for (std::uint32_t column = 0; column < scan.columns; ++column) {
-      const auto [sineYaw, cosineYaw] = sineCosine(left + column * across);
-      const Vec3 level = cosineYaw * ahead + sineYaw * right;
+    for (const Vec3& level : levels)
       rays.push_back({scan.origin, cosinePitch * level + sinePitch * up, scan.maxDistance});
-    }
   }
   return rays;
 }
