@@ -150,6 +150,8 @@ std::vector<std::string> prepareGltf(ConvertInput& input, AssimpInput& file, boo
   input.metadata.scene = plain.scene;
   input.metadata.problems = std::move(plain.problems);
   input.gltfJson = std::move(plain.json);
+  input.gltfNodes = std::move(plain.nodes);
+  input.gltfRoots = std::move(plain.roots);
   if (plain.glb.empty()) return {};
   file.text = std::move(plain.glb);
   if (input.format == ModelFormat::gltf) file.file += ".glb";

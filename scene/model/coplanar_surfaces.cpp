@@ -1,17 +1,20 @@
-// Triangles are sorted by their planes, rounded to a grid. Of each plane, those whose boxes within
-// the plane overlap are compared exactly. Planes that are equal but for rounding may fall into two
-// cells of the grid: such surfaces are missed.
+// Of objects that touch others, triangles are sorted by their planes, rounded to a grid. Of each
+// plane, those whose boxes within the plane overlap are compared exactly. Planes that are equal but
+// for rounding may fall into two cells of the grid: such surfaces are missed.
 #include "scene/model/coplanar_surfaces.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <utility>
 #include <vector>
 
+#include "collision/broad_phase/sort_and_sweep.hpp"
 #include "scene/model/draw_items.hpp"
 #include "scene/model/object_box.hpp"
 
@@ -21,6 +24,7 @@ namespace {
 constexpr double kMinArea = 0.01;        // square metres, of a triangle
 constexpr double kMinOverlap = 1e-3;     // square metres, of two triangles
 constexpr double kMaxGap = 1e-4;         // metres; depth in pictures is coarser from afar
+constexpr double kBoxMargin = 1e-3;      // metres; covers the gap of surfaces in one plane
 constexpr double kMinCosine = 1 - 1e-6;  // of the normals
 constexpr double kNormalStep = 1e-3;     // of the grid of planes, of a unit vector's components
 constexpr double kDistanceStep = 1e-3;   // of the grid of planes, metres
@@ -107,13 +111,42 @@ bool containsInPlane(const Triangle& of, const Triangle& t) {
       t, [&](const Vec3& p) { return std::abs(normal.dot(p - of[0])) <= kMaxGap; });
 }
 
+/// By object: whether its box touches that of another one.
+std::vector<bool> findTouchingObjects(const Model& model) {
+  std::vector<Aabb> boxes;
+  std::vector<std::uint32_t> objects;
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
+    const Aabb box = computeWorldAabb(model, model.objects[i]);
+    if (box.empty()) continue;
+    boxes.push_back(collision::inflated(box, kBoxMargin));
+    objects.push_back(i);
+  }
+  // From the largest to the smallest. Those that are found need no search of their own, so that a
+  // heap of boxes at one place costs no more than one search.
+  std::vector<std::size_t> bySize(boxes.size());
+  std::iota(bySize.begin(), bySize.end(), std::size_t{0});
+  std::ranges::stable_sort(bySize, std::ranges::greater(),
+                           [&](std::size_t i) { return boxes[i].size().squaredNorm(); });
+  const collision::SortAndSweep broadPhase(boxes);
+  std::vector<bool> touches(model.objects.size(), false);
+  for (const std::size_t i : bySize) {
+    if (touches[objects[i]]) continue;
+    const std::vector<collision::StaticId> found = broadPhase.overlapStatic(boxes[i]);
+    if (found.size() < 2) continue;  // itself alone
+    for (const collision::StaticId other : found) touches[objects[other]] = true;
+  }
+  return touches;
+}
+
 class CoplanarSearch {
  public:
   explicit CoplanarSearch(const Model& model)
       : model_(model), bodyOfObject_(mapObjectsToBodies(model)) {}
 
   CoplanarSurfaces run() {
-    for (std::uint32_t i = 0; i < model_.objects.size(); ++i) collectFacets(i);
+    const std::vector<bool> touches = findTouchingObjects(model_);
+    for (std::uint32_t i = 0; i < model_.objects.size(); ++i)
+      if (touches[i]) collectFacets(i);
     std::ranges::sort(facets_, [](const Facet& a, const Facet& b) {
       return std::pair(a.plane, std::pair(a.min.x(), a.object)) <
              std::pair(b.plane, std::pair(b.min.x(), b.object));

@@ -126,7 +126,7 @@ TEST(SceneReport, CoplanarSurfacesOfTooManyObjectsAreReportedAsNotAllCompared) {
   const auto report = [](std::size_t tiles) {
     std::vector<testing::NamedBox> boxes{{"slab", {-1, 0, 0}, {4, 0.3, 4}}};
     for (std::size_t i = 0; i < tiles; ++i) {
-      const double z = 5 + static_cast<double>(i);
+      const double z = 5 + 0.5 * static_cast<double>(i);  // each touches the next
       boxes.push_back({"tile", {0, 0, z}, {0.5, 0.3, z + 0.5}});
     }
     boxes.push_back({"rafter", {0, 0, 1}, {0.5, 0.2, 2}});

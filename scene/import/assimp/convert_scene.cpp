@@ -98,7 +98,8 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
                            computeAssimpFromFile(input.metadata, input.format).inverse();
   worldFromRoot.translate(input.shift);
   const GltfNodes exact =
-      gltf ? readGltfNodes(scene, input.gltfJson, model.diagnostics) : GltfNodes();
+      gltf ? matchGltfNodes(scene, input.gltfNodes, input.gltfRoots, model.diagnostics)
+           : GltfNodes();
   NodeTransforms transforms;
   const bool bodies = gltf && mayHaveGltfBodies(input.gltfJson);
   std::vector<ImportedNode> importedNodes =

@@ -53,23 +53,6 @@ std::vector<ObjectAttribute> readOwnAttributes(const Json& node) {
   return attributes;
 }
 
-/// The data that the import needs of a node of the JSON. A file may have a million nodes, so they
-/// are read one by one, and their JSON is not kept.
-struct PlainNode {
-  bool isObject = false;
-  StatedTransform transform;
-  std::vector<std::size_t> children;  ///< kNoIndex: not a number
-  std::vector<ObjectAttribute> attributes;
-};
-
-std::vector<std::size_t> readIndices(const Json& list) {
-  std::vector<std::size_t> indices;
-  indices.reserve(list.size());
-  for (const Json& index : list)
-    indices.push_back(index.is_number_unsigned() ? index.get<std::size_t>() : kNoIndex);
-  return indices;
-}
-
 PlainNode readPlainNode(const Json& json) {
   PlainNode node;
   if (!json.is_object()) return node;
@@ -78,24 +61,6 @@ PlainNode readPlainNode(const Json& json) {
   node.attributes = readOwnAttributes(json);
   node.children = readIndices(getArray(json, "children"));
   return node;
-}
-
-/// Parses the scenes and, one by one, the nodes; null: not a JSON object.
-Json parseScenesAndNodes(const std::string& text, std::vector<PlainNode>& nodes) {
-  bool inNodes = false;
-  const auto keep = [&](int depth, Json::parse_event_t event, Json& value) {
-    using Event = Json::parse_event_t;
-    if (event == Event::key && depth == 1) {
-      inNodes = value == "nodes";
-      return inNodes || value == "scene" || value == "scenes";
-    }
-    const bool ends =
-        event == Event::object_end || event == Event::array_end || event == Event::value;
-    if (!inNodes || depth != 2 || !ends) return true;
-    nodes.push_back(readPlainNode(value));
-    return false;
-  };
-  return Json::parse(text, keep, false);
 }
 
 /// Matches the file's tree to assimp's by structure: assimp keeps the order of children.
@@ -205,16 +170,31 @@ StatedTransform readNodeTransform(const Json& node) {
   return result;
 }
 
-GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson,
-                        std::vector<Diagnostic>& diagnostics) {
+std::vector<std::size_t> readIndices(const Json& list) {
+  std::vector<std::size_t> indices;
+  indices.reserve(list.size());
+  for (const Json& index : list)
+    indices.push_back(index.is_number_unsigned() ? index.get<std::size_t>() : kNoIndex);
+  return indices;
+}
+
+bool NodeReader::see(int depth, Json::parse_event_t event, const Json& value) {
+  using Event = Json::parse_event_t;
+  if (event == Event::key && depth == 1) {
+    inNodes_ = value == "nodes";
+    if (inNodes_) nodes_.clear();  // of several lists, the last counts
+  }
+  const bool ends =
+      event == Event::object_end || event == Event::array_end || event == Event::value;
+  if (!inNodes_ || depth != 2 || !ends) return true;
+  nodes_.push_back(readPlainNode(value));
+  return false;
+}
+
+GltfNodes matchGltfNodes(const aiScene& scene, const std::vector<PlainNode>& nodes,
+                         const std::vector<std::size_t>& roots,
+                         std::vector<Diagnostic>& diagnostics) {
   GltfNodes transforms;
-  std::vector<PlainNode> nodes;
-  const Json json = parseScenesAndNodes(gltfJson, nodes);
-  if (!json.is_object()) return transforms;
-  const Json& scenes = getArray(json, "scenes");
-  const std::size_t index = readIndexMember(&json, "scene").value_or(0);
-  if (index >= scenes.size()) return transforms;
-  const std::vector<std::size_t> roots = readIndices(getArray(scenes[index], "nodes"));
   transforms.reserve(nodes.size());
   NodeMatcher walker(nodes, transforms, diagnostics);
   // assimp adds a root node above several roots, but not above a single one.

@@ -1,15 +1,16 @@
 // Reads the node transforms of a glTF file in doubles. assimp rounds them to floats, which is half
-// a metre at five thousand kilometres. This reader parses the JSON again and matches its tree to
-// assimp's.
+// a metre at five thousand kilometres. The nodes are read during the pre-pass's parse, and their
+// tree is matched to assimp's.
 #pragma once
 
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <map>
-#include <nlohmann/json_fwd.hpp>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <unordered_map>
+#include <utility>
 #include <vector>
 
 #include "scene/model/model.hpp"
@@ -36,10 +37,35 @@ struct StatedTransform {
 
 StatedTransform readNodeTransform(const nlohmann::json& node);
 
-/// Reads the nodes of a glTF file's JSON in doubles. Nodes without a matching assimp node are left
-/// out and reported, as are transforms that glTF does not allow.
-GltfNodes readGltfNodes(const aiScene& scene, const std::string& gltfJson,
-                        std::vector<Diagnostic>& diagnostics);
+/// The data that the import needs of a node of the JSON.
+struct PlainNode {
+  bool isObject = false;
+  StatedTransform transform;
+  std::vector<std::size_t> children;  ///< kNoIndex: not a number
+  std::vector<ObjectAttribute> attributes;
+};
+
+/// Reads the nodes of a file while it is parsed. A file may have a million nodes, so they are read
+/// one by one, and their JSON is not kept.
+class NodeReader {
+ public:
+  /// Call it for each event of nlohmann::json::parse() in order, and return its result from the
+  /// callback: whether to keep a value that belongs to the nodes.
+  bool see(int depth, nlohmann::json::parse_event_t event, const nlohmann::json& value);
+  std::vector<PlainNode> takeNodes() { return std::move(nodes_); }
+
+ private:
+  std::vector<PlainNode> nodes_;
+  bool inNodes_ = false;  ///< whether the list of nodes is being read
+};
+
+std::vector<std::size_t> readIndices(const nlohmann::json& list);  ///< kNoIndex: not a number
+
+/// Matches the nodes of a file, below the roots of its scene, to assimp's. Nodes without a matching
+/// assimp node are left out and reported, as are transforms that glTF does not allow.
+GltfNodes matchGltfNodes(const aiScene& scene, const std::vector<PlainNode>& nodes,
+                         const std::vector<std::size_t>& roots,
+                         std::vector<Diagnostic>& diagnostics);
 
 /// The path and world transform of a glTF node.
 struct NodeTransform {

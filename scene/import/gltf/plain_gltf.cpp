@@ -34,27 +34,36 @@ using Json = nlohmann::json;
   throw ImportError(file.string() + ": its JSON " + fault + "; export it again");
 }
 
-/// Parses only the sections needed here. Of the nodes, of which there may be a million, only the
-/// graph is kept. Refuses a text whose copies and dumps would need much stack.
-Json parseMeshSections(const std::string& text, const std::filesystem::path& file,
-                       ExtensionNames& extensions, DuplicateKeys& duplicates, NodeGraph& nodes) {
+/// The parts of a file's JSON that are kept.
+struct ParsedGltf {
+  Json sections;  ///< those needed here
+  ExtensionNames extensions;
+  DuplicateKeys duplicates;
+  NodeGraph graph;
+  std::vector<PlainNode> nodes;  ///< there may be a million, so their JSON is not kept
+};
+
+/// Refuses a text whose copies and dumps would need much stack.
+ParsedGltf parseGltf(const std::string& text, const std::filesystem::path& file) {
+  ParsedGltf parsed;
+  NodeReader nodes;
   int deepest = 0;
   const auto wanted = [&](int depth, Json::parse_event_t event, Json& value) {
     deepest = std::max(deepest, depth);
-    duplicates.see(depth, event, value);
-    nodes.see(depth, event, value);
-    if (event == Json::parse_event_t::value) extensions.seeValue(value);
-    if (event != Json::parse_event_t::key) return true;
-    extensions.seeKey(depth, value.get_ref<const std::string&>());
+    parsed.duplicates.see(depth, event, value);
+    parsed.graph.see(depth, event, value);
+    if (event == Json::parse_event_t::value) parsed.extensions.seeValue(value);
+    const bool isKept = nodes.see(depth, event, value);
+    if (event != Json::parse_event_t::key) return isKept;
+    parsed.extensions.seeKey(depth, value.get_ref<const std::string&>());
     if (depth != 1) return true;
-    return value == "asset" || value == "extensionsRequired" || value == "extensionsUsed" ||
-           value == "meshes" || value == "accessors" || value == "bufferViews" ||
-           value == "buffers" || value == "scenes" || value == "scene" || value == "materials" ||
-           value == "textures";
+    return value == "nodes" || value == "asset" || value == "extensionsRequired" ||
+           value == "extensionsUsed" || value == "meshes" || value == "accessors" ||
+           value == "bufferViews" || value == "buffers" || value == "scenes" || value == "scene" ||
+           value == "materials" || value == "textures";
   };
-  Json sections;
   try {
-    sections = Json::parse(text, wanted);
+    parsed.sections = Json::parse(text, wanted);
   } catch (const Json::parse_error& error) {
     failJson(file, "is damaged (byte " + std::to_string(error.byte) + ")");
   } catch (const Json::out_of_range&) {
@@ -62,8 +71,10 @@ Json parseMeshSections(const std::string& text, const std::filesystem::path& fil
   }
   if (deepest > kMaxJsonDepth)
     failJson(file, "is nested deeper than " + std::to_string(kMaxJsonDepth) + " levels");
-  if (!sections.is_object()) failJson(file, "is not an object");
-  return sections;
+  if (!parsed.sections.is_object()) failJson(file, "is not an object");
+  parsed.sections.erase("nodes");  // an empty list
+  parsed.nodes = nodes.takeNodes();
+  return parsed;
 }
 
 /// The JSON text of a file. Old exporters write names in the encoding of their computer; bytes
@@ -357,25 +368,26 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   PlainGltf plain;
   std::vector<Diagnostic> problems;
   plain.json = readMendedJson(file, format, problems);
-  ExtensionNames extensions;
-  DuplicateKeys duplicates;
-  NodeGraph nodes;
-  Json sections = parseMeshSections(plain.json, file, extensions, duplicates, nodes);
+  ParsedGltf parsed = parseGltf(plain.json, file);
+  const DuplicateKeys& duplicates = parsed.duplicates;
   addDiagnostic(problems, "duplicate_key", duplicates.firstPath(), duplicates.count());
-  requireVersion2(sections, file);
-  plain.problems = checkGltfExtensions(sections, extensions, file, choice.ignoreAppearance);
+  requireVersion2(parsed.sections, file);
+  plain.problems =
+      checkGltfExtensions(parsed.sections, parsed.extensions, file, choice.ignoreAppearance);
   plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());
-  const bool other = chooseScene(sections, choice.scene, file, plain);
+  const bool other = chooseScene(parsed.sections, choice.scene, file, plain);
   // Rewriting leaves one value of a duplicate key, so that assimp reads the one checked here.
   if (other || choice.rewrite || duplicates.count() > 0 ||
-      needsRewriting(plain.json, sections, file, format)) {
+      needsRewriting(plain.json, parsed.sections, file, format)) {
+    parsed = {};
     rewriteGltf(file, format, plain);
-    nodes = {};
-    sections = parseMeshSections(plain.json, file, extensions, duplicates, nodes);
+    parsed = parseGltf(plain.json, file);
   }
-  const std::vector<std::size_t> triangles = countTrianglesByMesh(sections);
-  const Json& scenes = getArray(sections, "scenes");
-  nodes.check(getArray(scenes.at(plain.scene), "nodes"), triangles, file);
+  const std::vector<std::size_t> triangles = countTrianglesByMesh(parsed.sections);
+  const Json& roots = getArray(getArray(parsed.sections, "scenes").at(plain.scene), "nodes");
+  parsed.graph.check(roots, triangles, file);
+  plain.nodes = std::move(parsed.nodes);
+  plain.roots = readIndices(roots);
   plain.triangles = std::accumulate(triangles.begin(), triangles.end(), std::size_t{0});
   return plain;
 }

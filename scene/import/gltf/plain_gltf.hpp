@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "scene/import/file/model_format.hpp"
+#include "scene/import/gltf/gltf_nodes.hpp"
 
 namespace enfilade::scene {
 
@@ -23,6 +24,8 @@ struct PlainGltf {
   std::optional<std::size_t> triangles;  ///< in all meshes, each once; nullopt: unknown
   std::vector<std::string> scenes;       ///< names of all scenes; some may be empty
   std::uint32_t scene = 0;               ///< the one that is read
+  std::vector<PlainNode> nodes;          ///< all, by index, in doubles
+  std::vector<std::size_t> roots;        ///< of the scene that is read; indices of nodes
   std::vector<Diagnostic> problems;
   std::vector<std::string> dependencies;  ///< files that were read or looked for
 };

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
+#include <functional>
+#include <unordered_set>
 
 #include "collision/assert.hpp"
 #include "scene/model/add_diagnostic.hpp"
@@ -46,6 +49,8 @@ void countShell(const Shape& shape, const Shell& shell, const Object& object, Sc
   }
 }
 
+constexpr std::size_t kHashFactor = 0x9e3779b97f4a7c15;  // odd; its bits look random
+
 using TransformKey = std::array<double, 12>;
 
 TransformKey makeTransformKey(const Object& object) {
@@ -57,20 +62,24 @@ TransformKey makeTransformKey(const Object& object) {
   return key;
 }
 
-/// Counts objects with the same shape and the same transform.
+/// Counts objects with the same shape and the same transform as one before.
 void countRepeatedObjects(const Scene& scene, std::vector<Diagnostic>& diagnostics) {
   const auto& objects = scene.model().objects;
-  const auto less = [&](std::uint32_t a, std::uint32_t b) {
-    const std::uint32_t shapeA = scene.shapeIndex(a), shapeB = scene.shapeIndex(b);
-    if (shapeA != shapeB) return shapeA < shapeB;
-    return makeTransformKey(objects[a]) < makeTransformKey(objects[b]);
+  const auto computeHash = [&](std::uint32_t object) {
+    std::size_t hash = scene.shapeIndex(object);
+    for (const double entry : makeTransformKey(objects[object]))
+      hash = std::rotl(hash * kHashFactor, 29) ^ std::hash<double>()(entry);
+    return hash * kHashFactor;
   };
-  std::vector<std::uint32_t> order = scene.solidObjects();
-  std::stable_sort(order.begin(), order.end(), less);
-  for (std::size_t i = 1; i < order.size(); ++i) {
-    if (!less(order[i - 1], order[i]))
-      addDiagnostic(diagnostics, "repeated_object", objects[order[i]].path);
-  }
+  const auto areEqual = [&](std::uint32_t a, std::uint32_t b) {
+    return scene.shapeIndex(a) == scene.shapeIndex(b) &&
+           makeTransformKey(objects[a]) == makeTransformKey(objects[b]);
+  };
+  std::unordered_set<std::uint32_t, decltype(computeHash), decltype(areEqual)> seen(
+      scene.solidObjects().size(), computeHash, areEqual);
+  for (const std::uint32_t object : scene.solidObjects())
+    if (!seen.insert(object).second)
+      addDiagnostic(diagnostics, "repeated_object", objects[object].path);
 }
 
 void countCoplanarSurfaces(const Model& model, std::vector<Diagnostic>& diagnostics) {
