@@ -80,6 +80,8 @@ constexpr std::array kCatalog{
                    "a mesh does not exist, or cannot be read and states no extent: it is missing"},
     DiagnosticKind{"solid_mesh", error,
                    "a mesh cannot be read: it is a solid box of the extent that the file states"},
+    DiagnosticKind{"plain_data_used", warning,
+                   "its compressed data cannot be read; the plain data of the file was read"},
     DiagnosticKind{"non_manifold_edge", note,
                    "more than two faces share an edge, so inside and outside are undefined"},
     DiagnosticKind{"object_without_area", note, "it has no surface to collide with"},

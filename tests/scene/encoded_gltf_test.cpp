@@ -424,6 +424,26 @@ TEST(GltfSizes, ACountThatTheFileCannotJustifyIsRefused) {
   expectRefused(draco, "Draco header claims 4294967295 triangles");
 }
 
+TEST(EncodedGltf, DamagedDracoDataIsReplacedByThePlainDataOfTheFile) {
+  const TemporaryFolder folder;
+  GltfWriter file = tests::dracoTerrace(14, true);
+  file.json.erase("extensionsRequired");
+  file.binary.replace(0, 5, "OCARD");
+  const std::string refused = catchFailure(folder.write("alone.glb", file.glb()));
+  EXPECT_NE(refused.find("meshes[0].primitives[0]"), std::string::npos) << refused;
+
+  const tests::Terrace terrace;
+  Json& primitive = file.json["meshes"][0]["primitives"][0];
+  primitive["attributes"]["POSITION"] = file.addPoints(terrace.positions);
+  primitive["indices"] = file.addIndices(terrace.indices);
+  const Model model = importModel(folder.write("both.glb", file.glb()));
+  expectSameTriangles(readPlainTerrace(), listTriangles(model, model.objects.at(0)), 0);
+  EXPECT_EQ(countDiagnostics(model, "plain_data_used"), 1u);
+  EXPECT_NE(diagnosticText(model, "plain_data_used").find("meshes[0].primitives[0]"),
+            std::string::npos);
+  EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 0u);
+}
+
 // ---- textures -----------------------------------------------------------------------------------
 
 /// The terrace with a texture that only `extension` names.

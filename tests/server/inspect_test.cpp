@@ -64,7 +64,9 @@ TEST_F(Inspect, ListsStoreysOfIfcWithTheirObjects) {
   EXPECT_NE(table.out.find("0.000 m       2  Ground/floor"), std::string::npos) << table.out;
 }
 
-TEST_F(Inspect, ReportsNorthOnlyIfTheFileStatesIt) {
+TEST_F(Inspect, ReportsNorthAsTheIfcFileStatesItAndElseItsYAxis) {
+  const Ended room = run({"inspect", path("room.obj"), "--json", "--unit", "m"});
+  EXPECT_TRUE(nlohmann::json::parse(room.out).at("north").is_null()) << "OBJ has no north";
   std::string text = tests::IfcHouse().text();
   write(folder_ / "house.ifc", text);
   const auto report = [&] {
@@ -72,7 +74,8 @@ TEST_F(Inspect, ReportsNorthOnlyIfTheFileStatesIt) {
     EXPECT_EQ(ended.code, 0) << ended.err;
     return nlohmann::json::parse(ended.out).at("north");
   };
-  EXPECT_TRUE(report().is_null());
+  EXPECT_NEAR(report().at("x"), 0, 1e-12);
+  EXPECT_NEAR(report().at("facing"), 90, 1e-9);
   const std::string context = "1.E-05,#11,$)";
   text.replace(text.find(context), context.size(), "1.E-05,#11,#16)");
   text.insert(text.find("#20="), "#16=IFCDIRECTION((1.,0.));\n");

@@ -142,6 +142,26 @@ class MeshRewriter {
   Json rewritePrimitive(Json& primitive, const std::string& place, const RestPose* pose) {
     dropMissingMaterial(primitive, place);
     const Json original = primitive;
+    std::string fault = tryToRewrite(primitive, place, pose);
+    if (!fault.empty() && hasPlainPositions(original)) {
+      primitive = original;
+      primitive["extensions"].erase(kDracoExtension);
+      if (tryToRewrite(primitive, place, pose).empty()) {
+        addDiagnostic(problems_, "plain_data_used", fault);
+        fault.clear();
+      }
+    }
+    if (fault.empty()) {
+      readAny_ = true;
+      return std::move(primitive);
+    }
+    if (firstError_.empty()) firstError_ = fault;
+    return replaceUnreadable({original, pose, fault}, getArray(original_, "accessors"), buffers_,
+                             binary_, problems_);
+  }
+
+  /// Returns the reason why it cannot be read; "" for none.
+  std::string tryToRewrite(Json& primitive, const std::string& place, const RestPose* pose) {
     std::string fault;
     try {
       if (pose != nullptr) {
@@ -149,8 +169,6 @@ class MeshRewriter {
       } else {
         primitives_.rewrite(primitive, place);
       }
-      readAny_ = true;
-      return std::move(primitive);
     } catch (const UnreadableGltf&) {
       throw;
     } catch (const ImportError& error) {
@@ -158,10 +176,15 @@ class MeshRewriter {
     } catch (const Json::exception& error) {
       fault = std::string("its JSON is not valid glTF: ") + error.what() + "; export it again";
     }
-    if (firstError_.empty()) firstError_ = fault;
-    if (fault.find(place) == std::string::npos) fault = place + ": " + fault;
-    return replaceUnreadable({original, pose, fault}, getArray(original_, "accessors"), buffers_,
-                             binary_, problems_);
+    return fault.empty() || fault.find(place) != std::string::npos ? fault : place + ": " + fault;
+  }
+
+  /// Whether a Draco primitive has the same data without compression, too.
+  bool hasPlainPositions(const Json& primitive) const {
+    if (findMember(findMember(&primitive, "extensions"), kDracoExtension) == nullptr) return false;
+    const Json* positions = findEntry(getArray(original_, "accessors"),
+                                      findMember(findMember(&primitive, "attributes"), "POSITION"));
+    return findMember(positions, "bufferView") != nullptr;
   }
 
   void dropMissingMaterial(Json& primitive, const std::string& place) {

@@ -14,7 +14,6 @@ namespace {
 using Json = nlohmann::json;
 
 constexpr const char* kColours = "COLOR_0";
-constexpr const char* kDraco = "KHR_draco_mesh_compression";
 // glTF 2.0, 5.24.4; points and lines are below.
 constexpr std::size_t kTriangleMode = 4, kStripMode = 5, kFanMode = 6;
 /// Bytes of Draco's output that count as one of those that the file must justify: Draco compresses
@@ -231,7 +230,7 @@ void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
   const Widths widths = listAttributes(attributes, mapping, name);
   Json plain = Json::object();
   std::map<std::string, std::size_t> written;
-  const Json* draco = findMember(findMember(&primitive, "extensions"), kDraco);
+  const Json* draco = findMember(findMember(&primitive, "extensions"), kDracoExtension);
   if (draco != nullptr) {
     const WrittenDraco& mesh = writeDraco(*draco, attributes, widths, mapping, name);
     written = mesh.attributes;
@@ -258,7 +257,7 @@ void PlainPrimitives::rewrite(Json& primitive, const std::string& name) {
 PrimitiveArrays PlainPrimitives::readArrays(Json& primitive, const Json& attributes,
                                             const Widths& widths, const std::string& name) {
   PrimitiveArrays arrays;
-  const Json* draco = findMember(findMember(&primitive, "extensions"), kDraco);
+  const Json* draco = findMember(findMember(&primitive, "extensions"), kDracoExtension);
   if (draco != nullptr) {
     DracoMesh mesh = decodeDraco(*draco, attributes, widths, name);
     arrays = std::move(mesh.attributes);

@@ -17,6 +17,8 @@
 
 namespace enfilade::scene {
 
+inline constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
+
 class PlainPrimitives {
  public:
   /// All arguments must outlive this object.

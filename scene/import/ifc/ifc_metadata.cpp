@@ -78,13 +78,14 @@ bool isEndlessPlacement(const StepFile& file, std::uint32_t placement) {
 
 /// TrueNorth of an IfcGeometricRepresentationContext (identifier, type, dimensions, precision,
 /// placement, true north). It refers to the axes of the placement. Contexts of three dimensions
-/// come first.
-std::optional<Vec3> readTrueNorth(const StepFile& file) {
+/// come first. `unstated`: the direction in a context that states none; nullopt: none.
+std::optional<Vec3> readTrueNorth(const StepFile& file, const std::optional<Vec3>& unstated) {
   std::optional<Vec3> flat;
   for (const StepStatement& statement : file.statements()) {
     if (statement.type != "IFCGEOMETRICREPRESENTATIONCONTEXT") continue;
     const Arguments arguments = splitStepArguments(statement.arguments);
-    const auto direction = readStepVector(file, getArgument(arguments, 5), "IFCDIRECTION");
+    auto direction = readStepVector(file, getArgument(arguments, 5), "IFCDIRECTION");
+    if (!direction) direction = unstated;
     if (!direction) continue;
     Vec3 north = *direction;
     const auto placement = parseStepReference(getArgument(arguments, 4));
@@ -249,9 +250,11 @@ class IfcMetadataReader {
     }
     metadata_.mapConversion =
         readIfcMapConversion(file_, metadata_.metresPerUnit, metadata_.mapFault);
-    metadata_.trueNorth = readTrueNorth(file_);
+    metadata_.trueNorth = readTrueNorth(file_, std::nullopt);
     if (!metadata_.trueNorth && metadata_.mapConversion)
       metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
+    // IFC says that y points to north in a context that states nothing else.
+    if (!metadata_.trueNorth) metadata_.trueNorth = readTrueNorth(file_, Vec3::UnitY());
   }
 
   void readStatement(const StepStatement& statement) {
