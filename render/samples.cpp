@@ -45,7 +45,7 @@ std::vector<Eigen::Vector2d> makePattern(int samples) {
 using LinearTable = std::array<std::uint32_t, 256>;
 
 /// Linear light of sRGB bytes, 0..kWhite.
-const LinearTable& linearOfSrgb() {
+const LinearTable& getDecodingTable() {
   static const LinearTable table = [] {
     LinearTable values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
@@ -58,9 +58,9 @@ const LinearTable& linearOfSrgb() {
 }
 
 /// The inverse: for each linear value, the byte whose linear light is nearest.
-const std::vector<std::uint8_t>& srgbOfLinear() {
+const std::vector<std::uint8_t>& getEncodingTable() {
   static const std::vector<std::uint8_t> table = [] {
-    const LinearTable& linear = linearOfSrgb();
+    const LinearTable& linear = getDecodingTable();
     std::vector<std::uint8_t> bytes;
     for (std::uint32_t value = 0; value <= kWhite; ++value) {
       const std::size_t previous = bytes.empty() ? 0 : bytes.back();
@@ -103,14 +103,14 @@ Camera shiftCamera(const Camera& camera, const Eigen::Vector2d& offset) {
 
 void MeanColour::add(const std::vector<std::uint8_t>& srgb) {
   ENFILADE_ASSERT(srgb.size() == sums_.size());
-  const LinearTable& linear = linearOfSrgb();
+  const LinearTable& linear = getDecodingTable();
   for (std::size_t i = 0; i < srgb.size(); ++i) sums_[i] += linear[srgb[i]];
   ++pictures_;
 }
 
 std::vector<std::uint8_t> MeanColour::compute() const {
   ENFILADE_ASSERT(pictures_ > 0);
-  const std::vector<std::uint8_t>& srgb = srgbOfLinear();
+  const std::vector<std::uint8_t>& srgb = getEncodingTable();
   std::vector<std::uint8_t> mean(sums_.size());
   std::ranges::transform(sums_, mean.begin(), [&](std::uint32_t sum) {
     return srgb[(sum + pictures_ / 2) / pictures_];

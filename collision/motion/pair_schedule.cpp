@@ -7,13 +7,6 @@
 #include "collision/assert.hpp"
 
 namespace enfilade::collision {
-namespace {
-
-PairSchedule::BodyPair makeOrderedPair(std::uint32_t a, std::uint32_t b) {
-  return a < b ? PairSchedule::BodyPair{a, b} : PairSchedule::BodyPair{b, a};
-}
-
-}  // namespace
 
 void PairSchedule::set(std::uint32_t a, std::uint32_t b, double time) {
   if (a == b) throw std::invalid_argument("the two bodies of a pair must differ");
@@ -28,7 +21,7 @@ void PairSchedule::set(std::uint32_t a, std::uint32_t b, double time) {
   }
   const std::uint32_t slot = freeSlots_.back();
   freeSlots_.pop_back();
-  slots_[slot].entry = {time, makeOrderedPair(a, b)};
+  slots_[slot].entry = {time, makePair(a, b)};
   slotByPair_[{a, b}] = slot;
   slotByPair_[{b, a}] = slot;
   heap_.push_back(slot);

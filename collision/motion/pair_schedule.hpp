@@ -15,6 +15,9 @@ namespace enfilade::collision {
 class PairSchedule {
  public:
   using BodyPair = std::pair<std::uint32_t, std::uint32_t>;  ///< first < second
+  static BodyPair makePair(std::uint32_t a, std::uint32_t b) {
+    return a < b ? BodyPair{a, b} : BodyPair{b, a};
+  }
   struct Entry {
     double time;  ///< seconds; may be infinite, never NaN
     BodyPair pair;

@@ -362,6 +362,12 @@ void judge(Bench& bench, const std::vector<Vec3>& places,
   }
 }
 
+double measureLine(const std::vector<Vec3>& points) {
+  double length = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
+  return length;
+}
+
 /// Metres that the feet of an avatar move along a way, tick by tick: a step up or down counts with
 /// its height, wherever the points of the way are. nullopt: it cannot be walked.
 std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& way) {
@@ -400,7 +406,7 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   };
   Comparison result;
   std::vector<Disagreement> disagreements;
-  std::vector<double> ratios;
+  std::vector<double> ratios, feetRatios;
   int unwalkable = 0;
   for (int i = 0; i < 2 * effort.compared && !places.empty() && fill.size() > 0; ++i) {
     const bool isOfFill = i % 2 == 1;
@@ -428,10 +434,12 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
                   from.y(), from.z(), to.x(), to.y(), to.z());
       continue;
     }
-    ratios.push_back(*walked / *shortest);
-    if (ratios.back() > 1.02)
-      std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f\n", from.x(),
-                  from.y(), from.z(), to.x(), to.y(), to.z(), ratios.back());
+    ratios.push_back(path.length() / measureLine(way));
+    feetRatios.push_back(*walked / *shortest);
+    if (std::max(ratios.back(), feetRatios.back()) > 1.02)
+      std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f, feet %.4f\n",
+                  from.x(), from.y(), from.z(), to.x(), to.y(), to.z(), ratios.back(),
+                  feetRatios.back());
   }
   judge(bench, places, disagreements, result);
   row["fill_places"] = fill.size();
@@ -445,7 +453,10 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   row["lengths_unwalkable"] = unwalkable;
   row["length_median"] = number(quantile(ratios, 0.5));
   row["length_max"] = number(quantile(ratios, 1));
-  row["length_above"] = std::ranges::count_if(ratios, [](double ratio) { return ratio > 1.02; });
+  const auto isLong = [](double ratio) { return ratio > 1.02; };
+  row["length_above"] = std::ranges::count_if(ratios, isLong);
+  row["feet_max"] = number(quantile(feetRatios, 1));
+  row["feet_above"] = std::ranges::count_if(feetRatios, isLong);
 }
 
 void measureMeshes(Bench& bench, const Effort&, nlohmann::json& row) {

@@ -1,4 +1,4 @@
-// State hash and snapshot of an avatar.
+// State hash, snapshot and turn radius of an avatar.
 #pragma once
 
 #include "scene/model/hasher.hpp"
@@ -8,5 +8,9 @@ namespace enfilade::scene {
 
 void hashAvatar(const Avatar& avatar, Hasher& hash);
 AvatarSnapshot makeAvatarSnapshot(const Avatar& avatar);
+
+/// Maximum distance from the vertical through the feet of any point that turns, for all values of
+/// the joints; metres. 0 for a mere prism.
+double computeTurnRadius(const Avatar& avatar);
 
 }  // namespace enfilade::scene

@@ -6,6 +6,7 @@
 
 #include "collision/motion/sine_cosine.hpp"
 #include "scene/model/rotation.hpp"
+#include "scene/world/avatars/avatar_state.hpp"
 #include "scene/world/avatars/rigid_step.hpp"
 #include "scene/world/avatars/spawn.hpp"
 

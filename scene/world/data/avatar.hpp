@@ -98,9 +98,6 @@ inline bool turnsShape(const Avatar& avatar) {
 inline bool changesShape(const Avatar& avatar) {
   return avatar.chain.speed > 0 || (avatar.turn.left != 0 && turnsShape(avatar));
 }
-/// Maximum distance from the vertical through the feet of any point that turns, for all values of
-/// the joints; metres. 0 for a mere prism.
-double computeTurnRadius(const Avatar& avatar);
 
 struct QueuedOrder {
   Order order;

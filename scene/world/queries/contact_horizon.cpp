@@ -38,10 +38,6 @@ constexpr std::size_t kPairWork = 8;
 /// Fraction of the search time that boxes must prove, so that no exact distance is needed.
 constexpr double kBoxesSuffice = 0.5;
 
-collision::PairSchedule::BodyPair makePair(EntityId a, EntityId b) {
-  return a < b ? std::pair{a, b} : std::pair{b, a};
-}
-
 EntityId getOther(const collision::PairSchedule::BodyPair& pair, EntityId one) {
   return pair.first == one ? pair.second : pair.first;
 }
@@ -189,7 +185,7 @@ void ContactHorizons::restartUnbounded() {
     schedule_.scheduleBodyNow(id, now());
     if (Tracked* own = findTracked(id)) own->restUntil = now();
     for (const auto& [avatar, tracked] : tracked_) {
-      const BodyPair pair = makePair(avatar, id);
+      const BodyPair pair = collision::PairSchedule::makePair(avatar, id);
       if (avatar == id || tracked.restUntil <= now() || touching_.contains(pair)) continue;
       const double seconds = std::min(tracked.restUntil - now(), kMaxSearchSeconds);
       const double speed = state_.speedWithin(avatar, seconds) + state_.speedWithin(id, seconds);
@@ -207,7 +203,7 @@ void ContactHorizons::replacePairs(const AvatarSnapshot& avatar, Tracked& tracke
                                    const std::vector<HorizonState::Neighbour>& neighbours) {
   std::map<BodyPair, double> earliest;
   for (const auto& neighbour : neighbours)
-    earliest[makePair(avatar.id, neighbour.entity)] = neighbour.earliest;
+    earliest[collision::PairSchedule::makePair(avatar.id, neighbour.entity)] = neighbour.earliest;
   for (const Entry& entry : schedule_.findEntries(avatar.id)) {
     const auto other = tracked_.find(getOther(entry.pair, avatar.id));
     const bool needed = other != tracked_.end() && tracked.restUntil < other->second.restUntil;
@@ -222,7 +218,7 @@ void ContactHorizons::replacePairs(const AvatarSnapshot& avatar, Tracked& tracke
 
 void ContactHorizons::searchAround(const AvatarSnapshot& avatar, Tracked& tracked) {
   const auto isApart = [&](const HorizonState::Neighbour& neighbour) {
-    return !touching_.contains(makePair(avatar.id, neighbour.entity));
+    return !touching_.contains(collision::PairSchedule::makePair(avatar.id, neighbour.entity));
   };
   double seconds = searchSeconds_;
   std::vector<HorizonState::Neighbour> neighbours;
@@ -354,7 +350,7 @@ void ContactHorizons::validate() const {
       count += isTracked(other) && other < avatar ? 0 : 1;
     }
     for (const EntityId other : tracked.touching)
-      if (!touching_.contains(makePair(avatar, other)))
+      if (!touching_.contains(collision::PairSchedule::makePair(avatar, other)))
         throw std::logic_error("an avatar touches an entity that the pairs do not have");
   }
   if (count != schedule_.size()) throw std::logic_error("a pair has no selected avatar");
