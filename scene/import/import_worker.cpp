@@ -1,5 +1,6 @@
 #include "scene/import/import_worker.hpp"
 
+#include <malloc.h>
 #include <signal.h>
 #include <sys/personality.h>
 #include <sys/prctl.h>
@@ -51,6 +52,9 @@ void limitThisProcess(const ImportRequest& request, pid_t parent) {
   if (getppid() != parent) _exit(1);  // it died before the call above
   const rlimit none{0, 0};
   setrlimit(RLIMIT_CORE, &none);
+  // Small blocks that are freed join at once: a million of them would be looked through again at
+  // every large allocation.
+  mallopt(M_MXFAST, 0);
   // Only the soft limit: Node.js may be started from here. It reserves tens of gigabytes of address
   // space, so its written data is limited instead. Sanitizers reserve as much.
   const bool node = request.task == ImportTask::webIfc || request.task == ImportTask::ifcXml;

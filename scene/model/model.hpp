@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -80,10 +81,10 @@ struct Object {
       {};  ///< IFC OperationType or similar: "SINGLE_SWING_LEFT", "ELEVATOR"
   /// IFC OverallWidth and OverallHeight of doors and windows in metres; 0: unknown.
   double overallWidth = 0, overallHeight = 0;
-  /// Placement of an IFC product, in metres and without scale; nullopt: unknown. Its axes are
+  /// Placement of an IFC product, in metres and without scale; null: unknown. Its axes are
   /// IFC's: for a door, x runs along its width from the lower corner, y is the side to which it
-  /// opens, z is up.
-  std::optional<Eigen::Affine3d> worldFromPlacement = std::nullopt;
+  /// opens, z is up. Apart from the object, since few objects have one.
+  std::shared_ptr<const Eigen::Affine3d> worldFromPlacement = nullptr;
   Usage usage = Usage::both;
   /// The storey that contains it: an index into Model::storeys; nullopt: unknown.
   std::optional<std::uint32_t> storey = std::nullopt;

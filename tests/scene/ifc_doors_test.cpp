@@ -56,7 +56,7 @@ Model doorModel(const std::string& operation, const std::vector<DoorPart>& parts
   door.meshes = {1};
   Eigen::Affine3d placed(Eigen::Translation3d(2, 0, 3));
   placed.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
-  door.worldFromPlacement = placed;
+  door.worldFromPlacement = std::make_shared<Eigen::Affine3d>(placed);
   door.worldFromMesh = placed;
   model.objects.push_back(std::move(door));
   return model;
@@ -214,7 +214,8 @@ TEST(IfcDoors, UndecidableDoorsStayStaticAndAreReported) {
   has(still(doorModel("SINGLE_SWING_LEFT", doubleDoor(), 2)), "does not match 2 leaves");
   has(still(doorModel("SINGLE_SWING_LEFT", {{{0, 0, 0}, {1, 0.5, 2.1}}})), "too thick");
   Model lying = doorModel("SINGLE_SWING_LEFT", singleDoor());
-  lying.objects[1].worldFromPlacement->linear() = Eigen::Matrix3d::Identity();
+  lying.objects[1].worldFromPlacement = std::make_shared<Eigen::Affine3d>(
+      Eigen::Translation3d(lying.objects[1].worldFromPlacement->translation()));
   has(still(lying), "upright");
   Model nowhere = doorModel("SINGLE_SWING_LEFT", singleDoor());
   nowhere.objects[1].worldFromPlacement.reset();

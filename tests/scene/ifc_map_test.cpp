@@ -100,11 +100,12 @@ TEST(IfcMap, TheMapPropertySetsOfIfc2x3AreApplied) {
 
 // ---- north --------------------------------------------------------------------------------------
 
-TEST(IfcMap, NorthIsKnownOnlyIfTheFileStatesIt) {
+TEST(IfcMap, NorthIsAsTheFileStatesItAndElseItsYAxis) {
   const TemporaryFolder folder;
   IfcHouse house;
   const ImportOptions options = by(readersHere().front());
-  EXPECT_FALSE(importModel(folder.write("house.ifc", house.text()), options).north);
+  EXPECT_EQ(importModel(folder.write("house.ifc", house.text()), options).north,
+            Eigen::Vector2d(0, -1));
   // 30 degrees east of the file's y axis, so towards +x and -z of the scene.
   std::string text = house.text();
   const std::string context = "1.E-05,#11,$)";

@@ -34,7 +34,7 @@ Model smallModel() {
   object.operationType = "SINGLE_SWING_LEFT";
   object.overallWidth = 0.9;
   object.overallHeight = 2.1;
-  object.worldFromPlacement = Eigen::Affine3d(Eigen::Translation3d(4, 5, 6));
+  object.worldFromPlacement = std::make_shared<Eigen::Affine3d>(Eigen::Translation3d(4, 5, 6));
   object.meshes = {0, 1};
   object.worldFromMesh = Eigen::Translation3d(0.1, 0.2, 0.3) * Eigen::Scaling(-1.0, 2.0, 1.0);
   object.storey = 1;

@@ -40,6 +40,12 @@ Aabb computeObjectAabb(const Model& model, const Object& object,
   return box;
 }
 
+void movePlacement(Object& object, const Vec3& offset) {
+  if (!object.worldFromPlacement) return;
+  object.worldFromPlacement =
+      std::make_shared<Eigen::Affine3d>(Eigen::Translation3d(offset) * *object.worldFromPlacement);
+}
+
 double computeMedian(std::vector<double> values) {
   ENFILADE_ASSERT(!values.empty());
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);

@@ -19,6 +19,9 @@ Eigen::Matrix3d makeYUpRotation(UpAxis up);
 Aabb computeObjectAabb(const Model& model, const Object& object,
                        const Eigen::Affine3d& frameFromMesh);
 
+/// Moves an object's placement, if it is known.
+void movePlacement(Object& object, const Vec3& offset);
+
 /// The upper median of at least one value.
 double computeMedian(std::vector<double> values);
 

@@ -168,7 +168,7 @@ Object finishObject(ImportedNode& imported, const Vec3& offset, MeshTable& meshe
     }
   }
   object.worldFromMesh = Eigen::Translation3d(-offset) * frame;
-  if (object.worldFromPlacement) object.worldFromPlacement->pretranslate(-offset);
+  movePlacement(object, -offset);
   return object;
 }
 

@@ -66,7 +66,8 @@ class NodeCollector {
   }
 
   static Eigen::Affine3d parentFromNode(const aiNode& node, const GltfNode* exact) {
-    return exact == nullptr ? toAffine(node.mTransformation) : exact->parentFromNode;
+    return exact == nullptr ? toAffine(node.mTransformation)
+                            : exact->plain->transform.parentFromNode;
   }
 
   /// The state that a node inherits from its ancestors.
@@ -117,7 +118,7 @@ class NodeCollector {
                           state.depth + 1, state.parentIndex};
     if (exact != nullptr) {
       childState.parentIndex = exact->index;
-      importedNodes_[nodeIndex].object.attributes = exact->attributes;
+      importedNodes_[nodeIndex].object.attributes = exact->plain->attributes;
       if (transforms_ != nullptr)
         transforms_->emplace(exact->index,
                              NodeTransform{std::move(path), worldFromNode, state.parentIndex});

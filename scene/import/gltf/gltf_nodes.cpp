@@ -53,16 +53,6 @@ std::vector<ObjectAttribute> readOwnAttributes(const Json& node) {
   return attributes;
 }
 
-PlainNode readPlainNode(const Json& json) {
-  PlainNode node;
-  if (!json.is_object()) return node;
-  node.isObject = true;
-  node.transform = readNodeTransform(json);
-  node.attributes = readOwnAttributes(json);
-  node.children = readIndices(getArray(json, "children"));
-  return node;
-}
-
 /// Matches the file's tree to assimp's by structure: assimp keeps the order of children.
 class NodeMatcher {
  public:
@@ -84,7 +74,7 @@ class NodeMatcher {
                     describeNode(index, node) + " is listed several times");
     if (!isShared) reportTransform(plain.transform, index, node);
     isVisited_[index] = true;
-    matchedNodes_.emplace(&node, GltfNode{plain.transform.parentFromNode, index, plain.attributes});
+    matchedNodes_.emplace(&node, GltfNode{&plain, index});
     const bool wasBelowShared = std::exchange(isBelowShared_, isBelowShared_ || isShared);
     visitChildren(plain.children, node, depth + 1);
     isBelowShared_ = wasBelowShared;
@@ -178,17 +168,14 @@ std::vector<std::size_t> readIndices(const Json& list) {
   return indices;
 }
 
-bool NodeReader::see(int depth, Json::parse_event_t event, const Json& value) {
-  using Event = Json::parse_event_t;
-  if (event == Event::key && depth == 1) {
-    inNodes_ = value == "nodes";
-    if (inNodes_) nodes_.clear();  // of several lists, the last counts
-  }
-  const bool ends =
-      event == Event::object_end || event == Event::array_end || event == Event::value;
-  if (!inNodes_ || depth != 2 || !ends) return true;
-  nodes_.push_back(readPlainNode(value));
-  return false;
+PlainNode readPlainNode(const Json& json) {
+  PlainNode node;
+  if (!json.is_object()) return node;
+  node.isObject = true;
+  node.transform = readNodeTransform(json);
+  node.attributes = readOwnAttributes(json);
+  node.children = readIndices(getArray(json, "children"));
+  return node;
 }
 
 GltfNodes matchGltfNodes(const aiScene& scene, const std::vector<PlainNode>& nodes,

@@ -6,11 +6,10 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <map>
-#include <nlohmann/json.hpp>
+#include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
 #include <unordered_map>
-#include <utility>
 #include <vector>
 
 #include "scene/model/model.hpp"
@@ -19,14 +18,6 @@ struct aiNode;
 struct aiScene;
 
 namespace enfilade::scene {
-
-/// A node with the glTF file's own double-precision transform; assimp rounds it to floats.
-struct GltfNode {
-  Eigen::Affine3d parentFromNode;
-  std::size_t index;                        ///< index into the file's list of nodes
-  std::vector<ObjectAttribute> attributes;  ///< extras whose names begin with "_"
-};
-using GltfNodes = std::unordered_map<const aiNode*, GltfNode>;
 
 /// The transform of a node of the file's JSON, in doubles.
 struct StatedTransform {
@@ -41,28 +32,23 @@ StatedTransform readNodeTransform(const nlohmann::json& node);
 struct PlainNode {
   bool isObject = false;
   StatedTransform transform;
-  std::vector<std::size_t> children;  ///< kNoIndex: not a number
-  std::vector<ObjectAttribute> attributes;
+  std::vector<std::size_t> children;        ///< kNoIndex: not a number
+  std::vector<ObjectAttribute> attributes;  ///< extras whose names begin with "_"
 };
 
-/// Reads the nodes of a file while it is parsed. A file may have a million nodes, so they are read
-/// one by one, and their JSON is not kept.
-class NodeReader {
- public:
-  /// Call it for each event of nlohmann::json::parse() in order, and return its result from the
-  /// callback: whether to keep a value that belongs to the nodes.
-  bool see(int depth, nlohmann::json::parse_event_t event, const nlohmann::json& value);
-  std::vector<PlainNode> takeNodes() { return std::move(nodes_); }
-
- private:
-  std::vector<PlainNode> nodes_;
-  bool inNodes_ = false;  ///< whether the list of nodes is being read
-};
-
+PlainNode readPlainNode(const nlohmann::json& json);
 std::vector<std::size_t> readIndices(const nlohmann::json& list);  ///< kNoIndex: not a number
 
+/// A node of the file that assimp read.
+struct GltfNode {
+  const PlainNode* plain;
+  std::size_t index;  ///< into the file's list of nodes
+};
+using GltfNodes = std::unordered_map<const aiNode*, GltfNode>;
+
 /// Matches the nodes of a file, below the roots of its scene, to assimp's. Nodes without a matching
-/// assimp node are left out and reported, as are transforms that glTF does not allow.
+/// assimp node are left out and reported, as are transforms that glTF does not allow. `nodes` must
+/// outlive the result.
 GltfNodes matchGltfNodes(const aiScene& scene, const std::vector<PlainNode>& nodes,
                          const std::vector<std::size_t>& roots,
                          std::vector<Diagnostic>& diagnostics);

@@ -8,8 +8,8 @@
 
 #include "scene/import/gltf/encoding/data_uri.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
+#include "scene/import/gltf/encoding/texture_mapping.hpp"
 #include "scene/import/gltf/gltf_materials.hpp"
-#include "scene/import/gltf/texture_mapping.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -9,17 +9,16 @@
 #include "scene/import/assembly/path_names.hpp"
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/gltf/encoding/data_uri.hpp"
-#include "scene/import/gltf/encoding/duplicate_keys.hpp"
 #include "scene/import/gltf/encoding/gltf_binary.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/encoding/missing_references.hpp"
-#include "scene/import/gltf/encoding/node_graph.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
 #include "scene/import/gltf/gltf_extensions.hpp"
 #include "scene/import/gltf/gltf_instances.hpp"
 #include "scene/import/gltf/gltf_materials.hpp"
 #include "scene/import/gltf/gltf_metadata.hpp"
 #include "scene/import/gltf/gltf_rest_pose.hpp"
+#include "scene/import/gltf/parse_gltf.hpp"
 #include "scene/import/gltf/plain_check.hpp"
 #include "scene/import/gltf/plain_primitives.hpp"
 #include "scene/import/gltf/unreadable_mesh.hpp"
@@ -29,53 +28,6 @@ namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
-
-[[noreturn]] void failJson(const std::filesystem::path& file, const std::string& fault) {
-  throw ImportError(file.string() + ": its JSON " + fault + "; export it again");
-}
-
-/// The parts of a file's JSON that are kept.
-struct ParsedGltf {
-  Json sections;  ///< those needed here
-  ExtensionNames extensions;
-  DuplicateKeys duplicates;
-  NodeGraph graph;
-  std::vector<PlainNode> nodes;  ///< there may be a million, so their JSON is not kept
-};
-
-/// Refuses a text whose copies and dumps would need much stack.
-ParsedGltf parseGltf(const std::string& text, const std::filesystem::path& file) {
-  ParsedGltf parsed;
-  NodeReader nodes;
-  int deepest = 0;
-  const auto wanted = [&](int depth, Json::parse_event_t event, Json& value) {
-    deepest = std::max(deepest, depth);
-    parsed.duplicates.see(depth, event, value);
-    parsed.graph.see(depth, event, value);
-    if (event == Json::parse_event_t::value) parsed.extensions.seeValue(value);
-    const bool isKept = nodes.see(depth, event, value);
-    if (event != Json::parse_event_t::key) return isKept;
-    parsed.extensions.seeKey(depth, value.get_ref<const std::string&>());
-    if (depth != 1) return true;
-    return value == "nodes" || value == "asset" || value == "extensionsRequired" ||
-           value == "extensionsUsed" || value == "meshes" || value == "accessors" ||
-           value == "bufferViews" || value == "buffers" || value == "scenes" || value == "scene" ||
-           value == "materials" || value == "textures";
-  };
-  try {
-    parsed.sections = Json::parse(text, wanted);
-  } catch (const Json::parse_error& error) {
-    failJson(file, "is damaged (byte " + std::to_string(error.byte) + ")");
-  } catch (const Json::out_of_range&) {
-    failJson(file, "has a number that is too large");
-  }
-  if (deepest > kMaxJsonDepth)
-    failJson(file, "is nested deeper than " + std::to_string(kMaxJsonDepth) + " levels");
-  if (!parsed.sections.is_object()) failJson(file, "is not an object");
-  parsed.sections.erase("nodes");  // an empty list
-  parsed.nodes = nodes.takeNodes();
-  return parsed;
-}
 
 /// The JSON text of a file. Old exporters write names in the encoding of their computer; bytes
 /// that are not UTF-8 are replaced and reported.

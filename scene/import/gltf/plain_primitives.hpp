@@ -10,9 +10,9 @@
 
 #include "scene/import/gltf/encoding/draco_mesh.hpp"
 #include "scene/import/gltf/encoding/gltf_binary.hpp"
+#include "scene/import/gltf/encoding/texture_mapping.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
 #include "scene/import/gltf/gltf_rest_pose.hpp"
-#include "scene/import/gltf/texture_mapping.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {

@@ -91,9 +91,10 @@ class NodeBuilder {
     object.overallWidth = product.overallWidth * scale;
     object.overallHeight = product.overallHeight * scale;
     if (product.fileFromPlacement) {
-      object.worldFromPlacement = worldFromFile_ * *product.fileFromPlacement;
+      Eigen::Affine3d placement = worldFromFile_ * *product.fileFromPlacement;
       for (int axis = 0; axis < 3; ++axis)
-        object.worldFromPlacement->linear().col(axis).normalize();  // a placement has no scale
+        placement.linear().col(axis).normalize();  // a placement has no scale
+      object.worldFromPlacement = std::make_shared<Eigen::Affine3d>(placement);
     }
     return object;
   }
@@ -469,7 +470,7 @@ class IfcImport {
       Object described = builder.makeObject(*product->second);
       described.meshes = std::move(object.meshes);
       described.worldFromMesh = object.worldFromMesh;
-      if (described.worldFromPlacement) described.worldFromPlacement->pretranslate(-model.offset);
+      movePlacement(described, -model.offset);
       object = std::move(described);
     }
     return model;

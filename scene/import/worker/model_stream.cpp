@@ -159,7 +159,7 @@ void write(StreamWriter& out, const Object& o) {
   out.putMatrix(o.worldFromMesh.matrix().topRows<3>());
   out.put(o.overallWidth);
   out.put(o.overallHeight);
-  out.put(static_cast<std::uint8_t>(o.worldFromPlacement.has_value()));
+  out.put(static_cast<std::uint8_t>(o.worldFromPlacement != nullptr));
   if (o.worldFromPlacement) out.putMatrix(o.worldFromPlacement->matrix().topRows<3>());
   out.put(static_cast<std::uint8_t>(o.usage));
   out.put(o.storey.value_or(kNone));
@@ -189,8 +189,9 @@ Object readObject(StreamReader& in, std::size_t meshes, std::size_t storeys) {
   o.overallWidth = in.getFinite("overall width");
   o.overallHeight = in.getFinite("overall height");
   if (in.getBool("has a placement")) {
-    o.worldFromPlacement.emplace(Eigen::Affine3d::Identity());
-    o.worldFromPlacement->matrix().topRows<3>() = in.getMatrix<Rows>("placement");
+    Eigen::Affine3d placement = Eigen::Affine3d::Identity();
+    placement.matrix().topRows<3>() = in.getMatrix<Rows>("placement");
+    o.worldFromPlacement = std::make_shared<Eigen::Affine3d>(placement);
   }
   o.usage = static_cast<Object::Usage>(in.getUpTo(2, "object use"));
   o.storey = readStoreyIndex(in, storeys);

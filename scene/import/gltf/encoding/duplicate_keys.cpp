@@ -1,41 +1,44 @@
 #include "scene/import/gltf/encoding/duplicate_keys.hpp"
 
-#include "scene/import/gltf/encoding/gltf_json.hpp"
+#include <algorithm>
 
 namespace enfilade::scene {
+namespace {
 
-void DuplicateKeys::see(int level, nlohmann::json::parse_event_t event,
-                        const nlohmann::json& value) {
-  using Event = nlohmann::json::parse_event_t;
-  if (level > kMaxJsonDepth) return;  // the file is refused
-  const auto depth = static_cast<std::size_t>(level);
-  if (event == Event::key) {
-    addKey(depth, value.get_ref<const std::string&>());
-  } else if (event == Event::value) {
-    countElement(depth);
-  } else if (event == Event::object_start || event == Event::array_start) {
-    countElement(depth);
-    open(depth, event == Event::array_start);
-  }
-}
+constexpr std::size_t kMaxListedKeys = 16;  // of an object; more are found by a tree
 
-void DuplicateKeys::open(std::size_t depth, bool isArray) {
+}  // namespace
+
+void DuplicateKeys::seeStart(std::size_t depth, bool isArray) {
+  seeValue(depth);
   if (open_.size() <= depth) open_.resize(depth + 1);
-  open_[depth].isArray = isArray;
-  open_[depth].elements = 0;
-  open_[depth].keys.clear();
+  Container& container = open_[depth];
+  container.isArray = isArray;
+  container.elements = container.keyCount = 0;
+  container.moreKeys.clear();
 }
 
-void DuplicateKeys::countElement(std::size_t depth) {
+void DuplicateKeys::seeValue(std::size_t depth) {
   if (depth > 0 && open_[depth - 1].isArray) ++open_[depth - 1].elements;
 }
 
-void DuplicateKeys::addKey(std::size_t depth, const std::string& key) {
+void DuplicateKeys::seeKey(std::size_t depth, const std::string& key) {
   Container& object = open_[depth - 1];
   object.lastKey = key;
-  if (object.keys.insert(key).second) return;
+  if (addKey(object, key)) return;
   if (count_ == 0) firstPath_ = makePath(depth);
   ++count_;
+}
+
+/// Returns whether the object did not have the key. Memory of keys is used again: a file may have a
+/// million objects.
+bool DuplicateKeys::addKey(Container& object, const std::string& key) {
+  const auto end = object.keys.begin() + static_cast<std::ptrdiff_t>(object.keyCount);
+  if (std::find(object.keys.begin(), end, key) != end) return false;
+  if (object.keyCount == kMaxListedKeys) return object.moreKeys.insert(key).second;
+  if (end == object.keys.end()) object.keys.emplace_back();
+  object.keys[object.keyCount++] = key;
+  return true;
 }
 
 std::string DuplicateKeys::makePath(std::size_t depth) const {

@@ -12,9 +12,10 @@ namespace enfilade::scene {
 
 class DuplicateKeys {
  public:
-  /// Call it for each event of nlohmann::json::parse() in order. The parser reports no ends of
-  /// containers that its callback discards, so beginnings alone are used.
-  void see(int depth, nlohmann::json::parse_event_t event, const nlohmann::json& value);
+  /// Call these for each key, value and begin of a container in order. `depth`: of open containers.
+  void seeKey(std::size_t depth, const std::string& key);
+  void seeValue(std::size_t depth);  ///< one that is no container
+  void seeStart(std::size_t depth, bool isArray);
 
   std::size_t count() const { return count_; }
   const std::string& firstPath() const { return firstPath_; }  ///< e.g. "nodes[3].translation"
@@ -23,14 +24,14 @@ class DuplicateKeys {
   /// An object or array that is being read.
   struct Container {
     bool isArray = false;
-    std::size_t elements = 0;    ///< of an array, so far
-    std::set<std::string> keys;  ///< of an object, so far
+    std::size_t elements = 0;       ///< of an array, so far
+    std::vector<std::string> keys;  ///< the first of an object; those beyond keyCount are unused
+    std::size_t keyCount = 0;
+    std::set<std::string> moreKeys;  ///< of an object that has many
     std::string lastKey;
   };
 
-  void open(std::size_t depth, bool isArray);
-  void countElement(std::size_t depth);
-  void addKey(std::size_t depth, const std::string& key);
+  static bool addKey(Container& object, const std::string& key);
   std::string makePath(std::size_t depth) const;
 
   std::vector<Container> open_;  ///< by depth

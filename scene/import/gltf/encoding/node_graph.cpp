@@ -27,29 +27,30 @@ constexpr std::size_t kMaxNameBytes = 1023;  // of a node; assimp cuts off the r
 
 // ---- reading ------------------------------------------------------------------------------------
 
-void NodeGraph::see(int depth, Json::parse_event_t event, const Json& value) {
-  using Event = Json::parse_event_t;
-  if (event == Event::key && depth == 1) {
-    inNodes_ = value == "nodes";
+void NodeGraph::seeKey(std::size_t depth, const std::string& key) {
+  if (depth == 1) {
+    inNodes_ = key == "nodes";
     if (inNodes_) nodes_.clear();  // of several lists, the last counts
   }
+  if (!inNodes_ || depth != 3) return;
+  member_ = key;
+  inChildren_ = false;
+}
+
+void NodeGraph::seeStart(std::size_t depth, bool isArray) {
   if (!inNodes_) return;
-  if (event == Event::key && depth == 3) {
-    member_ = value.get_ref<const std::string&>();
-    inChildren_ = false;
-  } else if (event == Event::value) {
-    seeValue(depth, value);
-  } else if (depth == 2 && (event == Event::object_start || event == Event::array_start)) {
+  if (depth == 2) {
     nodes_.emplace_back();
     member_.clear();
-  } else if (depth == 3 && event == Event::array_start && member_ == "children") {
+  } else if (depth == 3 && isArray && member_ == "children") {
     inChildren_ = true;
     nodes_.back().firstChild = children_.size();
     nodes_.back().childCount = 0;
   }
 }
 
-void NodeGraph::seeValue(int depth, const Json& value) {
+void NodeGraph::seeValue(std::size_t depth, const Json& value) {
+  if (!inNodes_) return;
   if (depth == 2) nodes_.emplace_back();  // no object, but it counts for the indices
   if (depth == 4 && inChildren_ && value.is_number_unsigned()) {
     children_.push_back(value.get<std::size_t>());

@@ -15,9 +15,10 @@ namespace enfilade::scene {
 
 class NodeGraph {
  public:
-  /// Call it for each event of nlohmann::json::parse() in order; a callback that discards the nodes
-  /// gets these events, too.
-  void see(int depth, nlohmann::json::parse_event_t event, const nlohmann::json& value);
+  /// Call these for each key, value and begin of a container in order. `depth`: of open containers.
+  void seeKey(std::size_t depth, const std::string& key);
+  void seeValue(std::size_t depth, const nlohmann::json& value);  ///< one that is no container
+  void seeStart(std::size_t depth, bool isArray);
 
   /// Throws ImportError for nodes that are nested deeper than kMaxNodeDepth, read or not, because
   /// assimp reads also those that are animated; and for too many copies in the scene with these
@@ -32,8 +33,6 @@ class NodeGraph {
     std::size_t nameBytes = 0;
   };
   friend class CopyCounter;
-
-  void seeValue(int depth, const nlohmann::json& value);
 
   std::vector<Node> nodes_;
   std::vector<std::size_t> children_;  ///< of all nodes; indices that do not exist included

@@ -1,4 +1,4 @@
-#include "scene/import/gltf/texture_mapping.hpp"
+#include "scene/import/gltf/encoding/texture_mapping.hpp"
 
 #include <cmath>
 

@@ -1,0 +1,32 @@
+// Parses the JSON of a glTF file once for all that read it. Private to the import.
+#pragma once
+
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
+
+#include "scene/import/gltf/encoding/duplicate_keys.hpp"
+#include "scene/import/gltf/encoding/node_graph.hpp"
+#include "scene/import/gltf/gltf_extensions.hpp"
+#include "scene/import/gltf/gltf_nodes.hpp"
+
+namespace enfilade::scene {
+
+/// Throws ImportError with the file's name, a fault such as "is damaged" and a remedy.
+[[noreturn]] void failJson(const std::filesystem::path& file, const std::string& fault);
+
+/// The parts of a file's JSON that are kept.
+struct ParsedGltf {
+  nlohmann::json sections;  ///< an object of those that the pre-pass needs, without the nodes
+  ExtensionNames extensions;
+  DuplicateKeys duplicates;
+  NodeGraph graph;
+  std::vector<PlainNode> nodes;  ///< there may be a million, so their JSON is not kept
+};
+
+/// Throws ImportError for damaged JSON, and for a text whose copies and dumps would need much
+/// stack.
+ParsedGltf parseGltf(const std::string& text, const std::filesystem::path& file);
+
+}  // namespace enfilade::scene
