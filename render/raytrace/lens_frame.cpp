@@ -147,7 +147,8 @@ class LensTracer {
     colour = blendTransparent(colour, face, at, near, z, transmittance);
     transmittance_[pixel] = static_cast<std::uint8_t>(255 * transmittance + 0.5f);
     const float channels[3] = {colour.x, colour.y, colour.z};
-    for (std::size_t i = 0; i < 3; ++i) frame_.rgb[3 * pixel + i] = encodeSrgbByte(channels[i]);
+    for (std::size_t i = 0; i < 3; ++i)
+      frame_.rgb[3 * pixel + i] = linearToSrgbByteByTable(channels[i]);
   }
 
   void write(std::size_t pixel, const ShadedTriangle& triangle, const Face& face,

@@ -48,7 +48,7 @@ Neighbours findNeighbours(float u, std::uint32_t size) {
 
 }  // namespace
 
-std::uint8_t encodeSrgbByte(float value) {
+std::uint8_t linearToSrgbByteByTable(float value) {
   static const std::vector<std::uint8_t> kTable = makeEncodeTable();
   const float bounded = value > 0 ? std::min(value, 1.0f) : 0.0f;  // a NaN is black
   return kTable[static_cast<std::size_t>(bounded * static_cast<float>(kEncodedSteps) + 0.5f)];
@@ -73,7 +73,7 @@ void MipTexture::addCoarser() {
           bilinear(fine, (static_cast<float>(x) + 0.5f) / static_cast<float>(coarse.width),
                    (static_cast<float>(y) + 0.5f) / static_cast<float>(coarse.height));
       std::uint8_t* out = &pixels[4 * (std::size_t{y} * coarse.width + x)];
-      for (std::size_t c = 0; c < 3; ++c) out[c] = encodeSrgbByte(mean[c]);
+      for (std::size_t c = 0; c < 3; ++c) out[c] = linearToSrgbByteByTable(mean[c]);
       out[3] = static_cast<std::uint8_t>(std::lround(255.0f * mean[3]));
     }
   }

@@ -54,6 +54,6 @@ class MipTextures {
 };
 
 /// Encodes 0..1 by a table; the error is at most one step of the byte.
-std::uint8_t encodeSrgbByte(float value);
+std::uint8_t linearToSrgbByteByTable(float value);
 
 }  // namespace enfilade::render

@@ -283,8 +283,8 @@ void FrameTracer::encodeRow(int y, std::span<std::uint8_t> visibility) {
     const glsl::vec3& linear = linearColours_[pixel];
     const auto transmittance = static_cast<std::uint8_t>(
         transmittance_.empty() ? 255.0f : 255 * transmittance_[pixel] + 0.5f);
-    const std::array rgb{encodeSrgbByte(linear.x), encodeSrgbByte(linear.y),
-                         encodeSrgbByte(linear.z)};
+    const std::array rgb{linearToSrgbByteByTable(linear.x), linearToSrgbByteByTable(linear.y),
+                         linearToSrgbByteByTable(linear.z)};
     applyAo(rgb.data(), visibility[static_cast<std::size_t>(x)], transmittance,
             &frame_.rgb[3 * pixel]);
   }

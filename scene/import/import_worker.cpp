@@ -52,9 +52,6 @@ void limitThisProcess(const ImportRequest& request, pid_t parent) {
   if (getppid() != parent) _exit(1);  // it died before the call above
   const rlimit none{0, 0};
   setrlimit(RLIMIT_CORE, &none);
-  // Small blocks that are freed join at once: a million of them would be looked through again at
-  // every large allocation.
-  mallopt(M_MXFAST, 0);
   // Only the soft limit: Node.js may be started from here. It reserves tens of gigabytes of address
   // space, so its written data is limited instead. Sanitizers reserve as much.
   const bool node = request.task == ImportTask::webIfc || request.task == ImportTask::ifcXml;
@@ -65,6 +62,12 @@ void limitThisProcess(const ImportRequest& request, pid_t parent) {
   setrlimit(RLIMIT_AS, &memory);
   const rlimit data{request.options.memoryLimit, request.options.memoryLimit};
   if (node && request.options.memoryLimit > 0) setrlimit(RLIMIT_DATA, &data);
+}
+
+/// glibc consolidates all small freed blocks of its fast bins at each large allocation. A file may
+/// free millions.
+void disableFastBins() {
+  mallopt(M_MXFAST, 0);
 }
 
 /// Prefix in ENFILADE_IMPORT_FAULT that selects this task, with the colon.
@@ -281,6 +284,7 @@ std::optional<int> runImportWorker(int argc, char** argv) {
   const std::optional<ImportRequest> request = parseImportRequest(argc, argv, parent);
   if (!request) return 2;
   limitThisProcess(*request, parent);
+  disableFastBins();
   if (request->task == ImportTask::ifcPlusPlus) disableAslr(argv);
   int code = 1;
   try {

@@ -1,6 +1,7 @@
-// Of objects that touch others, triangles are sorted by their planes, rounded to a grid. Of each
-// plane, those whose boxes within the plane overlap are compared exactly. Planes that are equal but
-// for rounding may fall into two cells of the grid: such surfaces are missed.
+// Only objects whose boxes touch another box are compared. Their triangles are sorted by their
+// planes, rounded to a grid. Of each plane, those whose boxes within the plane overlap are compared
+// exactly. Planes that are equal but for rounding may fall into two cells of the grid: such
+// surfaces are missed.
 #include "scene/model/coplanar_surfaces.hpp"
 
 #include <algorithm>
@@ -121,8 +122,7 @@ std::vector<bool> findTouchingObjects(const Model& model) {
     boxes.push_back(collision::inflated(box, kBoxMargin));
     objects.push_back(i);
   }
-  // From the largest to the smallest. Those that are found need no search of their own, so that a
-  // heap of boxes at one place costs no more than one search.
+  // Boxes that a larger box found are not searched again: n boxes at one place cost one query.
   std::vector<std::size_t> bySize(boxes.size());
   std::iota(bySize.begin(), bySize.end(), std::size_t{0});
   std::ranges::stable_sort(bySize, std::ranges::greater(),

@@ -83,7 +83,7 @@ struct Object {
   double overallWidth = 0, overallHeight = 0;
   /// Placement of an IFC product, in metres and without scale; null: unknown. Its axes are
   /// IFC's: for a door, x runs along its width from the lower corner, y is the side to which it
-  /// opens, z is up. Apart from the object, since few objects have one.
+  /// opens, z is up. Stored outside the object, because few objects have one.
   std::shared_ptr<const Eigen::Affine3d> worldFromPlacement = nullptr;
   Usage usage = Usage::both;
   /// The storey that contains it: an index into Model::storeys; nullopt: unknown.
@@ -139,7 +139,7 @@ struct Model {
   /// Name of the map whose coordinates the file's are, such as "EPSG:25832": x east, y up, -z
   /// north. Empty: not on a map.
   std::string map;
-  /// Direction of true north in the scene: its x and z, unit length. nullopt: the file states none.
+  /// Direction of true north in the scene: its x and z, unit length. nullopt: unknown.
   std::optional<Eigen::Vector2d> north;
   /// Names of the scenes in the file (glTF), of which `fileScene` was read; a name may be empty.
   std::vector<std::string> fileScenes;

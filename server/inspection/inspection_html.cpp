@@ -16,7 +16,7 @@ using Row = std::vector<HtmlCell>;
 using Vec3 = scene::Vec3;
 
 std::string describeNorth(const std::optional<Eigen::Vector2d>& north) {
-  if (!north) return "not stated by the file";
+  if (!north) return "unknown";
   return fmt::format("x {:.6f}, z {:.6f}", north->x(), north->y());
 }
 

@@ -26,6 +26,7 @@
 
 #include "scene/import/import_worker.hpp"
 #include "scene/navigation/doors.hpp"
+#include "scene/navigation/passages.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/navigation/walk/walker.hpp"
 #include "scene/world/world.hpp"
@@ -362,12 +363,6 @@ void judge(Bench& bench, const std::vector<Vec3>& places,
   }
 }
 
-double measureLine(const std::vector<Vec3>& points) {
-  double length = 0;
-  for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
-  return length;
-}
-
 /// Metres that the feet of an avatar move along a way, tick by tick: a step up or down counts with
 /// its height, wherever the points of the way are. nullopt: it cannot be walked.
 std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& way) {
@@ -434,7 +429,7 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
                   from.y(), from.z(), to.x(), to.y(), to.z());
       continue;
     }
-    ratios.push_back(path.length() / measureLine(way));
+    ratios.push_back(scene::computeLength(points) / scene::computeLength(way));
     feetRatios.push_back(*walked / *shortest);
     if (std::max(ratios.back(), feetRatios.back()) > 1.02)
       std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f, feet %.4f\n",

@@ -27,7 +27,7 @@ def make_fill_row(row):
     return [row["scene"], f"{row['fill_places']:,}", row["reach_compared"], row["reach_wrong"],
             row["reach_walked"], row["reach_near_width"], row["reach_skipped"], row["islands_wrong"],
             f"{row['lengths']} ({row['lengths_unwalkable']})", short(row["length_median"]),
-            format_ratio(row["length_max"]), row["length_above"], format_ratio(row["feet_max"]), row["feet_above"]]
+            format_ratio(row["length_max"]), row["length_above"], format_ratio(row.get("feet_max")), row.get("feet_above", "–")]
 
 
 def make_time_row(row):
@@ -70,7 +70,7 @@ of radius, or a shift of the grid by one centimetre, changes the answer.
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight, where an avatar can walk that. In brackets are those where it cannot, or of
 which the fill has not both ends. They are measured along the points of both. *By feet*: an avatar walks both, and the
-metres that its feet move are compared, tick by tick. A step up or down then counts with its height.
+metres that its feet move are compared, tick by tick. A step up or down then counts with its height. –: not measured.
 
 {table(["scene", "places of the fill", "compared", "wrong", "walked", "near", "skipped", "islands", "lengths", "median share",
         "largest", "above 1.02", "by feet: largest", "above"], [make_fill_row(row) for row in parts["reach_compared"]])}

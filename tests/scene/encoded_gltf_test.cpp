@@ -442,6 +442,15 @@ TEST(EncodedGltf, DamagedDracoDataIsReplacedByThePlainDataOfTheFile) {
   EXPECT_NE(diagnosticText(model, "plain_data_used").find("meshes[0].primitives[0]"),
             std::string::npos);
   EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 0u);
+
+  // Plain data that is incomplete or damaged does not replace it. Accessors without data are zeros.
+  GltfWriter incomplete = file, damaged = file;
+  incomplete.json["accessors"][3].erase("bufferView");
+  damaged.json["accessors"][3]["count"] = 1u << 20;
+  for (const GltfWriter& broken : {incomplete, damaged}) {
+    const std::string text = catchFailure(folder.write("broken.glb", broken.glb()));
+    EXPECT_NE(text.find("its Draco data is damaged"), std::string::npos) << text;
+  }
 }
 
 // ---- textures -----------------------------------------------------------------------------------

@@ -131,6 +131,7 @@ std::vector<Damage> damagedFiles() {
       {"GlbCalledGltf", "a.gltf", glb, {"rename it to .glb"}},
       {"GltfCalledGlb", "a.glb", box, {"rename", ".gltf"}},
       {"NoJsonAtAll", "a.gltf", std::string(400, '['), {"its JSON is damaged (byte 401)"}},
+      {"JsonOfManyLevels", "a.gltf", std::string(4000, '['), {"deeper than 512 levels"}},
       {"JsonCutOff", "a.gltf", box.substr(0, 100), {"its JSON is damaged (byte 101)"}},
       {"JsonWithAComment", "a.gltf", "/* by hand */" + box, {"its JSON is damaged (byte 1)"}},
       {"JsonInUtf16", "a.gltf", std::string("\xff\xfe{\0", 4), {"its JSON is damaged (byte 1)"}},

@@ -70,6 +70,22 @@ TEST(SceneReport, ReportsDiagnosticsWithTheirFirstExample) {
   EXPECT_EQ(findExample(report, "inside_out_solid"), "turned");
 }
 
+TEST(SceneReport, RepeatedObjectsHaveTheShapeAndTheTransformOfAnother) {
+  Model model = testing::boxModel({{"box", {1, 0, 0}, {2, 1, 1}}, {"tall", {1, 0, 0}, {2, 2, 1}}});
+  for (const double zero : {0.0, -0.0}) {
+    Object again = model.objects[0];
+    again.path = "again" + std::to_string(zero);
+    again.worldFromMesh.translation().z() = zero;
+    model.objects.push_back(again);
+  }
+  Object moved = model.objects[0];
+  moved.worldFromMesh.translation().x() += 5;
+  model.objects.push_back(moved);
+  model.objects[0].worldFromMesh.translation().z() = 0;
+  const SceneReport report = makeSceneReport(Scene(std::move(model)));
+  EXPECT_EQ(countDiagnostics(report, "repeated_object"), 2u);
+}
+
 /// The coplanar pairs of two boxes, the second of another colour if `coloured`.
 std::size_t countCoplanar(const testing::NamedBox& a, const testing::NamedBox& b, bool coloured) {
   Model model = testing::boxModel({a, b});

@@ -41,7 +41,7 @@ Aabb computeObjectAabb(const Model& model, const Object& object,
 }
 
 void movePlacement(Object& object, const Vec3& offset) {
-  if (!object.worldFromPlacement) return;
+  if (!object.worldFromPlacement || offset.isZero(0)) return;
   object.worldFromPlacement =
       std::make_shared<Eigen::Affine3d>(Eigen::Translation3d(offset) * *object.worldFromPlacement);
 }

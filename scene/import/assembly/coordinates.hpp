@@ -19,7 +19,7 @@ Eigen::Matrix3d makeYUpRotation(UpAxis up);
 Aabb computeObjectAabb(const Model& model, const Object& object,
                        const Eigen::Affine3d& frameFromMesh);
 
-/// Moves an object's placement, if it is known.
+/// Adds `offset` (metres, world) to the placement of an object, if that is known.
 void movePlacement(Object& object, const Vec3& offset);
 
 /// The upper median of at least one value.

@@ -1,7 +1,9 @@
 // Converts assimp's scene to a Model. Runs only in the import worker.
 #pragma once
 
+#include <cstddef>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 #include "scene/import/assimp/assimp_reader.hpp"

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "scene/import/file/import_options.hpp"
+#include "scene/import/gltf/encoding/draco_mesh.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -17,11 +18,11 @@ constexpr const char* kVisibility = "KHR_node_visibility";
 
 /// Extensions that are read; their names in full.
 constexpr std::array<std::string_view, 10> kReadExtensions{
-    "KHR_draco_mesh_compression", "KHR_mesh_quantization",
-    "EXT_meshopt_compression",    "KHR_meshopt_compression",
-    "EXT_mesh_gpu_instancing",    "KHR_physics_rigid_bodies",
-    "KHR_implicit_shapes",        "KHR_texture_transform",
-    "EXT_texture_webp",           "KHR_materials_pbrSpecularGlossiness"};
+    kDracoExtension,           "KHR_mesh_quantization",
+    "EXT_meshopt_compression", "KHR_meshopt_compression",
+    "EXT_mesh_gpu_instancing", "KHR_physics_rigid_bodies",
+    "KHR_implicit_shapes",     "KHR_texture_transform",
+    "EXT_texture_webp",        "KHR_materials_pbrSpecularGlossiness"};
 
 /// Of this one each texture without another image is reported as missing.
 constexpr std::string_view kReportedExtension = "KHR_texture_basisu";

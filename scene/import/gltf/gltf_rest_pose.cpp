@@ -5,6 +5,7 @@
 #include <functional>
 #include <optional>
 
+#include "scene/import/gltf/encoding/draco_mesh.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/gltf_nodes.hpp"
 #include "scene/model/add_diagnostic.hpp"
@@ -133,8 +134,7 @@ void visitWeights(const RestPose& pose, std::size_t vertices, GltfBuffers& buffe
 /// The arrays JOINTS_n and WEIGHTS_n of a primitive. Throws ImportError.
 PrimitiveArrays readInfluences(const Json& primitive, GltfBuffers& buffers,
                                const std::string& name) {
-  const Json* draco =
-      findMember(findMember(&primitive, "extensions"), "KHR_draco_mesh_compression");
+  const Json* draco = findMember(findMember(&primitive, "extensions"), kDracoExtension);
   if (findMember(findMember(draco, "attributes"), "JOINTS_0") != nullptr)
     buffers.fail(name + ": its joints are in its Draco data");
   const Json* attributes = findMember(&primitive, "attributes");

@@ -1,5 +1,5 @@
-// The events of nlohmann-json's SAX parser are used, since its parser with a callback looks through
-// all elements of an array at the end of each.
+// nlohmann-json's callback parser scans all elements of an array at the end of each element, which
+// is quadratic. Its SAX parser does not.
 #include "scene/import/gltf/parse_gltf.hpp"
 
 #include <algorithm>

@@ -1,4 +1,5 @@
-// Parses the JSON of a glTF file once for all that read it. Private to the import.
+// Parses the JSON of a glTF file for all checks of the pre-pass and for its nodes. Private to the
+// import.
 #pragma once
 
 #include <filesystem>
@@ -25,8 +26,8 @@ struct ParsedGltf {
   std::vector<PlainNode> nodes;  ///< there may be a million, so their JSON is not kept
 };
 
-/// Throws ImportError for damaged JSON, and for a text whose copies and dumps would need much
-/// stack.
+/// Throws ImportError for JSON that is damaged, is no object, has a number that is too large, or is
+/// nested deeper than kMaxJsonDepth.
 ParsedGltf parseGltf(const std::string& text, const std::filesystem::path& file);
 
 }  // namespace enfilade::scene

@@ -94,13 +94,18 @@ class MeshRewriter {
   Json rewritePrimitive(Json& primitive, const std::string& place, const RestPose* pose) {
     dropMissingMaterial(primitive, place);
     const Json original = primitive;
+    const bool hasFallback = hasPlainData(original);
+    const std::vector<Diagnostic> before = hasFallback ? problems_ : std::vector<Diagnostic>();
     std::string fault = tryToRewrite(primitive, place, pose);
-    if (!fault.empty() && hasPlainPositions(original)) {
+    if (!fault.empty() && hasFallback) {
       primitive = original;
       primitive["extensions"].erase(kDracoExtension);
+      problems_ = before;
       if (tryToRewrite(primitive, place, pose).empty()) {
         addDiagnostic(problems_, "plain_data_used", fault);
         fault.clear();
+      } else {
+        problems_ = before;
       }
     }
     if (fault.empty()) {
@@ -131,12 +136,19 @@ class MeshRewriter {
     return fault.empty() || fault.find(place) != std::string::npos ? fault : place + ": " + fault;
   }
 
-  /// Whether a Draco primitive has the same data without compression, too.
-  bool hasPlainPositions(const Json& primitive) const {
+  /// Whether a Draco primitive has all its data without compression, too. An accessor without a
+  /// buffer view is all zeros.
+  bool hasPlainData(const Json& primitive) const {
     if (findMember(findMember(&primitive, "extensions"), kDracoExtension) == nullptr) return false;
-    const Json* positions = findEntry(getArray(original_, "accessors"),
-                                      findMember(findMember(&primitive, "attributes"), "POSITION"));
-    return findMember(positions, "bufferView") != nullptr;
+    const auto isStored = [this](const Json& accessor) {
+      return findMember(findEntry(getArray(original_, "accessors"), &accessor), "bufferView") !=
+             nullptr;
+    };
+    const Json* attributes = findMember(&primitive, "attributes");
+    const Json* indices = findMember(&primitive, "indices");
+    return attributes != nullptr && attributes->is_object() &&
+           std::all_of(attributes->begin(), attributes->end(), isStored) &&
+           (indices == nullptr || isStored(*indices));
   }
 
   void dropMissingMaterial(Json& primitive, const std::string& place) {
@@ -344,15 +356,15 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   std::vector<Diagnostic> problems;
   plain.json = readMendedJson(file, format, problems);
   ParsedGltf parsed = parseGltf(plain.json, file);
-  const DuplicateKeys& duplicates = parsed.duplicates;
-  addDiagnostic(problems, "duplicate_key", duplicates.firstPath(), duplicates.count());
+  const std::size_t duplicates = parsed.duplicates.count();
+  addDiagnostic(problems, "duplicate_key", parsed.duplicates.firstPath(), duplicates);
   requireVersion2(parsed.sections, file);
   plain.problems =
       checkGltfExtensions(parsed.sections, parsed.extensions, file, choice.ignoreAppearance);
   plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());
   const bool other = chooseScene(parsed.sections, choice.scene, file, plain);
   // Rewriting leaves one value of a duplicate key, so that assimp reads the one checked here.
-  if (other || choice.rewrite || duplicates.count() > 0 ||
+  if (other || choice.rewrite || duplicates > 0 ||
       needsRewriting(plain.json, parsed.sections, file, format)) {
     parsed = {};
     rewriteGltf(file, format, plain);

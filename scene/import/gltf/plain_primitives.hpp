@@ -17,8 +17,6 @@
 
 namespace enfilade::scene {
 
-inline constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
-
 class PlainPrimitives {
  public:
   /// All arguments must outlive this object.

@@ -84,8 +84,10 @@ std::optional<Vec3> readTrueNorth(const StepFile& file, const std::optional<Vec3
   for (const StepStatement& statement : file.statements()) {
     if (statement.type != "IFCGEOMETRICREPRESENTATIONCONTEXT") continue;
     const Arguments arguments = splitStepArguments(statement.arguments);
-    auto direction = readStepVector(file, getArgument(arguments, 5), "IFCDIRECTION");
-    if (!direction) direction = unstated;
+    const std::string_view stated = getArgument(arguments, 5);
+    const auto direction = stated.empty() || stated == "$" || stated == "*"
+                               ? unstated
+                               : readStepVector(file, stated, "IFCDIRECTION");
     if (!direction) continue;
     Vec3 north = *direction;
     const auto placement = parseStepReference(getArgument(arguments, 4));
@@ -254,7 +256,8 @@ class IfcMetadataReader {
     if (!metadata_.trueNorth && metadata_.mapConversion)
       metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
     // IFC says that y points to north in a context that states nothing else.
-    if (!metadata_.trueNorth) metadata_.trueNorth = readTrueNorth(file_, Vec3::UnitY());
+    if (!metadata_.trueNorth && metadata_.mapFault.empty())
+      metadata_.trueNorth = readTrueNorth(file_, Vec3::UnitY());
   }
 
   void readStatement(const StepStatement& statement) {

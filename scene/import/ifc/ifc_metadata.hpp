@@ -43,7 +43,8 @@ struct IfcMetadata {
   bool siUnit = true;                         ///< false: feet and other conversion-based units
   std::optional<IfcMapConversion> mapConversion;
   std::string mapFault;  ///< the reason if the file states a map that cannot be used
-  /// Horizontal direction of north in the file's axes: of its context, otherwise of its map.
+  /// Horizontal direction of north in the file's axes: of its context, otherwise of its map,
+  /// otherwise y. nullopt: none of these can be used.
   std::optional<Vec3> trueNorth;
   std::string schema;
   bool complete = true;                           ///< END-ISO-10303-21 is present

@@ -31,8 +31,8 @@ std::vector<Vec3> collectSpaceSurface(const IfcMeshes& meshes, std::uint32_t spa
   return corners;
 }
 
-/// North in the scene's horizontal plane; nullopt if the file states none, or an --up axis turned
-/// it upright.
+/// North in the scene's horizontal plane; nullopt if it is unknown, or an --up axis turned it
+/// upright.
 std::optional<Eigen::Vector2d> computeSceneNorth(const std::optional<Vec3>& trueNorth,
                                                  const Eigen::Affine3d& worldFromFile) {
   if (!trueNorth) return std::nullopt;

@@ -13,6 +13,9 @@
 namespace enfilade::scene {
 namespace {
 
+// 2^64 divided by the golden ratio (Knuth, multiplicative hashing); odd.
+constexpr std::size_t kHashFactor = 0x9e3779b97f4a7c15;
+
 bool hasDiagnostic(const std::vector<Diagnostic>& diagnostics, const char* kind) {
   return std::any_of(diagnostics.begin(), diagnostics.end(),
                      [&](const Diagnostic& diagnostic) { return diagnostic.kind == kind; });
@@ -48,8 +51,6 @@ void countShell(const Shape& shape, const Shell& shell, const Object& object, Sc
     ++(shell.bounds() ? shells.closed : shells.open);
   }
 }
-
-constexpr std::size_t kHashFactor = 0x9e3779b97f4a7c15;  // odd; its bits look random
 
 using TransformKey = std::array<double, 12>;
 

@@ -9,6 +9,8 @@
 
 namespace enfilade::scene {
 
+inline constexpr const char* kDracoExtension = "KHR_draco_mesh_compression";
+
 /// An attribute to decode.
 struct DracoAttribute {
   std::uint32_t id = 0;     ///< Draco's unique id

@@ -5,7 +5,8 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kMaxListedKeys = 16;  // of an object; more are found by a tree
+// Of an object. Few objects of glTF have more, and up to here a list is quicker than a tree.
+constexpr std::size_t kMaxListedKeys = 16;
 
 }  // namespace
 
@@ -30,8 +31,8 @@ void DuplicateKeys::seeKey(std::size_t depth, const std::string& key) {
   ++count_;
 }
 
-/// Returns whether the object did not have the key. Memory of keys is used again: a file may have a
-/// million objects.
+/// Returns whether the object did not have the key. The strings of keys are reused, since a file
+/// may have a million objects.
 bool DuplicateKeys::addKey(Container& object, const std::string& key) {
   const auto end = object.keys.begin() + static_cast<std::ptrdiff_t>(object.keyCount);
   if (std::find(object.keys.begin(), end, key) != end) return false;
