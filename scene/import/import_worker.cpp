@@ -147,9 +147,10 @@ bool isGltf(ModelFormat format) {
   return format == ModelFormat::gltf || format == ModelFormat::glb;
 }
 
-/// Passes a glTF file through the pre-pass. `rewrite`: also if it seems plain. assimp recognises
-/// GLB files by their extension.
-std::vector<std::string> prepareGltf(ConvertInput& input, AssimpInput& file, bool rewrite) {
+/// Passes a glTF file through the pre-pass. `rewrite`: also if its data seem plain. Returns whether
+/// it was rewritten; then `dependencies` gets the files of its data.
+bool prepareGltf(ConvertInput& input, AssimpInput& file, bool rewrite,
+                 std::vector<std::string>& dependencies) {
   PlainGltf plain = makePlainGltf(
       input.file, input.format, {input.options.gltfScene, rewrite, input.options.ignoreAppearance});
   input.metadata.triangles = plain.triangles;
@@ -157,12 +158,13 @@ std::vector<std::string> prepareGltf(ConvertInput& input, AssimpInput& file, boo
   input.metadata.scene = plain.scene;
   input.metadata.problems = std::move(plain.problems);
   input.gltfJson = std::move(plain.json);
-  input.gltfNodes = std::move(plain.nodes);
-  input.gltfRoots = std::move(plain.roots);
-  if (plain.glb.empty()) return {};
-  file.text = std::move(plain.glb);
-  if (input.format == ModelFormat::gltf) file.file += ".glb";
-  return plain.dependencies;
+  input.gltf = std::move(plain.tree);
+  file.text = std::move(plain.meshFile.start);
+  file.restAt = plain.meshFile.restAt;
+  // assimp recognises GLB files by their extension.
+  if (plain.isRewritten && input.format == ModelFormat::gltf) file.file += ".glb";
+  dependencies = std::move(plain.dependencies);
+  return plain.isRewritten;
 }
 
 Model importByAssimp(const ImportRequest& request) {
@@ -170,8 +172,9 @@ Model importByAssimp(const ImportRequest& request) {
   input.file = request.file;
   input.format = detectModelFormat(request.file).value();  // checked by the parent
   input.options = request.options;
-  AssimpInput file{request.file, "", request.task == ImportTask::assimp};
+  AssimpInput file{request.file, "", 0, request.task == ImportTask::assimp};
   std::vector<std::string> dependencies;
+  bool isRewritten = false;
   if (file.isIfc) {
     file.text = readDescriptor(kIfcFile);
     input.metadata = readIfcFileMetadata(file.text);
@@ -188,13 +191,13 @@ Model importByAssimp(const ImportRequest& request) {
       file.text = std::move(rebased.text);
       input.shift = rebased.shift;
     }
-    if (isGltf(input.format)) dependencies = prepareGltf(input, file, false);
+    if (isGltf(input.format)) isRewritten = prepareGltf(input, file, false, dependencies);
   }
   sendProgress("parse", 0);
   AssimpOutput read = readWithAssimp(file);
-  if (read.scene == nullptr && isGltf(input.format) && file.text.empty()) {
+  if (read.scene == nullptr && isGltf(input.format) && !isRewritten) {
     // One damaged mesh fails the whole file; the pre-pass replaces it.
-    dependencies = prepareGltf(input, file, true);
+    prepareGltf(input, file, true, dependencies);
     read = readWithAssimp(file);
   }
   if (read.scene == nullptr) throwReadFailure(input, read.failure);

@@ -58,8 +58,6 @@ constexpr std::array kCatalog{
     DiagnosticKind{"missing_camera", warning, "a node names a camera that the file lacks"},
     DiagnosticKind{"missing_node", error,
                    "a scene or node names a node that the file lacks: it is missing"},
-    DiagnosticKind{"unmatched_node", error,
-                   "its children are invalid: transforms below are coarse, bodies are not read"},
     DiagnosticKind{"mirrored_object", note, "mirrored: its faces were flipped to face outwards"},
     // surfaces
     DiagnosticKind{"broken_triangle_dropped", error,

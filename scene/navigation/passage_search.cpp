@@ -421,6 +421,7 @@ PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedG
   const auto report = [&] {
     if (progress) progress(static_cast<double>(++done) / static_cast<double>(count));
   };
+  if (progress) progress(0);
   crossGaps(all, gaps, walkers, report);
   for (const RimGap& gap : findLongGaps(all)) crossGap(all, gap, std::nullopt);
   const std::vector<std::uint32_t> closed = listClosedIslands(all);

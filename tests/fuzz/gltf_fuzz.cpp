@@ -1,5 +1,6 @@
 // Fuzz target of the glTF pre-pass. Input that begins with '{' is a .gltf file, all else a GLB
 // file.
+#include <algorithm>
 #include <nlohmann/json.hpp>
 
 #include "scene/import/file/import_options.hpp"
@@ -10,9 +11,9 @@
 namespace enfilade::fuzz {
 namespace {
 
-/// The rewritten file is what assimp reads without further checks of ours.
+/// assimp reads the rewritten file without further checks of ours.
 void requirePlainFile(const scene::PlainGltf& plain) {
-  require(plain.glb.starts_with("glTF"), "a rewritten file is a GLB file");
+  require(plain.meshFile.start.starts_with("glTF"), "a rewritten file is a GLB file");
   const auto json = nlohmann::json::parse(plain.json, nullptr, false);
   require(json.is_object(), "the JSON of a rewritten file is valid");
   const std::size_t size = json.at("buffers").at(0).at("byteLength");
@@ -32,6 +33,20 @@ void requirePlainFile(const scene::PlainGltf& plain) {
       require(node["mesh"].get<std::size_t>() < json.at("meshes").size(), "a node's mesh exists");
 }
 
+/// The nodes of the scene are followed without further checks.
+void requireTree(const scene::PlainGltf& plain) {
+  const scene::GltfNodeTree& tree = plain.tree;
+  for (const std::size_t root : tree.roots) require(root < tree.nodes.size(), "a root exists");
+  for (const std::size_t index : scene::listSceneNodes(tree)) {
+    const scene::PlainNode& node = tree.nodes[index];
+    require(node.isObject, "a node is an object");
+    for (const std::size_t child : node.children)
+      require(child < tree.nodes.size(), "a child exists");
+    if (node.mesh)
+      require(std::ranges::find(tree.meshes, *node.mesh) != tree.meshes.end(), "a mesh is read");
+  }
+}
+
 }  // namespace
 
 void tryBytes(std::span<const std::uint8_t> bytes) {
@@ -42,7 +57,8 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
     const scene::PlainGltf plain =
         scene::makePlainGltf(file.path(), text ? scene::ModelFormat::gltf : scene::ModelFormat::glb,
                              {.ignoreAppearance = ignoresAppearance});
-    if (!plain.glb.empty()) requirePlainFile(plain);
+    if (plain.isRewritten) requirePlainFile(plain);
+    requireTree(plain);
   } catch (const scene::ImportError& error) {
     require(error.what()[0] != '\0', "an error has a message");
   }

@@ -69,9 +69,10 @@ TEST(GltfNodes, WhatGltfDoesNotAllowInATransformIsIgnoredAndReported) {
 
 TEST(GltfNodes, AChildThatIsNoIndexIsReportedWithItsParent) {
   const Model model =
-      importNodes(R"({"name":"box","mesh":0,"children":[1.0]},{"name":"lost","mesh":0})");
-  EXPECT_EQ(countDiagnostics(model, "unmatched_node"), 1u);
-  EXPECT_EQ(diagnosticText(model, "unmatched_node"), "box");
+      importNodes(R"({"name":"box","mesh":0,"children":["1"]},{"name":"lost","mesh":0})");
+  EXPECT_EQ(countDiagnostics(model, "missing_node"), 1u);
+  EXPECT_EQ(diagnosticText(model, "missing_node"), "nodes[0] 'box': node is not an index");
+  EXPECT_EQ(model.objects.size(), 1u);
 }
 
 // ---- keys twice in one object -------------------------------------------------------------------

@@ -104,11 +104,15 @@ std::vector<Damage> damagedFiles() {
        "a.gltf",
        tests::gltf(BoxMesh({1, 1, 1}), "0",
                    R"({"children":[1],"mesh":0},{"children":[0],"mesh":0})"),
-       {}},
+       {"nodes[0] stands below itself"}},
       {"NodeThatIsItsOwnChild",
        "a.gltf",
-       tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"children":[0],"mesh":0})"),
-       {}},
+       tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"name":"a","children":[0],"mesh":0})"),
+       {"nodes[0] 'a' stands below itself"}},
+      {"NodeThatIsANumber",
+       "a.gltf",
+       tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"children":[1],"mesh":0},5)"),
+       {"nodes[1] is not an object"}},
       {"MeshThatIsNotThere", "a.gltf", tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"mesh":3})"), {}},
       {"TooDeep", "a.gltf", nestedGltf(3000, 1), {"2000 levels", "flatter tree"}},
       {"FarTooDeep", "a.gltf", nestedGltf(20'000, 1), {"2000 levels", "flatter tree"}},
@@ -271,7 +275,7 @@ TEST(MalformedFiles, AGltfNameInAnotherEncodingThanUtf8IsMendedAndReported) {
   const TemporaryFolder folder;
   const std::string text = replaced(boxGltf(), R"("name":"box")", "\"name\":\"T\xFCr\"");
   const Model model = importModel(folder.write("a.gltf", text));
-  EXPECT_EQ(model.objects.at(0).path, "T%FCr");
+  EXPECT_EQ(model.objects.at(0).path, "T\u00FCr");
   EXPECT_EQ(countDiagnostics(model, "mended_text"), 1u);
   expectSize(model, {1, 2, 3});
 }

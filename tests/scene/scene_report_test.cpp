@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <map>
+#include <random>
+#include <utility>
+
 #include "scene/model/coplanar_surfaces.hpp"
 #include "scene/model/diagnostic_catalog.hpp"
 #include "tests/scene/box_scene.hpp"
@@ -136,6 +140,33 @@ TEST(SceneReport, CoplanarPairsAreCountedOnceEachAndTheLargestIsTheExample) {
   EXPECT_EQ(found.countDifferentLooks(), 4u);
   EXPECT_EQ(found.example, "slab and wide");
   EXPECT_TRUE(found.isComplete);
+}
+
+TEST(SceneReport, CoplanarPairsAmongManyAreThoseOfEachPairAlone) {
+  // Boxes on a grid of half metres, of which many touch and some touch only smaller ones.
+  constexpr std::size_t kCount = 80, kFirstRed = 40;
+  std::mt19937 random(7);
+  const auto pick = [&](unsigned from, unsigned to) {
+    return 0.5 * static_cast<double>(from + random() % (to - from + 1));
+  };
+  std::vector<testing::NamedBox> boxes;
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const Vec3 min(pick(0, 16), pick(0, 8), pick(0, 16));
+    boxes.push_back({"box", min, min + Vec3(pick(1, 4), pick(1, 4), pick(1, 4))});
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, bool> found, expected;
+  for (const CoplanarPair& pair : findCoplanarSurfaces(twoColoured(boxes, kFirstRed)).pairs)
+    found[{pair.first, pair.second}] = pair.looksEqual;
+  for (std::uint32_t i = 0; i < kCount; ++i) {
+    for (std::uint32_t j = i + 1; j < kCount; ++j) {
+      const std::size_t firstRed = i >= kFirstRed ? 0 : j >= kFirstRed ? 1 : 2;
+      const auto alone = findCoplanarSurfaces(twoColoured({boxes[i], boxes[j]}, firstRed)).pairs;
+      if (!alone.empty()) expected[{i, j}] = alone[0].looksEqual;
+    }
+  }
+  EXPECT_EQ(found, expected);
+  EXPECT_GT(found.size(), 30u);
+  EXPECT_LT(found.size(), 500u);
 }
 
 TEST(SceneReport, CoplanarSurfacesOfTooManyObjectsAreReportedAsNotAllCompared) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
+#include <utility>
 
 namespace enfilade::scene {
 namespace {
@@ -26,7 +27,25 @@ std::size_t utf8SequenceLength(std::string_view text, std::size_t i) {
   return length;
 }
 
+bool isDigits(std::string_view text) {
+  return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
+}
+
+/// Names that assimp generates for unnamed nodes, in files that it wrote, too. They contain a
+/// counter, so they are not stable.
+bool isGeneratedName(std::string_view name) {
+  if (name.starts_with("$ColladaAutoName$")) return true;
+  if (name.starts_with("nodes[") && name.ends_with("]")) {
+    return isDigits(name.substr(6, name.size() - 7));
+  }
+  return name.starts_with("nodes_") && isDigits(name.substr(6));
+}
+
 }  // namespace
+
+std::string makeNodeSegment(std::string_view name) {
+  return name.empty() || isGeneratedName(name) ? "node" : encodePathSegment(name);
+}
 
 std::string encodePathSegment(std::string_view name) {
   static constexpr char kDigits[] = "0123456789ABCDEF";
@@ -47,21 +66,27 @@ std::string encodePathSegment(std::string_view name) {
   return result;
 }
 
-std::size_t replaceInvalidUtf8(std::string& text) {
+std::size_t mendUtf8(std::string& text) {
   constexpr std::uint64_t kHighBits = 0x8080808080808080u;
-  std::size_t replaced = 0;
+  std::string mended;
+  std::size_t count = 0, copied = 0;
   for (std::size_t i = 0; i < text.size();) {
     std::uint64_t eight = kHighBits;
     if (i + sizeof eight <= text.size()) std::memcpy(&eight, text.data() + i, sizeof eight);
     const bool ascii = (eight & kHighBits) == 0;
     const std::size_t length = ascii ? sizeof eight : utf8SequenceLength(text, i);
     if (length == 0) {
-      text[i] = '?';
-      ++replaced;
+      const auto c = static_cast<unsigned char>(text[i]);
+      mended.append(text, copied, i - copied);
+      mended += static_cast<char>(0xc0 | c >> 6);
+      mended += static_cast<char>(0x80 | (c & 0x3f));
+      copied = i + 1;
+      ++count;
     }
     i += std::max<std::size_t>(length, 1);
   }
-  return replaced;
+  if (count > 0) text = std::move(mended.append(text, copied));
+  return count;
 }
 
 std::string SiblingNames::makeUnique(const std::string& name) {

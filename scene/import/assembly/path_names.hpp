@@ -11,8 +11,11 @@ namespace enfilade::scene {
 /// One path segment: '/', '%', control characters and invalid UTF-8 are percent-encoded.
 std::string encodePathSegment(std::string_view name);
 
-/// Replaces each byte that is not part of UTF-8 by '?'. Returns their number.
-std::size_t replaceInvalidUtf8(std::string& text);
+/// encodePathSegment() of a node's name; "node" if it has none, or one that assimp generated.
+std::string makeNodeSegment(std::string_view name);
+
+/// Reads each byte that is not part of UTF-8 as a letter of Latin-1. Returns their number.
+std::size_t mendUtf8(std::string& text);
 
 /// Makes names unique below one parent.
 class SiblingNames {

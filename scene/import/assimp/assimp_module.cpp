@@ -13,7 +13,11 @@
 #include <assimp/ProgressHandler.hpp>
 #include <cmath>
 #include <cstdint>
+#include <cstring>
+#include <memory>
+#include <string_view>
 #include <type_traits>
+#include <utility>
 
 #include "scene/import/assimp/assimp_reader.hpp"
 #include "scene/import/file/uri.hpp"
@@ -36,6 +40,46 @@ class ProgressForwarder : public Assimp::ProgressHandler {
   int lastPercent_ = 0;
 };
 
+/// A text that the end of a file follows.
+class SplicedStream : public Assimp::IOStream {
+ public:
+  SplicedStream(std::string_view text, std::unique_ptr<Assimp::IOStream> file, std::size_t restAt)
+      : text_(text),
+        file_(std::move(file)),
+        restAt_(restAt),
+        size_(text.size() + file_->FileSize() - restAt) {}
+
+  std::size_t Read(void* to, std::size_t size, std::size_t count) override {
+    if (size == 0) return 0;
+    count = std::min(count, (size_ - at_) / size);
+    const std::size_t bytes = size * count;
+    const std::size_t fromText = std::min(bytes, text_.size() - std::min(at_, text_.size()));
+    if (fromText > 0) std::memcpy(to, text_.data() + at_, fromText);
+    at_ += fromText;
+    if (bytes == fromText) return count;
+    const bool found =
+        file_->Seek(restAt_ + at_ - text_.size(), aiOrigin_SET) == aiReturn_SUCCESS &&
+        file_->Read(static_cast<char*>(to) + fromText, bytes - fromText, 1) == 1;
+    at_ += bytes - fromText;
+    return found ? count : 0;
+  }
+  aiReturn Seek(std::size_t offset, aiOrigin origin) override {
+    const std::size_t from = origin == aiOrigin_CUR ? at_ : origin == aiOrigin_END ? size_ : 0;
+    if (offset > size_ - from) return aiReturn_FAILURE;
+    at_ = from + offset;
+    return aiReturn_SUCCESS;
+  }
+  std::size_t Tell() const override { return at_; }
+  std::size_t FileSize() const override { return size_; }
+  std::size_t Write(const void*, std::size_t, std::size_t) override { return 0; }
+  void Flush() override {}
+
+ private:
+  std::string_view text_;  ///< outlives the stream
+  std::unique_ptr<Assimp::IOStream> file_;
+  std::size_t restAt_, size_, at_ = 0;
+};
+
 /// Records the files that assimp opens or looks for, and substitutes the repaired text of one file.
 class TrackingIoSystem : public Assimp::DefaultIOSystem {
  public:
@@ -54,6 +98,10 @@ class TrackingIoSystem : public Assimp::DefaultIOSystem {
       return DefaultIOSystem::Open(other.empty() ? file : other.c_str(), mode);
     }
     // assimp only reads from the stream, and the text outlives it.
+    if (input_.restAt > 0) {
+      std::unique_ptr<Assimp::IOStream> whole(DefaultIOSystem::Open(file, mode));
+      return whole ? new SplicedStream(input_.text, std::move(whole), input_.restAt) : nullptr;
+    }
     return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(input_.text.data()),
                                       input_.text.size());
   }
@@ -167,8 +215,8 @@ void readFile(const AssimpInput& file, AssimpOutput& to) {
 }  // namespace
 }  // namespace enfilade::scene
 
-extern "C" [[gnu::visibility("default")]] void enfiladeReadByAssimp2(
+extern "C" [[gnu::visibility("default")]] void enfiladeReadByAssimp3(
     const enfilade::scene::AssimpInput& file, enfilade::scene::AssimpOutput& read) {
   enfilade::scene::readFile(file, read);
 }
-static_assert(std::is_same_v<decltype(enfiladeReadByAssimp2), enfilade::scene::AssimpReadFunction>);
+static_assert(std::is_same_v<decltype(enfiladeReadByAssimp3), enfilade::scene::AssimpReadFunction>);

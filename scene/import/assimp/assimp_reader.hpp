@@ -29,8 +29,9 @@ struct FileMaterial {
 /// A file for assimp.
 struct AssimpInput {
   std::string file;
-  std::string text;    ///< replaces the file's contents if it was unzipped or repaired
-  bool isIfc = false;  ///< true: assimp reads only `text`
+  std::string text;        ///< replaces the file's contents, if it is not empty
+  std::size_t restAt = 0;  ///< the file's bytes from here on follow the text; 0: none
+  bool isIfc = false;      ///< true: assimp reads only `text`
 };
 
 /// The result of reading a file with assimp.
@@ -52,6 +53,6 @@ AssimpOutput readWithAssimp(const AssimpInput& file);
 /// The module's exported function; its symbol is kAssimpReadSymbol. Increase the number in the
 /// symbol whenever this signature, its structs or the progress message changes.
 using AssimpReadFunction = void(const AssimpInput& file, AssimpOutput& read);
-inline constexpr const char* kAssimpReadSymbol = "enfiladeReadByAssimp2";
+inline constexpr const char* kAssimpReadSymbol = "enfiladeReadByAssimp3";
 
 }  // namespace enfilade::scene

@@ -3,8 +3,8 @@
 #include <assimp/material.h>
 #include <assimp/scene.h>
 
+#include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <span>
 
@@ -15,8 +15,7 @@
 #include "scene/import/assimp/nodes.hpp"
 #include "scene/import/bodies/gltf_bodies.hpp"
 #include "scene/import/bodies/name_suffixes.hpp"
-#include "scene/import/gltf/gltf_metadata.hpp"
-#include "scene/import/gltf/gltf_nodes.hpp"
+#include "scene/import/gltf/collect_gltf_nodes.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
@@ -42,12 +41,8 @@ void reportMissingTriangles(const aiScene& scene, const ConvertInput& input,
       read += face.mNumIndices == 3 ? 1 : 0;
   }
   if (!input.metadata.triangles || read >= *input.metadata.triangles) return;
-  // A mesh that the scene does not use may explain it; to know that takes a look at all nodes.
-  const std::size_t used =
-      countSceneTriangles(nlohmann::json::parse(input.gltfJson, nullptr, false));
-  if (read < used)
-    addDiagnostic(diagnostics, "broken_triangle_dropped", "a vertex index is out of range",
-                  used - read);
+  addDiagnostic(diagnostics, "broken_triangle_dropped", "a vertex index is out of range",
+                *input.metadata.triangles - read);
 }
 
 /// Vertex colours multiply the material, and a material without a colour is grey here, as assimp's
@@ -68,6 +63,21 @@ void whitenUncolouredMaterials(const std::vector<FileMaterial>& materials,
     }
     mesh.material = known->second;
   }
+}
+
+/// Finds the meshes of a glTF file in the scene that assimp read from its GltfMeshFile.
+std::vector<std::span<const unsigned>> matchMeshes(const aiScene& scene,
+                                                   const ConvertInput& input) {
+  const std::span nodes(scene.mRootNode->mChildren, scene.mRootNode->mNumChildren);
+  const std::vector<std::size_t>& meshes = input.gltf.meshes;
+  if (nodes.size() != meshes.size())
+    throw ImportError(input.file.string() + ": assimp read " + std::to_string(nodes.size()) +
+                      " of its " + std::to_string(meshes.size()) + " meshes; export it again");
+  std::vector<std::span<const unsigned>> parts;
+  if (!meshes.empty()) parts.resize(*std::ranges::max_element(meshes) + 1);
+  for (std::size_t i = 0; i < meshes.size(); ++i)
+    parts[meshes[i]] = std::span(nodes[i]->mMeshes, nodes[i]->mNumMeshes);
+  return parts;
 }
 
 }  // namespace
@@ -97,14 +107,12 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
   worldFromRoot.linear() = makeYUpRotation(model.upAxis) * model.metresPerUnit *
                            computeAssimpFromFile(input.metadata, input.format).inverse();
   worldFromRoot.translate(input.shift);
-  const GltfNodes exact =
-      gltf ? matchGltfNodes(scene, input.gltfNodes, input.gltfRoots, model.diagnostics)
-           : GltfNodes();
   NodeTransforms transforms;
   const bool bodies = gltf && mayHaveGltfBodies(input.gltfJson);
   std::vector<ImportedNode> importedNodes =
-      collectObjects(scene, input.format, worldFromRoot, exact, meshes, model.diagnostics,
-                     bodies ? &transforms : nullptr);
+      gltf ? collectGltfNodes(input.gltf, {meshes, matchMeshes(scene, input)}, worldFromRoot,
+                              model.diagnostics, bodies ? &transforms : nullptr)
+           : collectObjects(scene, input.format, worldFromRoot, meshes, model.diagnostics);
   if (progress) progress("convert", 0.5);
 
   finishModel(std::move(importedNodes), std::move(meshes), input.file, input.options.offset, model);

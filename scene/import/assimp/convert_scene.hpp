@@ -9,7 +9,7 @@
 #include "scene/import/assimp/assimp_reader.hpp"
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/file/model_format.hpp"
-#include "scene/import/gltf/gltf_nodes.hpp"
+#include "scene/import/gltf/encoding/gltf_nodes.hpp"
 
 namespace enfilade::scene {
 
@@ -19,10 +19,9 @@ struct ConvertInput {
   ModelFormat format = ModelFormat::gltf;
   FileMetadata metadata;
   ImportOptions options;
-  std::string gltfJson;                ///< of a glTF file, as assimp read it
-  std::vector<PlainNode> gltfNodes;    ///< of a glTF file, all
-  std::vector<std::size_t> gltfRoots;  ///< the nodes of a glTF file's scene that have no parent
-  bool joined = true;                  ///< see AssimpOutput::joined
+  std::string gltfJson;       ///< of a glTF file, with all nodes
+  GltfNodeTree gltf;          ///< of a glTF file
+  bool joined = true;         ///< see AssimpOutput::joined
   Vec3 shift = Vec3::Zero();  ///< subtracted before assimp read the file; file units and axes
 };
 

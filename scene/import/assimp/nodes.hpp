@@ -4,19 +4,18 @@
 #include <Eigen/Geometry>
 #include <vector>
 
-#include "scene/import/assembly/finish_model.hpp"
+#include "scene/import/assembly/imported_node.hpp"
 #include "scene/import/file/model_format.hpp"
-#include "scene/import/gltf/gltf_nodes.hpp"
+
+struct aiScene;
 
 namespace enfilade::scene {
 
 /// The nodes that have triangles, in document order. `worldFromRoot` is applied after the root's
-/// own transform. The transforms of the nodes of `exact` are added to `transforms`, unless
-/// it is null.
+/// own transform. For glTF: collectGltfNodes().
 std::vector<ImportedNode> collectObjects(const aiScene& scene, ModelFormat format,
                                          const Eigen::Affine3d& worldFromRoot,
-                                         const GltfNodes& exact, const std::vector<Mesh>& meshes,
-                                         std::vector<Diagnostic>& diagnostics,
-                                         NodeTransforms* transforms);
+                                         const std::vector<Mesh>& meshes,
+                                         std::vector<Diagnostic>& diagnostics);
 
 }  // namespace enfilade::scene

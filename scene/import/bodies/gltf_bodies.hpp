@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <set>
 
-#include "scene/import/gltf/gltf_nodes.hpp"
+#include "scene/import/gltf/encoding/gltf_nodes.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {

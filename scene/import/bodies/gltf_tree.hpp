@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "scene/import/gltf/gltf_nodes.hpp"
+#include "scene/import/gltf/encoding/gltf_nodes.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <optional>
-#include <set>
 #include <vector>
 
 #include "scene/import/gltf/encoding/gltf_json.hpp"
@@ -42,33 +41,6 @@ std::vector<std::size_t> countTrianglesByMesh(const Json& gltf) {
   std::vector<std::size_t> triangles;
   for (const Json& mesh : getArray(gltf, "meshes"))
     triangles.push_back(countTrianglesOfMesh(gltf, mesh));
-  return triangles;
-}
-
-std::size_t countSceneTriangles(const Json& gltf) {
-  const Json &nodes = getArray(gltf, "nodes"), &meshes = getArray(gltf, "meshes"),
-             &scenes = getArray(gltf, "scenes");
-  std::set<std::size_t> reachedNodes, reachedMeshes;
-  std::vector<std::size_t> open;
-  const auto reach = [&](const Json& indices) {
-    for (const Json& index : indices) {
-      if (!index.is_number_unsigned() || index.get<std::size_t>() >= nodes.size()) continue;
-      if (reachedNodes.insert(index.get<std::size_t>()).second)
-        open.push_back(index.get<std::size_t>());
-    }
-  };
-  const std::size_t scene = readIndexMember(&gltf, "scene").value_or(0);
-  if (scene < scenes.size()) reach(getArray(scenes[scene], "nodes"));
-  while (!open.empty()) {
-    const Json& node = nodes[open.back()];
-    open.pop_back();
-    if (const auto mesh = readIndexMember(&node, "mesh"); mesh && *mesh < meshes.size())
-      reachedMeshes.insert(*mesh);
-    reach(getArray(node, "children"));
-  }
-  std::size_t triangles = 0;
-  for (const std::size_t mesh : reachedMeshes)
-    triangles += countTrianglesOfMesh(gltf, meshes[mesh]);
   return triangles;
 }
 

@@ -10,8 +10,5 @@ namespace enfilade::scene {
 /// Number of triangles of each mesh by its accessors. Entries that are invalid count as none:
 /// assimp reports them.
 std::vector<std::size_t> countTrianglesByMesh(const nlohmann::json& gltf);
-/// As countTrianglesByMesh(), for the meshes of the default scene, each counted once: assimp reads
-/// no others.
-std::size_t countSceneTriangles(const nlohmann::json& gltf);
 
 }  // namespace enfilade::scene

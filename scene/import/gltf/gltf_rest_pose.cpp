@@ -7,7 +7,7 @@
 
 #include "scene/import/gltf/encoding/draco_mesh.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
-#include "scene/import/gltf/gltf_nodes.hpp"
+#include "scene/import/gltf/encoding/gltf_nodes.hpp"
 #include "scene/model/add_diagnostic.hpp"
 #include "scene/model/box_mesh.hpp"
 

@@ -15,10 +15,13 @@ namespace {
 
 using Json = nlohmann::json;
 
-constexpr std::array<std::string_view, 11> kSections{
-    "asset",     "extensionsRequired", "extensionsUsed", "meshes",
-    "accessors", "bufferViews",        "buffers",        "scenes",
-    "scene",     "materials",          "textures"};
+constexpr std::array<std::string_view, 14> kSections{"asset",          "extensionsRequired",
+                                                     "extensionsUsed", "meshes",
+                                                     "accessors",      "buffers",
+                                                     "bufferViews",    "materials",
+                                                     "textures",       "images",
+                                                     "samplers",       "cameras",
+                                                     "scenes",         "scene"};
 
 bool isSection(std::string_view key) {
   return std::ranges::find(kSections, key) != kSections.end();
@@ -44,7 +47,6 @@ class GltfHandler : public nlohmann::json_sax<Json> {
   bool key(string_t& name) override {
     const std::size_t depth = countOpen();
     to_.duplicates.seeKey(depth, name);
-    to_.graph.seeKey(depth, name);
     to_.extensions.seeKey(static_cast<int>(depth), name);
     if (depth == 1) {
       inNodes_ = name == "nodes";
@@ -85,7 +87,6 @@ class GltfHandler : public nlohmann::json_sax<Json> {
   bool addValue(Json value) {
     const std::size_t depth = countOpen();
     to_.duplicates.seeValue(depth);
-    to_.graph.seeValue(depth, value);
     to_.extensions.seeValue(value);
     place(std::move(value));
     if (isInListOfNodes()) to_.nodes.push_back(readPlainNode(node_));
@@ -95,7 +96,6 @@ class GltfHandler : public nlohmann::json_sax<Json> {
   bool open(Json container) {
     const std::size_t depth = countOpen();
     to_.duplicates.seeStart(depth, container.is_array());
-    to_.graph.seeStart(depth, container.is_array());
     open_.push_back(place(std::move(container)));
     return true;
   }

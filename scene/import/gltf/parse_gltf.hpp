@@ -8,9 +8,8 @@
 #include <vector>
 
 #include "scene/import/gltf/encoding/duplicate_keys.hpp"
-#include "scene/import/gltf/encoding/node_graph.hpp"
+#include "scene/import/gltf/encoding/gltf_nodes.hpp"
 #include "scene/import/gltf/gltf_extensions.hpp"
-#include "scene/import/gltf/gltf_nodes.hpp"
 
 namespace enfilade::scene {
 
@@ -22,7 +21,6 @@ struct ParsedGltf {
   nlohmann::json sections;  ///< an object of those that the pre-pass needs, without the nodes
   ExtensionNames extensions;
   DuplicateKeys duplicates;
-  NodeGraph graph;
   std::vector<PlainNode> nodes;  ///< there may be a million, so their JSON is not kept
 };
 

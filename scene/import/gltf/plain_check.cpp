@@ -18,8 +18,8 @@ using Json = nlohmann::json;
 
 /// Texts in the JSON of a file that may need rewriting. Exporters sometimes forget to list an
 /// extension in extensionsUsed, so the whole text is searched.
-constexpr std::array<std::string_view, 17> kRewrittenTexts{
-    "\"skin\"",  // assimp ignores one that does not exist if the file has no skins
+constexpr std::array<std::string_view, 16> kRewrittenTexts{
+    "\"skin\"",  // one that does not exist is reported
     "\"skins\"",
     "\"targets\"",
     "\"EXT_meshopt_compression\"",
@@ -32,7 +32,6 @@ constexpr std::array<std::string_view, 17> kRewrittenTexts{
     "\"sparse\"",
     "\"EXT_texture_avif\"",
     "\"KHR_materials_pbrSpecularGlossiness\"",
-    "\"KHR_lights_punctual\"",  // assimp refuses a file with a broken light
     "\"DATA:",
     "\"Data:",
     ";BASE64,"};
@@ -150,7 +149,7 @@ bool isPlainBuffer(const Json& buffer, std::size_t index, const std::filesystem:
   if (!length) return false;
   const Json* uri = findMember(&buffer, "uri");
   if (uri == nullptr)
-    return format == ModelFormat::glb && index == 0 && readGlbBinarySize(file) >= *length;
+    return format == ModelFormat::glb && index == 0 && findGlbBinary(file).size >= *length;
   if (!uri->is_string()) return false;
   const auto& text = uri->get_ref<const std::string&>();
   if (isDataUri(text)) return isPlainDataUri(text, *length);

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <nlohmann/json.hpp>
-#include <numeric>
+#include <optional>
 #include <string_view>
 
 #include "scene/import/assembly/path_names.hpp"
@@ -12,6 +12,7 @@
 #include "scene/import/gltf/encoding/gltf_binary.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/import/gltf/encoding/missing_references.hpp"
+#include "scene/import/gltf/encoding/node_graph.hpp"
 #include "scene/import/gltf/gltf_buffers.hpp"
 #include "scene/import/gltf/gltf_extensions.hpp"
 #include "scene/import/gltf/gltf_instances.hpp"
@@ -30,12 +31,12 @@ namespace {
 using Json = nlohmann::json;
 
 /// The JSON text of a file. Old exporters write names in the encoding of their computer; bytes
-/// that are not UTF-8 are replaced and reported.
+/// that are not UTF-8 are reported.
 std::string readMendedJson(const std::filesystem::path& file, ModelFormat format,
                            std::vector<Diagnostic>& problems) {
   std::string text = readGltfJson(file, format);
-  const std::size_t replaced = replaceInvalidUtf8(text);
-  addDiagnostic(problems, "mended_text", "replaced bytes that are not UTF-8", replaced);
+  const std::size_t mended = mendUtf8(text);
+  addDiagnostic(problems, "mended_text", "read bytes that are not UTF-8 as Latin-1", mended);
   return text;
 }
 
@@ -264,7 +265,9 @@ void addMissingScene(Json& gltf, const std::filesystem::path& file) {
   gltf["scenes"] = Json::array({{{"nodes", std::move(roots)}}});
 }
 
-void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGltf& to) {
+/// Returns the data of the new file. Its JSON is `to.json`, and its sections and nodes `parsed`.
+GltfBinary rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGltf& to,
+                       ParsedGltf& parsed) {
   const Json original = Json::parse(to.json);
   GltfBuffers buffers(file, format, original);
   GltfBinary binary;
@@ -273,7 +276,6 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   addMissingScene(gltf, file);
   try {
     dropMissingReferences(gltf, to.problems);
-    dropAllLights(gltf);
     replaceSpecularGlossiness(gltf);
     // Instances are copies of the posed mesh, so all instances of a node share one.
     const auto poses = separatePosedMeshes(gltf, buffers, to.problems);
@@ -290,10 +292,63 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   }
   // Names that are not UTF-8 would make dump() throw.
   to.json = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
-  to.glb = binary.makeGlb(to.json);
-  if (to.glb.empty())
-    throw ImportError(file.string() + ": its meshes exceed 4 GiB when decoded; split it");
   to.dependencies = buffers.dependencies();
+  to.isRewritten = true;
+  parsed = {};
+  for (const Json& node : getArray(gltf, "nodes")) parsed.nodes.push_back(readPlainNode(node));
+  gltf.erase("nodes");
+  parsed.sections = std::move(gltf);
+  return binary;
+}
+
+// ---- the file of meshes -------------------------------------------------------------------------
+
+/// The meshes of the scene in the order in which a reader that follows its nodes comes to them.
+std::vector<std::size_t> listMeshes(const GltfNodeTree& tree, std::size_t meshCount) {
+  std::vector<bool> isListed(meshCount, false);
+  std::vector<std::size_t> meshes;
+  for (const std::size_t index : listSceneNodes(tree)) {
+    const std::optional<std::size_t>& mesh = tree.nodes[index].mesh;
+    if (!mesh || *mesh >= meshCount || isListed[*mesh]) continue;
+    isListed[*mesh] = true;
+    meshes.push_back(*mesh);
+  }
+  return meshes;
+}
+
+/// The JSON of a GltfMeshFile.
+std::string writeMeshJson(Json sections, const std::vector<std::size_t>& meshes) {
+  Json json = Json::object();
+  for (const char* section : {"asset", "extensionsUsed", "meshes", "accessors", "bufferViews",
+                              "buffers", "materials", "textures", "images", "samplers"})
+    if (const auto found = sections.find(section); found != sections.end())
+      json[section] = std::move(*found);
+  Json children = Json::array(), nodes = Json::array({Json::object()});
+  for (const std::size_t mesh : meshes) {
+    children.push_back(nodes.size());
+    nodes.push_back({{"mesh", mesh}});
+  }
+  nodes[0]["children"] = std::move(children);
+  json["nodes"] = std::move(nodes);
+  json["scenes"] = Json::array({{{"nodes", Json::array({0u})}}});
+  json["scene"] = 0u;
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+/// `binary`: null if the file is not rewritten.
+GltfMeshFile makeMeshFile(std::string json, const GltfBinary* binary,
+                          const std::filesystem::path& file, ModelFormat format) {
+  if (binary == nullptr && format == ModelFormat::gltf) return {std::move(json)};
+  GltfMeshFile made;
+  if (binary != nullptr) {
+    made.start = binary->makeGlb(std::move(json));
+  } else {
+    made.restAt = findGlbBinary(file).chunk;
+    made.start = makeGlbStart(std::move(json), std::filesystem::file_size(file) - made.restAt);
+  }
+  if (made.start.empty())
+    throw ImportError(file.string() + ": its meshes exceed 4 GiB when decoded; split it");
+  return made;
 }
 
 // ---- scenes -------------------------------------------------------------------------------------
@@ -363,19 +418,26 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
       checkGltfExtensions(parsed.sections, parsed.extensions, file, choice.ignoreAppearance);
   plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());
   const bool other = chooseScene(parsed.sections, choice.scene, file, plain);
+  const auto readTree = [&] {
+    const Json& scenes = getArray(parsed.sections, "scenes");
+    plain.tree = {std::move(parsed.nodes), {}, {}};
+    if (!scenes.empty()) plain.tree.roots = readIndices(getArray(scenes.at(plain.scene), "nodes"));
+  };
+  readTree();
+  std::optional<GltfBinary> binary;
   // Rewriting leaves one value of a duplicate key, so that assimp reads the one checked here.
   if (other || choice.rewrite || duplicates > 0 ||
+      hasMissingReferences(plain.tree, parsed.sections) ||
       needsRewriting(plain.json, parsed.sections, file, format)) {
-    parsed = {};
-    rewriteGltf(file, format, plain);
-    parsed = parseGltf(plain.json, file);
+    binary = rewriteGltf(file, format, plain, parsed);
+    readTree();
   }
   const std::vector<std::size_t> triangles = countTrianglesByMesh(parsed.sections);
-  const Json& roots = getArray(getArray(parsed.sections, "scenes").at(plain.scene), "nodes");
-  parsed.graph.check(roots, triangles, file);
-  plain.nodes = std::move(parsed.nodes);
-  plain.roots = readIndices(roots);
-  plain.triangles = std::accumulate(triangles.begin(), triangles.end(), std::size_t{0});
+  validateNodeGraph(plain.tree, triangles, file);
+  plain.tree.meshes = listMeshes(plain.tree, triangles.size());
+  for (const std::size_t mesh : plain.tree.meshes) plain.triangles += triangles[mesh];
+  plain.meshFile = makeMeshFile(writeMeshJson(std::move(parsed.sections), plain.tree.meshes),
+                                binary ? &*binary : nullptr, file, format);
   return plain;
 }
 

@@ -1,31 +1,37 @@
-// The pre-pass over glTF files: checks them, and rewrites those that assimp would not read, or not
-// read right, to a GLB file of plain accessors. It decodes KHR_mesh_quantization,
-// EXT_meshopt_compression, KHR_meshopt_compression, KHR_draco_mesh_compression, sparse accessors,
-// strips, fans and data URIs, expands EXT_mesh_gpu_instancing and applies KHR_texture_transform.
-// Nodes and meshes keep their indices. All other files stay as they are.
+// The pre-pass over glTF files: checks them, reads their nodes, and makes a file of their meshes
+// for assimp. Data that assimp would not read, or not read right, is rewritten to plain accessors:
+// it decodes KHR_mesh_quantization, EXT_meshopt_compression, KHR_meshopt_compression,
+// KHR_draco_mesh_compression, sparse accessors, strips, fans and data URIs, expands
+// EXT_mesh_gpu_instancing and applies KHR_texture_transform. Nodes and meshes keep their indices.
 #pragma once
 
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
-#include <optional>
 #include <string>
 #include <vector>
 
 #include "scene/import/file/model_format.hpp"
-#include "scene/import/gltf/gltf_nodes.hpp"
+#include "scene/import/gltf/encoding/gltf_nodes.hpp"
 
 namespace enfilade::scene {
 
-/// A glTF file for assimp.
+/// A glTF or GLB file with a node for each mesh of the scene, in order, below one root node. assimp
+/// takes 1.2 KB for a node, and a file may have a million.
+struct GltfMeshFile {
+  std::string start;       ///< its bytes, or the first of them
+  std::size_t restAt = 0;  ///< the bytes of the original file from here on follow; 0: none
+};
+
+/// A glTF file that was checked.
 struct PlainGltf {
-  std::string json;                      ///< as assimp reads it
-  std::string glb;                       ///< the rewritten file; empty: the file itself is plain
-  std::optional<std::size_t> triangles;  ///< in all meshes, each once; nullopt: unknown
-  std::vector<std::string> scenes;       ///< names of all scenes; some may be empty
-  std::uint32_t scene = 0;               ///< the one that is read
-  std::vector<PlainNode> nodes;          ///< all, by index, in doubles
-  std::vector<std::size_t> roots;        ///< of the scene that is read; indices of nodes
+  std::string json;          ///< with all nodes
+  bool isRewritten = false;  ///< then `json` and `meshFile` are of a GLB file
+  GltfMeshFile meshFile;
+  GltfNodeTree tree;
+  std::size_t triangles = 0;        ///< of the scene's meshes, each once
+  std::vector<std::string> scenes;  ///< names of all scenes; some may be empty
+  std::uint32_t scene = 0;          ///< the one that is read
   std::vector<Diagnostic> problems;
   std::vector<std::string> dependencies;  ///< files that were read or looked for
 };

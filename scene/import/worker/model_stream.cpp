@@ -3,7 +3,9 @@
 #include <sys/mman.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
+#include <thread>
 
 #include "scene/import/worker/stream_bytes.hpp"
 
@@ -12,7 +14,6 @@ namespace {
 
 constexpr std::uint32_t kNone = 0xffffffff;   // an absent index
 constexpr std::uint32_t kMagic = 0x4d464e45;  // "ENFM"
-constexpr std::size_t kHugePageBytes = 2 << 20;
 
 // ---- one pair of functions per type -------------------------------------------------------------
 
@@ -173,16 +174,28 @@ void write(StreamWriter& out, const Object& o) {
   }
 }
 
-/// Parts may precede their whole; that index is checked when all objects are read.
-Object readObject(StreamReader& in, std::size_t meshes, std::size_t storeys) {
-  Object o;
+struct ObjectReferences {
+  std::size_t meshes, storeys, objects;
+};
+
+/// The index of one of `objects`; nullopt: absent.
+std::optional<std::uint32_t> readObjectIndex(StreamReader& in, std::size_t objects,
+                                             const char* field) {
+  const auto index = in.get<std::uint32_t>(field);
+  if (index == kNone) return std::nullopt;
+  if (index >= objects) in.fail(field, "no object " + std::to_string(index));
+  return index;
+}
+
+/// `counts`: of what an object may refer to. In place, because there may be a million.
+void readObject(StreamReader& in, const ObjectReferences& counts, Object& o) {
   o.path = in.getText("object path");
   o.globalId = in.getText("GlobalId");
   o.ifcClass = in.getText("IFC class");
   o.operationType = in.getText("operation");
   o.meshes = in.getArray<std::uint32_t>("object meshes");
   for (const std::uint32_t mesh : o.meshes) {
-    if (mesh >= meshes) in.fail("object meshes", "no mesh " + std::to_string(mesh));
+    if (mesh >= counts.meshes) in.fail("object meshes", "no mesh " + std::to_string(mesh));
   }
   using Rows = Eigen::Matrix<double, 3, 4>;
   o.worldFromMesh.matrix().topRows<3>() = in.getMatrix<Rows>("object transform");
@@ -194,12 +207,10 @@ Object readObject(StreamReader& in, std::size_t meshes, std::size_t storeys) {
     o.worldFromPlacement = std::make_shared<Eigen::Affine3d>(placement);
   }
   o.usage = static_cast<Object::Usage>(in.getUpTo(2, "object use"));
-  o.storey = readStoreyIndex(in, storeys);
-  const auto whole = in.get<std::uint32_t>("piece of");
-  if (whole != kNone) o.partOf = whole;
+  o.storey = readStoreyIndex(in, counts.storeys);
+  o.partOf = readObjectIndex(in, counts.objects, "piece of");
   o.className = in.getText("class");
-  const auto thing = in.get<std::uint32_t>("thing");
-  if (thing != kNone) o.thing = thing;
+  o.thing = readObjectIndex(in, counts.objects, "thing");
   const std::size_t attributes = in.count(16, "attributes");
   for (std::size_t i = 0; i < attributes; ++i) {
     ObjectAttribute& attribute = o.attributes.emplace_back();
@@ -208,7 +219,6 @@ Object readObject(StreamReader& in, std::size_t meshes, std::size_t storeys) {
     for (const double value : attribute.values)
       if (!std::isfinite(value)) in.fail("attribute values", "not a finite number");
   }
-  return o;
 }
 
 void write(StreamWriter& out, const PathKey& key) {
@@ -305,26 +315,40 @@ void writeAll(StreamWriter& out, const std::vector<T>& values) {
   for (const T& value : values) write(out, value);
 }
 
-/// Asks for huge pages behind the reserved memory. A million objects take 130,000 small pages, and
-/// their faults a fifth of the time. Advice alone: without huge pages nothing else changes.
+/// Lets a second thread have the kernel clear the reserved memory of many values, while the first
+/// of them are read. A million objects take 100,000 pages. Huge pages are no better: where the
+/// memory of a virtual machine is fresh, they take five times as long. Returns the thread to wait
+/// for.
 template <class T>
-void adviseHugePages(const std::vector<T>& reserved) {
+std::jthread fetchReserved(const std::vector<T>& reserved) {
+  constexpr std::size_t kManyBytes = 16 << 20;
+  const std::size_t bytes = reserved.capacity() * sizeof(T);
+  if (bytes < kManyBytes) return {};
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
-  const auto begin = (reinterpret_cast<std::uintptr_t>(reserved.data()) + page - 1) / page * page;
-  const auto end =
-      reinterpret_cast<std::uintptr_t>(reserved.data() + reserved.capacity()) / page * page;
-  if (begin + kHugePageBytes <= end)
-    madvise(reinterpret_cast<void*>(begin), end - begin, MADV_HUGEPAGE);
+  const auto begin = reinterpret_cast<std::uintptr_t>(reserved.data()) / page * page + page;
+  // An older kernel refuses the call; each page is then cleared when it is first written.
+  return std::jthread([begin, end = begin + (bytes - page) / page * page] {
+    // In steps: each holds a lock that allocations of other threads wait for.
+    constexpr std::uintptr_t kStep = 1 << 16;
+    for (std::uintptr_t at = begin; at < end; at += kStep)
+      madvise(reinterpret_cast<void*>(at), std::min(kStep, end - at), MADV_POPULATE_WRITE);
+  });
 }
 
 /// `smallest`: minimum size of an item in bytes, so that a false count cannot allocate much.
+/// `read` fills the next of so many items.
+template <class T, class Read>
+void readInPlace(StreamReader& in, std::vector<T>& values, std::size_t smallest, const char* field,
+                 const Read& read) {
+  const std::size_t n = in.count(smallest, field);
+  values.reserve(n);  // a small multiple of the remaining bytes
+  const std::jthread fetching = fetchReserved(values);
+  for (std::size_t i = 0; i < n; ++i) read(values.emplace_back(), n);
+}
 template <class T, class Read>
 void readAll(StreamReader& in, std::vector<T>& values, std::size_t smallest, const char* field,
              const Read& read) {
-  const std::size_t n = in.count(smallest, field);
-  values.reserve(n);  // a small multiple of the remaining bytes
-  adviseHugePages(values);
-  for (std::size_t i = 0; i < n; ++i) values.push_back(read());
+  readInPlace(in, values, smallest, field, [&](T& value, std::size_t) { value = read(); });
 }
 
 void readHeader(StreamReader& in, std::size_t size) {
@@ -405,14 +429,9 @@ Model deserializeModel(std::span<const std::byte> bytes) {
   readAll(in, model.meshes, 52, "meshes", [&] { return readMesh(in, model.materials.size()); });
   readAll(in, model.storeys, 24, "storeys", [&] { return readStorey(in); });
   readAll(in, model.spaces, 29, "spaces", [&] { return readSpace(in, model.storeys.size()); });
-  readAll(in, model.objects, 170, "objects",
-          [&] { return readObject(in, model.meshes.size(), model.storeys.size()); });
-  for (const Object& object : model.objects) {
-    if (object.partOf && *object.partOf >= model.objects.size())
-      in.fail("piece of", "no object " + std::to_string(*object.partOf));
-    if (object.thing && *object.thing >= model.objects.size())
-      in.fail("thing", "no object " + std::to_string(*object.thing));
-  }
+  readInPlace(in, model.objects, 170, "objects", [&](Object& object, std::size_t count) {
+    readObject(in, {model.meshes.size(), model.storeys.size(), count}, object);
+  });
   readAll(in, model.bodies, 215, "bodies", [&] { return readBodySpec(in); });
   if (const auto reason = validateBodies(model)) in.fail("bodies", *reason);
   model.metresPerUnit = in.getFinite("metres per unit");

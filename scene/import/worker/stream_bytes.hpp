@@ -97,9 +97,10 @@ class StreamReader {
     return value;
   }
   std::string getText(const char* field) {
-    std::string text(count(1, field), '\0');
-    take(text.data(), text.size(), field);
-    return text;
+    const std::size_t size = count(1, field);
+    const auto* first = reinterpret_cast<const char*>(bytes_.data() + position_);
+    position_ += size;
+    return {first, size};
   }
   std::vector<std::uint8_t> getBytes(const char* field) {
     const std::size_t size = count(1, field);
@@ -115,14 +116,12 @@ class StreamReader {
   }
   template <class Matrix>
   Matrix getMatrix(const char* field) {
-    Matrix m;
-    for (Eigen::Index r = 0; r < m.rows(); ++r) {
-      for (Eigen::Index c = 0; c < m.cols(); ++c) {
-        m(r, c) = get<typename Matrix::Scalar>(field);
-        if (!std::isfinite(m(r, c))) fail(field, "not a finite number");
-      }
-    }
-    return m;
+    Eigen::Array<typename Matrix::Scalar, Matrix::RowsAtCompileTime, Matrix::ColsAtCompileTime,
+                 Matrix::ColsAtCompileTime == 1 ? Eigen::ColMajor : Eigen::RowMajor>
+        rows;
+    take(rows.data(), sizeof rows, field);
+    if (!rows.allFinite()) fail(field, "not a finite number");
+    return rows.matrix();
   }
   /// Reads a count of items that take at least `smallest` bytes each.
   std::size_t count(std::size_t smallest, const char* field) {

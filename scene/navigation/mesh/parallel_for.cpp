@@ -13,6 +13,7 @@ void parallelFor(std::size_t count, int threads, const std::function<void(double
   std::atomic<std::size_t> next{0}, done{0};
   std::exception_ptr failure;
   std::mutex failureMutex;
+  if (progress) progress(0);  // other threads may do all the work
   const auto run = [&](bool reports) {
     try {
       for (std::size_t i = next++; i < count; i = next++) {

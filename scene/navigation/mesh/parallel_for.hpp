@@ -6,8 +6,8 @@
 
 namespace enfilade::scene {
 
-/// Calls `work` with 0 to `count` - 1. `progress`, which may be empty, gets the share that is done;
-/// the calling thread reports it. Throws what `work` throws.
+/// Calls `work` with 0 to `count` - 1. `progress`, which may be empty, gets the share that is done,
+/// first 0; the calling thread reports it. Throws what `work` throws.
 void parallelFor(std::size_t count, int threads, const std::function<void(double)>& progress,
                  const std::function<void(std::size_t)>& work);
 

@@ -154,7 +154,14 @@ std::uint64_t hashModel(const Model& model) {
   return hash.value();
 }
 
-/// Positions used by triangles with an area, each once per mesh.
+/// Whether positions of so few that a linear search is quick contain one.
+bool containsPosition(const std::vector<Eigen::Vector3f>& positions, const Eigen::Vector3f& p) {
+  constexpr std::size_t kFew = 64;
+  return positions.size() <= kFew && std::ranges::find(positions, p) != positions.end();
+}
+
+/// Positions used by triangles with an area. Small meshes repeat a position for each normal; it is
+/// listed once.
 std::vector<Eigen::Vector3f> collectSolidPositions(const Model& model,
                                                    const std::vector<std::uint32_t>& meshes) {
   std::vector<Eigen::Vector3f> positions;
@@ -167,7 +174,8 @@ std::vector<Eigen::Vector3f> collectSolidPositions(const Model& model,
                                            mesh.indices[i + 2]};
       if (!hasExactArea(mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]])) continue;
       for (const std::uint32_t corner : t) {
-        if (!used[corner]) positions.push_back(mesh.positions[corner]);
+        if (!used[corner] && !containsPosition(positions, mesh.positions[corner]))
+          positions.push_back(mesh.positions[corner]);
         used[corner] = true;
       }
     }
@@ -200,22 +208,13 @@ void requireValidIndices(const Model& model) {
       }
     }
   }
-  for (const Object& object : model.objects) {
-    for (const std::uint32_t mesh : object.meshes) {
-      if (mesh >= model.meshes.size()) {
-        throw std::invalid_argument("object '" + object.path + "': no mesh " +
-                                    std::to_string(mesh));
-      }
-    }
-  }
 }
 
-/// True if the object has so many triangles that its collision geometry is built before avatars
-/// come near.
-bool hasManyTriangles(const Model& model, std::uint32_t object) {
+/// True if the meshes have so many triangles that the collision geometry of an object is built
+/// before avatars come near.
+bool haveManyTriangles(const Model& model, const std::vector<std::uint32_t>& meshes) {
   std::size_t triangles = 0;
-  for (const std::uint32_t mesh : model.objects[object].meshes)
-    triangles += model.meshes[mesh].indices.size() / 3;
+  for (const std::uint32_t mesh : meshes) triangles += model.meshes[mesh].indices.size() / 3;
   return triangles > kManyTriangles;
 }
 
@@ -223,9 +222,8 @@ bool hasManyTriangles(const Model& model, std::uint32_t object) {
 
 Scene::Scene(Model model) : model_(std::move(model)) {
   requireValidIndices(model_);
+  assignShapeIndices();
   if (const auto error = validateBodies(model_)) throw std::invalid_argument(*error);
-  auto hash =
-      std::async(std::launch::async | std::launch::deferred, [this] { return hashModel(model_); });
   std::vector<bool> isBodyObject(model_.objects.size());
   MeshShapeCache meshShapes;
   for (const BodySpec& body : model_.bodies) {
@@ -233,13 +231,13 @@ Scene::Scene(Model model) : model_(std::move(model)) {
     bodyShapes_.push_back(
         std::make_shared<const BodyShape>(buildBodyShape(model_, body, meshShapes)));
   }
-  assignShapeIndices();
-  computeObjectBounds(isBodyObject);
-  hash_ = hash.get();
+  computeHashAndBoxes(isBodyObject);
   shapes_ = std::make_unique<LazyArray<Shape>>(meshesOfShape_.size());
   collisionGeometries_ = std::make_unique<LazyArray<CollisionGeometry>>(model_.objects.size());
+  std::vector<bool> isDense;  // by shape
+  for (const auto& meshes : meshesOfShape_) isDense.push_back(haveManyTriangles(model_, meshes));
   for (std::uint32_t i = 0; i < solidObjects_.size(); ++i)
-    if (hasManyTriangles(model_, solidObjects_[i])) denseIndices_.push_back(i);
+    if (isDense[shapeIndexOfObject_[solidObjects_[i]]]) denseIndices_.push_back(i);
   prefetcher_ = std::make_unique<Prefetcher>(*this);
 }
 
@@ -251,6 +249,10 @@ void Scene::assignShapeIndices() {
                                          kNoShape);  // for single-mesh objects
   shapeIndexOfObject_.reserve(model_.objects.size());
   for (const Object& object : model_.objects) {
+    for (const std::uint32_t mesh : object.meshes)
+      if (mesh >= model_.meshes.size())
+        throw std::invalid_argument("object '" + object.path + "': no mesh " +
+                                    std::to_string(mesh));
     const auto next = static_cast<std::uint32_t>(meshesOfShape_.size());
     std::uint32_t index = next;
     if (object.meshes.size() == 1) {
@@ -265,20 +267,38 @@ void Scene::assignShapeIndices() {
   }
 }
 
-void Scene::computeObjectBounds(const std::vector<bool>& isBodyObject) {
+void Scene::computeHashAndBoxes(const std::vector<bool>& isBodyObject) {
   std::vector<std::vector<Eigen::Vector3f>> positions;
   for (const auto& meshes : meshesOfShape_)
     positions.push_back(collectSolidPositions(model_, meshes));
-  for (std::uint32_t i = 0; i < model_.objects.size(); ++i) {
-    const Eigen::Affine3d& placed = model_.objects[i].worldFromMesh;
-    const auto& own = positions[shapeIndexOfObject_[i]];
-    if (own.empty() || !preservesArea(placed)) continue;
-    Aabb box;
-    for (const Eigen::Vector3f& p : own) box.include(placed * p.cast<double>());
-    bounds_.include(box);
-    if (isBodyObject[i] || model_.objects[i].usage == Object::Usage::visualOnly) continue;
+  std::vector<Aabb> boxes(model_.objects.size());  // empty: without area
+  std::vector<char> isStatic(boxes.size());        // bytes, because two threads write them
+  std::atomic<std::size_t> next = 0;
+  const auto computeBoxes = [&] {
+    constexpr std::size_t kStep = 4096;
+    for (std::size_t begin = next.fetch_add(kStep); begin < boxes.size();
+         begin = next.fetch_add(kStep)) {
+      for (std::size_t i = begin; i < std::min(begin + kStep, boxes.size()); ++i) {
+        const Eigen::Affine3d& placed = model_.objects[i].worldFromMesh;
+        isStatic[i] = !isBodyObject[i] && model_.objects[i].usage != Object::Usage::visualOnly;
+        if (!preservesArea(placed)) continue;
+        for (const Eigen::Vector3f& p : positions[shapeIndexOfObject_[i]])
+          boxes[i].include(placed * p.cast<double>());
+      }
+    }
+  };
+  auto helper = std::async(std::launch::async | std::launch::deferred, [&] {
+    hash_ = hashModel(model_);
+    computeBoxes();
+  });
+  computeBoxes();
+  helper.get();
+  for (std::uint32_t i = 0; i < boxes.size(); ++i) {
+    if (boxes[i].empty()) continue;
+    bounds_.include(boxes[i]);
+    if (!isStatic[i]) continue;
     solidObjects_.push_back(i);
-    staticBoxes_.push_back(box);
+    staticBoxes_.push_back(boxes[i]);
   }
 }
 

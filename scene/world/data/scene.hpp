@@ -82,7 +82,7 @@ class Scene {
   struct LazyArray;
   class Prefetcher;
   void assignShapeIndices();
-  void computeObjectBounds(const std::vector<bool>& isBodyObject);
+  void computeHashAndBoxes(const std::vector<bool>& isBodyObject);
 
   Model model_;
   std::vector<std::uint32_t> solidObjects_;

@@ -1,6 +1,7 @@
 #include "scene/import/gltf/encoding/gltf_binary.hpp"
 
 #include <array>
+#include <utility>
 
 namespace enfilade::scene {
 namespace {
@@ -47,15 +48,21 @@ void GltfBinary::install(nlohmann::json& gltf) {
   gltf["buffers"].push_back(std::move(buffer));
 }
 
-std::string GltfBinary::makeGlb(std::string json) const {
+std::string makeGlbStart(std::string json, std::size_t rest) {
   json.resize((json.size() + 3) / 4 * 4, ' ');
-  const std::size_t binary = (bytes_.size() + 3) / 4 * 4;
-  const std::size_t size = 12 + 8 + json.size() + 8 + binary;
+  const std::size_t size = 12 + 8 + json.size() + rest;
   if (size > 0xffffffff) return "";
   std::string glb = "glTF";
-  glb.reserve(size);
   for (const std::size_t word : {std::size_t{2}, size, json.size()}) appendGlbWord(glb, word);
-  glb.append("JSON").append(json);
+  return glb.append("JSON").append(json);
+}
+
+std::string GltfBinary::makeGlb(std::string json) const {
+  const std::size_t binary = (bytes_.size() + 3) / 4 * 4;
+  std::string glb = makeGlbStart(std::move(json), 8 + binary);
+  if (glb.empty()) return "";
+  const std::size_t size = glb.size() + 8 + binary;
+  glb.reserve(size);
   appendGlbWord(glb, binary);
   glb.append("BIN").append(1, '\0').append(bytes_);
   glb.resize(size, '\0');

@@ -1,6 +1,7 @@
 // The buffer, views and accessors of a glTF file that is being written. Private to the import.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <nlohmann/json.hpp>
 #include <span>
@@ -8,6 +9,10 @@
 #include <string_view>
 
 namespace enfilade::scene {
+
+/// The header and the JSON of a GLB file whose binary chunk of `rest` bytes, its header included,
+/// follows. "" if the file exceeds the four gigabytes of a GLB file.
+std::string makeGlbStart(std::string json, std::size_t rest);
 
 class GltfBinary {
  public:

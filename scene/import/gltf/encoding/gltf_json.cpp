@@ -10,8 +10,9 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kGlbHeader = 20;     // bytes: file header and header of the first chunk
-constexpr std::size_t kJsonLengthAt = 12;  // bytes: length of the first chunk
+constexpr std::size_t kGlbHeader = 20;      // bytes: file header and header of the first chunk
+constexpr std::size_t kGlbChunkHeader = 8;  // bytes: length and type
+constexpr std::size_t kJsonLengthAt = 12;   // bytes: length of the first chunk
 
 /// A number of 32 bits at `at`; 0 beyond the end of the file.
 std::uint32_t readGlbWord(std::ifstream& in, std::size_t at) {
@@ -44,12 +45,14 @@ std::string readGltfJson(const std::filesystem::path& file, ModelFormat format) 
   return text;
 }
 
-std::size_t readGlbBinarySize(const std::filesystem::path& file) {
+GlbBinary findGlbBinary(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
-  const std::size_t second = kGlbHeader + readGlbWord(in, kJsonLengthAt);
-  const std::size_t length = readGlbWord(in, second);
+  GlbBinary binary{kGlbHeader + readGlbWord(in, kJsonLengthAt), 0};
+  const std::size_t length = readGlbWord(in, binary.chunk);
   std::error_code error;
-  return second + 8 + length <= std::filesystem::file_size(file, error) && !error ? length : 0;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (!error && binary.chunk + kGlbChunkHeader + length <= size) binary.size = length;
+  return binary;
 }
 
 bool mentions(const std::string& text, std::string_view words) {

@@ -26,8 +26,12 @@ inline constexpr std::size_t kNoIndex = ~std::size_t{0};  ///< in place of a mem
 /// The JSON text of a glTF or GLB file. Throws ImportError if a GLB file is too short for it.
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format);
 
-/// Bytes of the second chunk of a GLB file, its first buffer; 0 if it is missing or cut off.
-std::size_t readGlbBinarySize(const std::filesystem::path& file);
+/// The second chunk of a GLB file, its first buffer.
+struct GlbBinary {
+  std::size_t chunk = 0;  ///< offset of its header in the file
+  std::size_t size = 0;   ///< bytes after the header; 0 if it is missing or cut off
+};
+GlbBinary findGlbBinary(const std::filesystem::path& file);
 
 /// Whether the text contains the words. Several times as fast as std::string::find if the text has
 /// many characters like the first of them, as JSON has quotes.

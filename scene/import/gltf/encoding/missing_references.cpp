@@ -1,5 +1,6 @@
 #include "scene/import/gltf/encoding/missing_references.hpp"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <string>
@@ -60,21 +61,19 @@ void dropMissingNodes(Json& owner, const char* key, const std::string& name, con
   if (kept.size() < getArray(owner, key).size()) owner[key] = std::move(kept);
 }
 
-constexpr const char* kLights = "KHR_lights_punctual";
-
-void dropLights(Json& owner) {
-  const auto extensions = owner.find("extensions");
-  if (extensions != owner.end() && extensions->is_object()) extensions->erase(kLights);
-}
-
 }  // namespace
 
-void dropAllLights(Json& gltf) {
-  dropLights(gltf);
-  const auto nodes = gltf.find("nodes");
-  if (nodes == gltf.end() || !nodes->is_array()) return;
-  for (Json& node : *nodes)
-    if (node.is_object()) dropLights(node);
+bool hasMissingReferences(const GltfNodeTree& tree, const Json& sections) {
+  const std::size_t meshes = getArray(sections, "meshes").size();
+  const std::size_t cameras = getArray(sections, "cameras").size();
+  const auto isMissing = [&](std::size_t node) { return node >= tree.nodes.size(); };
+  const std::vector<std::size_t> scene = listSceneNodes(tree);
+  return std::ranges::any_of(tree.roots, isMissing) ||
+         std::ranges::any_of(scene, [&](std::size_t index) {
+           const PlainNode& node = tree.nodes[index];
+           return (node.mesh && *node.mesh >= meshes) || (node.camera && *node.camera >= cameras) ||
+                  std::ranges::any_of(node.children, isMissing);
+         });
 }
 
 void dropMissingReferences(Json& gltf, std::vector<Diagnostic>& problems) {

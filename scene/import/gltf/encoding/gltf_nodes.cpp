@@ -1,6 +1,4 @@
-#include "scene/import/gltf/gltf_nodes.hpp"
-
-#include <assimp/scene.h>
+#include "scene/import/gltf/encoding/gltf_nodes.hpp"
 
 #include <algorithm>
 #include <array>
@@ -10,15 +8,13 @@
 #include <utility>
 
 #include "scene/import/gltf/encoding/gltf_json.hpp"
-#include "scene/model/add_diagnostic.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
 
-/// Of a rotation's length from 1; three rounded digits make less.
-constexpr double kMaxLengthError = 0.01;
+constexpr std::size_t kMaxNameBytes = 1023;  // of a node
 constexpr double kMaxLastRowError =
     1e-6;  ///< of a matrix from 0, 0, 0, 1; covers the rounding to floats
 
@@ -53,63 +49,12 @@ std::vector<ObjectAttribute> readOwnAttributes(const Json& node) {
   return attributes;
 }
 
-/// Matches the file's tree to assimp's by structure: assimp keeps the order of children.
-class NodeMatcher {
- public:
-  NodeMatcher(const std::vector<PlainNode>& nodes, GltfNodes& matchedNodes,
-              std::vector<Diagnostic>& diagnostics)
-      : nodes_(nodes),
-        matchedNodes_(matchedNodes),
-        diagnostics_(diagnostics),
-        isVisited_(nodes.size(), false) {}
-
-  /// Stops where the trees differ, and reports it; assimp's transforms are used there.
-  void visit(std::size_t index, const aiNode& node, int depth) {
-    if (depth > kMaxNodeDepth) return;  // refused by the reader of the tree
-    if (index >= nodes_.size() || !nodes_[index].isObject) return reportUnmatched(node);
-    const PlainNode& plain = nodes_[index];
-    const bool isShared = isVisited_[index];
-    if (isShared && !isBelowShared_)
-      addDiagnostic(diagnostics_, "shared_node",
-                    describeNode(index, node) + " is listed several times");
-    if (!isShared) reportTransform(plain.transform, index, node);
-    isVisited_[index] = true;
-    matchedNodes_.emplace(&node, GltfNode{&plain, index});
-    const bool wasBelowShared = std::exchange(isBelowShared_, isBelowShared_ || isShared);
-    visitChildren(plain.children, node, depth + 1);
-    isBelowShared_ = wasBelowShared;
-  }
-
-  void visitChildren(const std::vector<std::size_t>& indices, const aiNode& parent, int depth) {
-    if (indices.size() != parent.mNumChildren) return reportUnmatched(parent);
-    for (std::size_t i = 0; i < indices.size(); ++i) visit(indices[i], *parent.mChildren[i], depth);
-  }
-
- private:
-  static std::string describeNode(std::size_t index, const aiNode& node) {
-    return "nodes[" + std::to_string(index) + "] '" + node.mName.C_Str() + "'";
-  }
-
-  void reportUnmatched(const aiNode& node) {
-    addDiagnostic(diagnostics_, "unmatched_node", node.mName.C_Str());
-  }
-
-  void reportTransform(const StatedTransform& transform, std::size_t index, const aiNode& node) {
-    if (transform.fault == nullptr && transform.rotationLength == 1) return;
-    const std::string name = describeNode(index, node) + ": ";
-    if (transform.fault != nullptr)
-      addDiagnostic(diagnostics_, "broken_transform_dropped", name + transform.fault);
-    if (std::abs(transform.rotationLength - 1) > kMaxLengthError)
-      addDiagnostic(diagnostics_, "rescaled_rotation",
-                    name + "of length " + std::to_string(transform.rotationLength));
-  }
-
-  const std::vector<PlainNode>& nodes_;
-  GltfNodes& matchedNodes_;
-  std::vector<Diagnostic>& diagnostics_;
-  std::vector<bool> isVisited_;  ///< by node
-  bool isBelowShared_ = false;   ///< what is below a shared node is not reported by itself
-};
+/// A member that is an index; kNoIndex if it is anything else, nullopt without it.
+std::optional<std::size_t> readReference(const Json& node, const char* key) {
+  const Json* index = findMember(&node, key);
+  if (index == nullptr) return std::nullopt;
+  return index->is_number_unsigned() ? index->get<std::size_t>() : kNoIndex;
+}
 
 Eigen::Affine3d readMatrix(const std::array<double, 16>& numbers, const char*& fault) {
   Eigen::Affine3d transform;
@@ -172,25 +117,48 @@ PlainNode readPlainNode(const Json& json) {
   PlainNode node;
   if (!json.is_object()) return node;
   node.isObject = true;
+  const Json* name = findMember(&json, "name");
+  if (name != nullptr && name->is_string())
+    node.name = name->get_ref<const std::string&>().substr(0, kMaxNameBytes);
   node.transform = readNodeTransform(json);
   node.attributes = readOwnAttributes(json);
   node.children = readIndices(getArray(json, "children"));
+  node.mesh = readReference(json, "mesh");
+  node.camera = readReference(json, "camera");
   return node;
 }
 
-GltfNodes matchGltfNodes(const aiScene& scene, const std::vector<PlainNode>& nodes,
-                         const std::vector<std::size_t>& roots,
-                         std::vector<Diagnostic>& diagnostics) {
-  GltfNodes transforms;
-  transforms.reserve(nodes.size());
-  NodeMatcher walker(nodes, transforms, diagnostics);
-  // assimp adds a root node above several roots, but not above a single one.
-  if (roots.size() == 1) {
-    walker.visit(roots[0], *scene.mRootNode, 0);
-  } else {
-    walker.visitChildren(roots, *scene.mRootNode, 0);
+std::string describeNode(const PlainNode& node, std::size_t index) {
+  const std::string place = "nodes[" + std::to_string(index) + "]";
+  return node.name.empty() ? place : place + " '" + node.name + "'";
+}
+
+std::vector<std::size_t> listSceneNodes(const GltfNodeTree& tree) {
+  struct OpenNode {
+    std::size_t node, nextChild;
+  };
+  const std::vector<PlainNode>& nodes = tree.nodes;
+  std::vector<bool> isFound(nodes.size(), false);
+  std::vector<std::size_t> finished;
+  std::vector<OpenNode> open;
+  const auto visit = [&](std::size_t node) {
+    if (node >= nodes.size() || isFound[node]) return;
+    isFound[node] = true;
+    open.push_back({node, 0});
+  };
+  for (const std::size_t root : tree.roots) {
+    visit(root);
+    while (!open.empty()) {
+      OpenNode& top = open.back();
+      if (top.nextChild < nodes[top.node].children.size()) {
+        visit(nodes[top.node].children[top.nextChild++]);
+      } else {
+        finished.push_back(top.node);
+        open.pop_back();
+      }
+    }
   }
-  return transforms;
+  return finished;
 }
 
 }  // namespace enfilade::scene

@@ -1,6 +1,5 @@
-// Reads the node transforms of a glTF file in doubles. assimp rounds them to floats, which is half
-// a metre at five thousand kilometres. The nodes are read during the pre-pass's parse, and their
-// tree is matched to assimp's.
+// The nodes of a glTF file. Their transforms are in doubles: assimp would round them to floats,
+// which is half a metre at five thousand kilometres.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -9,13 +8,9 @@
 #include <nlohmann/json_fwd.hpp>
 #include <optional>
 #include <string>
-#include <unordered_map>
 #include <vector>
 
 #include "scene/model/model.hpp"
-
-struct aiNode;
-struct aiScene;
 
 namespace enfilade::scene {
 
@@ -28,30 +23,31 @@ struct StatedTransform {
 
 StatedTransform readNodeTransform(const nlohmann::json& node);
 
-/// The data that the import needs of a node of the JSON.
+/// The data that the import needs of a node of the JSON. An index that is not a number is larger
+/// than any list.
 struct PlainNode {
   bool isObject = false;
+  std::string name;  ///< at most 1,023 bytes, to bound the lengths of paths
   StatedTransform transform;
-  std::vector<std::size_t> children;        ///< kNoIndex: not a number
+  std::vector<std::size_t> children;
+  std::optional<std::size_t> mesh, camera;
   std::vector<ObjectAttribute> attributes;  ///< extras whose names begin with "_"
 };
 
 PlainNode readPlainNode(const nlohmann::json& json);
 std::vector<std::size_t> readIndices(const nlohmann::json& list);  ///< kNoIndex: not a number
+/// "nodes[3] 'door'"
+std::string describeNode(const PlainNode& node, std::size_t index);
 
-/// A node of the file that assimp read.
-struct GltfNode {
-  const PlainNode* plain;
-  std::size_t index;  ///< into the file's list of nodes
+/// The nodes of a file and the scene that is read.
+struct GltfNodeTree {
+  std::vector<PlainNode> nodes;     ///< all, by index
+  std::vector<std::size_t> roots;   ///< of the scene; indices of nodes
+  std::vector<std::size_t> meshes;  ///< of the scene, in the order in which assimp gets them
 };
-using GltfNodes = std::unordered_map<const aiNode*, GltfNode>;
 
-/// Matches the nodes of a file, below the roots of its scene, to assimp's. Nodes without a matching
-/// assimp node are left out and reported, as are transforms that glTF does not allow. `nodes` must
-/// outlive the result.
-GltfNodes matchGltfNodes(const aiScene& scene, const std::vector<PlainNode>& nodes,
-                         const std::vector<std::size_t>& roots,
-                         std::vector<Diagnostic>& diagnostics);
+/// The nodes of the scene, each once, after all below it. Indices that do not exist are left out.
+std::vector<std::size_t> listSceneNodes(const GltfNodeTree& tree);
 
 /// The path and world transform of a glTF node.
 struct NodeTransform {
