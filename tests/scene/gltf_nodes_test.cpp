@@ -86,11 +86,11 @@ TEST(GltfNodes, AKeyTwiceInOneObjectIsReportedWithItsPathAndTheLastCounts) {
       R"("extras":{"a":[1,[2],{"b":2},{"c":{"d":1,"e":[{"d":1},{"d":2}],"d":2,"d":3}}]})");
   EXPECT_EQ(countDiagnostics(deep, "duplicate_key"), 2u);
   EXPECT_EQ(diagnosticText(deep, "duplicate_key"), "nodes[0].extras.a[3].c.d");
-  // An object of many keys, and one of few after it.
+  // Two objects of many keys, of which the first has some twice.
   std::string many;
   for (int i = 0; i < 40; ++i) many += "\"k" + std::to_string(i) + "\":1,";
   const Model wide =
-      modelWith(R"("extras":{"a":[{)" + many + R"("k39":2,"k3":2},{"k3":1,"k30":1}]})");
+      modelWith(R"("extras":{"a":[{)" + many + R"("k39":2,"k3":2},{)" + many + R"("k40":1}]})");
   EXPECT_EQ(countDiagnostics(wide, "duplicate_key"), 2u);
   EXPECT_EQ(diagnosticText(wide, "duplicate_key"), "nodes[0].extras.a[0].k39");
 }
