@@ -123,6 +123,8 @@ constexpr std::array kCatalog{
                    "a door or window whose wall is closed behind it: it is impassable"},
     DiagnosticKind{"broken_map", warning,
                    "the file's place on a map cannot be used: it keeps its own coordinates"},
+    DiagnosticKind{"broken_north", warning,
+                   "a direction of north that cannot be used: it is ignored"},
     DiagnosticKind{"broken_elevation", warning,
                    "a storey's elevation is no number: only its placement counts"},
     DiagnosticKind{"map_place", note, "where the file's own coordinates lie on a map"},

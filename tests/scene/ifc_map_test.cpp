@@ -116,6 +116,22 @@ TEST(IfcMap, NorthIsAsTheFileStatesItAndElseItsYAxis) {
   EXPECT_LT((*north - Eigen::Vector2d(0.5, -0.866025403784439)).norm(), 1e-9);
 }
 
+TEST(IfcMap, ANorthThatCannotBeUsedIsReported) {
+  const TemporaryFolder folder;
+  const ImportOptions options = by(readersHere().front());
+  for (const char* north : {"#16", "#999", "(0.,1.)"}) {
+    std::string text = IfcHouse().text();
+    const std::string context = "1.E-05,#11,$)";
+    text.replace(text.find(context), context.size(), std::string("1.E-05,#11,") + north + ")");
+    text.insert(text.find("#20="), "#16=IFCDIRECTION((0.,0.));\n");
+    const Model model = importModel(folder.write("broken.ifc", text), options);
+    EXPECT_FALSE(model.north) << north;
+    EXPECT_EQ(countDiagnostics(model, "broken_north"), 1u) << north;
+    EXPECT_TRUE(diagnosticText(model, "broken_north").ends_with(std::string("TrueNorth ") + north))
+        << diagnosticText(model, "broken_north");
+  }
+}
+
 TEST(IfcMap, NorthFollowsFromTheMapIfNothingElseStatesIt) {
   const TemporaryFolder folder;
   IfcHouse house;

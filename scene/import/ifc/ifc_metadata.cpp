@@ -78,23 +78,34 @@ bool isEndlessPlacement(const StepFile& file, std::uint32_t placement) {
 
 /// TrueNorth of an IfcGeometricRepresentationContext (identifier, type, dimensions, precision,
 /// placement, true north). It refers to the axes of the placement. Contexts of three dimensions
-/// come first. `unstated`: the direction in a context that states none; nullopt: none.
-std::optional<Vec3> readTrueNorth(const StepFile& file, const std::optional<Vec3>& unstated) {
+/// come first. `unstated`: the direction in a context that states none; nullopt: none. Those that
+/// cannot be used are added to `problems`.
+std::optional<Vec3> readTrueNorth(const StepFile& file, const std::optional<Vec3>& unstated,
+                                  std::vector<Diagnostic>& problems) {
   std::optional<Vec3> flat;
+  const auto report = [&](const StepStatement& context, std::string_view stated) {
+    addDiagnostic(problems, "broken_north",
+                  "#" + std::to_string(context.id) + ": TrueNorth " + std::string(stated));
+  };
   for (const StepStatement& statement : file.statements()) {
     if (statement.type != "IFCGEOMETRICREPRESENTATIONCONTEXT") continue;
     const Arguments arguments = splitStepArguments(statement.arguments);
     const std::string_view stated = getArgument(arguments, 5);
-    const auto direction = stated.empty() || stated == "$" || stated == "*"
-                               ? unstated
-                               : readStepVector(file, stated, "IFCDIRECTION");
-    if (!direction) continue;
+    const bool isStated = !stated.empty() && stated != "$" && stated != "*";
+    const auto direction = isStated ? readStepVector(file, stated, "IFCDIRECTION") : unstated;
+    if (!direction) {
+      if (isStated) report(statement, stated);
+      continue;
+    }
     Vec3 north = *direction;
     const auto placement = parseStepReference(getArgument(arguments, 4));
     if (const auto axes = placement ? readAxisPlacement(file, *placement, 1) : std::nullopt)
       north = axes->linear() * north;
     north.z() = 0;
-    if (!north.allFinite() || !(north.norm() > 1e-9)) continue;
+    if (!north.allFinite() || !(north.norm() > 1e-9)) {
+      if (isStated) report(statement, stated);
+      continue;
+    }
     if (parseStepNumber(getArgument(arguments, 2)) == 3) return north.normalized();
     if (!flat) flat = north.normalized();
   }
@@ -252,12 +263,13 @@ class IfcMetadataReader {
     }
     metadata_.mapConversion =
         readIfcMapConversion(file_, metadata_.metresPerUnit, metadata_.mapFault);
-    metadata_.trueNorth = readTrueNorth(file_, std::nullopt);
+    metadata_.trueNorth = readTrueNorth(file_, std::nullopt, metadata_.diagnostics);
     if (!metadata_.trueNorth && metadata_.mapConversion)
       metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
     // IFC says that y points to north in a context that states nothing else.
+    std::vector<Diagnostic> reported;
     if (!metadata_.trueNorth && metadata_.mapFault.empty())
-      metadata_.trueNorth = readTrueNorth(file_, Vec3::UnitY());
+      metadata_.trueNorth = readTrueNorth(file_, Vec3::UnitY(), reported);
   }
 
   void readStatement(const StepStatement& statement) {
