@@ -21,6 +21,7 @@
 #include "scene/import/assimp/assimp_reader.hpp"
 #include "scene/import/assimp/convert_scene.hpp"
 #include "scene/import/assimp/obj_text.hpp"
+#include "scene/import/bodies/gltf_bodies.hpp"
 #include "scene/import/file_metadata.hpp"
 #include "scene/import/gltf/plain_gltf.hpp"
 #include "scene/import/ifc/ifc_plus_plus.hpp"
@@ -157,10 +158,15 @@ bool prepareGltf(ConvertInput& input, AssimpInput& file, bool rewrite,
   input.metadata.scenes = std::move(plain.scenes);
   input.metadata.scene = plain.scene;
   input.metadata.problems = std::move(plain.problems);
-  input.gltfJson = std::move(plain.json);
-  input.gltf = std::move(plain.tree);
-  file.text = std::move(plain.meshFile.start);
-  file.restAt = plain.meshFile.restAt;
+  // The text may have hundreds of megabytes.
+  input.gltfJson = mayHaveGltfBodies(plain.json) ? std::move(plain.json) : std::string();
+  plain.json = {};
+  GltfMeshFile meshes = takeMeshFile(plain, input.file, input.format);
+  file.text = std::move(meshes.start);
+  file.restAt = meshes.restAt;
+  file.restBytes = meshes.restBytes;
+  input.gltfNodes = std::move(plain.tree);
+  input.gltfMeshes = std::move(plain.meshes);
   // assimp recognises GLB files by their extension.
   if (plain.isRewritten && input.format == ModelFormat::gltf) file.file += ".glb";
   dependencies = std::move(plain.dependencies);
@@ -172,7 +178,9 @@ Model importByAssimp(const ImportRequest& request) {
   input.file = request.file;
   input.format = detectModelFormat(request.file).value();  // checked by the parent
   input.options = request.options;
-  AssimpInput file{request.file, "", 0, request.task == ImportTask::assimp};
+  AssimpInput file;
+  file.file = request.file;
+  file.isIfc = request.task == ImportTask::assimp;
   std::vector<std::string> dependencies;
   bool isRewritten = false;
   if (file.isIfc) {

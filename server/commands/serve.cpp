@@ -21,6 +21,8 @@
 namespace enfilade::server {
 namespace {
 
+constexpr int kTopPad = 128 << 10;  // bytes; the default of glibc
+
 void printReady(const Server& server, const scene::Scene& scene, const ServeCommand& command) {
   nlohmann::ordered_json ready{
       {"ready", true},
@@ -111,7 +113,11 @@ ExitCode serveUntilSignal(const ServeCommand& command) {
   Access access = command.access;
   if (!command.tokenFile.empty()) access.tokens = readTokens(command.tokenFile);
   requireListenable(command.listen, access);  // before the model is read
+  // The heap grows in small steps otherwise, and each waits while another thread fetches memory: a
+  // scene of a million objects takes a thousand.
+  mallopt(M_TOP_PAD, 16 << 20);
   const auto scene = loadScene(command.model);
+  mallopt(M_TOP_PAD, kTopPad);
   ServerOptions options;
   options.additionalScenes = loadFurtherScenes(command);
   // Before the server starts: its threads inherit the signal mask.
@@ -139,9 +145,6 @@ ExitCode serve(const ServeCommand& command) {
   // Without it glibc raises the threshold up to 32 MiB as blocks are freed. It then keeps the
   // memory of large pictures and messages of clients that left.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
-  // The heap grows in steps of 128 KB otherwise, and each waits while another thread fetches memory:
-  // a scene of a million objects takes a thousand.
-  mallopt(M_TOP_PAD, 16 << 20);
   try {
     return serveUntilSignal(applyRecording(command));
   } catch (const Divergence& diverged) {

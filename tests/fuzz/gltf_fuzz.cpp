@@ -1,6 +1,7 @@
 // Fuzz target of the glTF pre-pass. Input that begins with '{' is a .gltf file, all else a GLB
 // file.
-#include <algorithm>
+#include <cstdint>
+#include <cstring>
 #include <nlohmann/json.hpp>
 
 #include "scene/import/file/import_options.hpp"
@@ -11,9 +12,22 @@
 namespace enfilade::fuzz {
 namespace {
 
-/// assimp reads the rewritten file without further checks of ours.
-void requirePlainFile(const scene::PlainGltf& plain) {
-  require(plain.meshFile.start.starts_with("glTF"), "a rewritten file is a GLB file");
+/// assimp reads the file without further checks of ours.
+void requireMeshFile(const scene::GltfMeshFile& file, std::size_t meshCount) {
+  std::string json = file.start;
+  if (json.starts_with("glTF")) {
+    std::uint32_t size = 0, jsonSize = 0;
+    std::memcpy(&size, file.start.data() + 8, sizeof size);
+    std::memcpy(&jsonSize, file.start.data() + 12, sizeof jsonSize);
+    require(size == file.start.size() + file.restBytes, "a GLB file is as long as it says");
+    json = file.start.substr(20, jsonSize);
+  }
+  const auto parsed = nlohmann::json::parse(json, nullptr, false);
+  require(parsed.is_object(), "the JSON of the meshes is valid");
+  require(parsed.at("nodes").at(0).at("children").size() == meshCount, "each mesh has a node");
+}
+
+void requirePlainData(const scene::PlainGltf& plain) {
   const auto json = nlohmann::json::parse(plain.json, nullptr, false);
   require(json.is_object(), "the JSON of a rewritten file is valid");
   const std::size_t size = json.at("buffers").at(0).at("byteLength");
@@ -42,8 +56,7 @@ void requireTree(const scene::PlainGltf& plain) {
     require(node.isObject, "a node is an object");
     for (const std::size_t child : node.children)
       require(child < tree.nodes.size(), "a child exists");
-    if (node.mesh)
-      require(std::ranges::find(tree.meshes, *node.mesh) != tree.meshes.end(), "a mesh is read");
+    if (node.mesh) require(*node.mesh < plain.sections.at("meshes").size(), "a node's mesh exists");
   }
 }
 
@@ -54,11 +67,12 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
   const bool text = !bytes.empty() && bytes[0] == '{';
   const bool ignoresAppearance = bytes.empty() || bytes.back() % 8 != 0;  // mostly, to read on
   try {
-    const scene::PlainGltf plain =
-        scene::makePlainGltf(file.path(), text ? scene::ModelFormat::gltf : scene::ModelFormat::glb,
-                             {.ignoreAppearance = ignoresAppearance});
-    if (plain.isRewritten) requirePlainFile(plain);
+    const auto format = text ? scene::ModelFormat::gltf : scene::ModelFormat::glb;
+    scene::PlainGltf plain =
+        scene::makePlainGltf(file.path(), format, {.ignoreAppearance = ignoresAppearance});
+    if (plain.isRewritten) requirePlainData(plain);
     requireTree(plain);
+    requireMeshFile(scene::takeMeshFile(plain, file.path(), format), plain.meshes.size());
   } catch (const scene::ImportError& error) {
     require(error.what()[0] != '\0', "an error has a message");
   }

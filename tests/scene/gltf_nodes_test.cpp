@@ -69,10 +69,31 @@ TEST(GltfNodes, WhatGltfDoesNotAllowInATransformIsIgnoredAndReported) {
 
 TEST(GltfNodes, AChildThatIsNoIndexIsReportedWithItsParent) {
   const Model model =
-      importNodes(R"({"name":"box","mesh":0,"children":["1"]},{"name":"lost","mesh":0})");
-  EXPECT_EQ(countDiagnostics(model, "missing_node"), 1u);
+      importNodes(R"({"name":"box","mesh":0,"children":[1.0,"1"]},{"name":"lost","mesh":0})");
+  EXPECT_EQ(countDiagnostics(model, "missing_node"), 2u);
   EXPECT_EQ(diagnosticText(model, "missing_node"), "nodes[0] 'box': node is not an index");
   EXPECT_EQ(model.objects.size(), 1u);
+}
+
+TEST(GltfNodes, TheRootThatAssimpWritesIsNotInPathsButMoves) {
+  const Model model = importNodes(
+      R"({"name":"ROOT","translation":[0,7,0],"children":[1]},{"name":"box","mesh":0})");
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_EQ(model.objects[0].path, "box");
+  EXPECT_EQ(model.objects[0].worldFromMesh.translation().y() + model.offset.y(), 7);
+}
+
+TEST(GltfNodes, ALongNameIsCutBetweenCharacters) {
+  std::string name(1022, 'n');
+  const Model model = importNodes(R"({"name":")" + name + "\u00FC" + R"(","mesh":0})");
+  EXPECT_EQ(model.objects.at(0).path, name);
+}
+
+TEST(GltfNodes, ACircleOutsideTheSceneIsNotRead) {
+  const Model model =
+      importNodes(R"({"name":"box","mesh":0},{"children":[2],"mesh":0},{"children":[1]})");
+  ASSERT_EQ(model.objects.size(), 1u);
+  EXPECT_TRUE(model.diagnostics.empty()) << model.diagnostics[0].kind;
 }
 
 // ---- keys twice in one object -------------------------------------------------------------------

@@ -4,16 +4,19 @@
 #include <cstring>
 #include <functional>
 #include <limits>
+#include <map>
 
 #include "scene/import/import_model.hpp"
 #include "scene/model/diagnostic_catalog.hpp"
 #include "scene/world/data/scene.hpp"
 #include "tests/scene/encoded_gltf.hpp"
+#include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/import_outcome.hpp"
 
 namespace enfilade::scene {
 namespace {
 
+using tests::BoxMesh;
 using tests::GltfWriter;
 using tests::Json;
 using tests::TemporaryFolder;
@@ -80,6 +83,58 @@ TEST(GltfScenes, AnUnknownOneIsAnErrorThatListsThem) {
   const std::string obj =
       catchFailure(folder.write("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"), options);
   EXPECT_NE(obj.find("--gltf-scene needs a glTF file"), std::string::npos) << obj;
+}
+
+// ---- the file of meshes -------------------------------------------------------------------------
+
+TEST(GltfMeshFile, EachNodeHasTheMeshThatItNames) {
+  // Meshes in descending order, children before and after their parents, one mesh twice, one
+  // primitive more in each, and one that no node names.
+  constexpr std::size_t kMeshes = 5;
+  GltfWriter file = tests::plainTerrace();
+  const Json primitive = file.json["meshes"][0]["primitives"][0];
+  file.json["meshes"] = Json::array();
+  for (std::size_t m = 0; m < kMeshes; ++m)
+    file.json["meshes"].push_back({{"primitives", std::vector<Json>(m + 1, primitive)}});
+  file.json["nodes"] = {{{"name", "a"}, {"mesh", 4}, {"children", {3}}},
+                        {{"name", "b"}, {"mesh", 0}},
+                        {{"name", "c"}, {"mesh", 2}, {"children", {1}}},
+                        {{"name", "d"}, {"mesh", 1}},
+                        {{"name", "e"}, {"mesh", 2}, {"translation", {50, 0, 0}}}};
+  file.json["scenes"] = {{{"nodes", {4, 2, 0}}}};
+  const TemporaryFolder folder;
+  for (const bool isRewritten : {false, true}) {
+    if (isRewritten) file.json["nodes"][1]["camera"] = 9;
+    const Model model = importModel(folder.write("a.glb", file.glb()));
+    std::map<std::string, std::size_t> primitives;
+    for (const Object& object : model.objects) primitives[object.path] = object.meshes.size();
+    EXPECT_EQ(primitives, (std::map<std::string, std::size_t>{
+                              {"e", 3}, {"c", 3}, {"c/b", 1}, {"a", 5}, {"a/d", 2}}));
+    EXPECT_EQ(countDiagnostics(model, "missing_camera"), isRewritten ? 1u : 0u);
+  }
+}
+
+TEST(GltfMeshFile, TheBinaryChunkMayFollowAnyJsonOrBeMissing) {
+  const TemporaryFolder folder;
+  const std::string glb = tests::glb(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
+  std::uint32_t size = 0;
+  std::memcpy(&size, glb.data() + 12, sizeof size);
+  const auto withJson = [&](const std::string& json, const std::string& rest) {
+    std::string text = "glTF";
+    for (const std::size_t word : {std::size_t{2}, 20 + json.size() + rest.size(), json.size()})
+      for (int shift = 0; shift < 32; shift += 8) text += static_cast<char>(word >> shift & 255);
+    return text + "JSON" + json + rest;
+  };
+  const std::string json = glb.substr(20, size), rest = glb.substr(20 + size);
+  for (int blanks = 0; blanks < 5; ++blanks) {
+    const Model model = importModel(
+        folder.write("a.glb", withJson(json + std::string(static_cast<std::size_t>(blanks), ' '),
+                                       rest + std::string(64, 'x'))));
+    EXPECT_EQ(Scene(Model(model)).bounds().size(), Vec3(1, 2, 3)) << blanks;
+  }
+  const std::string embedded = tests::gltf(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
+  const Model model = importModel(folder.write("b.glb", withJson(embedded, "")));
+  EXPECT_EQ(Scene(Model(model)).bounds().size(), Vec3(1, 2, 3));
 }
 
 // ---- meshes that cannot be read -----------------------------------------------------------------

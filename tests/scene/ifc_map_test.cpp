@@ -118,13 +118,14 @@ TEST(IfcMap, NorthIsAsTheFileStatesItAndElseItsYAxis) {
 
 TEST(IfcMap, ANorthThatCannotBeUsedIsReported) {
   const TemporaryFolder folder;
-  const ImportOptions options = by(readersHere().front());
-  for (const char* north : {"#16", "#999", "(0.,1.)"}) {
+  for (const auto& [reader, north] :
+       {std::pair(readersHere().front(), "#16"), std::pair(readersHere().back(), "#16"),
+        std::pair(readersHere().front(), "#999"), std::pair(readersHere().front(), "(0.,1.)")}) {
     std::string text = IfcHouse().text();
     const std::string context = "1.E-05,#11,$)";
     text.replace(text.find(context), context.size(), std::string("1.E-05,#11,") + north + ")");
     text.insert(text.find("#20="), "#16=IFCDIRECTION((0.,0.));\n");
-    const Model model = importModel(folder.write("broken.ifc", text), options);
+    const Model model = importModel(folder.write("broken.ifc", text), by(reader));
     EXPECT_FALSE(model.north) << north;
     EXPECT_EQ(countDiagnostics(model, "broken_north"), 1u) << north;
     EXPECT_TRUE(diagnosticText(model, "broken_north").ends_with(std::string("TrueNorth ") + north))

@@ -109,6 +109,22 @@ std::vector<Damage> damagedFiles() {
        "a.gltf",
        tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"name":"a","children":[0],"mesh":0})"),
        {"nodes[0] 'a' stands below itself"}},
+      {"CircleBelowASharedNode",
+       "a.gltf",
+       tests::gltf(
+           BoxMesh({1, 1, 1}), "0,1",
+           R"({"children":[2]},{"children":[2]},{"children":[3]},{"children":[2],"mesh":0})"),
+       {"nodes[2] stands below itself"}},
+      {"CircleInAFileThatIsRewritten",
+       "a.gltf",
+       tests::gltf(BoxMesh({1, 1, 1}), "0",
+                   R"({"children":[1],"mesh":7},{"children":[0],"mesh":0,"skin":3})"),
+       {"nodes[0] stands below itself"}},
+      {"NodesThatAreNoList",
+       "a.gltf",
+       replaced(replaced(box, R"("nodes":[{)", R"("nodes":{"a":{)"), "}],\"materials\"",
+                "}},\"materials\""),
+       {"its JSON has no list of nodes"}},
       {"NodeThatIsANumber",
        "a.gltf",
        tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"children":[1],"mesh":0},5)"),
@@ -276,6 +292,10 @@ TEST(MalformedFiles, AGltfNameInAnotherEncodingThanUtf8IsMendedAndReported) {
   const std::string text = replaced(boxGltf(), R"("name":"box")", "\"name\":\"T\xFCr\"");
   const Model model = importModel(folder.write("a.gltf", text));
   EXPECT_EQ(model.objects.at(0).path, "T\u00FCr");
+  const std::string euro = replaced(boxGltf(), R"("name":"box")", "\"name\":\"5\x80\x81\"");
+  EXPECT_EQ(importModel(folder.write("b.gltf", euro)).objects.at(0).path, "5\u20AC\uFFFD");
+  const std::string control = replaced(boxGltf(), R"("name":"box")", "\"name\":\"a\u009Bb\"");
+  EXPECT_EQ(importModel(folder.write("c.gltf", control)).objects.at(0).path, "a%C2%9Bb");
   EXPECT_EQ(countDiagnostics(model, "mended_text"), 1u);
   expectSize(model, {1, 2, 3});
 }

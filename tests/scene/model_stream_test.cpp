@@ -120,6 +120,31 @@ TEST(ModelStream, EveryShorterStreamIsRefused) {
   }
 }
 
+/// So many objects that a second thread fetches their memory.
+TEST(ModelStream, ManyObjectsAreReadOrRefusedWhereverTheStreamEnds) {
+  Model model = smallModel();
+  const Object first = model.objects[0];
+  while (model.objects.size() < 60'000) {
+    Object& object = model.objects.emplace_back(first);
+    object.path += std::to_string(model.objects.size());
+    object.partOf = static_cast<std::uint32_t>(model.objects.size() / 2);
+    object.thing = 0;
+  }
+  const std::vector<std::byte> bytes = serializeModel(model);
+  EXPECT_EQ(serializeModel(deserializeModel(bytes)), bytes);
+  for (const std::size_t size : {bytes.size() / 4, bytes.size() / 2, bytes.size() - 1}) {
+    std::vector<std::byte> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
+    const std::uint64_t length = size;
+    std::memcpy(cut.data() + 8, &length, sizeof length);
+    EXPECT_THROW(deserializeModel(cut), ModelStreamError) << size;
+  }
+  for (const auto index : {&Object::partOf, &Object::thing}) {
+    Model broken = model;
+    broken.objects[100].*index = 60'000;
+    EXPECT_THROW(deserializeModel(serializeModel(broken)), ModelStreamError);
+  }
+}
+
 TEST(ModelStream, AnotherVersionIsRefusedByItsNumber) {
   std::vector<std::byte> bytes = serializeModel(smallModel());
   bytes[4] = std::byte{99};

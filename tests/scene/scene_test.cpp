@@ -35,6 +35,55 @@ Model randomModel(unsigned seed, std::size_t objects) {
   return model;
 }
 
+TEST(Scene, BoxesAndHashOfManyObjectsAreThoseOfOneThread) {
+  // More objects than two threads take at once; meshes below and above the limit of the search for
+  // repeated positions.
+  Model model = randomModel(3, 4);
+  for (int repeats = 0; repeats < 3; ++repeats) {
+    Mesh& large = model.meshes[0];
+    large.positions.insert(large.positions.end(), large.positions.begin(), large.positions.end());
+  }
+  const std::size_t vertices = model.meshes[0].positions.size();
+  for (std::uint32_t i = 0; i + 2 < vertices; i += 3)
+    model.meshes[0].indices.insert(model.meshes[0].indices.end(), {i, i + 1, i + 2});
+  ASSERT_GT(vertices, 65u);
+  std::mt19937 random(4);
+  const auto draw = [&] { return static_cast<double>(random() % 1000); };
+  while (model.objects.size() < 10'000) {
+    Object object = model.objects[random() % 4];
+    object.path = "copy" + std::to_string(model.objects.size());
+    object.worldFromMesh.translation() += 0.5 * Vec3(draw(), draw(), draw());
+    if (random() % 7 == 0) object.worldFromMesh.linear().setZero();
+    if (random() % 5 == 0) object.usage = Object::Usage::visualOnly;
+    model.objects.push_back(object);
+  }
+  const Scene scene{Model(model)};
+  std::vector<std::uint32_t> solid;
+  std::vector<Aabb> boxes;
+  for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
+    const Object& object = model.objects[i];
+    if (object.worldFromMesh.linear().isZero(0) || object.usage == Object::Usage::visualOnly)
+      continue;
+    Aabb box;
+    const Mesh& mesh = model.meshes[object.meshes[0]];
+    for (std::size_t t = 0; t < mesh.indices.size(); t += 3) {
+      const std::uint32_t* corners = &mesh.indices[t];
+      if (hasExactArea(mesh.positions[corners[0]], mesh.positions[corners[1]],
+                       mesh.positions[corners[2]]))
+        for (int k = 0; k < 3; ++k) box.include(computeWorldPosition(object, mesh, corners[k]));
+    }
+    solid.push_back(i);
+    boxes.push_back(box);
+  }
+  EXPECT_EQ(scene.solidObjects(), solid);
+  ASSERT_EQ(scene.staticBoxes().size(), boxes.size());
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    ASSERT_EQ(scene.staticBoxes()[i].min, boxes[i].min) << i;
+    ASSERT_EQ(scene.staticBoxes()[i].max, boxes[i].max) << i;
+  }
+  EXPECT_EQ(scene.hash(), Scene(std::move(model)).hash());
+}
+
 TEST(Scene, BoxesAreExactlyTheExtremesOfTheTrianglesWithArea) {
   const Scene scene(randomModel(7, 40));
   std::size_t skipped = 0;

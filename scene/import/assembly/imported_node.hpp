@@ -10,7 +10,7 @@
 
 namespace enfilade::scene {
 
-/// Its meshes may have different transforms. Metres, Y up, offset not yet removed.
+/// The meshes of a node may have different transforms. Metres, Y up, offset not yet removed.
 struct ImportedNode {
   struct MeshInstance {
     std::uint32_t mesh;  ///< index into the meshes that accompany the nodes
@@ -20,8 +20,8 @@ struct ImportedNode {
   std::vector<MeshInstance> instances;
 };
 
-/// Places meshes at a node; `meshes` are indices into `all`. Meshes without triangles are left out,
-/// and so are all at a transform that is not finite or so large that boxes could overflow, which is
+/// Places meshes at a node; `meshes` are indices into `all`. Meshes without triangles are left out.
+/// A transform that is not finite, or so large that boxes could overflow, places none and is
 /// reported.
 void addMeshInstances(std::span<const unsigned> meshes, const Eigen::Affine3d& worldFromNode,
                       const std::vector<Mesh>& all, ImportedNode& imported,

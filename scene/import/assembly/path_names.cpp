@@ -27,6 +27,26 @@ std::size_t utf8SequenceLength(std::string_view text, std::size_t i) {
   return length;
 }
 
+/// The character of a byte above 0x7f in Windows-1252, which extends Latin-1.
+char16_t decodeWindows1252(unsigned char byte) {
+  static constexpr std::u16string_view kFirst =  // 0x80 to 0x9f; U+FFFD: undefined
+      u"\u20ac\ufffd\u201a\u0192\u201e\u2026\u2020\u2021\u02c6\u2030\u0160\u2039\u0152\ufffd\u017d"
+      u"\ufffd"
+      u"\ufffd\u2018\u2019\u201c\u201d\u2022\u2013\u2014\u02dc\u2122\u0161\u203a\u0153\ufffd\u017e"
+      u"\u0178";
+  return byte < 0xa0 ? kFirst[byte - 0x80u] : byte;
+}
+
+void appendUtf8(std::string& to, char16_t character) {
+  if (character < 0x800) {
+    to += static_cast<char>(0xc0 | character >> 6);
+  } else {
+    to += static_cast<char>(0xe0 | character >> 12);
+    to += static_cast<char>(0x80 | (character >> 6 & 0x3f));
+  }
+  to += static_cast<char>(0x80 | (character & 0x3f));
+}
+
 bool isDigits(std::string_view text) {
   return !text.empty() && text.find_first_not_of("0123456789") == std::string_view::npos;
 }
@@ -53,7 +73,9 @@ std::string encodePathSegment(std::string_view name) {
   for (std::size_t i = 0; i < name.size();) {
     const auto c = static_cast<unsigned char>(name[i]);
     const std::size_t length = utf8SequenceLength(name, i);
-    if (length == 0 || c < 0x20 || c == 0x7f || c == '/' || c == '%') {
+    const bool isControl =
+        c < 0x20 || c == 0x7f || (c == 0xc2 && length == 2 && (name[i + 1] & 0x20) == 0);
+    if (length == 0 || isControl || c == '/' || c == '%') {
       result += '%';
       result += kDigits[c >> 4];
       result += kDigits[c & 15];
@@ -66,7 +88,7 @@ std::string encodePathSegment(std::string_view name) {
   return result;
 }
 
-std::size_t mendUtf8(std::string& text) {
+std::size_t decodeOtherBytes(std::string& text) {
   constexpr std::uint64_t kHighBits = 0x8080808080808080u;
   std::string mended;
   std::size_t count = 0, copied = 0;
@@ -76,10 +98,8 @@ std::size_t mendUtf8(std::string& text) {
     const bool ascii = (eight & kHighBits) == 0;
     const std::size_t length = ascii ? sizeof eight : utf8SequenceLength(text, i);
     if (length == 0) {
-      const auto c = static_cast<unsigned char>(text[i]);
       mended.append(text, copied, i - copied);
-      mended += static_cast<char>(0xc0 | c >> 6);
-      mended += static_cast<char>(0x80 | (c & 0x3f));
+      appendUtf8(mended, decodeWindows1252(static_cast<unsigned char>(text[i])));
       copied = i + 1;
       ++count;
     }

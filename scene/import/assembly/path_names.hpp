@@ -14,8 +14,8 @@ std::string encodePathSegment(std::string_view name);
 /// encodePathSegment() of a node's name; "node" if it has none, or one that assimp generated.
 std::string makeNodeSegment(std::string_view name);
 
-/// Reads each byte that is not part of UTF-8 as a letter of Latin-1. Returns their number.
-std::size_t mendUtf8(std::string& text);
+/// Reads each byte that is not part of UTF-8 as a character of Windows-1252. Returns their number.
+std::size_t decodeOtherBytes(std::string& text);
 
 /// Makes names unique below one parent.
 class SiblingNames {

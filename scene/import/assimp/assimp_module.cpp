@@ -40,14 +40,14 @@ class ProgressForwarder : public Assimp::ProgressHandler {
   int lastPercent_ = 0;
 };
 
-/// A text that the end of a file follows.
+/// A text that a part of a file follows.
 class SplicedStream : public Assimp::IOStream {
  public:
-  SplicedStream(std::string_view text, std::unique_ptr<Assimp::IOStream> file, std::size_t restAt)
-      : text_(text),
+  SplicedStream(const AssimpInput& input, std::unique_ptr<Assimp::IOStream> file)
+      : text_(input.text),
         file_(std::move(file)),
-        restAt_(restAt),
-        size_(text.size() + file_->FileSize() - restAt) {}
+        restAt_(input.restAt),
+        size_(text_.size() + input.restBytes) {}
 
   std::size_t Read(void* to, std::size_t size, std::size_t count) override {
     if (size == 0) return 0;
@@ -98,9 +98,9 @@ class TrackingIoSystem : public Assimp::DefaultIOSystem {
       return DefaultIOSystem::Open(other.empty() ? file : other.c_str(), mode);
     }
     // assimp only reads from the stream, and the text outlives it.
-    if (input_.restAt > 0) {
+    if (input_.restBytes > 0) {
       std::unique_ptr<Assimp::IOStream> whole(DefaultIOSystem::Open(file, mode));
-      return whole ? new SplicedStream(input_.text, std::move(whole), input_.restAt) : nullptr;
+      return whole ? new SplicedStream(input_, std::move(whole)) : nullptr;
     }
     return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(input_.text.data()),
                                       input_.text.size());

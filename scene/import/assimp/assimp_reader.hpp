@@ -29,9 +29,9 @@ struct FileMaterial {
 /// A file for assimp.
 struct AssimpInput {
   std::string file;
-  std::string text;        ///< replaces the file's contents, if it is not empty
-  std::size_t restAt = 0;  ///< the file's bytes from here on follow the text; 0: none
-  bool isIfc = false;      ///< true: assimp reads only `text`
+  std::string text;                       ///< replaces the file's contents, if it is not empty
+  std::size_t restAt = 0, restBytes = 0;  ///< bytes of the file that follow the text
+  bool isIfc = false;                     ///< true: assimp reads only `text`
 };
 
 /// The result of reading a file with assimp.

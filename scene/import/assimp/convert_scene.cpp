@@ -69,7 +69,7 @@ void whitenUncolouredMaterials(const std::vector<FileMaterial>& materials,
 std::vector<std::span<const unsigned>> matchMeshes(const aiScene& scene,
                                                    const ConvertInput& input) {
   const std::span nodes(scene.mRootNode->mChildren, scene.mRootNode->mNumChildren);
-  const std::vector<std::size_t>& meshes = input.gltf.meshes;
+  const std::vector<std::size_t>& meshes = input.gltfMeshes;
   if (nodes.size() != meshes.size())
     throw ImportError(input.file.string() + ": assimp read " + std::to_string(nodes.size()) +
                       " of its " + std::to_string(meshes.size()) + " meshes; export it again");
@@ -108,9 +108,9 @@ Model convertScene(const aiScene& scene, const std::vector<FileMaterial>& materi
                            computeAssimpFromFile(input.metadata, input.format).inverse();
   worldFromRoot.translate(input.shift);
   NodeTransforms transforms;
-  const bool bodies = gltf && mayHaveGltfBodies(input.gltfJson);
+  const bool bodies = !input.gltfJson.empty();
   std::vector<ImportedNode> importedNodes =
-      gltf ? collectGltfNodes(input.gltf, {meshes, matchMeshes(scene, input)}, worldFromRoot,
+      gltf ? collectGltfNodes(input.gltfNodes, {meshes, matchMeshes(scene, input)}, worldFromRoot,
                               model.diagnostics, bodies ? &transforms : nullptr)
            : collectObjects(scene, input.format, worldFromRoot, meshes, model.diagnostics);
   if (progress) progress("convert", 0.5);

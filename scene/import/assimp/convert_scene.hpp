@@ -19,9 +19,10 @@ struct ConvertInput {
   ModelFormat format = ModelFormat::gltf;
   FileMetadata metadata;
   ImportOptions options;
-  std::string gltfJson;       ///< of a glTF file, with all nodes
-  GltfNodeTree gltf;          ///< of a glTF file
-  bool joined = true;         ///< see AssimpOutput::joined
+  std::string gltfJson;                 ///< of a glTF file with bodies, with all nodes
+  GltfNodeTree gltfNodes;               ///< of a glTF file
+  std::vector<std::size_t> gltfMeshes;  ///< of a glTF file: PlainGltf::meshes
+  bool joined = true;                   ///< see AssimpOutput::joined
   Vec3 shift = Vec3::Zero();  ///< subtracted before assimp read the file; file units and axes
 };
 

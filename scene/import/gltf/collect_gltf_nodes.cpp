@@ -56,7 +56,7 @@ class GltfNodeCollector {
     for (const std::size_t child : children) visit(child, state);
   }
 
-  /// Once for each node that is listed several times, not for those below it.
+  /// Each further listing of a node is reported, but not of those below it.
   void reportNode(std::size_t index) {
     const PlainNode& node = tree_.nodes[index];
     const bool isShared = isVisited_[index];

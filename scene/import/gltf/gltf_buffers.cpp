@@ -22,8 +22,6 @@ using Json = nlohmann::json;
 constexpr std::size_t kMaxBufferBytes = std::size_t{4} << 30;     // per buffer
 constexpr std::size_t kMaxAccessorNumbers = 1'000'000'000;        // per accessor
 constexpr std::size_t kMaxExpansion = 256, kFreeBytes = 1 << 20;  // see the header
-constexpr std::size_t kFirstChunkOffset = 12,
-                      kChunkHeaderSize = 8;  // bytes; a chunk has length, then type
 
 /// Size in bytes (glTF 2.0, 5.1.3); 0: not a component type.
 std::size_t getComponentSize(std::size_t componentType) {
@@ -80,29 +78,26 @@ std::vector<Number> convertElements(const GltfElements& elements, bool normalise
   return values;
 }
 
-std::string readFileBytes(const std::filesystem::path& file, std::size_t from) {
-  std::error_code error;
-  const auto size = std::filesystem::file_size(file, error);
-  if (error || size < from || size - from > kMaxBufferBytes) return {};
-  std::string bytes(static_cast<std::size_t>(size) - from, '\0');
+/// "" if the file is shorter.
+std::string readFileBytes(const std::filesystem::path& file, std::size_t from, std::size_t size) {
+  std::string bytes(size, '\0');
   std::ifstream in(file, std::ios::binary);
   in.seekg(static_cast<std::streamoff>(from));
   in.read(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   return in ? bytes : std::string();
 }
 
-/// The second chunk of a GLB file (glTF 2.0, 4.4): its first buffer.
+/// The first buffer of a GLB file.
 std::string readBinaryChunk(const std::filesystem::path& file) {
-  const std::string all = readFileBytes(file, 0);
-  const auto word = [&](std::size_t at) {
-    std::uint32_t value = 0;
-    if (at + 4 <= all.size()) std::memcpy(&value, all.data() + at, 4);
-    return std::size_t{value};
-  };
-  const std::size_t second = kFirstChunkOffset + kChunkHeaderSize + word(kFirstChunkOffset);
-  const std::size_t start = second + kChunkHeaderSize;
-  if (start > all.size() || start + word(second) > all.size()) return {};
-  return all.substr(start, word(second));
+  const GlbBinary binary = findGlbBinary(file);
+  return readFileBytes(file, binary.chunkAt + kGlbChunkHeader, binary.size);
+}
+
+std::string readWholeFile(const std::filesystem::path& file) {
+  std::error_code error;
+  const std::uintmax_t size = std::filesystem::file_size(file, error);
+  if (error || size > kMaxBufferBytes) return {};
+  return readFileBytes(file, 0, static_cast<std::size_t>(size));
 }
 
 }  // namespace
@@ -163,7 +158,7 @@ std::string GltfBuffers::readBuffer(std::size_t index) {
     dependencies_.push_back(path.string());
     std::error_code error;
     if (!std::filesystem::is_regular_file(path, error)) continue;
-    std::string bytes = readFileBytes(path, 0);
+    std::string bytes = readWholeFile(path);
     loaded_ += bytes.size();
     return bytes;
   }

@@ -96,6 +96,7 @@ class GltfHandler : public nlohmann::json_sax<Json> {
   bool open(Json container) {
     const std::size_t depth = countOpen();
     to_.duplicates.seeStart(depth, container.is_array());
+    if (depth == 1 && inNodes_ && !container.is_array()) failJson(file_, "has no list of nodes");
     open_.push_back(place(std::move(container)));
     return true;
   }

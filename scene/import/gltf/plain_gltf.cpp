@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <string_view>
+#include <utility>
 
 #include "scene/import/assembly/path_names.hpp"
 #include "scene/import/file/import_options.hpp"
@@ -35,8 +36,8 @@ using Json = nlohmann::json;
 std::string readMendedJson(const std::filesystem::path& file, ModelFormat format,
                            std::vector<Diagnostic>& problems) {
   std::string text = readGltfJson(file, format);
-  const std::size_t mended = mendUtf8(text);
-  addDiagnostic(problems, "mended_text", "read bytes that are not UTF-8 as Latin-1", mended);
+  const std::size_t decoded = decodeOtherBytes(text);
+  addDiagnostic(problems, "mended_text", "read bytes that are not UTF-8 as Windows-1252", decoded);
   return text;
 }
 
@@ -169,34 +170,41 @@ class MeshRewriter {
   std::string firstError_;
 };
 
-/// The meshes that nodes refer to, by index.
-std::vector<bool> findUsedMeshes(const Json& gltf) {
-  std::vector<bool> used(getArray(gltf, "meshes").size());
-  for (const Json& node : getArray(gltf, "nodes"))
-    if (const auto mesh = readIndexMember(&node, "mesh"); mesh && *mesh < used.size())
-      used[*mesh] = true;
-  return used;
+/// See PlainGltf::meshes.
+std::vector<std::size_t> listMeshes(const GltfNodeTree& tree, std::size_t meshCount) {
+  std::vector<bool> isListed(meshCount, false);
+  std::vector<std::size_t> meshes;
+  for (const std::size_t index : listSceneNodes(tree)) {
+    const std::optional<std::size_t>& mesh = tree.nodes[index].mesh;
+    if (!mesh || *mesh >= meshCount || isListed[*mesh]) continue;
+    isListed[*mesh] = true;
+    meshes.push_back(*mesh);
+  }
+  return meshes;
 }
 
-/// Throws ImportError if no mesh that nodes use can be read.
-void rewriteMeshes(Json& gltf, const std::map<std::size_t, RestPose>& poses, GltfBuffers& buffers,
+/// Problems of meshes that the scene does not use are not reported. Throws ImportError if none that
+/// it uses can be read.
+void rewriteMeshes(Json& gltf, const GltfNodeTree& tree,
+                   const std::map<std::size_t, RestPose>& poses, GltfBuffers& buffers,
                    GltfBinary& binary, std::vector<Diagnostic>& problems) {
   const Json original{{"accessors", getArray(gltf, "accessors")},
                       {"materials", getArray(gltf, "materials")}};
   MeshRewriter rewriter(original, buffers, binary, problems);
   const auto meshes = gltf.find("meshes");
   if (meshes == gltf.end() || !meshes->is_array()) return;
-  const std::vector<bool> used = findUsedMeshes(gltf);
+  std::vector<bool> isUsed(meshes->size(), false);
+  for (const std::size_t mesh : listMeshes(tree, meshes->size())) isUsed[mesh] = true;
   bool readAny = false;
   for (std::size_t m = 0; m < meshes->size(); ++m) {
     const auto pose = poses.find(m);
     const RestPose* const own = pose == poses.end() ? nullptr : &pose->second;
     const std::size_t number = own == nullptr ? m : own->mesh;
     std::vector<Diagnostic> before;
-    if (!used[m]) before = problems;
+    if (!isUsed[m]) before = problems;
     rewriter.rewrite((*meshes)[m], "meshes[" + std::to_string(number) + "]", own);
-    if (!used[m]) problems = std::move(before);  // those of a mesh that is not drawn do not count
-    readAny = readAny || (rewriter.readAny() && used[m]);
+    if (!isUsed[m]) problems = std::move(before);
+    readAny = readAny || (rewriter.readAny() && isUsed[m]);
   }
   if (!readAny && !rewriter.firstError().empty()) throw ImportError(rewriter.firstError());
 }
@@ -265,9 +273,15 @@ void addMissingScene(Json& gltf, const std::filesystem::path& file) {
   gltf["scenes"] = Json::array({{{"nodes", std::move(roots)}}});
 }
 
-/// Returns the data of the new file. Its JSON is `to.json`, and its sections and nodes `parsed`.
-GltfBinary rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGltf& to,
-                       ParsedGltf& parsed) {
+/// Reads the scene's root nodes.
+GltfNodeTree makeTree(std::vector<PlainNode> nodes, const Json& sections, std::uint32_t scene) {
+  GltfNodeTree tree{std::move(nodes), {}};
+  const Json& scenes = getArray(sections, "scenes");
+  if (scene < scenes.size()) tree.roots = readIndices(getArray(scenes[scene], "nodes"));
+  return tree;
+}
+
+void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGltf& to) {
   const Json original = Json::parse(to.json);
   GltfBuffers buffers(file, format, original);
   GltfBinary binary;
@@ -281,7 +295,10 @@ GltfBinary rewriteGltf(const std::filesystem::path& file, ModelFormat format, Pl
     const auto poses = separatePosedMeshes(gltf, buffers, to.problems);
     expandInstances(gltf, buffers, to.problems);
     dropMissingTextures(gltf, to.problems);
-    rewriteMeshes(gltf, poses, buffers, binary, to.problems);
+    std::vector<PlainNode> nodes;
+    for (const Json& node : getArray(gltf, "nodes")) nodes.push_back(readPlainNode(node));
+    to.tree = makeTree(std::move(nodes), gltf, to.scene);
+    rewriteMeshes(gltf, to.tree, poses, buffers, binary, to.problems);
     rewriteImages(gltf, buffers, binary);
     removeAnimation(gltf);
     simplifyMaterials(gltf);
@@ -294,26 +311,9 @@ GltfBinary rewriteGltf(const std::filesystem::path& file, ModelFormat format, Pl
   to.json = gltf.dump(-1, ' ', false, Json::error_handler_t::replace);
   to.dependencies = buffers.dependencies();
   to.isRewritten = true;
-  parsed = {};
-  for (const Json& node : getArray(gltf, "nodes")) parsed.nodes.push_back(readPlainNode(node));
+  to.binary = std::move(binary);
   gltf.erase("nodes");
-  parsed.sections = std::move(gltf);
-  return binary;
-}
-
-// ---- the file of meshes -------------------------------------------------------------------------
-
-/// The meshes of the scene in the order in which a reader that follows its nodes comes to them.
-std::vector<std::size_t> listMeshes(const GltfNodeTree& tree, std::size_t meshCount) {
-  std::vector<bool> isListed(meshCount, false);
-  std::vector<std::size_t> meshes;
-  for (const std::size_t index : listSceneNodes(tree)) {
-    const std::optional<std::size_t>& mesh = tree.nodes[index].mesh;
-    if (!mesh || *mesh >= meshCount || isListed[*mesh]) continue;
-    isListed[*mesh] = true;
-    meshes.push_back(*mesh);
-  }
-  return meshes;
+  to.sections = std::move(gltf);
 }
 
 /// The JSON of a GltfMeshFile.
@@ -333,22 +333,6 @@ std::string writeMeshJson(Json sections, const std::vector<std::size_t>& meshes)
   json["scenes"] = Json::array({{{"nodes", Json::array({0u})}}});
   json["scene"] = 0u;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
-}
-
-/// `binary`: null if the file is not rewritten.
-GltfMeshFile makeMeshFile(std::string json, const GltfBinary* binary,
-                          const std::filesystem::path& file, ModelFormat format) {
-  if (binary == nullptr && format == ModelFormat::gltf) return {std::move(json)};
-  GltfMeshFile made;
-  if (binary != nullptr) {
-    made.start = binary->makeGlb(std::move(json));
-  } else {
-    made.restAt = findGlbBinary(file).chunk;
-    made.start = makeGlbStart(std::move(json), std::filesystem::file_size(file) - made.restAt);
-  }
-  if (made.start.empty())
-    throw ImportError(file.string() + ": its meshes exceed 4 GiB when decoded; split it");
-  return made;
 }
 
 // ---- scenes -------------------------------------------------------------------------------------
@@ -418,27 +402,34 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
       checkGltfExtensions(parsed.sections, parsed.extensions, file, choice.ignoreAppearance);
   plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());
   const bool other = chooseScene(parsed.sections, choice.scene, file, plain);
-  const auto readTree = [&] {
-    const Json& scenes = getArray(parsed.sections, "scenes");
-    plain.tree = {std::move(parsed.nodes), {}, {}};
-    if (!scenes.empty()) plain.tree.roots = readIndices(getArray(scenes.at(plain.scene), "nodes"));
-  };
-  readTree();
-  std::optional<GltfBinary> binary;
+  plain.tree = makeTree(std::move(parsed.nodes), parsed.sections, plain.scene);
+  plain.sections = std::move(parsed.sections);
   // Rewriting leaves one value of a duplicate key, so that assimp reads the one checked here.
   if (other || choice.rewrite || duplicates > 0 ||
-      hasMissingReferences(plain.tree, parsed.sections) ||
-      needsRewriting(plain.json, parsed.sections, file, format)) {
-    binary = rewriteGltf(file, format, plain, parsed);
-    readTree();
-  }
-  const std::vector<std::size_t> triangles = countTrianglesByMesh(parsed.sections);
+      hasMissingReferences(plain.tree, plain.sections) ||
+      needsRewriting(plain.json, plain.sections, file, format))
+    rewriteGltf(file, format, plain);
+  const std::vector<std::size_t> triangles = countTrianglesByMesh(plain.sections);
   validateNodeGraph(plain.tree, triangles, file);
-  plain.tree.meshes = listMeshes(plain.tree, triangles.size());
-  for (const std::size_t mesh : plain.tree.meshes) plain.triangles += triangles[mesh];
-  plain.meshFile = makeMeshFile(writeMeshJson(std::move(parsed.sections), plain.tree.meshes),
-                                binary ? &*binary : nullptr, file, format);
+  plain.meshes = listMeshes(plain.tree, triangles.size());
+  for (const std::size_t mesh : plain.meshes) plain.triangles += triangles[mesh];
   return plain;
+}
+
+GltfMeshFile takeMeshFile(PlainGltf& plain, const std::filesystem::path& file, ModelFormat format) {
+  std::string json = writeMeshJson(std::move(plain.sections), plain.meshes);
+  if (!plain.isRewritten && format == ModelFormat::gltf) return {std::move(json)};
+  GltfMeshFile made;
+  if (plain.isRewritten) {
+    made.start = std::exchange(plain.binary, {}).makeGlb(std::move(json));
+  } else if (const GlbBinary rest = findGlbBinary(file); rest.size > 0) {
+    made.restAt = rest.chunkAt;
+    made.restBytes = kGlbChunkHeader + rest.size;
+  }
+  if (!plain.isRewritten) made.start = makeGlbStart(std::move(json), made.restBytes);
+  if (made.start.empty())
+    throw ImportError(file.string() + ": its meshes exceed the 4 GiB of a GLB file; split it");
+  return made;
 }
 
 }  // namespace enfilade::scene

@@ -4,6 +4,7 @@
 #include <set>
 #include <string_view>
 
+#include "scene/import/assembly/path_names.hpp"
 #include "scene/import/ifc/class_names.hpp"
 #include "scene/model/add_diagnostic.hpp"
 
@@ -79,13 +80,15 @@ bool isEndlessPlacement(const StepFile& file, std::uint32_t placement) {
 /// TrueNorth of an IfcGeometricRepresentationContext (identifier, type, dimensions, precision,
 /// placement, true north). It refers to the axes of the placement. Contexts of three dimensions
 /// come first. `unstated`: the direction in a context that states none; nullopt: none. Those that
-/// cannot be used are added to `problems`.
+/// cannot be used, before the one that is, are added to `problems`.
 std::optional<Vec3> readTrueNorth(const StepFile& file, const std::optional<Vec3>& unstated,
                                   std::vector<Diagnostic>& problems) {
   std::optional<Vec3> flat;
+  constexpr std::size_t kMaxShownBytes = 80;
   const auto report = [&](const StepStatement& context, std::string_view stated) {
     addDiagnostic(problems, "broken_north",
-                  "#" + std::to_string(context.id) + ": TrueNorth " + std::string(stated));
+                  "#" + std::to_string(context.id) + ": TrueNorth " +
+                      encodePathSegment(stated.substr(0, kMaxShownBytes)));
   };
   for (const StepStatement& statement : file.statements()) {
     if (statement.type != "IFCGEOMETRICREPRESENTATIONCONTEXT") continue;
@@ -267,9 +270,9 @@ class IfcMetadataReader {
     if (!metadata_.trueNorth && metadata_.mapConversion)
       metadata_.trueNorth = computeGridNorth(*metadata_.mapConversion);
     // IFC says that y points to north in a context that states nothing else.
-    std::vector<Diagnostic> reported;
+    std::vector<Diagnostic> ignored;  // they were reported above
     if (!metadata_.trueNorth && metadata_.mapFault.empty())
-      metadata_.trueNorth = readTrueNorth(file_, Vec3::UnitY(), reported);
+      metadata_.trueNorth = readTrueNorth(file_, Vec3::UnitY(), ignored);
   }
 
   void readStatement(const StepStatement& statement) {

@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <array>
+#include <stop_token>
+#include <system_error>
 #include <thread>
 
 #include "scene/import/worker/stream_bytes.hpp"
@@ -317,8 +319,8 @@ void writeAll(StreamWriter& out, const std::vector<T>& values) {
 
 /// Lets a second thread have the kernel clear the reserved memory of many values, while the first
 /// of them are read. A million objects take 100,000 pages. Huge pages are no better: where the
-/// memory of a virtual machine is fresh, they take five times as long. Returns the thread to wait
-/// for.
+/// memory of a virtual machine is fresh, they take five times as long. The returned thread stops
+/// early if it is destroyed. Without a free thread each page is cleared when it is first written.
 template <class T>
 std::jthread fetchReserved(const std::vector<T>& reserved) {
   constexpr std::size_t kManyBytes = 16 << 20;
@@ -326,13 +328,20 @@ std::jthread fetchReserved(const std::vector<T>& reserved) {
   if (bytes < kManyBytes) return {};
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
   const auto begin = reinterpret_cast<std::uintptr_t>(reserved.data()) / page * page + page;
-  // An older kernel refuses the call; each page is then cleared when it is first written.
-  return std::jthread([begin, end = begin + (bytes - page) / page * page] {
+  const auto fetch = [begin,
+                      end = begin + (bytes - page) / page * page](const std::stop_token& stop) {
     // In steps: each holds a lock that allocations of other threads wait for.
     constexpr std::uintptr_t kStep = 1 << 16;
-    for (std::uintptr_t at = begin; at < end; at += kStep)
-      madvise(reinterpret_cast<void*>(at), std::min(kStep, end - at), MADV_POPULATE_WRITE);
-  });
+    for (std::uintptr_t at = begin; at < end && !stop.stop_requested(); at += kStep) {
+      const std::uintptr_t size = std::min(kStep, end - at);
+      if (madvise(reinterpret_cast<void*>(at), size, MADV_POPULATE_WRITE) != 0) return;
+    }
+  };
+  try {
+    return std::jthread(fetch);
+  } catch (const std::system_error&) {
+    return {};
+  }
 }
 
 /// `smallest`: minimum size of an item in bytes, so that a false count cannot allocate much.

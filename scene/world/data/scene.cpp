@@ -198,7 +198,7 @@ void requireObject(const Model& model, std::uint32_t object) {
                           std::to_string(model.objects.size()));
 }
 
-void requireValidIndices(const Model& model) {
+void requireValidMeshes(const Model& model) {
   for (const Mesh& mesh : model.meshes) {
     for (const std::uint32_t index : mesh.indices) {
       if (index >= mesh.positions.size()) {
@@ -212,7 +212,7 @@ void requireValidIndices(const Model& model) {
 
 /// True if the meshes have so many triangles that the collision geometry of an object is built
 /// before avatars come near.
-bool haveManyTriangles(const Model& model, const std::vector<std::uint32_t>& meshes) {
+bool hasManyTriangles(const Model& model, const std::vector<std::uint32_t>& meshes) {
   std::size_t triangles = 0;
   for (const std::uint32_t mesh : meshes) triangles += model.meshes[mesh].indices.size() / 3;
   return triangles > kManyTriangles;
@@ -221,7 +221,7 @@ bool haveManyTriangles(const Model& model, const std::vector<std::uint32_t>& mes
 }  // namespace
 
 Scene::Scene(Model model) : model_(std::move(model)) {
-  requireValidIndices(model_);
+  requireValidMeshes(model_);
   assignShapeIndices();
   if (const auto error = validateBodies(model_)) throw std::invalid_argument(*error);
   std::vector<bool> isBodyObject(model_.objects.size());
@@ -235,7 +235,7 @@ Scene::Scene(Model model) : model_(std::move(model)) {
   shapes_ = std::make_unique<LazyArray<Shape>>(meshesOfShape_.size());
   collisionGeometries_ = std::make_unique<LazyArray<CollisionGeometry>>(model_.objects.size());
   std::vector<bool> isDense;  // by shape
-  for (const auto& meshes : meshesOfShape_) isDense.push_back(haveManyTriangles(model_, meshes));
+  for (const auto& meshes : meshesOfShape_) isDense.push_back(hasManyTriangles(model_, meshes));
   for (std::uint32_t i = 0; i < solidObjects_.size(); ++i)
     if (isDense[shapeIndexOfObject_[solidObjects_[i]]]) denseIndices_.push_back(i);
   prefetcher_ = std::make_unique<Prefetcher>(*this);
@@ -243,6 +243,7 @@ Scene::Scene(Model model) : model_(std::move(model)) {
 
 Scene::~Scene() = default;
 
+/// Throws std::invalid_argument for meshes that do not exist.
 void Scene::assignShapeIndices() {
   std::map<std::vector<std::uint32_t>, std::uint32_t> indexOfMeshes;
   std::vector<std::uint32_t> indexOfMesh(model_.meshes.size(),

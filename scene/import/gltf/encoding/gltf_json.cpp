@@ -10,9 +10,8 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kGlbHeader = 20;      // bytes: file header and header of the first chunk
-constexpr std::size_t kGlbChunkHeader = 8;  // bytes: length and type
-constexpr std::size_t kJsonLengthAt = 12;   // bytes: length of the first chunk
+constexpr std::size_t kGlbHeader = 20;     // bytes: file header and header of the first chunk
+constexpr std::size_t kJsonLengthAt = 12;  // bytes: length of the first chunk
 
 /// A number of 32 bits at `at`; 0 beyond the end of the file.
 std::uint32_t readGlbWord(std::ifstream& in, std::size_t at) {
@@ -48,10 +47,10 @@ std::string readGltfJson(const std::filesystem::path& file, ModelFormat format) 
 GlbBinary findGlbBinary(const std::filesystem::path& file) {
   std::ifstream in(file, std::ios::binary);
   GlbBinary binary{kGlbHeader + readGlbWord(in, kJsonLengthAt), 0};
-  const std::size_t length = readGlbWord(in, binary.chunk);
+  const std::size_t length = readGlbWord(in, binary.chunkAt);
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(file, error);
-  if (!error && binary.chunk + kGlbChunkHeader + length <= size) binary.size = length;
+  if (!error && binary.chunkAt + kGlbChunkHeader + length <= size) binary.size = length;
   return binary;
 }
 

@@ -26,10 +26,12 @@ inline constexpr std::size_t kNoIndex = ~std::size_t{0};  ///< in place of a mem
 /// The JSON text of a glTF or GLB file. Throws ImportError if a GLB file is too short for it.
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format);
 
+inline constexpr std::size_t kGlbChunkHeader = 8;  // bytes: length and type
+
 /// The second chunk of a GLB file, its first buffer.
 struct GlbBinary {
-  std::size_t chunk = 0;  ///< offset of its header in the file
-  std::size_t size = 0;   ///< bytes after the header; 0 if it is missing or cut off
+  std::size_t chunkAt = 0;  ///< offset of its header in the file
+  std::size_t size = 0;     ///< bytes after the header; 0 if it is missing or cut off
 };
 GlbBinary findGlbBinary(const std::filesystem::path& file);
 

@@ -49,6 +49,13 @@ std::vector<ObjectAttribute> readOwnAttributes(const Json& node) {
   return attributes;
 }
 
+/// At most kMaxNameBytes, of whole characters.
+std::string cutName(const std::string& name) {
+  std::size_t size = std::min(name.size(), kMaxNameBytes);
+  while (size > 0 && size < name.size() && (name[size] & 0xc0) == 0x80) --size;
+  return name.substr(0, size);
+}
+
 /// A member that is an index; kNoIndex if it is anything else, nullopt without it.
 std::optional<std::size_t> readReference(const Json& node, const char* key) {
   const Json* index = findMember(&node, key);
@@ -119,7 +126,7 @@ PlainNode readPlainNode(const Json& json) {
   node.isObject = true;
   const Json* name = findMember(&json, "name");
   if (name != nullptr && name->is_string())
-    node.name = name->get_ref<const std::string&>().substr(0, kMaxNameBytes);
+    node.name = cutName(name->get_ref<const std::string&>());
   node.transform = readNodeTransform(json);
   node.attributes = readOwnAttributes(json);
   node.children = readIndices(getArray(json, "children"));

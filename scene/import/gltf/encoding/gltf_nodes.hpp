@@ -41,9 +41,8 @@ std::string describeNode(const PlainNode& node, std::size_t index);
 
 /// The nodes of a file and the scene that is read.
 struct GltfNodeTree {
-  std::vector<PlainNode> nodes;     ///< all, by index
-  std::vector<std::size_t> roots;   ///< of the scene; indices of nodes
-  std::vector<std::size_t> meshes;  ///< of the scene, in the order in which assimp gets them
+  std::vector<PlainNode> nodes;    ///< all, by index
+  std::vector<std::size_t> roots;  ///< of the scene; indices of nodes
 };
 
 /// The nodes of the scene, each once, after all below it. Indices that do not exist are left out.

@@ -32,7 +32,7 @@ std::string describeEntry(const char* section, std::size_t index, const Json& en
 
 std::string describeMissing(const char* kind, const Json& index) {
   return std::string(": ") + kind +
-         (index.is_number() ? " " + index.dump() + " does not exist" : " is not an index");
+         (index.is_number_integer() ? " " + index.dump() + " does not exist" : " is not an index");
 }
 
 void dropMissingMembers(Json& node, std::size_t number, const Json& gltf,
