@@ -112,6 +112,12 @@ bool containsInPlane(const Triangle& of, const Triangle& t) {
       t, [&](const Vec3& p) { return std::abs(normal.dot(p - of[0])) <= kMaxGap; });
 }
 
+std::size_t countTriangles(const Model& model, const Object& object) {
+  std::size_t triangles = 0;
+  for (const std::uint32_t mesh : object.meshes) triangles += model.meshes[mesh].triangleCount();
+  return triangles;
+}
+
 /// By object: whether its box touches that of another one.
 std::vector<bool> findTouchingObjects(const Model& model) {
   std::vector<Aabb> boxes;
@@ -140,8 +146,8 @@ std::vector<bool> findTouchingObjects(const Model& model) {
 
 class CoplanarSearch {
  public:
-  explicit CoplanarSearch(const Model& model)
-      : model_(model), bodyOfObject_(mapObjectsToBodies(model)) {}
+  CoplanarSearch(const Model& model, std::size_t maxTriangles)
+      : model_(model), trianglesLeft_(maxTriangles), bodyOfObject_(mapObjectsToBodies(model)) {}
 
   CoplanarSurfaces run() {
     const std::vector<bool> touches = findTouchingObjects(model_);
@@ -151,7 +157,8 @@ class CoplanarSearch {
       return std::pair(a.plane, std::pair(a.min.x(), a.object)) <
              std::pair(b.plane, std::pair(b.min.x(), b.object));
     });
-    for (std::size_t i = 0; i < facets_.size() && found_.isComplete; ++i) compareWithNext(i);
+    for (std::size_t i = 0; i < facets_.size() && comparisons_ <= kMaxComparisons; ++i)
+      compareWithNext(i);
     for (const auto& [pair, looksEqual] : pairs_)
       found_.pairs.push_back({pair.first, pair.second, looksEqual});
     if (largestOverlap_ > 0)
@@ -179,6 +186,12 @@ class CoplanarSearch {
     const Object& object = model_.objects[index];
     if (object.usage == Object::Usage::collisionOnly) return;
     if (bodyOfObject_[index] && isTrigger(bodyOfObject_[index]->kind)) return;
+    const std::size_t triangles = countTriangles(model_, object);
+    if (triangles > trianglesLeft_) {
+      found_.isComplete = false;
+      return;
+    }
+    trianglesLeft_ -= triangles;
     for (const std::uint32_t mesh : object.meshes) {
       if (!isDrawnOpaque(findMaterial(model_, model_.meshes[mesh]))) continue;
       const std::size_t indices = model_.meshes[mesh].indices.size();
@@ -244,6 +257,7 @@ class CoplanarSearch {
   }
 
   const Model& model_;
+  std::size_t trianglesLeft_;
   const std::vector<const BodySpec*> bodyOfObject_;
   std::vector<Facet> facets_;
   std::map<ObjectPair, bool> pairs_;  ///< whether they look equal
@@ -255,8 +269,7 @@ class CoplanarSearch {
 
 std::size_t countTriangles(const Model& model) {
   std::size_t triangles = 0;
-  for (const Object& object : model.objects)
-    for (const std::uint32_t mesh : object.meshes) triangles += model.meshes[mesh].triangleCount();
+  for (const Object& object : model.objects) triangles += countTriangles(model, object);
   return triangles;
 }
 
@@ -266,8 +279,8 @@ std::size_t CoplanarSurfaces::countDifferentLooks() const {
   return static_cast<std::size_t>(std::ranges::count(pairs, false, &CoplanarPair::looksEqual));
 }
 
-CoplanarSurfaces findCoplanarSurfaces(const Model& model) {
-  return CoplanarSearch(model).run();
+CoplanarSurfaces findCoplanarSurfaces(const Model& model, std::size_t maxTriangles) {
+  return CoplanarSearch(model, maxTriangles).run();
 }
 
 std::vector<CoplanarRank> rankCoplanarObjects(const Model& model) {

@@ -2,6 +2,7 @@
 // Rounding would decide pixel by pixel which of them a picture shows; ranks decide instead.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -26,8 +27,13 @@ struct CoplanarSurfaces {
   std::size_t countDifferentLooks() const;
 };
 
-/// Compares drawn opaque triangles of 0.01 m^2 or more.
-CoplanarSurfaces findCoplanarSurfaces(const Model& model);
+/// Of objects that touch: 1.7 GB at most, and some seconds.
+inline constexpr std::size_t kMaxCoplanarTriangles = 25'000'000;
+
+/// Compares drawn opaque triangles of 0.01 m^2 or more. Objects whose triangles would exceed
+/// `maxTriangles`, repetitions counted, are left out.
+CoplanarSurfaces findCoplanarSurfaces(const Model& model,
+                                      std::size_t maxTriangles = kMaxCoplanarTriangles);
 
 /// Decides which of coplanar surfaces is visible.
 struct CoplanarRank {

@@ -169,6 +169,20 @@ TEST(SceneReport, CoplanarPairsAmongManyAreThoseOfEachPairAlone) {
   EXPECT_LT(found.size(), 500u);
 }
 
+TEST(SceneReport, CoplanarSurfacesBeyondTheLimitOfTrianglesAreLeftOutAndReported) {
+  const Model model = twoColoured({{"slab", {0, 0, 0}, {4, 0.3, 4}},
+                                   {"a", {1, 0, 1}, {2, 0.2, 2}},
+                                   {"b", {3, 0, 3}, {4, 0.2, 4}}},
+                                  1);
+  const CoplanarSurfaces all = findCoplanarSurfaces(model, 36);  // a box has twelve
+  EXPECT_TRUE(all.isComplete);
+  EXPECT_EQ(all.pairs.size(), 2u);
+  const CoplanarSurfaces some = findCoplanarSurfaces(model, 35);
+  EXPECT_FALSE(some.isComplete);
+  ASSERT_EQ(some.pairs.size(), 1u);
+  EXPECT_EQ(some.pairs[0], (CoplanarPair{0, 1, false}));
+}
+
 TEST(SceneReport, CoplanarSurfacesOfTooManyObjectsAreReportedAsNotAllCompared) {
   const auto report = [](std::size_t tiles) {
     std::vector<testing::NamedBox> boxes{{"slab", {-1, 0, 0}, {4, 0.3, 4}}};
