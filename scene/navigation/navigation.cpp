@@ -258,7 +258,9 @@ std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
   };
   std::vector<Candidate> candidates;
   const std::vector<Vec3> aims = listAims(named, centre);
-  for (const std::uint32_t polygon : ample_->findPolygons(box.centre(), 0.5 * box.size())) {
+  // The mesh lies up to kHeightError above or below a floor, which may be the top of the box.
+  const Vec3 extents = 0.5 * box.size() + Vec3(0, kHeightError, 0);
+  for (const std::uint32_t polygon : ample_->findPolygons(box.centre(), extents)) {
     const std::uint32_t number = islands_.numberOf[polygon];
     if (island && number != *island) continue;
     const bool isAside = number == kNoIsland || !islands_.islands[number].isDrawn;

@@ -27,7 +27,7 @@ struct ServerLimits {
   std::uint32_t requestsPerSecond = 50'000;     ///< per client, averaged
   std::size_t outgoingBytes = 64u << 20;        ///< of unsent replies and events per client
   std::size_t totalOutgoingBytes = 1u << 30;    ///< of all clients
-  std::size_t outgoingFrames = 4;               ///< unsent frames per client
+  std::size_t outgoingFrames = 64;              ///< unsent frames per client
   std::size_t outgoingFrameBytes = 512u << 20;  ///< of several unsent frames
   std::uint32_t frameSubscriptions = 16;        ///< frame subscriptions per client
   int sendBuffer = 0;                           ///< bytes of the socket; 0: system default

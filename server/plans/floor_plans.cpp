@@ -21,7 +21,8 @@ constexpr double kMaxWidth = 1600, kMaxHeight = 1200;  // pixels of the plan
 constexpr double kPointsPerMetre = 72 / 0.0254;        // of a page
 constexpr double kPageUnit = 0.7;                      // points of a thin line
 
-/// The plan shows the bounds of the section, without lawns and roofs; without a section, the scene.
+/// The plan shows the bounds of the section and of the rooms, without lawns and roofs; the scene,
+/// if the storey has neither.
 Aabb computePlanArea(const scene::Scene& scene, const FloorPlan& plan) {
   Aabb area;
   for (const PlanShape& shape : plan.shapes) {
@@ -30,6 +31,7 @@ Aabb computePlanArea(const scene::Scene& scene, const FloorPlan& plan) {
       for (const auto& line : *lines)
         for (const Vec3& point : line) area.include(point);
   }
+  for (const scene::Space& room : plan.rooms) area.include(room.box);
   if (area.empty()) area = scene.bounds();
   Aabb drawn = collision::inflated(area, kMargin);
   drawn.min.y() = std::min(drawn.min.y(), scene.bounds().min.y());

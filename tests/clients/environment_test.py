@@ -60,6 +60,21 @@ class Environments(RoomCase):
             self.assertTrue(np.isfinite(results[0][0][name]).any())
         self.assertEqual(env.render().shape, (12, 16, 3))
 
+    def test_a_step_brings_the_pictures_of_many_cameras_however_late_they_are_read(self):
+        self.need_pictures()
+        cameras = [enfilade.Camera(f"c{i}", (800, 600), ("rgb",), yaw=0.1 * i) for i in range(16)]
+        env = self.environment(size=None, cameras=cameras)
+        env.reset(seed=1)
+        posted = env._post_step(env._meaning(np.zeros(2)))
+        time.sleep(1)  # 23 MB are more than the sockets keep
+        seen = env._take_step(posted)[0]
+        self.assertTrue(all(seen[f"c{i}_rgb"].any() for i in range(16)))
+
+    def test_more_cameras_than_a_server_keeps_pictures_are_refused(self):
+        cameras = [enfilade.Camera(f"c{i}", (8, 8)) for i in range(65)]
+        with self.assertRaisesRegex(ValueError, "cameras: .* at most 64 pictures"):
+            self.environment(size=None, cameras=cameras)
+
     def test_who_goes_ahead_comes_to_the_goal(self):
         env = self.environment(starts=[(0, 0.01, 0, 0)], goal=(2, 0, 0), channels=(), discrete=True)
         env.reset(seed=0)

@@ -395,6 +395,14 @@ TEST(GltfExtensions, GltfOneIsRefusedInWords) {
   const std::string text = catchFailure(folder.write("old.gltf", file.gltf("a.bin")));
   EXPECT_NE(text.find("glTF version 1.0 cannot be read; export it as glTF 2.0"), std::string::npos)
       << text;
+  // Its nodes and meshes are dictionaries.
+  for (const char* section : {"nodes", "meshes"}) {
+    GltfWriter old = tests::plainTerrace();
+    if (std::string_view(section) == "nodes") old.json["asset"]["version"] = "1.0";
+    old.json[section] = {{"a", old.json[section][0]}};
+    const std::string fault = catchFailure(folder.write("older.gltf", old.gltf("a.bin")));
+    EXPECT_NE(fault.find("glTF version 1.0 cannot be read"), std::string::npos) << fault;
+  }
   file.json["asset"] = {{"version", "2.1"}, {"minVersion", "2.1"}};
   const std::string newer = catchFailure(folder.write("newer.glb", file.glb()));
   EXPECT_NE(newer.find("needs a reader of glTF 2.1"), std::string::npos) << newer;

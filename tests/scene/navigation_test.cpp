@@ -219,6 +219,17 @@ TEST(Navigation, FindsRoomsStoreysAndObjectsByName) {
   EXPECT_TRUE(findNamedPlaces(*scene, "nowhere", 1).empty());
 }
 
+TEST(Navigation, TheObjectBelowTheFeetIsFoundOnTheIslandOfTheStart) {
+  const auto scene = std::make_shared<const Scene>(boxModel(twoRooms(0.3)));  // too narrow
+  Navigation navigation(scene, {}, {});
+  const auto named = findNamedPlaces(*scene, "object:floor", 1.3);
+  for (const Vec3& start : {Vec3(1, 0, 0), Vec3(7, 0, 0), Vec3(5, 0, 2), Vec3(3, 0, -2)}) {
+    const auto place = navigation.findPlaceIn(named, start);
+    ASSERT_TRUE(place);
+    EXPECT_EQ(navigation.findIsland(*place), navigation.findIsland(start)) << start.transpose();
+  }
+}
+
 TEST(Navigation, ARoomShapedLikeAnLIsFoundInItsSolid) {
   // The L lies along two sides of the left room; its notch contains the box's centre.
   Model model = boxModel(twoRooms(1));

@@ -1,4 +1,4 @@
-// Headings of plans are whole, however narrow the plan is.
+// Pages of plans: their headings are whole, however narrow they are, and they show all rooms.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -8,6 +8,7 @@
 #include "server/plans/floor_plans.hpp"
 #include "server/plans/plan_drawing.hpp"
 #include "tests/scene/box_scene.hpp"
+#include "tests/scene/prism_space.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::server {
@@ -43,6 +44,26 @@ TEST(PlanHeadings, ANarrowPageHasMoreLinesAboveThePlan) {
                               longName = sizeAt("Erdgeschoss mit Werkstatt, Lager und Anlieferung");
   EXPECT_EQ(shortName[0], longName[0]);
   EXPECT_GT(longName[1], shortName[1] + 10);
+}
+
+TEST(PlanPages, RoomsFarFromWallsAreOnThePage) {
+  scene::Model model = scene::testing::boxModel(
+      {{"floor", {0, -0.2, 0}, {40, 0, 40}}, {"wall", {0, 0, 0}, {0.2, 3, 20}}});
+  model.storeys = {{"EG", "", 0}};
+  const tests::TemporaryFolder folder;
+  const auto file = folder.path() / "page.svg";
+  const auto writePage = [&] {
+    EXPECT_TRUE(writeStoreyPage(scene::Scene(model), {0, "EG", 0}, renderBlank, 100, file));
+    return readPageSize(file);
+  };
+  const std::array<double, 2> wallAlone = writePage();
+  // A terrace, 10 m east of the wall and 10 m wide.
+  model.spaces = {tests::makePrism({{10, 0}, {20, 0}, {20, 20}, {10, 20}}, 3)};
+  model.spaces[0].storey = 0, model.spaces[0].longName = "Terrasse";
+  const std::array<double, 2> withTerrace = writePage();
+  constexpr double kPointsPerMetre = 72 / 0.0254 / 100;
+  EXPECT_GT(withTerrace[0], 24 * kPointsPerMetre);
+  EXPECT_LT(wallAlone[0], 24 * kPointsPerMetre);
 }
 
 TEST(PlanHeadings, NoLineIsCut) {

@@ -50,7 +50,7 @@ class GltfHandler : public nlohmann::json_sax<Json> {
     to_.extensions.seeKey(static_cast<int>(depth), name);
     if (depth == 1) {
       inNodes_ = name == "nodes";
-      if (inNodes_) to_.nodes.clear();  // of several lists, the last counts
+      if (inNodes_) to_.nodes.clear(), to_.hasWrongNodes = false;  // the last of several counts
       isKept_ = isSection(name);
     }
     key_ = std::move(name);
@@ -89,6 +89,7 @@ class GltfHandler : public nlohmann::json_sax<Json> {
     to_.duplicates.seeValue(depth);
     to_.extensions.seeValue(value);
     place(std::move(value));
+    if (depth == 1 && inNodes_) to_.hasWrongNodes = true;
     if (isInListOfNodes()) to_.nodes.push_back(readPlainNode(node_));
     return true;
   }
@@ -96,7 +97,10 @@ class GltfHandler : public nlohmann::json_sax<Json> {
   bool open(Json container) {
     const std::size_t depth = countOpen();
     to_.duplicates.seeStart(depth, container.is_array());
-    if (depth == 1 && inNodes_ && !container.is_array()) failJson(file_, "has no list of nodes");
+    if (depth == 1 && inNodes_ && !container.is_array()) {
+      to_.hasWrongNodes = true;
+      inNodes_ = false;
+    }
     open_.push_back(place(std::move(container)));
     return true;
   }

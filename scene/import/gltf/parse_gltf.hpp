@@ -22,6 +22,7 @@ struct ParsedGltf {
   ExtensionNames extensions;
   DuplicateKeys duplicates;
   std::vector<PlainNode> nodes;  ///< there may be a million, so their JSON is not kept
+  bool hasWrongNodes = false;    ///< the nodes are no list; an object in glTF 1.0
 };
 
 /// Throws ImportError for JSON that is damaged, is no object, has a number that is too large, or is

@@ -398,6 +398,7 @@ PlainGltf makePlainGltf(const std::filesystem::path& file, ModelFormat format,
   const std::size_t duplicates = parsed.duplicates.count();
   addDiagnostic(problems, "duplicate_key", parsed.duplicates.firstPath(), duplicates);
   requireVersion2(parsed.sections, file);
+  if (parsed.hasWrongNodes) failJson(file, "has no list of nodes");
   plain.problems =
       checkGltfExtensions(parsed.sections, parsed.extensions, file, choice.ignoreAppearance);
   plain.problems.insert(plain.problems.end(), problems.begin(), problems.end());

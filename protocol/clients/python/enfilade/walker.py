@@ -62,6 +62,9 @@ class Walker:
             if width > widest or height > highest:
                 raise ValueError(f"size: the server draws at most {widest} x {highest} pixels, "
                                  f"not {width} x {height}")
+        most = client.limits.max_unread_pictures
+        if len(self.cameras) > most:
+            raise ValueError(f"cameras: the server keeps at most {most} pictures of one step")
         self._seconds = self.ticks_per_step * client.tick_seconds
 
     # ---- actions ----------------------------------------------------------------------------
