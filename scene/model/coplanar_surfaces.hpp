@@ -22,12 +22,12 @@ struct CoplanarPair {
 struct CoplanarSurfaces {
   std::vector<CoplanarPair> pairs;  ///< ascending; some are missing if `isComplete` is false
   std::string example;              ///< the paths of the pair of different looks that overlaps most
-  bool isComplete = true;           ///< false: the scene has too many surfaces in one plane
+  bool isComplete = true;           ///< false: too many triangles, or too many in one plane
 
   std::size_t countDifferentLooks() const;
 };
 
-/// Of objects that touch: 1.7 GB at most, and some seconds.
+/// Comparing them takes some seconds and at most 1.7 GB.
 inline constexpr std::size_t kMaxCoplanarTriangles = 25'000'000;
 
 /// Compares drawn opaque triangles of 0.01 m^2 or more. Objects whose triangles would exceed

@@ -89,6 +89,8 @@ constexpr std::array kCatalog{
         "coplanar_surfaces", note,
         "surfaces of two objects in one plane: pictures show the smaller object, or, above two "
         "million triangles, flicker; move one by a millimetre"},
+    DiagnosticKind{"coplanar_search_ended", note,
+                   "there are too many triangles to look for all surfaces in one plane"},
     DiagnosticKind{"repeated_object", warning,
                    "the same shape twice in the same place; delete one, they flicker"},
     // appearance

@@ -117,9 +117,9 @@ ExitCode serveUntilSignal(const ServeCommand& command) {
   // scene of a million objects takes a thousand.
   mallopt(M_TOP_PAD, 16 << 20);
   const auto scene = loadScene(command.model);
-  mallopt(M_TOP_PAD, kTopPad);
   ServerOptions options;
   options.additionalScenes = loadFurtherScenes(command);
+  mallopt(M_TOP_PAD, kTopPad);
   // Before the server starts: its threads inherit the signal mask.
   const sigset_t ending = blockEndingSignals();
   options.world = makeWorldOptions(command);

@@ -75,6 +75,16 @@ TEST(GltfNodes, AChildThatIsNoIndexIsReportedWithItsParent) {
   EXPECT_EQ(model.objects.size(), 1u);
 }
 
+TEST(GltfNodes, ChildrenThatAreNoListAreReported) {
+  for (const char* children : {"1", R"({"0":1})", "null"}) {
+    const std::string parent = std::string(R"({"name":"box","mesh":0,"children":)") + children;
+    const Model model = importNodes(parent + R"(},{"name":"lost","mesh":0})");
+    EXPECT_EQ(countDiagnostics(model, "missing_node"), 1u) << children;
+    EXPECT_EQ(diagnosticText(model, "missing_node"), "nodes[0] 'box': \"children\" is not a list");
+    EXPECT_EQ(model.objects.size(), 1u);
+  }
+}
+
 TEST(GltfNodes, TheRootThatAssimpWritesIsNotInPathsButMoves) {
   const Model model = importNodes(
       R"({"name":"ROOT","translation":[0,7,0],"children":[1]},{"name":"box","mesh":0})");
@@ -89,7 +99,7 @@ TEST(GltfNodes, ALongNameIsCutBetweenCharacters) {
   EXPECT_EQ(model.objects.at(0).path, name);
 }
 
-TEST(GltfNodes, ACircleOutsideTheSceneIsNotRead) {
+TEST(GltfNodes, ACycleOutsideTheSceneIsNotRead) {
   const Model model =
       importNodes(R"({"name":"box","mesh":0},{"children":[2],"mesh":0},{"children":[1]})");
   ASSERT_EQ(model.objects.size(), 1u);

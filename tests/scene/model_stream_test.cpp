@@ -122,9 +122,11 @@ TEST(ModelStream, EveryShorterStreamIsRefused) {
 
 /// So many objects that a second thread fetches their memory.
 TEST(ModelStream, ManyObjectsAreReadOrRefusedWhereverTheStreamEnds) {
+  constexpr std::size_t kObjects = 60'000;
+  static_assert(kObjects * sizeof(Object) > 16 << 20);  // from here on two threads read
   Model model = smallModel();
   const Object first = model.objects[0];
-  while (model.objects.size() < 60'000) {
+  while (model.objects.size() < kObjects) {
     Object& object = model.objects.emplace_back(first);
     object.path += std::to_string(model.objects.size());
     object.partOf = static_cast<std::uint32_t>(model.objects.size() / 2);

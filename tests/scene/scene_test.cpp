@@ -35,7 +35,7 @@ Model randomModel(unsigned seed, std::size_t objects) {
   return model;
 }
 
-TEST(Scene, BoxesAndHashOfManyObjectsAreThoseOfOneThread) {
+TEST(Scene, BoxesOfManyObjectsAreThoseOfOneThreadAndTheHashIsRepeatable) {
   // More objects than two threads take at once; meshes below and above the limit of the search for
   // repeated positions.
   Model model = randomModel(3, 4);

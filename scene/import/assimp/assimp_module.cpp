@@ -40,7 +40,7 @@ class ProgressForwarder : public Assimp::ProgressHandler {
   int lastPercent_ = 0;
 };
 
-/// A text that a part of a file follows.
+/// A text followed by a range of the bytes of a file.
 class SplicedStream : public Assimp::IOStream {
  public:
   SplicedStream(const AssimpInput& input, std::unique_ptr<Assimp::IOStream> file)
@@ -80,7 +80,8 @@ class SplicedStream : public Assimp::IOStream {
   std::size_t restAt_, size_, at_ = 0;
 };
 
-/// Records the files that assimp opens or looks for, and substitutes the repaired text of one file.
+/// Records the files that assimp opens or looks for, and substitutes the text for one file, or for
+/// its start.
 class TrackingIoSystem : public Assimp::DefaultIOSystem {
  public:
   TrackingIoSystem(const AssimpInput& input, std::vector<std::string>& dependencies)
@@ -97,11 +98,11 @@ class TrackingIoSystem : public Assimp::DefaultIOSystem {
       const std::string other = findPercentDecoded(file);
       return DefaultIOSystem::Open(other.empty() ? file : other.c_str(), mode);
     }
-    // assimp only reads from the stream, and the text outlives it.
     if (input_.restBytes > 0) {
       std::unique_ptr<Assimp::IOStream> whole(DefaultIOSystem::Open(file, mode));
       return whole ? new SplicedStream(input_, std::move(whole)) : nullptr;
     }
+    // assimp only reads from the stream, and the text outlives it.
     return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(input_.text.data()),
                                       input_.text.size());
   }

@@ -126,7 +126,6 @@ bool mayHaveGltfBodies(const std::string& text) {
 
 std::set<std::uint32_t> addGltfBodies(const std::filesystem::path& file, const std::string& text,
                                       const NodeTransforms& transforms, Model& model) {
-  if (!mayHaveGltfBodies(text)) return {};
   const Json json = Json::parse(text, nullptr, false);
   if (!json.is_object()) return {};
   std::set<std::uint32_t> staticObjects;

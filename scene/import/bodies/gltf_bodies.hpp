@@ -11,7 +11,7 @@
 
 namespace enfilade::scene {
 
-/// Whether the JSON may declare bodies or classes. Without, addGltfBodies() does nothing.
+/// Whether the JSON may declare bodies or classes. Without, addGltfBodies() adds nothing.
 bool mayHaveGltfBodies(const std::string& text);
 
 /// Adds the bodies, collision shapes and classes that the JSON of a glTF file declares for its

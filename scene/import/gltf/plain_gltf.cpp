@@ -235,17 +235,6 @@ void rewriteImages(Json& gltf, GltfBuffers& buffers, GltfBinary& binary) {
   }
 }
 
-/// Removes what refers to the old accessors: rest poses are applied, and animations are not read.
-void removeAnimation(Json& gltf) {
-  for (const char* section : {"animations", "skins", "extensionsRequired"}) gltf.erase(section);
-  const auto nodes = gltf.find("nodes");
-  if (nodes == gltf.end() || !nodes->is_array()) return;
-  for (Json& node : *nodes) {
-    if (!node.is_object()) continue;
-    for (const char* member : {"skin", "weights"}) node.erase(member);
-  }
-}
-
 void removeReadExtensions(Json& gltf) {
   const auto used = gltf.find("extensionsUsed");
   if (used == gltf.end() || !used->is_array()) return;
@@ -277,7 +266,7 @@ void addMissingScene(Json& gltf, const std::filesystem::path& file) {
 GltfNodeTree makeTree(std::vector<PlainNode> nodes, const Json& sections, std::uint32_t scene) {
   GltfNodeTree tree{std::move(nodes), {}};
   const Json& scenes = getArray(sections, "scenes");
-  if (scene < scenes.size()) tree.roots = readIndices(getArray(scenes[scene], "nodes"));
+  if (scene < scenes.size()) tree.roots = readIndices(scenes[scene], "nodes");
   return tree;
 }
 
@@ -286,7 +275,6 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
   GltfBuffers buffers(file, format, original);
   GltfBinary binary;
   Json gltf = original;
-  gltf["scene"] = to.scene;
   addMissingScene(gltf, file);
   try {
     dropMissingReferences(gltf, to.problems);
@@ -300,7 +288,6 @@ void rewriteGltf(const std::filesystem::path& file, ModelFormat format, PlainGlt
     to.tree = makeTree(std::move(nodes), gltf, to.scene);
     rewriteMeshes(gltf, to.tree, poses, buffers, binary, to.problems);
     rewriteImages(gltf, buffers, binary);
-    removeAnimation(gltf);
     simplifyMaterials(gltf);
     removeReadExtensions(gltf);
     binary.install(gltf);

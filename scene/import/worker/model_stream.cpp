@@ -322,7 +322,7 @@ void writeAll(StreamWriter& out, const std::vector<T>& values) {
 /// memory of a virtual machine is fresh, they take five times as long. The returned thread stops
 /// early if it is destroyed. Without a free thread each page is cleared when it is first written.
 template <class T>
-std::jthread fetchReserved(const std::vector<T>& reserved) {
+std::jthread prefaultReserved(const std::vector<T>& reserved) {
   constexpr std::size_t kManyBytes = 16 << 20;
   const std::size_t bytes = reserved.capacity() * sizeof(T);
   if (bytes < kManyBytes) return {};
@@ -351,7 +351,7 @@ void readInPlace(StreamReader& in, std::vector<T>& values, std::size_t smallest,
                  const Read& read) {
   const std::size_t n = in.count(smallest, field);
   values.reserve(n);  // a small multiple of the remaining bytes
-  const std::jthread fetching = fetchReserved(values);
+  const std::jthread prefaulting = prefaultReserved(values);
   for (std::size_t i = 0; i < n; ++i) read(values.emplace_back(), n);
 }
 template <class T, class Read>

@@ -85,9 +85,8 @@ void countRepeatedObjects(const Scene& scene, std::vector<Diagnostic>& diagnosti
 
 void countCoplanarSurfaces(const Model& model, std::vector<Diagnostic>& diagnostics) {
   const CoplanarSurfaces found = findCoplanarSurfaces(model);
-  addDiagnostic(diagnostics, "coplanar_surfaces",
-                found.example + (found.isComplete ? "" : "; not all surfaces were compared"),
-                found.countDifferentLooks());
+  addDiagnostic(diagnostics, "coplanar_surfaces", found.example, found.countDifferentLooks());
+  if (!found.isComplete) addDiagnostic(diagnostics, "coplanar_search_ended", model.source);
 }
 
 }  // namespace

@@ -3,6 +3,8 @@
 #include <array>
 #include <utility>
 
+#include "scene/import/gltf/encoding/gltf_json.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -50,7 +52,7 @@ void GltfBinary::install(nlohmann::json& gltf) {
 
 std::string makeGlbStart(std::string json, std::size_t rest) {
   json.resize((json.size() + 3) / 4 * 4, ' ');
-  const std::size_t size = 12 + 8 + json.size() + rest;
+  const std::size_t size = kGlbHeader + json.size() + rest;
   if (size > 0xffffffff) return "";
   std::string glb = "glTF";
   for (const std::size_t word : {std::size_t{2}, size, json.size()}) appendGlbWord(glb, word);
@@ -59,9 +61,9 @@ std::string makeGlbStart(std::string json, std::size_t rest) {
 
 std::string GltfBinary::makeGlb(std::string json) const {
   const std::size_t binary = (bytes_.size() + 3) / 4 * 4;
-  std::string glb = makeGlbStart(std::move(json), 8 + binary);
+  std::string glb = makeGlbStart(std::move(json), kGlbChunkHeader + binary);
   if (glb.empty()) return "";
-  const std::size_t size = glb.size() + 8 + binary;
+  const std::size_t size = glb.size() + kGlbChunkHeader + binary;
   glb.reserve(size);
   appendGlbWord(glb, binary);
   glb.append("BIN").append(1, '\0').append(bytes_);

@@ -10,7 +10,6 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr std::size_t kGlbHeader = 20;     // bytes: file header and header of the first chunk
 constexpr std::size_t kJsonLengthAt = 12;  // bytes: length of the first chunk
 
 /// A number of 32 bits at `at`; 0 beyond the end of the file.

@@ -26,6 +26,7 @@ inline constexpr std::size_t kNoIndex = ~std::size_t{0};  ///< in place of a mem
 /// The JSON text of a glTF or GLB file. Throws ImportError if a GLB file is too short for it.
 std::string readGltfJson(const std::filesystem::path& file, ModelFormat format);
 
+inline constexpr std::size_t kGlbHeader = 20;      // bytes: of the file and of its first chunk
 inline constexpr std::size_t kGlbChunkHeader = 8;  // bytes: length and type
 
 /// The second chunk of a GLB file, its first buffer.

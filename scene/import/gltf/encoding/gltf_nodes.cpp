@@ -56,11 +56,15 @@ std::string cutName(const std::string& name) {
   return name.substr(0, size);
 }
 
+std::size_t toIndex(const Json& value) {
+  return value.is_number_unsigned() ? value.get<std::size_t>() : kNoIndex;
+}
+
 /// A member that is an index; kNoIndex if it is anything else, nullopt without it.
 std::optional<std::size_t> readReference(const Json& node, const char* key) {
   const Json* index = findMember(&node, key);
   if (index == nullptr) return std::nullopt;
-  return index->is_number_unsigned() ? index->get<std::size_t>() : kNoIndex;
+  return toIndex(*index);
 }
 
 Eigen::Affine3d readMatrix(const std::array<double, 16>& numbers, const char*& fault) {
@@ -112,11 +116,13 @@ StatedTransform readNodeTransform(const Json& node) {
   return result;
 }
 
-std::vector<std::size_t> readIndices(const Json& list) {
+std::vector<std::size_t> readIndices(const Json& owner, const char* key) {
+  const Json* list = findMember(&owner, key);
+  if (list == nullptr) return {};
+  if (!list->is_array()) return {kNoIndex};
   std::vector<std::size_t> indices;
-  indices.reserve(list.size());
-  for (const Json& index : list)
-    indices.push_back(index.is_number_unsigned() ? index.get<std::size_t>() : kNoIndex);
+  indices.reserve(list->size());
+  for (const Json& index : *list) indices.push_back(toIndex(index));
   return indices;
 }
 
@@ -124,20 +130,28 @@ PlainNode readPlainNode(const Json& json) {
   PlainNode node;
   if (!json.is_object()) return node;
   node.isObject = true;
-  const Json* name = findMember(&json, "name");
-  if (name != nullptr && name->is_string())
-    node.name = cutName(name->get_ref<const std::string&>());
+  node.name = readEntryName(json);
   node.transform = readNodeTransform(json);
   node.attributes = readOwnAttributes(json);
-  node.children = readIndices(getArray(json, "children"));
+  node.children = readIndices(json, "children");
   node.mesh = readReference(json, "mesh");
   node.camera = readReference(json, "camera");
   return node;
 }
 
+std::string readEntryName(const Json& entry) {
+  const Json* name = findMember(&entry, "name");
+  if (name == nullptr || !name->is_string()) return {};
+  return cutName(name->get_ref<const std::string&>());
+}
+
+std::string describeEntry(const char* section, std::size_t index, const std::string& name) {
+  const std::string place = std::string(section) + "[" + std::to_string(index) + "]";
+  return name.empty() ? place : place + " '" + name + "'";
+}
+
 std::string describeNode(const PlainNode& node, std::size_t index) {
-  const std::string place = "nodes[" + std::to_string(index) + "]";
-  return node.name.empty() ? place : place + " '" + node.name + "'";
+  return describeEntry("nodes", index, node.name);
 }
 
 std::vector<std::size_t> listSceneNodes(const GltfNodeTree& tree) {

@@ -35,8 +35,18 @@ struct PlainNode {
 };
 
 PlainNode readPlainNode(const nlohmann::json& json);
-std::vector<std::size_t> readIndices(const nlohmann::json& list);  ///< kNoIndex: not a number
+/// The indices of a member that is a list; kNoIndex for what is no index, and for a member that is
+/// no list.
+std::vector<std::size_t> readIndices(const nlohmann::json& owner, const char* key);
+/// Cut to kMaxNameBytes.
+std::string readEntryName(const nlohmann::json& entry);
+
 /// "nodes[3] 'door'"
+/// Cut to kMaxNameBytes.
+std::string readEntryName(const nlohmann::json& entry);
+
+/// "nodes[3] 'door'"
+std::string describeEntry(const char* section, std::size_t index, const std::string& name);
 std::string describeNode(const PlainNode& node, std::size_t index);
 
 /// The nodes of a file and the scene that is read.

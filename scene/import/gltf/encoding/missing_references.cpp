@@ -22,14 +22,6 @@ constexpr std::array<Reference, 3> kReferences{{{"mesh", "meshes", "missing_mesh
                                                 {"camera", "cameras", "missing_camera"},
                                                 {"skin", "skins", "skin_ignored"}}};
 
-/// "nodes[3] 'door'"
-std::string describeEntry(const char* section, std::size_t index, const Json& entry) {
-  std::string text = std::string(section) + "[" + std::to_string(index) + "]";
-  const Json* name = findMember(&entry, "name");
-  if (name != nullptr && name->is_string()) text += " '" + name->get<std::string>() + "'";
-  return text;
-}
-
 std::string describeMissing(const char* kind, const Json& index) {
   return std::string(": ") + kind +
          (index.is_number_integer() ? " " + index.dump() + " does not exist" : " is not an index");
@@ -41,7 +33,7 @@ void dropMissingMembers(Json& node, std::size_t number, const Json& gltf,
     const Json* index = findMember(&node, member);
     if (index == nullptr || findEntry(getArray(gltf, section), index) != nullptr) continue;
     const std::string fault =
-        describeEntry("nodes", number, node) + describeMissing(member, *index);
+        describeEntry("nodes", number, readEntryName(node)) + describeMissing(member, *index);
     addDiagnostic(problems, diagnostic, fault);
     node.erase(member);
   }
@@ -50,6 +42,13 @@ void dropMissingMembers(Json& node, std::size_t number, const Json& gltf,
 /// `key`: a member of `owner` that is a list of nodes.
 void dropMissingNodes(Json& owner, const char* key, const std::string& name, const Json& nodes,
                       std::vector<Diagnostic>& problems) {
+  const Json* stated = findMember(&owner, key);
+  if (stated == nullptr) return;
+  if (!stated->is_array()) {
+    addDiagnostic(problems, "missing_node", name + ": \"" + key + "\" is not a list");
+    owner.erase(key);
+    return;
+  }
   Json kept = Json::array();
   for (const Json& index : getArray(owner, key)) {
     if (findEntry(nodes, &index) != nullptr) {
@@ -81,13 +80,15 @@ void dropMissingReferences(Json& gltf, std::vector<Diagnostic>& problems) {
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     Json& node = gltf["nodes"][i];
     if (!node.is_object()) continue;
-    dropMissingNodes(node, "children", describeEntry("nodes", i, node), nodes, problems);
+    dropMissingNodes(node, "children", describeEntry("nodes", i, readEntryName(node)), nodes,
+                     problems);
     dropMissingMembers(node, i, gltf, problems);
   }
   for (std::size_t i = 0; i < getArray(gltf, "scenes").size(); ++i) {
     Json& scene = gltf["scenes"][i];
     if (scene.is_object())
-      dropMissingNodes(scene, "nodes", describeEntry("scenes", i, scene), nodes, problems);
+      dropMissingNodes(scene, "nodes", describeEntry("scenes", i, readEntryName(scene)), nodes,
+                       problems);
   }
 }
 
