@@ -69,9 +69,11 @@ std::vector<std::byte> serializeEntry(const CacheEntry& entry) {
     out.append(std::uint64_t{file.exists});
     out.append(file.content);
   }
-  const std::vector<std::byte> stream = serializeModel(entry.model);
-  out.bytes.reserve(out.bytes.size() + stream.size() + kChecksumSize);
-  out.append(stream.data(), stream.size());
+  const std::uint64_t size = measureModelStream(entry.model);
+  out.bytes.reserve(out.bytes.size() + size + kChecksumSize);  // it may take most of the memory
+  writeModelStream(entry.model, size, [&](std::span<const std::byte> block) {
+    out.append(block.data(), block.size());
+  });
   out.append(computeContentHash(out.bytes));
   return std::move(out.bytes);
 }
