@@ -1,6 +1,7 @@
 #include "scene/import/cache/model_cache_entry.hpp"
 
 #include <cstring>
+#include <span>
 
 #include "scene/import/worker/model_stream.hpp"
 
