@@ -1,4 +1,4 @@
-// A town house: one of the prototypes that a district repeats.
+// Adds a town house, one of the prototypes that a district repeats.
 #pragma once
 
 #include "assets/random.hpp"

@@ -1,4 +1,5 @@
-// Declares the parts that makeBuilding() assembles.
+// The parts of the bundled building that makeBuilding() assembles: wings, hall, stair, lift,
+// furniture and grounds.
 #pragma once
 
 #include "assets/furniture.hpp"

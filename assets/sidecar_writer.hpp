@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "assets/building.hpp"
+#include "assets/moving_part.hpp"
+#include "scene/model/model.hpp"
 
 namespace enfilade::assets {
 

@@ -1,12 +1,16 @@
 // A model under construction: shapes are placed under a path; equal meshes are stored once.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <map>
 #include <set>
 #include <string>
+#include <vector>
 
-#include "assets/building.hpp"
+#include "assets/moving_part.hpp"
 #include "assets/painted_mesh.hpp"
+#include "scene/model/model.hpp"
 
 namespace enfilade::assets {
 

@@ -1,14 +1,13 @@
 # Compiles several sources of a room as one file, so that their common headers are parsed once.
 # Sources with compile options or definitions of their own stay separate. collision/ and
 # scene/physics/ do too: what the compiler inlines there, and so their speed, must not depend on
-# neighbouring files. So do most tests, and a new one may use any name; those with messages take too
-# long.
+# neighbouring files. So do small test programs, where a new test may use any name.
 
 # enfilade_unity_build(TARGET SIZE [FOLDER..]): groups the sources of each folder of TARGET, at most
 # SIZE in one group. The folders listed last are small and share a group. An edit of a source then
 # compiles at most SIZE of them.
 function(enfilade_unity_build target size)
-  if(NOT ENFILADE_UNITY STREQUAL "ON" AND NOT target IN_LIST ENFILADE_UNITY)
+  if(NOT ENFILADE_UNITY)
     return()
   endif()
   get_target_property(sources ${target} SOURCES)

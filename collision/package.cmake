@@ -8,6 +8,7 @@ set(public_headers
   bounds/bounding_box.hpp
   broad_phase/broad_phase_audit.hpp
   broad_phase/sort_and_sweep.hpp
+  broad_phase/sweep_result.hpp
   compound/compound_view.hpp
   compound/nearest_parts.hpp
   compound/overlapping_parts.hpp
@@ -22,6 +23,7 @@ set(public_headers
   motion/time_of_impact.hpp
   motion/time_to_contact.hpp
   narrow_phase/contact_manifold.hpp
+  narrow_phase/feature.hpp
   narrow_phase/narrow_phase.hpp
   narrow_phase/penetration_depth.hpp
   narrow_phase/refine.hpp

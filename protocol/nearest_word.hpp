@@ -1,4 +1,4 @@
-// The word that a typing error most probably meant.
+// Finds the known word nearest to a misspelt one, by edit distance.
 #pragma once
 
 #include <algorithm>

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <sstream>
 
-#include "render/camera_basis.hpp"
-#include "render/lens.hpp"
+#include "collision/assert.hpp"
+#include "render/fisheye.hpp"
 
 namespace enfilade::render {
 namespace {
@@ -130,6 +130,13 @@ Pinhole computeIntrinsics(const Camera& camera) {
   if (camera.pinhole) return *camera.pinhole;
   const double focal = camera.height / (2 * std::tan(camera.fovY / 2));
   return {focal, focal, camera.width / 2.0, camera.height / 2.0};
+}
+
+Pinhole computeFisheyeIntrinsics(const Camera& camera) {
+  ENFILADE_ASSERT(camera.lens && camera.lens->kind == Camera::Lens::Kind::fisheye);
+  if (camera.pinhole) return *camera.pinhole;
+  const double focal = 0.5 * camera.width / distort(camera.lens->k, 0.5 * camera.lens->width);
+  return {focal, focal, 0.5 * camera.width, 0.5 * camera.height};
 }
 
 Camera makeFirstPersonCamera(const scene::AvatarSnapshot& avatar, int width, int height,

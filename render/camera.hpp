@@ -1,7 +1,10 @@
-// The camera: pose, projection and image size.
+// The camera is a pose, a projection and an image size. Axes and frustum planes are derived from
+// it.
 #pragma once
 
 #include <array>
+#include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <string>
 
@@ -50,6 +53,21 @@ struct Camera {
   int width = 640, height = 480;  ///< pixels, 1..4096
 };
 
+/// A plane; points p with normal.dot(p) + offset >= 0 are inside.
+struct Plane {
+  Vec3 normal;
+  double offset;
+};
+
+/// A camera's axes and its mapping from metres to normalised device coordinates (NDC, -1..1).
+struct CameraBasis {
+  Vec3 right, up, forward;  ///< orthonormal, world frame
+  /// From metres to NDC; perspective: at distance 1.
+  double scaleX, scaleY;
+  /// NDC (right, up) of the principal point; 0 except for pinholes.
+  double shiftX, shiftY;
+};
+
 /// `camera` must satisfy validateCamera().
 inline std::size_t countPixels(const Camera& camera) {
   return static_cast<std::size_t>(camera.width) * static_cast<std::size_t>(camera.height);
@@ -61,6 +79,9 @@ std::optional<std::string> validateCamera(const Camera& camera);
 /// The intrinsics of a perspective camera: its pinhole, otherwise computed from fovY.
 Pinhole computeIntrinsics(const Camera& camera);
 
+/// The intrinsics of a fisheye: the camera's pinhole, or those of Lens::width.
+Pinhole computeFisheyeIntrinsics(const Camera& camera);
+
 /// The camera at an avatar's eyes. Exclude the avatar itself by FrameOptions::hiddenEntity.
 Camera makeFirstPersonCamera(const scene::AvatarSnapshot& avatar, int width, int height,
                              double fovY = 1.2);
@@ -69,6 +90,12 @@ Camera makeFirstPersonCamera(const scene::AvatarSnapshot& avatar, int width, int
 /// everything above `cutHeight` and below `floorHeight`.
 Camera makePlanCamera(const scene::Aabb& bounds, double floorHeight, double cutHeight, int width,
                       int height);
+
+/// `camera` must satisfy validateCamera().
+CameraBasis computeCameraBasis(const Camera& camera);
+
+/// The four sides, near and far. A point inside all six planes may be in the image.
+std::array<Plane, 6> computeFrustum(const Camera& camera);
 
 /// Projects a world point: x, y are pixels from the top left corner (right, down), z is the
 /// z-distance in metres. x, y are NaN for points behind a perspective camera.

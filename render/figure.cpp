@@ -122,7 +122,7 @@ void addSections(scene::Mesh& mesh, const std::vector<Section>& sections, double
 }
 
 /// The first and last sections are poles.
-const std::vector<Section>& torsoSections() {
+const std::vector<Section>& getTorsoSections() {
   static const std::vector<Section> sections{
       {0.775, 0, 0},         {0.785, 0.070, 0.060}, {0.820, 0.130, 0.090}, {0.900, 0.163, 0.110},
       {0.980, 0.152, 0.104}, {1.080, 0.134, 0.094}, {1.190, 0.148, 0.102}, {1.300, 0.172, 0.110},
@@ -211,7 +211,7 @@ scene::Mesh makePose(double crouch) {
   };
   scene::Mesh mesh;
   mesh.name = "figure";
-  addSections(mesh, torsoSections(), 0, lean);
+  addSections(mesh, getTorsoSections(), 0, lean);
   addSections(mesh, makeHeadSections(), 0.016, lean);
   addLimb(mesh, {lean(Vec3(-0.004, 1.44, 0)), 0.058}, {lean(Vec3(0.008, 1.56, 0)), 0.050});
   for (const double side : {-1.0, 1.0}) {

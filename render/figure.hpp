@@ -1,4 +1,4 @@
-// The drawn shape of a person, standing or crouching, as in an architect's model.
+// Figure: the mesh of a standing or crouching person that is drawn for an avatar.
 #pragma once
 
 #include "scene/model/model.hpp"

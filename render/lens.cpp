@@ -1,21 +1,16 @@
 #include "render/lens.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 
-#include "collision/assert.hpp"
+#include "render/fisheye.hpp"
 
 namespace enfilade::render {
 namespace {
 
 constexpr double kPi = std::numbers::pi;
-
-/// OpenCV's fisheye model: distance from the centre, in focal lengths, of a direction at `angle`.
-double distort(const std::array<double, 4>& k, double angle) {
-  const double square = angle * angle;
-  return angle * (1 + square * (k[0] + square * (k[1] + square * (k[2] + square * k[3]))));
-}
 
 /// A lower bound of the slope of distort() between two angles.
 double boundSlope(const std::array<double, 4>& k, double low, double high) {
@@ -38,13 +33,6 @@ double findMaxAngle(const std::array<double, 4>& k, double low, double high) {
 }
 
 }  // namespace
-
-Pinhole computeFisheyeIntrinsics(const Camera& camera) {
-  ENFILADE_ASSERT(camera.lens && camera.lens->kind == Camera::Lens::Kind::fisheye);
-  if (camera.pinhole) return *camera.pinhole;
-  const double focal = 0.5 * camera.width / distort(camera.lens->k, 0.5 * camera.lens->width);
-  return {focal, focal, 0.5 * camera.width, 0.5 * camera.height};
-}
 
 LensMapping::LensMapping(const Camera& camera)
     : lens_(*camera.lens), width_(camera.width), height_(camera.height) {

@@ -1,7 +1,6 @@
 // Lenses that bend straight lines: fisheye and equirectangular pictures.
 #pragma once
 
-#include <array>
 #include <optional>
 
 #include "render/camera.hpp"
@@ -30,8 +29,5 @@ class LensMapping {
   double pixelsPerRadian_ = 1;
   double maxAngle_ = 0;  ///< of a fisheye, radians: the polynomial increases up to here
 };
-
-/// The intrinsics of a fisheye: the camera's pinhole, or those of Lens::width.
-Pinhole computeFisheyeIntrinsics(const Camera& camera);
 
 }  // namespace enfilade::render

@@ -1,4 +1,4 @@
-// Errors of the renderers.
+// RenderError: exception of the renderers, and RendererUnavailable.
 #pragma once
 
 #include <stdexcept>

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "collision/assert.hpp"
-#include "render/camera_basis.hpp"
+#include "render/camera.hpp"
 #include "scene/model/srgb.hpp"
 
 namespace enfilade::render {

@@ -1,4 +1,4 @@
-// Several samples in each pixel, and their mean colour.
+// Supersampling: sample positions in a pixel, and the mean colour of the samples.
 #pragma once
 
 #include <cstdint>

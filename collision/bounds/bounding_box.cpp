@@ -38,7 +38,7 @@ constexpr double kUnderflow = 0x1p-1000;  // above the loss of a few products to
 
 // Nanoseconds, measured by `./dev bench boxes` (tests/benchmarks/report/boxes.md). A pair is a
 // warm narrow-phase query of two bodies that are clear.
-constexpr double kCubeCost = 7, kScanCost = 5, kScanCostPerVertex = 1.9;
+constexpr double kCubeCost = 7, kScanCost = 5, kScanCostPerVertex = 1.85;
 constexpr double kClimbCost = 63;      // of a body that hardly turns
 constexpr double kClimbTurnCost = 75;  // a radian of turn, times the root of the number of vertices
 constexpr double kPairCost = 200;
@@ -312,7 +312,8 @@ AabbMethod chooseAabbMethod(const Hull& hull) {
 }
 
 AabbMethod chooseTightMethod(const Hull& hull) {
-  return estimateScanCost(hull) <= kClimbCost ? AabbMethod::vertexScan : AabbMethod::hillClimb;
+  return estimateScanCost(hull) <= estimateClimbCost(hull, kUsualTurn) ? AabbMethod::vertexScan
+                                                                       : AabbMethod::hillClimb;
 }
 
 }  // namespace enfilade::collision

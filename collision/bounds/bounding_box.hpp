@@ -64,7 +64,7 @@ Aabb computeTightAabb(const Hull& hull, const Mat3& rotation, const Vec3& transl
 /// The method that costs least per tick for a body that turns by a few degrees. The cost includes
 /// the narrow-phase queries that a larger box causes among bodies of its own size.
 AabbMethod chooseAabbMethod(const Hull& hull);
-/// The tight method that costs less for a body that hardly turns.
+/// The tight method that costs less for a body that turns by 2 degrees a tick.
 AabbMethod chooseTightMethod(const Hull& hull);
 
 }  // namespace enfilade::collision

@@ -22,7 +22,7 @@ std::vector<ProxyPair> collectSweepPairs(const SortAndSweep& sweep,
                                          std::span<const ProxyId> selected) {
   std::vector<ProxyPair> pairs;
   for (const ProxyId id : selected) {
-    for (const SortAndSweep::Overlap& overlap : sweep.getOverlaps(id)) {
+    for (const ProxyOverlap& overlap : sweep.getOverlaps(id)) {
       pairs.push_back(overlap.isDynamic ? makeDynamicPair(id, overlap.id)
                                         : ProxyPair{id, overlap.id, false});
     }

@@ -19,7 +19,7 @@ inline SignedBounds toMaxEndpoints(const Aabb& box) {
 inline SignedBounds toMinEndpoints(const Aabb& box) {
   return {-box.max.x(), -box.max.y(), -box.max.z(), box.min.x(), box.min.y(), box.min.z()};
 }
-inline Aabb aabbFromMinEndpoints(const SignedBounds& o) {
+inline Aabb makeAabbFromMinEndpoints(const SignedBounds& o) {
   return {Vec3(o[3], o[4], o[5]), Vec3(-o[0], -o[1], -o[2])};
 }
 

@@ -42,10 +42,13 @@
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <utility>
 
 #include "collision/assert.hpp"
+#include "collision/broad_phase/sort_and_sweep_batch.hpp"
 #include "collision/broad_phase/sort_and_sweep_dynamic.hpp"
 #include "collision/broad_phase/sort_and_sweep_pairs.hpp"
+#include "collision/broad_phase/sort_and_sweep_state.hpp"
 #include "collision/broad_phase/sort_and_sweep_static.hpp"
 
 namespace enfilade::collision {
@@ -118,7 +121,7 @@ std::vector<StaticId> makeSequentialIds(std::size_t count) {
   return ids;
 }
 
-Aabb aabbFromMaxEndpoints(const SignedBounds& r) {
+Aabb makeAabbFromMaxEndpoints(const SignedBounds& r) {
   return {Vec3(-r[0], -r[1], -r[2]), Vec3(r[3], r[4], r[5])};
 }
 
@@ -163,6 +166,18 @@ void removeAllOverlaps(SweepState& sweep, ProxyId id) {
     removeDynamicOverlap(sweep, id, proxy.overlaps.back().id);
   sweep.overlappingStatics.clear();
   replaceStaticOverlaps(sweep, id);
+}
+
+/// Step 4 of an update: in a batch where this is cheaper.
+void updateDynamicOverlaps(SweepState& sweep) {
+  if (!sweep.batch.isActive && isBatchCheaper(sweep)) enterBatch(sweep);
+  if (sweep.batch.isActive) {
+    updateBatch(sweep);
+  } else {
+    updateNeighbours(sweep);
+  }
+  sweep.counters.swaps += std::exchange(sweep.windowLists.swaps, 0);
+  sweep.counters.aabbTests += std::exchange(sweep.windowLists.aabbTests, 0);
 }
 
 }  // namespace
@@ -292,13 +307,13 @@ std::span<const ProxyPair> SortAndSweep::removedPairs() const {
   return state_->removedPairs;
 }
 
-std::span<const SortAndSweep::Overlap> SortAndSweep::getOverlaps(ProxyId proxy) const {
+std::span<const ProxyOverlap> SortAndSweep::getOverlaps(ProxyId proxy) const {
   if (proxy >= state_->proxies.size()) return {};
   return state_->proxies[proxy].overlaps;
 }
 
-std::span<const SortAndSweep::Overlap> SortAndSweep::getDynamicOverlaps(ProxyId proxy) const {
-  const std::span<const Overlap> all = getOverlaps(proxy);
+std::span<const ProxyOverlap> SortAndSweep::getDynamicOverlaps(ProxyId proxy) const {
+  const std::span<const ProxyOverlap> all = getOverlaps(proxy);
   std::size_t first = all.size();
   while (first > 0 && all[first - 1].isDynamic) --first;
   return all.subspan(first);
@@ -340,7 +355,7 @@ SortAndSweep::ProxyTable SortAndSweep::saveProxies() const {
   const SweepState& s = *state_;
   ProxyTable table{s.freeIds, {}, s.tick > 0};
   for (const ProxyId id : s.removed)
-    table.removed.emplace_back(id, aabbFromMaxEndpoints(s.proxyMaxEndpoints[id]));
+    table.removed.emplace_back(id, makeAabbFromMaxEndpoints(s.proxyMaxEndpoints[id]));
   return table;
 }
 

@@ -2,7 +2,6 @@
 // Reports overlapping boxes as changes from tick to tick.
 #pragma once
 
-#include <compare>
 #include <cstddef>
 #include <cstdint>
 #include <memory>
@@ -10,31 +9,10 @@
 #include <utility>
 #include <vector>
 
+#include "collision/broad_phase/sweep_result.hpp"
 #include "collision/types.hpp"
 
 namespace enfilade::collision {
-
-using StaticId = std::uint32_t;  ///< index into the constructor's boxes, or from insertStatic()
-using ProxyId = std::uint32_t;   ///< from insert(); reused after remove() and update()
-
-/// A dynamic and a static proxy, or two dynamic ones (then `proxy` < `other`).
-struct ProxyPair {
-  ProxyId proxy;
-  std::uint32_t other;  ///< a StaticId, or a ProxyId if `otherIsDynamic`
-  bool otherIsDynamic;
-
-  auto operator<=>(const ProxyPair&) const = default;
-};
-
-/// Counters of the last update(), for metrics and complexity tests.
-struct SweepCounters {
-  std::uint64_t swaps = 0;         ///< endpoint swaps on all axes
-  std::uint64_t windowsBuilt = 0;  ///< proxy windows that were built
-  std::uint64_t staticEdits = 0;   ///< static boxes inserted or removed
-  std::uint64_t rebuilds = 0;      ///< 1 if the whole static grid was rebuilt
-  std::uint64_t batched = 0;       ///< dynamic proxies in a batch update (sort_and_sweep_batch.cpp)
-  std::uint64_t aabbTests = 0;  ///< full box tests: of window builds and of nearby dynamic proxies
-};
 
 struct SweepState;  // internal
 
@@ -84,20 +62,11 @@ class SortAndSweep {
   /// update().
   std::span<const ProxyPair> addedPairs() const;
   std::span<const ProxyPair> removedPairs() const;
-  /// A box that overlaps a given dynamic proxy.
-  struct Overlap {
-    std::uint32_t id;
-    bool isDynamic;
-    auto operator<=>(const Overlap& o) const {
-      return isDynamic != o.isDynamic ? isDynamic <=> o.isDynamic : id <=> o.id;
-    }
-    bool operator==(const Overlap&) const = default;
-  };
   /// All current overlaps of a dynamic proxy, sorted: static boxes first. Empty for an unknown id.
   /// Valid until the next update().
-  std::span<const Overlap> getOverlaps(ProxyId proxy) const;
+  std::span<const ProxyOverlap> getOverlaps(ProxyId proxy) const;
   /// Those of getOverlaps() with dynamic proxies. Costs no look at the static ones.
-  std::span<const Overlap> getDynamicOverlaps(ProxyId proxy) const;
+  std::span<const ProxyOverlap> getDynamicOverlaps(ProxyId proxy) const;
   /// Static boxes that overlap an arbitrary box, ascending, as of the last update(). For single
   /// queries, such as a free-space test. The cost is linear in the boxes of the cells it covers.
   /// Throws std::invalid_argument for a box that is empty or not finite.

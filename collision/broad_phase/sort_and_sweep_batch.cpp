@@ -26,18 +26,18 @@ using IdPair = BoxTable::IdPair;
 // Estimated costs, nanoseconds.
 constexpr double kSwapCost = 6, kNeighbourTestCost = 6;
 constexpr double kBatchProxyCost = 90, kBatchPairCost = 15;
-// The present way is kept unless the other one is cheaper by this factor.
+// The present method is kept unless the other one is cheaper by this factor.
 constexpr double kEnterRatio = 1.5, kLeaveRatio = 1.15;
 constexpr std::size_t kMinBatchProxies = 256;  // fewer proxies are never a batch
 constexpr std::uint64_t kReviewInterval = 32;  // updates, in a batch
 constexpr std::uint64_t kCheckInterval = 8;    // updates, of the lists
 
-bool isLive(const SweepState& sweep, ProxyId id) {
+bool isPresent(const SweepState& sweep, ProxyId id) {
   const ProxyState state = sweep.proxies[id].state;
   return state == ProxyState::active || state == ProxyState::added;
 }
 
-std::size_t countLive(const SweepState& sweep) {
+std::size_t countPresent(const SweepState& sweep) {
   return sweep.proxies.size() - sweep.freeIds.size() - sweep.removed.size();
 }
 
@@ -51,7 +51,7 @@ double predictSwapCost(const SweepState& sweep, const std::array<double, 3>& tra
   std::size_t count = 0;
   for (std::size_t k = 0; k < kSample; ++k) {
     const auto id = static_cast<ProxyId>(k * sweep.proxies.size() / kSample);
-    if (isLive(sweep, id)) ids[count++] = id;
+    if (isPresent(sweep, id)) ids[count++] = id;
   }
   if (count == 0) return 0;
   double swaps = 0;
@@ -61,7 +61,7 @@ double predictSwapCost(const SweepState& sweep, const std::array<double, 3>& tra
       positions[k] = sweep.proxyMaxEndpoints[ids[k]][axis + 3];
     std::sort(positions.begin(), positions.begin() + static_cast<std::ptrdiff_t>(count));
     const double width = positions[count * 7 / 8] - positions[count / 8];
-    const double endpoints = 2 * kShare * static_cast<double>(countLive(sweep));
+    const double endpoints = 2 * kShare * static_cast<double>(countPresent(sweep));
     // Both endpoints of a window pass at most all others: on a storey all have one height.
     const double passed = 2 * static_cast<double>(windows);
     swaps += (travel[axis] < passed * width ? travel[axis] / width : passed) * endpoints;
@@ -76,15 +76,16 @@ double predictBatchCost(std::size_t moving, std::size_t pairs) {
 
 // ---- pairs -------------------------------------------------------------------------------------
 
-/// Lists the partners of each proxy, ascending. Two counting sorts: as the pairs are symmetric, the
-/// second one, which takes the lists of the first in the order of ids, writes ascending partners.
-void listPartners(std::span<const IdPair> pairs, std::size_t proxies, BatchState& batch) {
+/// Lists the proxies that overlap each proxy, ascending. Two counting sorts: as the pairs are
+/// symmetric, the second one, which takes the lists of the first in the order of ids, writes
+/// ascending lists.
+void listDynamicOverlaps(std::span<const IdPair> pairs, std::size_t proxies, BatchState& batch) {
   std::vector<std::uint32_t>& start = batch.next.start;
   start.assign(proxies + 1, 0);
   for (const auto& [a, b] : pairs) ++start[a], ++start[b];
   std::exclusive_scan(start.begin(), start.end(), start.begin(), std::uint32_t{0});
   batch.unsorted.resize(2 * pairs.size());
-  batch.next.partners.resize(2 * pairs.size());
+  batch.next.overlapping.resize(2 * pairs.size());
   batch.writeAt.assign(start.begin(), start.end());
   for (const auto& [a, b] : pairs) {
     batch.unsorted[batch.writeAt[a]++] = b;
@@ -93,20 +94,21 @@ void listPartners(std::span<const IdPair> pairs, std::size_t proxies, BatchState
   batch.writeAt.assign(start.begin(), start.end());
   for (ProxyId id = 0; id < proxies; ++id) {
     for (std::uint32_t k = start[id]; k < start[id + 1]; ++k)
-      batch.next.partners[batch.writeAt[batch.unsorted[k]]++] = id;
+      batch.next.overlapping[batch.writeAt[batch.unsorted[k]]++] = id;
   }
 }
 
-/// Replaces the dynamic overlaps of a moving proxy by `partners`, and records the differences. The
-/// other moving proxies replace their own.
-void replacePartners(SweepState& sweep, ProxyId id, std::span<const ProxyId> partners) {
-  std::vector<SortAndSweep::Overlap>& overlapList = sweep.proxies[id].overlaps;
-  const auto firstDynamic = std::ranges::find(overlapList, true, &SortAndSweep::Overlap::isDynamic);
+/// Replaces the dynamic overlaps of a moving proxy by `overlapping`, and records the differences.
+/// The other moving proxies replace their own.
+void replaceDynamicOverlaps(SweepState& sweep, ProxyId id, std::span<const ProxyId> overlapping) {
+  std::vector<ProxyOverlap>& overlapList = sweep.proxies[id].overlaps;
+  const auto firstDynamic = std::ranges::find(overlapList, true, &ProxyOverlap::isDynamic);
   auto before = firstDynamic;
-  auto now = partners.begin();
+  auto now = overlapping.begin();
   bool differs = false;
-  while (before != overlapList.end() || now != partners.end()) {
-    const bool ends = now == partners.end() || (before != overlapList.end() && before->id < *now);
+  while (before != overlapList.end() || now != overlapping.end()) {
+    const bool ends =
+        now == overlapping.end() || (before != overlapList.end() && before->id < *now);
     if (!ends && before != overlapList.end() && before->id == *now) {
       ++before, ++now;
       continue;
@@ -115,11 +117,11 @@ void replacePartners(SweepState& sweep, ProxyId id, std::span<const ProxyId> par
     const ProxyId other = ends ? (before++)->id : *now++;
     if (!sweep.batch.isResting[other] && other < id) continue;
     recordDynamicChange(sweep, id, other, !ends);
-    if (sweep.batch.isResting[other]) changePartner(sweep, other, id, !ends);
+    if (sweep.batch.isResting[other]) changeDynamicOverlap(sweep, other, id, !ends);
   }
   if (!differs) return;
   overlapList.erase(firstDynamic, overlapList.end());
-  for (const ProxyId other : partners) overlapList.push_back({other, true});
+  for (const ProxyId other : overlapping) overlapList.push_back({other, true});
 }
 
 /// Brings the list of moving proxies up to date.
@@ -129,7 +131,7 @@ void updateMembers(SweepState& sweep) {
   batch.hasMoved.resize(sweep.proxies.size(), 0);
   for (const ProxyId id : sweep.removed) batch.isResting[id] = 0;
   if (!sweep.removed.empty())
-    std::erase_if(batch.moving, [&](ProxyId id) { return !isLive(sweep, id); });
+    std::erase_if(batch.moving, [&](ProxyId id) { return !isPresent(sweep, id); });
   for (const ProxyId id : sweep.added) {
     ENFILADE_ASSERT(!batch.isResting[id]);
     batch.moving.push_back(id);
@@ -137,7 +139,7 @@ void updateMembers(SweepState& sweep) {
   }
   for (const ProxyId id : sweep.moved) {
     batch.hasMoved[id] = 1;
-    if (!batch.isResting[id] || !isLive(sweep, id)) continue;
+    if (!batch.isResting[id] || !isPresent(sweep, id)) continue;
     batch.isResting[id] = 0;
     batch.moving.push_back(id);
     batch.woken.push_back(id);
@@ -163,14 +165,14 @@ void findPairs(SweepState& sweep) {
 /// Brings the overlaps of all moving proxies up to date.
 void updateOverlaps(SweepState& sweep) {
   BatchState& batch = sweep.batch;
-  listPartners(batch.found, sweep.proxies.size(), batch);
+  listDynamicOverlaps(batch.found, sweep.proxies.size(), batch);
   const bool isFirst = batch.known.start.empty();
   for (const ProxyId id : batch.moving) {
     if (isFirst || !std::ranges::equal(batch.known.of(id), batch.next.of(id)))
-      replacePartners(sweep, id, batch.next.of(id));
+      replaceDynamicOverlaps(sweep, id, batch.next.of(id));
   }
-  // The known partners of a proxy that rested lack those that rested, too.
-  for (const ProxyId id : batch.woken) replacePartners(sweep, id, batch.next.of(id));
+  // The known overlaps of a proxy that rested lack those that rested, too.
+  for (const ProxyId id : batch.woken) replaceDynamicOverlaps(sweep, id, batch.next.of(id));
   batch.woken.clear();
   std::swap(batch.known, batch.next);
 }
@@ -196,25 +198,27 @@ void reviewResting(SweepState& sweep) {
 }
 
 /// Predicts the cost of an update with the endpoint lists, from the motion since the last review.
-double predictListCost(SweepState& sweep, std::span<const ProxyId> live, std::size_t neighbours) {
+double predictListCost(SweepState& sweep, std::span<const ProxyId> present,
+                       std::size_t neighbours) {
   const BatchState& batch = sweep.batch;
   const double updates = static_cast<double>(kReviewInterval);
-  const double movedShare = static_cast<double>(batch.movedSinceReview) /
-                            (updates * static_cast<double>(std::max<std::size_t>(live.size(), 1)));
+  const double movedShare =
+      static_cast<double>(batch.movedSinceReview) /
+      (updates * static_cast<double>(std::max<std::size_t>(present.size(), 1)));
   return predictSwapCost(sweep, batch.travel, batch.rebuiltSinceReview) / updates +
          kNeighbourTestCost * 2 * movedShare * static_cast<double>(neighbours);
 }
 
 /// Counts the overlapping windows, which would be neighbours. Rebuilds all windows: they may be
 /// wide from a faster motion.
-std::size_t countNeighbours(SweepState& sweep, std::span<const ProxyId> live) {
+std::size_t countNeighbours(SweepState& sweep, std::span<const ProxyId> present) {
   std::vector<SignedBounds> windows(sweep.proxies.size());
-  for (const ProxyId id : live) {
+  for (const ProxyId id : present) {
     rebuildWindow(sweep, id);
     windows[id] = sweep.proxies[id].window.maxBounds;
   }
   BoxTable table;
-  table.build(windows, live);
+  table.build(windows, present);
   std::vector<IdPair> pairs;
   table.findPairs(pairs);
   return pairs.size();
@@ -223,25 +227,25 @@ std::size_t countNeighbours(SweepState& sweep, std::span<const ProxyId> live) {
 /// Returns to the endpoint lists if these are cheaper.
 void reviewCost(SweepState& sweep) {
   BatchState& batch = sweep.batch;
-  std::vector<ProxyId> live = batch.moving;
+  std::vector<ProxyId> present = batch.moving;
   for (const ProxyId id : batch.restingTable.ids()) {
-    if (batch.isResting[id]) live.push_back(id);
+    if (batch.isResting[id]) present.push_back(id);
   }
-  std::sort(live.begin(), live.end());
-  ENFILADE_ASSERT(live.size() == countLive(sweep));
+  std::sort(present.begin(), present.end());
+  ENFILADE_ASSERT(present.size() == countPresent(sweep));
   const double limit = predictBatchCost(batch.moving.size(), sweep.pairCount) / kLeaveRatio;
-  const bool isSmall = live.size() < kMinBatchProxies;
+  const bool isSmall = present.size() < kMinBatchProxies;
   const bool leaves =
-      isSmall || (predictListCost(sweep, live, 0) < limit &&
-                  predictListCost(sweep, live, countNeighbours(sweep, live)) < limit);
+      isSmall || (predictListCost(sweep, present, 0) < limit &&
+                  predictListCost(sweep, present, countNeighbours(sweep, present)) < limit);
   batch.travel.fill(0);
   batch.movedSinceReview = batch.rebuiltSinceReview = 0;
   if (!leaves) return;
-  for (const ProxyId id : live)
+  for (const ProxyId id : present)
     sweep.windowLists.setMaxEndpoints(id, sweep.proxies[id].window.maxBounds);
   sweep.changes.clear();
-  sweep.windowLists.insert(live, sweep.changes);
-  sweep.windowLists.commit(live);
+  sweep.windowLists.insert(present, sweep.changes);
+  sweep.windowLists.commit(present);
   for (const PairChange& change : sweep.changes) addNeighbours(sweep, change.a, change.b);
   batch = {};
 }
@@ -249,15 +253,15 @@ void reviewCost(SweepState& sweep) {
 }  // namespace
 
 bool isBatchCheaper(const SweepState& sweep) {
-  const std::size_t live = countLive(sweep);
-  if (live < kMinBatchProxies) return false;
-  if (2 * sweep.added.size() >= live) return true;  // their motion is not known yet
+  const std::size_t present = countPresent(sweep);
+  if (present < kMinBatchProxies) return false;
+  if (2 * sweep.added.size() >= present) return true;  // their motion is not known yet
   // Many windows at once may be a burst; otherwise a look from time to time suffices.
-  const bool isBurst = 4 * sweep.rebuilt.size() >= live;
+  const bool isBurst = 4 * sweep.rebuilt.size() >= present;
   if (!isBurst && sweep.tick % kCheckInterval != 0) return false;
   const double listCost = predictSwapCost(sweep, sweep.travel, sweep.rebuilt.size()) +
                           kNeighbourTestCost * static_cast<double>(sweep.neighbourTests);
-  return listCost > kEnterRatio * predictBatchCost(live, sweep.pairCount);
+  return listCost > kEnterRatio * predictBatchCost(present, sweep.pairCount);
 }
 
 void enterBatch(SweepState& sweep) {

@@ -8,16 +8,14 @@
 
 #include <algorithm>
 #include <array>
-#include <utility>
 
 #include "collision/assert.hpp"
-#include "collision/broad_phase/sort_and_sweep_batch.hpp"
 #include "collision/broad_phase/sort_and_sweep_pairs.hpp"
 
 namespace enfilade::collision {
 namespace {
 
-std::uint8_t oppositeAxis(std::uint8_t k) {
+std::uint8_t getOppositeAxis(std::uint8_t k) {
   constexpr std::array<std::uint8_t, 7> kOpposite{3, 4, 5, 0, 1, 2, Neighbour::kOverlapping};
   ENFILADE_ASSERT(k < kOpposite.size());
   return kOpposite[k];
@@ -25,7 +23,7 @@ std::uint8_t oppositeAxis(std::uint8_t k) {
 
 /// True if signed axis `k` separates `a` from `b`. The sign of the rounded sum is exact.
 bool isSeparatedOn(const SignedBounds& a, const SignedBounds& b, std::uint8_t k) {
-  return a[k] + b[oppositeAxis(k)] < 0;
+  return a[k] + b[getOppositeAxis(k)] < 0;
 }
 
 /// Signed axis of `a` with the largest separation from `b`; kOverlapping if the boxes overlap.
@@ -33,7 +31,7 @@ std::uint8_t findSeparatingAxis(const SignedBounds& a, const SignedBounds& b) {
   std::uint8_t separatingAxis = Neighbour::kOverlapping;
   double minSum = 0;
   for (std::uint8_t k = 0; k < 6; ++k) {
-    const double sum = a[k] + b[oppositeAxis(k)];
+    const double sum = a[k] + b[getOppositeAxis(k)];
     separatingAxis = sum < minSum ? k : separatingAxis;
     minSum = std::min(sum, minSum);
   }
@@ -62,7 +60,7 @@ void testNeighbours(SweepState& sweep, ProxyId id) {
     std::vector<Neighbour>& theirs = sweep.proxies[neighbour.id].neighbours;
     const auto own = findNeighbour(theirs, id);
     ENFILADE_ASSERT(own != theirs.end() && own->id == id);
-    own->separatingAxis = oppositeAxis(neighbour.separatingAxis);
+    own->separatingAxis = getOppositeAxis(neighbour.separatingAxis);
     if (!wasOverlapping) {
       addDynamicOverlap(sweep, id, neighbour.id);
     } else {
@@ -84,7 +82,7 @@ void addNeighbours(SweepState& sweep, ProxyId a, ProxyId b) {
   ofA.insert(at, {b, separatingAxis});
   const auto other = findNeighbour(ofB, a);
   ENFILADE_ASSERT(other == ofB.end() || other->id != a);  // neighbours are symmetric
-  ofB.insert(other, {a, oppositeAxis(separatingAxis)});
+  ofB.insert(other, {a, getOppositeAxis(separatingAxis)});
   if (separatingAxis == Neighbour::kOverlapping) addDynamicOverlap(sweep, a, b);
 }
 
@@ -99,10 +97,7 @@ void removeNeighbours(SweepState& sweep, ProxyId a, ProxyId b) {
   ofB.erase(other);
 }
 
-namespace {
-
-/// Updates the endpoint lists of the windows and tests the neighbours of moved proxies.
-void updateLists(SweepState& sweep) {
+void updateNeighbours(SweepState& sweep) {
   sweep.changes.clear();
   for (const ProxyId id : sweep.rebuilt)
     sweep.windowLists.setMaxEndpoints(id, sweep.proxies[id].window.maxBounds);
@@ -125,19 +120,6 @@ void updateLists(SweepState& sweep) {
     }
     testNeighbours(sweep, sweep.moved[k]);
   }
-}
-
-}  // namespace
-
-void updateDynamicOverlaps(SweepState& sweep) {
-  if (!sweep.batch.isActive && isBatchCheaper(sweep)) enterBatch(sweep);
-  if (sweep.batch.isActive) {
-    updateBatch(sweep);
-  } else {
-    updateLists(sweep);
-  }
-  sweep.counters.swaps += std::exchange(sweep.windowLists.swaps, 0);
-  sweep.counters.aabbTests += std::exchange(sweep.windowLists.aabbTests, 0);
 }
 
 }  // namespace enfilade::collision

@@ -5,8 +5,9 @@
 
 namespace enfilade::collision {
 
-/// Updates neighbours and pairs of the moved, added and rebuilt proxies (step 4).
-void updateDynamicOverlaps(SweepState& sweep);
+/// Updates the endpoint lists of the windows, and neighbours and pairs of the moved, added and
+/// rebuilt proxies (step 4).
+void updateNeighbours(SweepState& sweep);
 
 /// Two proxies whose windows overlap become neighbours, and their boxes may be a pair.
 void addNeighbours(SweepState& sweep, ProxyId a, ProxyId b);

@@ -7,16 +7,14 @@
 namespace enfilade::collision {
 namespace {
 
-using Overlap = SortAndSweep::Overlap;
-
-bool insertOverlap(std::vector<Overlap>& overlapList, const Overlap& overlap) {
+bool insertOverlap(std::vector<ProxyOverlap>& overlapList, const ProxyOverlap& overlap) {
   const auto at = std::lower_bound(overlapList.begin(), overlapList.end(), overlap);
   if (at != overlapList.end() && *at == overlap) return false;
   overlapList.insert(at, overlap);
   return true;
 }
 
-bool eraseOverlap(std::vector<Overlap>& overlapList, const Overlap& overlap) {
+bool eraseOverlap(std::vector<ProxyOverlap>& overlapList, const ProxyOverlap& overlap) {
   const auto at = std::lower_bound(overlapList.begin(), overlapList.end(), overlap);
   if (at == overlapList.end() || *at != overlap) return false;
   overlapList.erase(at);
@@ -38,7 +36,7 @@ void removeStaticOverlap(SweepState& sweep, ProxyId id, StaticId other) {
 }
 
 void replaceStaticOverlaps(SweepState& sweep, ProxyId id) {
-  std::vector<Overlap>& overlapList = sweep.proxies[id].overlaps;
+  std::vector<ProxyOverlap>& overlapList = sweep.proxies[id].overlaps;
   std::sort(sweep.overlappingStatics.begin(), sweep.overlappingStatics.end());
   ENFILADE_ASSERT(std::adjacent_find(sweep.overlappingStatics.begin(),
                                      sweep.overlappingStatics.end()) ==
@@ -67,8 +65,8 @@ void replaceStaticOverlaps(SweepState& sweep, ProxyId id) {
   overlapList.assign(sweep.merged.begin(), sweep.merged.end());
 }
 
-void changePartner(SweepState& sweep, ProxyId id, ProxyId other, bool added) {
-  std::vector<Overlap>& overlapList = sweep.proxies[id].overlaps;
+void changeDynamicOverlap(SweepState& sweep, ProxyId id, ProxyId other, bool added) {
+  std::vector<ProxyOverlap>& overlapList = sweep.proxies[id].overlaps;
   [[maybe_unused]] const bool changed =
       added ? insertOverlap(overlapList, {other, true}) : eraseOverlap(overlapList, {other, true});
   ENFILADE_ASSERT(changed);
@@ -82,13 +80,13 @@ void recordDynamicChange(SweepState& sweep, ProxyId a, ProxyId b, bool added) {
 
 void addDynamicOverlap(SweepState& sweep, ProxyId a, ProxyId b) {
   if (!insertOverlap(sweep.proxies[a].overlaps, {b, true})) return;
-  changePartner(sweep, b, a, true);
+  changeDynamicOverlap(sweep, b, a, true);
   recordDynamicChange(sweep, a, b, true);
 }
 
 void removeDynamicOverlap(SweepState& sweep, ProxyId a, ProxyId b) {
   if (!eraseOverlap(sweep.proxies[a].overlaps, {b, true})) return;
-  changePartner(sweep, b, a, false);
+  changeDynamicOverlap(sweep, b, a, false);
   recordDynamicChange(sweep, a, b, false);
 }
 

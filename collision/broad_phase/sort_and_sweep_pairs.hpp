@@ -12,7 +12,7 @@ void addDynamicOverlap(SweepState& sweep, ProxyId a, ProxyId b);
 void removeDynamicOverlap(SweepState& sweep, ProxyId a, ProxyId b);
 
 /// The two parts of a change of a dynamic pair: the overlaps of one proxy, and the record.
-void changePartner(SweepState& sweep, ProxyId id, ProxyId other, bool added);
+void changeDynamicOverlap(SweepState& sweep, ProxyId id, ProxyId other, bool added);
 void recordDynamicChange(SweepState& sweep, ProxyId a, ProxyId b, bool added);
 
 /// Replaces the static overlaps of the proxy by `overlappingStatics`, which it sorts, and records

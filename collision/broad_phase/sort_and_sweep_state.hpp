@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <set>
@@ -13,8 +14,9 @@
 #include "collision/broad_phase/cell_grid.hpp"
 #include "collision/broad_phase/endpoint_lists.hpp"
 #include "collision/broad_phase/proxy_window.hpp"
-#include "collision/broad_phase/sort_and_sweep.hpp"
 #include "collision/broad_phase/static_grid.hpp"
+#include "collision/broad_phase/sweep_result.hpp"
+#include "collision/types.hpp"
 
 namespace enfilade::collision {
 
@@ -37,8 +39,8 @@ struct alignas(64) DynamicProxy {
   // The fields that a steady tick reads come first: two cache lines.
   SignedBounds bracketLow{},
       bracketHigh{};  ///< bracket: no endpoint is crossed while low <= maxEndpoints < high
-  std::vector<Neighbour> neighbours;            ///< sorted by id
-  std::vector<SortAndSweep::Overlap> overlaps;  ///< sorted
+  std::vector<Neighbour> neighbours;   ///< sorted by id
+  std::vector<ProxyOverlap> overlaps;  ///< sorted
 
   ProxyWindow window;
   ProxyState state = ProxyState::unused;
@@ -50,12 +52,12 @@ struct alignas(64) DynamicProxy {
 };
 
 /// The overlapping dynamic proxies of each proxy.
-struct PartnerLists {
-  std::vector<std::uint32_t> start;  ///< by proxy: its first partner; and the end of the last one
-  std::vector<ProxyId> partners;     ///< ascending for each proxy
+struct OverlapLists {
+  std::vector<std::uint32_t> start;  ///< by proxy: its first one; and the end of the last list
+  std::vector<ProxyId> overlapping;  ///< ascending for each proxy
   std::span<const ProxyId> of(ProxyId id) const {
     if (id + std::size_t{1} >= start.size()) return {};
-    return std::span(partners).subspan(start[id], start[id + 1] - start[id]);
+    return std::span(overlapping).subspan(start[id], start[id + 1] - start[id]);
   }
 };
 
@@ -67,8 +69,8 @@ struct BatchState {
   std::vector<std::uint8_t> hasMoved;   ///< by proxy: since the last review
   BoxTable movingTable, restingTable;
   std::vector<ProxyId> woken;  ///< resting proxies that have moved in this update
-  PartnerLists known;          ///< as found in the last update: without partners that both rest
-  PartnerLists next;           ///< scratch
+  OverlapLists known;          ///< as found in the last update: without pairs that both rest
+  OverlapLists next;           ///< scratch
   std::vector<std::uint32_t> writeAt;   ///< scratch
   std::vector<ProxyId> unsorted;        ///< scratch
   std::vector<BoxTable::IdPair> found;  ///< scratch: each pair once
@@ -103,10 +105,10 @@ struct SweepState {
   std::uint64_t tick = 0;
   std::size_t nextRefreshed = 0;
 
-  std::vector<PairChange> changes;            ///< scratch
-  StaticGrid::RowList rows;                   ///< scratch: static boxes near a proxy
-  std::vector<StaticId> overlappingStatics;   ///< scratch: static boxes that overlap it
-  std::vector<SortAndSweep::Overlap> merged;  ///< scratch
+  std::vector<PairChange> changes;           ///< scratch
+  StaticGrid::RowList rows;                  ///< scratch: static boxes near a proxy
+  std::vector<StaticId> overlappingStatics;  ///< scratch: static boxes that overlap it
+  std::vector<ProxyOverlap> merged;          ///< scratch
   std::vector<ProxyPair> addedPairs, removedPairs;
   std::size_t pairCount = 0;
   SweepCounters counters;

@@ -158,7 +158,7 @@ void rebuildStaticGrid(SweepState& sweep) {
     const Row row =
         sweep.pendingRemovals.contains(id) ? StaticGrid::kNoRow : sweep.staticGrid.findRow(id);
     if (row == StaticGrid::kNoRow) continue;
-    boxes.push_back(aabbFromMinEndpoints(sweep.staticGrid.minEndpoints(row)));
+    boxes.push_back(makeAabbFromMinEndpoints(sweep.staticGrid.minEndpoints(row)));
     ids.push_back(id);
   }
   for (const auto& [id, box] : sweep.pendingInserts) {

@@ -414,7 +414,7 @@ void StaticGrid::remove(Row row) {
   ENFILADE_ASSERT(row < minEndpoints_.size() && rowById_[ids_[row]] == row);
   ++editCount_;
   FineCoords fineCoords =
-      grid_.toFineCoords(toMaxEndpoints(aabbFromMinEndpoints(minEndpoints_[row])));
+      grid_.toFineCoords(toMaxEndpoints(makeAabbFromMinEndpoints(minEndpoints_[row])));
   const std::size_t level = grid_.chooseLevel(fineCoords);
   forEachCoords(toCellRange(fineCoords), [&](const CellCoords& at) {
     const Cell index = slots_[findSlot(level, at)];

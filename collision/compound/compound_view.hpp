@@ -1,4 +1,4 @@
-// Concave and articulated objects: convex parts under a tree of boxes, at a pose.
+// CompoundView: a concave or articulated object, as convex parts under a tree of boxes at a pose.
 #pragma once
 
 #include <functional>

@@ -29,6 +29,7 @@
 #include <limits>
 
 #include "collision/assert.hpp"
+#include "collision/floating_point.hpp"
 
 namespace enfilade::collision {
 namespace {
@@ -63,7 +64,7 @@ double computeMotion(const PartFront::Object& object, const CompoundView& view) 
   // The difference of two rotations stretches no vector by more than its norm / sqrt(2).
   const double motion =
       (turn * centre + shift).norm() + 0.7072 * turn.norm() * (0.5 * (max - min)).norm();
-  return motion * (1 + 0x1p-40) + computePad(view);
+  return motion * kRoundUpFactor + computePad(view);
 }
 
 /// An object with its tree and the world boxes of this call.

@@ -31,7 +31,7 @@ namespace enfilade::collision {
 inline constexpr double kMaxUnitLength = 1 + 16 * kRoundoff;
 
 /// The maximum |coordinate|.
-inline double maxAbsCoordinate(const Vec3& v) {
+inline double computeMaxAbsCoordinate(const Vec3& v) {
   return std::max(std::max(std::abs(v.x()), std::abs(v.y())), std::abs(v.z()));
 }
 
@@ -134,7 +134,7 @@ struct MinkowskiDifference {
       : a(convexA),
         b(convexB),
         roundedShift(subtractAsPair(convexB.translation, convexA.translation)),
-        reach((a.radius + b.radius + maxAbsCoordinate(roundedShift)) * (1 + 8 * kRoundoff)) {
+        reach((a.radius + b.radius + computeMaxAbsCoordinate(roundedShift)) * (1 + 8 * kRoundoff)) {
     if (!(reach + 0 * (roundedShift.x() + roundedShift.y() + roundedShift.z()) <
           std::numeric_limits<double>::infinity())) [[unlikely]]
       requireFinite(convexA, convexB);

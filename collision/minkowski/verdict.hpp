@@ -1,4 +1,4 @@
-// The exact result of a query on two convex bodies.
+// Verdict: the exact relation of two convex bodies.
 #pragma once
 
 #include <cstdint>

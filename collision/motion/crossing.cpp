@@ -206,7 +206,7 @@ class ExactTranslation {
     velocity_ = {velocity[0].get_num(), velocity[1].get_num(), velocity[2].get_num()};
   }
 
-  std::optional<CrossingTime> findFirstContact() {
+  std::optional<CrossingTime> findContactPosition() {
     for (std::uint32_t i = 0; i < sizeA_; ++i)
       for (std::uint32_t j = 0; j < sizeB_; ++j) addFaces({i, j});
     constexpr double kNever = std::numeric_limits<double>::infinity();
@@ -282,7 +282,7 @@ std::optional<CrossingTime> findExactCrossingTime(const MovingBody& a, const Mov
       countFaces(a.body.vertices.size(), b.body.vertices.size()) > kMaxFaces)
     return std::nullopt;
   ExactTranslation translation(a, b);
-  return translation.findFirstContact();
+  return translation.findContactPosition();
 }
 
 bool isCrossingProved(const MovingBody& a, const MovingBody& b, double from, double to,

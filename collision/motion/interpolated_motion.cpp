@@ -33,20 +33,15 @@ constexpr double kSafetyFraction =
     0.25;  // of a motion, at each attempt: keeps part of the gap for the next step
 
 /// Returns q1 or -q1, whichever is closer to q0.
-Quat nearestRotation(const Quat& q0, const Quat& q1) {
+Quat alignHemisphere(const Quat& q0, const Quat& q1) {
   if (q0.dot(q1) >= 0) return q1;
   return Quat(-q1.w(), -q1.x(), -q1.y(), -q1.z());
 }
 
 /// Upper bound in radians.
 double computeRotationAngle(const Quat& from, const Quat& to) {
-  const double s = 0.5 * (nearestRotation(from, to).coeffs() - from.coeffs()).norm();
+  const double s = 0.5 * (alignHemisphere(from, to).coeffs() - from.coeffs()).norm();
   return 4 * s * (1 + s * s) * kRoundUpFactor;
-}
-
-void placeFrame(const CentrePose& pose, const Vec3& centreInFrame, RigidTransform& worldFromFrame) {
-  worldFromFrame.rotation = pose.rotation.toRotationMatrix();
-  worldFromFrame.translation = pose.centre - worldFromFrame.rotation * centreInFrame;
 }
 
 PlacedConvex placeAt(const InterpolatedShape& body, bool atEnd) {
@@ -62,10 +57,10 @@ struct MovingPair {
   InterpolatedShape a, b;
 
   /// Certified separation along a unit axis, at the start or the end.
-  double separationAlong(const Vec3& axis, bool atEnd) const {
+  double computeSeparationAlong(const Vec3& axis, bool atEnd) const {
     return computeAxisSeparation(placeAt(a, atEnd), placeAt(b, atEnd), axis).lowerBound;
   }
-  double chordDeviation() const {
+  double computeChordDeviationSum() const {
     return computeChordDeviation(a.motion) + computeChordDeviation(b.motion);
   }
 };
@@ -90,9 +85,9 @@ Sample querySample(const MovingPair& pair, bool atEnd, const FeatureCache& hint,
 }
 
 /// The certified separation along the axis of `cache`.
-double separationAlong(const MovingPair& pair, const FeatureCache& cache, bool atEnd) {
+double computeSeparationAlong(const MovingPair& pair, const FeatureCache& cache, bool atEnd) {
   if (cache.axis.isZero(0)) return 0;
-  return pair.separationAlong(cache.axis.stableNormalized(), atEnd);
+  return pair.computeSeparationAlong(cache.axis.stableNormalized(), atEnd);
 }
 
 /// Returns whether a plane with these gaps at the ends separates the bodies throughout.
@@ -107,10 +102,11 @@ bool isProvenClear(const MovingPair& pair, const Sample& start, const Sample& en
   const double approach = computeApproachBound(computeDisplacementBound(pair.a.motion),
                                                computeDisplacementBound(pair.b.motion));
   if (approach < start.lowerBound || approach < end.lowerBound) return true;
-  const double deviation = pair.chordDeviation();
-  return isSeparatedByPlane(start.axisLowerBound, separationAlong(pair, start.cache, true),
+  const double deviation = pair.computeChordDeviationSum();
+  return isSeparatedByPlane(start.axisLowerBound, computeSeparationAlong(pair, start.cache, true),
                             deviation) ||
-         isSeparatedByPlane(separationAlong(pair, end.cache, false), end.axisLowerBound, deviation);
+         isSeparatedByPlane(computeSeparationAlong(pair, end.cache, false), end.axisLowerBound,
+                            deviation);
 }
 
 /// A position of both motions.
@@ -174,12 +170,18 @@ class ClearanceSearch {
 
 }  // namespace
 
+RigidTransform placeFrame(const CentrePose& pose, const Vec3& centreInFrame) {
+  RigidTransform worldFromFrame{pose.rotation.toRotationMatrix(), {}};
+  worldFromFrame.translation = pose.centre - worldFromFrame.rotation * centreInFrame;
+  return worldFromFrame;
+}
+
 void updateDerived(InterpolatedMotion& motion) {
   ENFILADE_ASSERT(!(std::abs(motion.from.rotation.squaredNorm() - 1) > 1e-6) &&
                   !(std::abs(motion.to.rotation.squaredNorm() - 1) > 1e-6));
   motion.rotationAngle = computeRotationAngle(motion.from.rotation, motion.to.rotation);
-  placeFrame(motion.from, motion.centreInFrame, motion.fromFrame);
-  placeFrame(motion.to, motion.centreInFrame, motion.toFrame);
+  motion.fromFrame = placeFrame(motion.from, motion.centreInFrame);
+  motion.toFrame = placeFrame(motion.to, motion.centreInFrame);
 }
 
 DisplacementBound computeDisplacementBound(const InterpolatedMotion& motion) {
@@ -195,7 +197,7 @@ CentrePose computeMiddlePose(const CentrePose& from, const CentrePose& to) {
   CentrePose middle;
   middle.centre = 0.5 * (from.centre + to.centre);
   middle.rotation.coeffs() =
-      from.rotation.coeffs() + nearestRotation(from.rotation, to.rotation).coeffs();
+      from.rotation.coeffs() + alignHemisphere(from.rotation, to.rotation).coeffs();
   const double length = std::sqrt(middle.rotation.squaredNorm());
   ENFILADE_ASSERT(!(length < 1));  // the nearer of two unit quaternions: the sum is longer
   middle.rotation.coeffs() /= length;
@@ -231,9 +233,9 @@ InterpolatedMotion truncateMotion(const InterpolatedMotion& motion, double fract
 double computeClearFractionAlong(const InterpolatedShape& a, const InterpolatedShape& b,
                                  const Vec3& axis) {
   const MovingPair pair{a, b};
-  const double atStart = pair.separationAlong(axis, false),
-               atEnd = pair.separationAlong(axis, true);
-  const double deviation = pair.chordDeviation();
+  const double atStart = pair.computeSeparationAlong(axis, false),
+               atEnd = pair.computeSeparationAlong(axis, true);
+  const double deviation = pair.computeChordDeviationSum();
   if (isSeparatedByPlane(atStart, atEnd, deviation)) return 1;
   if (!(atStart > 0 && atStart < std::numeric_limits<double>::infinity())) return -1;
   // If the gap changed linearly, it would vanish at this fraction.
@@ -244,9 +246,9 @@ double computeClearFractionAlong(const InterpolatedShape& a, const InterpolatedS
     const InterpolatedMotion doneA = truncateMotion(a.motion, fraction),
                              doneB = truncateMotion(b.motion, fraction);
     const MovingPair done{{a.shape, doneA}, {b.shape, doneB}};
-    const double atFraction = done.separationAlong(axis, true);
-    if (atFraction > 0 &&
-        isSeparatedByPlane(done.separationAlong(axis, false), atFraction, done.chordDeviation()))
+    const double atFraction = done.computeSeparationAlong(axis, true);
+    if (atFraction > 0 && isSeparatedByPlane(done.computeSeparationAlong(axis, false), atFraction,
+                                             done.computeChordDeviationSum()))
       return fraction;
   }
   return -1;
@@ -263,7 +265,7 @@ MotionResult computeClearance(const InterpolatedShape& a, const InterpolatedShap
   const MovingPair pair{a, b};
   MotionResult result{.outcome = MotionOutcome::unproved, .lo = 0};
   const Sample start = lowerBound > 0
-                           ? Sample{cache, lowerBound, separationAlong(pair, cache, false)}
+                           ? Sample{cache, lowerBound, computeSeparationAlong(pair, cache, false)}
                            : querySample(pair, false, cache, result);
   if (!(start.lowerBound > 0)) return result;
   const Sample end = querySample(pair, true, start.cache, result);

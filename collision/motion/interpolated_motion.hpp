@@ -12,6 +12,9 @@ struct CentrePose {
   Quat rotation = Quat::Identity();
 };
 
+/// worldFromFrame of a frame in which the centre of mass is at `centreInFrame`.
+RigidTransform placeFrame(const CentrePose& pose, const Vec3& centreInFrame);
+
 /// Motion of a body within a step. The centre moves straight, and the rotation is uniform, by the
 /// shorter way.
 struct InterpolatedMotion {

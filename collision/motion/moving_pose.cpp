@@ -150,6 +150,17 @@ double computeRadius(const PlacedConvex& body, bool placed) {
   return radius * (1 + 16 * kRoundoff);
 }
 
+double computeRadiusAround(const PlacedConvex& body, const Vec3& point) {
+  constexpr double kSlack = 64 * kRoundoff;
+  double squared = 0, magnitude = point.norm() + body.translation.norm();
+  for (const Vec3& v : body.vertices) {
+    const Vec3 placed = placeVertex(body, v);
+    magnitude = std::max(magnitude, v.norm());
+    squared = std::max(squared, (placed - point).squaredNorm());
+  }
+  return std::sqrt(squared) * (1 + kSlack) + kSlack * magnitude;
+}
+
 DoubleDouble computeDisplacement(Difference position, Difference velocity, Difference acceleration,
                                  double time) {
   Expansion sum;

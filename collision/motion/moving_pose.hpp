@@ -34,6 +34,9 @@ double computeRotationError(const Mat3& rotation, const Vec3& angularVelocity, d
 /// frame. `placed` true: after the rotation, which may be slightly non-orthonormal.
 double computeRadius(const PlacedConvex& body, bool placed);
 
+/// Maximum distance of a placed vertex from `point`, rounded up; metres.
+double computeRadiusAround(const PlacedConvex& body, const Vec3& point);
+
 /// A sum of doubles as two doubles with an error bound.
 struct DoubleDouble {
   double high = 0, low = 0;

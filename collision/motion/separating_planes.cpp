@@ -56,7 +56,8 @@ bool isAbove(const PlacedConvex& b, const Aabb& boxOfB, const Vec3& normal, doub
 
 SeparatingPlanes::Plane SeparatingPlanes::makePlane(const Vec3& axis) const {
   Plane plane;
-  const Vec3 scaled = axis / maxAbsCoordinate(axis);  // its square neither overflows nor underflows
+  const Vec3 scaled =
+      axis / computeMaxAbsCoordinate(axis);  // its square neither overflows nor underflows
   plane.normal = scaled / computeNorm(scaled);
   const Vec3 direction = BoundedConvex(a_).bodyFromWorld<double>(plane.normal);
   plane.support = findMaxProjection(a_.vertices, direction);

@@ -4,23 +4,18 @@
 // Translation. If a plane with normal n separates A and B by d, the motion of A by s * displacement
 // leaves a distance of at least d - s * (displacement . n).
 //
-// Rotation about a fixed line. Let u be the axis and r a vertex relative to the pivot. A rotation
-// by phi moves the vertex along n by
-//   c sin(phi) + k (1 - cos(phi)),  c = n . (u x r),  k = n . (u x (u x r)),
-// whose second derivative is at most |n x u| |u x r|. Two planes are tried, and the longer step is
-// taken. A fixed plane bounds the motion of A's vertices. A plane that rotates with A bounds the
-// opposite motion of B's vertices. With the second plane, the speed of the far end of a long link
-// does not limit the approach of its face to a post.
-//
-// Uniform motion between two poses: as the rotation, about the moving origin, with a plane that
-// does not rotate. A body is near its goal most of the time, where the plane of the nearest face is
-// a good one. If both bodies move, the plane moves with the second one; if both rotate, each may
-// use up half of the gap.
-//
-// Departure: Mirtich bounds the speed of all points by one number.
+// Rotation about a fixed line, and uniform motion between two poses: plane_bound.cpp.
 #include "collision/motion/shape_cast.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "collision/assert.hpp"
 #include "collision/motion/conservative_advancement.hpp"
+#include "collision/motion/moving_pose.hpp"
+#include "collision/motion/plane_bound.hpp"
 #include "collision/narrow_phase/penetration_depth.hpp"
 
 namespace enfilade::collision {
@@ -34,7 +29,6 @@ constexpr int kMaxScrewSteps = 200;       // two or three are usual
 constexpr double kGrazing = 1e-9;
 constexpr double kArrivalTolerance = 1.0 / 32;    // of (rest - min): tolerance at a target
 constexpr double kKeptDistanceRatio = 15.0 / 16;  // of an initial distance below min: to be kept
-constexpr double kRelativeSlack = 0x1p-40;        // of a step; more than the rounding of a root
 constexpr double kMinStepNearContact = 1.0 / 32;  // shorter steps close to contact end the cast
 constexpr double kMinStep = 1e-9;                 // shorter steps are no progress
 
@@ -125,20 +119,7 @@ struct TranslationCast {
   }
 };
 
-// ---- rotation about a fixed line ---------------------------------------------------------------
-
-/// Path of a vertex that rotates about a line; the parameter is the angle.
-struct RotationPath {
-  const PlacedConvex& body;
-  Vec3 normal, pivot, axis;
-  Vec3 tangent = normal.cross(axis);  // n . (u x r) = (n x u) . r
-  double across = tangent.norm();
-
-  Vec3 arm(const Vec3& vertex) const { return placeVertex(body, vertex) - pivot; }
-  double height(const Vec3& r) const { return normal.dot(r); }
-  double speed(const Vec3& r) const { return tangent.dot(r); }
-  double curvature(const Vec3& r) const { return across * axis.cross(r).norm(); }
-};
+// ---- rotation ----------------------------------------------------------------------------------
 
 struct RotationCast {
   const PlacedConvex& a;
@@ -147,23 +128,8 @@ struct RotationCast {
   FeatureCache& cache;
   Vec3 axis = rotation.angle > 0 ? rotation.axis : Vec3(-rotation.axis);
   double angle = std::abs(rotation.angle);
-  double maxRadius = computeMaxDistance();  ///< of A's points from the pivot, metres
-
-  double computeMaxDistance() const {
-    double squared = 0;
-    for (const Vec3& v : a.vertices)
-      squared = std::max(squared, (placeVertex(a, v) - rotation.pivot).squaredNorm());
-    return std::sqrt(squared);
-  }
-
-  /// Angle (radians) up to which a gap along `normal` (from A to B) is proved to stay open.
-  double computeCertifiedAngle(const PlacedConvex& moved, const Vec3& normal, double gap) const {
-    const double fixedPlaneAngle =
-        findPlaneCrossing(a.vertices, gap, RotationPath{moved, normal, rotation.pivot, axis});
-    const double rotatingPlaneAngle =
-        findPlaneCrossing(b.vertices, gap, RotationPath{b, -normal, rotation.pivot, -axis});
-    return (1 - kRelativeSlack) * std::max(fixedPlaneAngle, rotatingPlaneAngle);
-  }
+  double radiusA = computeRadiusAround(a, rotation.pivot);  ///< of the vertices, metres
+  double radiusB = -1;                                      ///< the same of B's; < 0: not known yet
 
   void advanceTo(const TargetDistance& target, MotionResult& result) {
     RigidTransform pose;
@@ -173,14 +139,21 @@ struct RotationCast {
         [&](double at) {
           pose = computeTransformAfter(a, rotation, at);
           moved = place({a.vertices, a.hull}, pose);
-          const double maxTravel = (1 - at) * angle * maxRadius;
+          const double maxTravel = (1 - at) * angle * radiusA;
           return computeSeparationWithin(moved, b, target.distance + target.tolerance + maxTravel,
                                          cache);
         },
-        [&](double, const SeparationResult& separation) {
-          const double gap = separation.distance - separation.errorBound - target.distance;
-          if (separation.verdict != Verdict::separated || gap <= target.tolerance) return kArrived;
-          return computeCertifiedAngle(moved, separation.normal, gap) / angle;
+        [&](double at, const SeparationResult& separation) {
+          const double distance = separation.distance - separation.errorBound;
+          if (separation.verdict != Verdict::separated ||
+              distance - target.distance <= target.tolerance)
+            return kArrived;
+          if (radiusB < 0) radiusB = computeRadiusAround(b, rotation.pivot);
+          PairMotion pair;
+          pair.a = {moved, rotation.pivot - moved.translation, angle * axis, radiusA};
+          pair.b = {b, rotation.pivot - b.translation, Vec3::Zero(), radiusB};
+          pair.keptDistance = target.distance;
+          return computeCertifiedStep(pair, {separation.normal, distance}, cache, 1 - at);
         });
   }
 
@@ -191,7 +164,7 @@ struct RotationCast {
     const SeparationResult& start = rest.separation;
     if (rest.lo != 0 || start.distance > min.distance + min.tolerance) return min;
     const Vec3 r = start.pointA - rotation.pivot;
-    if (start.normal.dot(axis.cross(r)) > kGrazing * maxRadius) return std::nullopt;
+    if (start.normal.dot(axis.cross(r)) > kGrazing * radiusA) return std::nullopt;
     const double kept = kKeptDistanceRatio * start.distance;
     return TargetDistance{kept, std::min(min.tolerance, 0.25 * (start.distance - kept))};
   }
@@ -199,39 +172,17 @@ struct RotationCast {
 
 // ---- uniform motion between two poses ----------------------------------------------------------
 
-/// Path of a vertex along `normal`, in the body frame at `rotation`; the parameter is the fraction.
-struct ScrewPath {
-  Vec3 localNormal, tangent;
-  double translationSpeed, curvaturePerRadius;
-
-  ScrewPath(const ScrewMotion& motion, const Vec3& relativeTranslation, const Mat3& rotation,
-            const Vec3& normal)
-      : localNormal(rotation.transpose() * normal),
-        // n . (w x r) = (n x w) . r, and n . (w x (w x r)) = (n x w) . (w x r) for any rotated r.
-        tangent(rotation.transpose() * normal.cross(motion.angle * motion.axis)),
-        translationSpeed(normal.dot(relativeTranslation)),
-        curvaturePerRadius(tangent.norm() * std::abs(motion.angle) * (1 + kRelativeSlack)) {}
-
-  const Vec3& arm(const Vec3& vertex) const { return vertex; }
-  double height(const Vec3& r) const { return localNormal.dot(r); }
-  double speed(const Vec3& r) const { return translationSpeed + tangent.dot(r); }
-  double curvature(const Vec3& r) const { return curvaturePerRadius * r.norm(); }
-};
-
 /// `still`: B if it is stationary; then `b` is only its shape.
 MotionResult castScrew(const MovingShape& a, const MovingShape& b, const PlacedConvex* still,
                        const ContactOffset& offset, FeatureCache& cache) {
   RigidTransform poseA, poseB;
-  const Vec3 relativeTranslation = a.motion.translation - b.motion.translation;
-  const bool rotatesB = b.motion.angle != 0;
-  const auto certify = [&](const Vec3& normal, double gap) {
-    const ScrewPath pathA(a.motion, relativeTranslation, poseA.rotation, normal);
-    const double share = rotatesB ? gap / 2 : gap;
-    const double step = findPlaneCrossing(a.shape.vertices, share, pathA);
-    if (!rotatesB) return step;
-    const ScrewPath pathB(b.motion, Vec3::Zero(), poseB.rotation, -normal);
-    return std::min(step, findPlaneCrossing(b.shape.vertices, share, pathB));
-  };
+  PairMotion pair;
+  pair.velocity = b.motion.translation - a.motion.translation;
+  pair.keptDistance = offset.min;
+  pair.a.angularVelocity = a.motion.angle * a.motion.axis;
+  pair.b.angularVelocity = b.motion.angle * b.motion.axis;
+  pair.a.radius = computeRadiusAround({a.shape.vertices}, Vec3::Zero());
+  if (!still) pair.b.radius = computeRadiusAround({b.shape.vertices}, Vec3::Zero());
   MotionResult result{.lo = 0};
   double queried = 0;
   advanceFraction(
@@ -246,8 +197,17 @@ MotionResult castScrew(const MovingShape& a, const MovingShape& b, const PlacedC
       [&](double at, const SeparationResult& separation) {
         if (separation.verdict != Verdict::separated) return kArrived;
         const double distance = separation.distance - separation.errorBound;
+        pair.a.body = place(a.shape, poseA);
+        pair.b.body = still ? *still : place(b.shape, poseB);
+        const Vec3 between = pair.b.body.translation - poseA.translation;
+        if (still) {  // about A's origin: the offset and what the bound adds for it are 0
+          pair.b.reference = -between;
+          pair.b.radius = computeRadiusAround(*still, poseA.translation);
+        } else {
+          pair.offset = between;
+        }
         const double certified =
-            certify(separation.normal, std::max(0.0, distance - offset.min)) * (1 - kRelativeSlack);
+            computeCertifiedStep(pair, {separation.normal, distance}, cache, 1 - at);
         const double minStep = distance <= offset.rest ? kMinStepNearContact : kMinStep;
         return at + certified < 1 && certified < minStep ? kArrived : certified;
       });

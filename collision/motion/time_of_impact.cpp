@@ -3,46 +3,26 @@
 //
 // Steps
 //  1. A plane with normal n separates A and B by `gap` at time s.
-//  2. Let the plane rotate, too, at omega. With w = q - p for a vertex p of A and q of B, the
-//     separation along the rotated normal n(tau) is the minimum n . w, and
-//       (n . w)' = n . (T' - omega x T) + n . ((wB - omega) x rB) - n . ((wA - omega) x rA),
-//     where T is the vector from A's reference point to B's, and r from a body's reference point to
-//     its vertex. The second derivative is at most K (below). Up to tau the separation is at least
-//       f(tau) = gap - tau v - max over A (tau c - g) - max over B (tau c - g) - K tau^2 / 2
-//     with the closing speeds v and c. g >= 0 is the distance of a vertex behind the foremost one.
-//     f is concave and f(0) > 0: if f(tau) is positive, the bodies are separated up to tau.
-//  3. Advance to the root of f. Four rotations of the plane are tried, and the longest step wins:
-//     none; with B (a face of B is nearest); with A; and the rotation that keeps both nearest edges
-//     in their planes. The right one accounts for all first-order terms, so the steps converge
-//     quadratically, like Newton's; without it a swinging door needs hundreds of steps. A further
-//     bound treats the bodies as solids of revolution, which only translate.
-//  4. When the steps become small, times slightly ahead are probed. A crossing of features proves a
+//  2. Advance by the step that this plane certifies (plane_bound.cpp).
+//  3. When the steps become small, times slightly ahead are probed. A crossing of features proves a
 //     contact (crossing.hpp), even if no double is the time of the contact. So does a depth above
 //     the pose error and, if the pose is exact, touching.
 //
-// Departure: Mirtich bounds the speed of all points by one number and never rotates the plane.
-//
-// K. For a vertex r of a body that rotates at w, with delta = w - omega, in the frame of the plane:
-//   omega x (omega x r) - 2 omega x (w x r) + w x (w x r)
-//     = delta x (delta x r) + (delta x omega) x r
-// (Jacobi), so at most |delta| (|delta| + |omega|) rho, rho the radius. For T: |T''| + 2 |omega|
-// |T'| + |omega|^2 |T|, bounded over the step. If omega = 0, only the component of T'' along n
-// counts.
-//
 // Rounding. The gap is either the exact distance (refineSeparation) minus its relative error, or
-// the projection on n with the bound 16 u (S_A + S_B + |T|): four sums of three products. All other
-// errors are relative to their own terms; kSlack times the sum of these terms is deducted from f.
+// the projection on n with the bound 16 u (S_A + S_B + |T|): four sums of three products. S is the
+// magnitude of a body (computeMagnitude), T the vector between the reference points.
 #include "collision/motion/time_of_impact.hpp"
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
-#include <vector>
 
 #include "collision/assert.hpp"
 #include "collision/floating_point.hpp"
 #include "collision/motion/conservative_advancement.hpp"
 #include "collision/motion/crossing.hpp"
+#include "collision/motion/plane_bound.hpp"
 #include "collision/narrow_phase/refine.hpp"
 
 namespace enfilade::collision {
@@ -50,244 +30,27 @@ namespace {
 
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMaxSteps = 400;             // steps; 5 to 10 are usual
-constexpr int kMaxRootIterations = 32;     // iterations over the lines of f to find its root
 constexpr int kMaxProbes = 8;              // failed probes during the advance
 constexpr double kSmallStep = 0x1p-43;     // of (1 s + time): step below which contacts are probed
 constexpr double kMinWindow = 0x1p-46;     // of (1 s + time): first probe window
 constexpr double kNarrowWindow = 0x1p-40;  // of (1 s + time): normal probe window, below 1e-12
 constexpr double kMaxWindow = 0x1p-24;     // of (1 s + time): last window before `unproved`
 constexpr double kSharpGapRatio = 0x1p12;  // gap in errors above which no exact distance is needed
-constexpr double kSlack = 64 * kRoundoff;  // see the head of this file
-constexpr double kMaxGrowth = 16;    // maximum ratio of successive steps with a rotating plane
-constexpr int kMaxGrowthSteps = 16;  // attempts at longer steps; a shorter step is also valid
+constexpr double kSlack = 64 * kRoundoff;  // of the length of a normal
 
-/// A plane that separates the bodies at some time.
-struct SeparatingPlane {
-  Vec3 normal = Vec3::UnitY();  ///< from A to B
-  double gap = -kInfinity;      ///< metres, proved; <= 0 proves nothing
-};
-
-/// Contribution of a vertex to the closing of the gap: tau * speed - behind. The maximum counts.
-struct Line {
-  double speed, behind;
-};
-
-struct RotatedBody {
-  std::vector<Vec3> vertices;  ///< about the reference point, world axes
-  Vec3 angularVelocity;
-  double radius;
-  double magnitude;  ///< scale of the rounding errors; equals the radius for an exact rotation
-
-  RotatedBody(const PlacedConvex& body, const Motion& motion)
-      : angularVelocity(motion.angularVelocity),
-        radius(computeRadius(body, true)),
-        magnitude(body.rotation ? body.rotation->norm() * computeRadius(body, false) : radius) {
-    vertices.reserve(body.vertices.size());
-    for (const Vec3& v : body.vertices)
-      vertices.push_back(body.rotation ? Vec3(*body.rotation * v) : v);
-  }
-};
-
-/// State of the pair at one time, as required by f.
-struct PairState {
-  RotatedBody a, b;
-  Vec3 offset, velocity, acceleration;  ///< T, T', T'': of B's reference point from A's
-
-  PairState(const PairAtTime& pair, const Motion& motionA, const Motion& motionB, double time)
-      : a(pair.a(), motionA),
-        b(pair.b(), motionB),
-        offset(pair.b().translation - pair.a().translation),
-        velocity((motionB.velocity - motionA.velocity) +
-                 time * (motionB.acceleration - motionA.acceleration)),
-        acceleration(motionB.acceleration - motionA.acceleration) {}
-};
-
-/// f (see the head of this file) for one rotation of the plane.
-struct GapBound {
-  double gap = 0, speed = 0, curvature = 0;
-  std::vector<Line> a, b;  ///< empty: no rotation relative to the plane
-};
-
-const Line& findForemostLine(const std::vector<Line>& lines, double tau) {
-  ENFILADE_ASSERT(!lines.empty());
-  return *std::max_element(lines.begin(), lines.end(), [tau](const Line& p, const Line& q) {
-    return tau * p.speed - p.behind < tau * q.speed - q.behind;
-  });
-}
-
-/// Lower bound of f(tau).
-double computeGapBound(const GapBound& f, double tau) {
-  double value = f.gap - tau * f.speed - 0.5 * f.curvature * tau * tau;
-  double size = f.gap + tau * std::abs(f.speed) + f.curvature * tau * tau;
-  for (const auto* lines : {&f.a, &f.b}) {
-    if (lines->empty()) continue;
-    const Line& line = findForemostLine(*lines, tau);
-    value -= tau * line.speed - line.behind;
-    size += tau * std::abs(line.speed) + line.behind;
-  }
-  return value - kSlack * size;
-}
-
-/// Time up to which f is proved positive: close to its root, at most `cap`.
-double computeCertifiedStep(const GapBound& f, double cap) {
-  if (!(f.gap > 0)) return 0;
-  double tau = cap;
-  for (int i = 0; i < kMaxRootIterations && !(computeGapBound(f, tau) > 0); ++i) {
-    double gap = f.gap, speed = f.speed;
-    for (const auto* lines : {&f.a, &f.b}) {
-      if (lines->empty()) continue;
-      const Line& line = findForemostLine(*lines, tau);
-      gap += line.behind;
-      speed += line.speed;
-    }
-    // If the root does not decrease, its line was used before: only rounding remains.
-    const double root = findFirstRoot(gap, speed, f.curvature);
-    if (!(root < tau)) break;
-    tau = root;
-  }
-  for (double reduction = 0x1p-44; reduction < 1; reduction *= 8) {
-    if (computeGapBound(f, tau) > 0) return tau;
-    tau *= 1 - reduction;
-  }
-  return 0;
-}
-
-std::vector<Line> makeLines(const RotatedBody& body, const Vec3& angularVelocity,
-                            const Vec3& towards) {
-  std::vector<Line> lines;
-  if (angularVelocity.isZero(0)) return lines;
-  lines.reserve(body.vertices.size());
-  double maxSupport = -kInfinity;
-  for (const Vec3& r : body.vertices) maxSupport = std::max(maxSupport, towards.dot(r));
-  const double slack = kSlack * body.magnitude;
-  const double speedError = kSlack * body.magnitude * angularVelocity.norm();
-  for (const Vec3& r : body.vertices)
-    lines.push_back({towards.dot(angularVelocity.cross(r)) + speedError,
-                     std::max(0.0, maxSupport - towards.dot(r) - slack)});
-  return lines;
-}
-
-double computeCurvature(const RotatedBody& body, const Vec3& angularVelocity,
-                        const Vec3& planeAngularVelocity) {
-  const double relative = angularVelocity.norm();
-  return relative * (relative + planeAngularVelocity.norm()) * body.radius;
-}
-
-/// Bound for a plane that rotates at `planeAngularVelocity`, valid for steps up to `cap`.
-GapBound makeGapBound(const PairState& at, const SeparatingPlane& plane,
-                      const Vec3& planeAngularVelocity, double cap) {
-  const Vec3& n = plane.normal;
-  const Vec3 relativeA = at.a.angularVelocity - planeAngularVelocity;
-  const Vec3 relativeB = at.b.angularVelocity - planeAngularVelocity;
-  GapBound f;
-  f.gap = plane.gap;
-  const double planeSpeed = planeAngularVelocity.norm();
-  f.speed = -n.dot(at.velocity - planeAngularVelocity.cross(at.offset)) +
-            kSlack * (at.velocity.norm() + planeSpeed * at.offset.norm());
-  f.a = makeLines(at.a, relativeA, n);
-  f.b = makeLines(at.b, relativeB, -n);
-  const double accelerationNorm = at.acceleration.norm();
-  f.curvature = computeCurvature(at.a, relativeA, planeAngularVelocity) +
-                computeCurvature(at.b, relativeB, planeAngularVelocity);
-  if (planeSpeed > 0) {
-    const double maxSpeed = at.velocity.norm() + accelerationNorm * cap;
-    const double maxOffsetSpeed =
-        planeAngularVelocity.cross(at.offset).norm() + planeSpeed * maxSpeed * cap;
-    f.curvature += accelerationNorm + 2 * planeSpeed * maxSpeed + planeSpeed * maxOffsetSpeed +
-                   kSlack * planeSpeed * planeSpeed * at.offset.norm();
-  } else {
-    f.curvature += std::max(0.0, -n.dot(at.acceleration)) + kSlack * accelerationNorm;
-  }
-  f.curvature *= 1 + kSlack;
-  return f;
-}
-
-/// Angular velocity of the plane that keeps the two nearest edges parallel to it. nullopt if the
-/// nearest features are not two edges.
-std::optional<Vec3> findEdgeRotation(const PairState& at, const Vec3& n,
-                                     const FeatureCache& features) {
-  if (features.size < 2 || features.size > 3) return std::nullopt;
-  const VertexPair first = features.pairs[0];
-  std::uint32_t otherA = first.a, otherB = first.b;
-  for (int i = 1; i < features.size; ++i) {
-    if (features.pairs[i].a != first.a) otherA = features.pairs[i].a;
-    if (features.pairs[i].b != first.b) otherB = features.pairs[i].b;
-  }
-  if (otherA == first.a || otherB == first.b) return std::nullopt;
-  const std::size_t maxIndex = std::max(first.a, otherA);
-  if (maxIndex >= at.a.vertices.size() || std::max(first.b, otherB) >= at.b.vertices.size())
-    return std::nullopt;
-  const Vec3 edgeA = at.a.vertices[otherA] - at.a.vertices[first.a];
-  const Vec3 edgeB = at.b.vertices[otherB] - at.b.vertices[first.b];
-  const Vec3 acrossA = edgeA.cross(n), acrossB = edgeB.cross(n);
-  // n' . edge = -n . (w x edge) for both, n' . n = 0.
-  const Vec3 change = -n.dot(at.a.angularVelocity.cross(edgeA)) / edgeA.dot(acrossB) * acrossB -
-                      n.dot(at.b.angularVelocity.cross(edgeB)) / edgeB.dot(acrossA) * acrossA;
-  const Vec3 angularVelocity = n.cross(change);
-  return angularVelocity.allFinite() ? std::optional(angularVelocity) : std::nullopt;
-}
-
-/// Maximum projection on `n` of any vertex for any rotation about the body's axis.
-double computeRevolvedSupport(const RotatedBody& body, const Vec3& n) {
-  const bool rotates = !body.angularVelocity.isZero(0);
-  const Vec3 axis = rotates ? Vec3(body.angularVelocity.normalized()) : Vec3(Vec3::Zero());
-  const double axial = n.dot(axis);
-  const double radial = (n - axial * axis).norm();
-  double maxSupport = -kInfinity;
-  for (const Vec3& r : body.vertices) {
-    const double height = r.dot(axis);
-    maxSupport = std::max(
-        maxSupport, rotates ? axial * height + radial * (r - height * axis).norm() : n.dot(r));
-  }
-  return maxSupport + kSlack * body.magnitude;
-}
-
-/// Step for the solids of revolution of the bodies, which only translate. Long for distant bodies
-/// and for a body that rotates in free space.
-double computeRevolvedStep(const PairState& at, const Vec3& n, double cap) {
-  const double accelerationNorm = at.acceleration.norm();
-  GapBound f;
-  f.gap = n.dot(at.offset) - computeRevolvedSupport(at.a, n) - computeRevolvedSupport(at.b, -n) -
-          kSlack * at.offset.norm();
-  f.speed = -n.dot(at.velocity) + kSlack * at.velocity.norm();
-  f.curvature = std::max(0.0, -n.dot(at.acceleration)) + kSlack * accelerationNorm;
-  return computeCertifiedStep(f, cap);
-}
-
-/// Time for which the bodies are proved to stay separated, at most `cap`.
-double computeLongestStep(const PairState& at, const SeparatingPlane& plane,
-                          const FeatureCache& features, double cap) {
-  double best = computeCertifiedStep(makeGapBound(at, plane, Vec3::Zero(), cap), cap);
-  if (at.a.angularVelocity.isZero(0) && at.b.angularVelocity.isZero(0)) return best;
-  best = std::max(best, computeRevolvedStep(at, plane.normal, cap));
-  const double length = at.offset.norm();
-  if (length > 0) best = std::max(best, computeRevolvedStep(at, at.offset / length, cap));
-  const auto tryRotatingPlane = [&](const Vec3& planeAngularVelocity) {
-    // The curvature bound grows with the step length, so the step is extended gradually.
-    bool reached = !planeAngularVelocity.isZero(0) && best > 0;
-    for (int i = 0; i < kMaxGrowthSteps && reached && best < cap; ++i) {
-      const double maxStep = std::min(cap, kMaxGrowth * best);
-      const double step =
-          computeCertifiedStep(makeGapBound(at, plane, planeAngularVelocity, maxStep), maxStep);
-      reached = step >= maxStep;
-      best = std::max(best, step);
-    }
-  };
-  tryRotatingPlane(at.b.angularVelocity);
-  tryRotatingPlane(at.a.angularVelocity);
-  if (const auto edgeAngularVelocity = findEdgeRotation(at, plane.normal, features))
-    tryRotatingPlane(*edgeAngularVelocity);
+double findMaxProjection(const PlacedConvex& body, const Vec3& direction) {
+  const Vec3 local = body.rotation ? Vec3(body.rotation->transpose() * direction) : direction;
+  double best = -kInfinity;
+  for (const Vec3& vertex : body.vertices) best = std::max(best, local.dot(vertex));
   return best;
 }
 
 /// Gap along the normal of computeSeparation(), recomputed with a rounding bound.
-SeparatingPlane makeSeparatingPlane(const Vec3& normal, const PairState& at, double poseError) {
-  double maxA = -kInfinity, minB = kInfinity;
-  for (const Vec3& r : at.a.vertices) maxA = std::max(maxA, normal.dot(r));
-  for (const Vec3& r : at.b.vertices) minB = std::min(minB, normal.dot(r));
-  const double size = at.a.magnitude + at.b.magnitude + at.offset.norm();
+SeparatingPlane makeSeparatingPlane(const Vec3& normal, const PairMotion& at, double poseError) {
+  const double size = computeMagnitude(at.a) + computeMagnitude(at.b) + at.offset.norm();
   const double error = 16 * kRoundoff * size + poseError;
-  const double gap = (normal.dot(at.offset) + minB) - maxA;
+  const double gap = (normal.dot(at.offset) - findMaxProjection(at.b.body, -normal)) -
+                     findMaxProjection(at.a.body, normal);
   // The length of the normal is 1 up to a few units of rounding.
   return {normal, gap > kSharpGapRatio * error ? (gap - error) * (1 - kSlack) : -kInfinity};
 }
@@ -318,7 +81,12 @@ double findSimplestTime(double time, double ahead) {
 class ImpactSearch {
  public:
   ImpactSearch(const MovingBody& a, const MovingBody& b, double horizon, FeatureCache& cache)
-      : a_(a), b_(b), horizon_(horizon), cache_(cache) {}
+      : a_(a),
+        b_(b),
+        horizon_(horizon),
+        cache_(cache),
+        radiusA_(computeRadius(a.body, true)),
+        radiusB_(computeRadius(b.body, true)) {}
 
   MotionResult run() {
     double reached = 0;
@@ -341,15 +109,24 @@ class ImpactSearch {
     ended_ = true;
   }
 
+  PairMotion makePairMotion(const PairAtTime& pair) const {
+    const Motion &a = a_.motion, &b = b_.motion;
+    return {{pair.a(), Vec3::Zero(), a.angularVelocity, radiusA_},
+            {pair.b(), Vec3::Zero(), b.angularVelocity, radiusB_},
+            pair.b().translation - pair.a().translation,
+            (b.velocity - a.velocity) + time_ * (b.acceleration - a.acceleration),
+            b.acceleration - a.acceleration};
+  }
+
   /// Moves time_ to the latest time that a plane certifies, and returns it: the horizon if the rest
   /// is clear, kArrived if the search has ended or there is no further step.
   double certify() {
     const PairAtTime pair(a_, b_, time_);
-    const PairState at(pair, a_.motion, b_.motion, time_);
+    const PairMotion at = makePairMotion(pair);
     const SeparatingPlane plane = findSeparatingPlane(pair, at);
     if (ended_ || !(plane.gap > 0)) return kArrived;
     const double before = time_;
-    time_ = addStep(computeLongestStep(at, plane, cache_, horizon_ - time_));
+    time_ = addStep(computeCertifiedStep(at, plane, cache_, horizon_ - time_));
     if (time_ >= horizon_) return horizon_;
     const bool stuck = !(time_ > before);
     const bool small = time_ - before < kSmallStep * (1 + time_);
@@ -367,7 +144,7 @@ class ImpactSearch {
     return next > time_ && (next - time_) * (1 + 4 * kRoundoff) <= step ? next : time_;
   }
 
-  SeparatingPlane findSeparatingPlane(const PairAtTime& pair, const PairState& at) {
+  SeparatingPlane findSeparatingPlane(const PairAtTime& pair, const PairMotion& at) {
     const SeparationResult separation = computeSeparation(pair.a(), pair.b(), cache_);
     result_.countQuery(separation.certificate);
     if (separation.verdict != Verdict::separated) {
@@ -463,6 +240,7 @@ class ImpactSearch {
   const MovingBody& b_;
   double horizon_;
   FeatureCache& cache_;
+  const double radiusA_, radiusB_;
   double time_ = 0;
   int probes_ = 0, crossingProbes_ = 0;
   bool exactlyUndecided_ = false;

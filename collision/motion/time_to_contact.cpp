@@ -35,11 +35,11 @@ constexpr double kRoundUp =
 struct ScaledGap {
   double distance, speed, acceleration;
 
-  double underRoot() const { return speed * speed + 2 * (acceleration * distance); }
+  double computeDiscriminant() const { return speed * speed + 2 * (acceleration * distance); }
 };
 
 ScaledGap scaleUp(ScaledGap s) {
-  for (int i = 0; i < kMaxScalings && s.underRoot() < kMinSquare; ++i)
+  for (int i = 0; i < kMaxScalings && s.computeDiscriminant() < kMinSquare; ++i)
     s = {s.distance * kScale, s.speed * kScale, s.acceleration * kScale};
   return s;
 }
@@ -67,7 +67,7 @@ double computeTimeToContact(double distance, const ClosingBounds& closing) {
   if (!(distance > 0) || !(closing.speed >= 0) || !(closing.acceleration >= 0)) return 0;
   if (closing.speed == 0 && closing.acceleration == 0) return kInfinity;
   const ScaledGap s = scaleUp({distance, closing.speed, closing.acceleration});
-  const double time = 2 * s.distance / (s.speed + std::sqrt(s.underRoot()));
+  const double time = 2 * s.distance / (s.speed + std::sqrt(s.computeDiscriminant()));
   if (!(time >= kMinTime)) return 0;
   return std::min(time, std::numeric_limits<double>::max()) * (1 - 12 * kRoundoff);
 }

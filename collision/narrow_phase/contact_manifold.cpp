@@ -266,7 +266,7 @@ class DepthInterpolator {
     for (std::size_t i = 1; i + 1 < size_; ++i)
       normal_ += (outline.corners[i] - first_).cross(outline.corners[i + 1] - first_);
   }
-  double depthAt(const Vec3& point) const {
+  double computeDepthAt(const Vec3& point) const {
     const Vec3 away = point - first_;
     double depth = first_.z();
     if (size_ == 2) {
@@ -347,7 +347,7 @@ ContactManifold computeContactManifold(const PlacedConvex& a, const PlacedConvex
   std::size_t count = 0;
   for (std::size_t i = 0; i < overlap.size; ++i) {
     Vec3 pointA = overlap.corners[i], pointB = pointA;
-    (fromA ? pointB : pointA).z() = depths.depthAt(overlap.corners[i]);
+    (fromA ? pointB : pointA).z() = depths.computeDepthAt(overlap.corners[i]);
     const double separation = pointB.z() - pointA.z();
     if (separation <= input.limit + 2 * rounding)
       points[count++] = {frame.toWorld(pointA), frame.toWorld(pointB), separation, kInfiniteSpread};

@@ -2,9 +2,14 @@
 // narrow phase.
 #pragma once
 
+#include <cstdint>
+
 #include "collision/assert.hpp"
-#include "collision/narrow_phase/narrow_phase.hpp"
+#include "collision/minkowski/feature_cache.hpp"
+#include "collision/minkowski/verdict.hpp"
+#include "collision/narrow_phase/feature.hpp"
 #include "collision/shapes/hull.hpp"
+#include "collision/shapes/placed_convex.hpp"
 
 namespace enfilade::collision {
 

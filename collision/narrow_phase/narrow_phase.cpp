@@ -71,8 +71,8 @@ struct WitnessPoints {
         error(static_cast<double>(4 * difference.pointError())) {
     squaredLength =
         setCoordinate<0>(difference) + setCoordinate<1>(difference) + setCoordinate<2>(difference);
-    maxCoordinate =
-        std::max(maxAbsCoordinate(pointA), maxAbsCoordinate(pointB)) * (1 - 8 * kRoundoff);
+    maxCoordinate = std::max(computeMaxAbsCoordinate(pointA), computeMaxAbsCoordinate(pointB)) *
+                    (1 - 8 * kRoundoff);
   }
   /// Whether `metres` is at most `units` roundoffs of the largest coordinate. Searches for a larger
   /// coordinate if those of the witness points are too small.
@@ -103,8 +103,8 @@ struct WitnessPoints {
   bool isCommonPoint(const Vec3& tA, const Simplex<Real>& simplex) {
     const double length = computeSquareRoot(squaredLength);
     if (!isWithin(length, 2, simplex)) return false;
-    const double inWorld =
-        std::max(maxAbsCoordinate(plus(pointA, tA)), maxCoordinate - maxAbsCoordinate(tA));
+    const double inWorld = std::max(computeMaxAbsCoordinate(plus(pointA, tA)),
+                                    maxCoordinate - computeMaxAbsCoordinate(tA));
     return length <= 8 * kRoundoff * inWorld;
   }
 
@@ -113,9 +113,9 @@ struct WitnessPoints {
   template <class Real>
   void raiseMaxCoordinate(const Simplex<Real>& simplex) {
     for (int i = 0; i < simplex.size; ++i)
-      maxCoordinate =
-          std::max(maxCoordinate, maxAbsCoordinate(simplex.points[i].template cast<double>()) *
-                                      (0.5 - 4 * kRoundoff));
+      maxCoordinate = std::max(maxCoordinate,
+                               computeMaxAbsCoordinate(simplex.points[i].template cast<double>()) *
+                                   (0.5 - 4 * kRoundoff));
   }
   /// Sets coordinate k of the points; returns its contribution to the squared length.
   template <int k>

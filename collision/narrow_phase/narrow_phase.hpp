@@ -2,10 +2,12 @@
 // certified error bound, and witness points. The tick uses it; refine.hpp has exact numbers.
 #pragma once
 
+#include <cstdint>
 #include <optional>
 
 #include "collision/minkowski/feature_cache.hpp"
 #include "collision/minkowski/verdict.hpp"
+#include "collision/narrow_phase/feature.hpp"
 #include "collision/shapes/placed_convex.hpp"
 
 namespace enfilade::collision {
@@ -16,8 +18,6 @@ enum class Certificate : std::uint8_t {
   expansion,  ///< exact sums of doubles
   rational    ///< integers of arbitrary length
 };
-/// The smallest feature of a convex body's surface that contains a closest point.
-enum class Feature : std::uint8_t { none, vertex, edge, face };
 
 /// The separation of two closed convex bodies A and B. The verdict is exact.
 struct SeparationResult {

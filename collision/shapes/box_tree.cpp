@@ -39,7 +39,7 @@ double roundOutward(double difference, double sign) {
   return difference + sign * std::abs(difference) * 0x1p-52;
 }
 
-double halfArea(const Aabb& box) {
+double computeHalfArea(const Aabb& box) {
   const Vec3 size = box.size();
   return size.x() * size.y() + size.y() * size.z() + size.z() * size.x();
 }
@@ -162,13 +162,13 @@ class Builder {
     Bin left;
     for (std::size_t bin = 1; bin < kBins; ++bin) {
       left.include(bins[bin - 1]);
-      leftCost[bin] = left.count > 0 ? halfArea(left.box) * left.count : -1;
+      leftCost[bin] = left.count > 0 ? computeHalfArea(left.box) * left.count : -1;
     }
     Bin right;
     for (std::size_t bin = kBins - 1; bin > 0; --bin) {
       right.include(bins[bin]);
       if (right.count == 0 || leftCost[bin] < 0) continue;
-      const double cost = leftCost[bin] + halfArea(right.box) * right.count;
+      const double cost = leftCost[bin] + computeHalfArea(right.box) * right.count;
       if (cost < best.cost) best = {axis, static_cast<int>(bin), cost};
     }
   }

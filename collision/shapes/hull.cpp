@@ -138,7 +138,7 @@ class TriangleHull {
 
   void collectVisible(Index point);
   void buildCone(Index point);
-  static Index oppositeCorner(const Triangle& t, Index neighbour);
+  static Index findOppositeCorner(const Triangle& t, Index neighbour);
   std::vector<Index> groupCoplanarTriangles() const;
 
   std::span<const Vec3> points_;
@@ -199,7 +199,7 @@ void TriangleHull::buildCone(Index point) {
 }
 
 /// Corner of `t` that its neighbour does not share.
-Index TriangleHull::oppositeCorner(const Triangle& t, Index neighbour) {
+Index TriangleHull::findOppositeCorner(const Triangle& t, Index neighbour) {
   const std::size_t edge = t.adjacent[0] == neighbour ? 0 : t.adjacent[1] == neighbour ? 1 : 2;
   return t.corner[(edge + 2) % 3];
 }
@@ -219,7 +219,7 @@ std::vector<Index> TriangleHull::groupCoplanarTriangles() const {
       open.pop_back();
       for (const Index other : t.adjacent) {
         if (plane[other] != kNone) continue;
-        const Index apex = oppositeCorner(triangles_[other], inPlane);
+        const Index apex = findOppositeCorner(triangles_[other], inPlane);
         if (orient3d(points_[t.corner[0]], points_[t.corner[1]], points_[t.corner[2]],
                      points_[apex]) != 0)
           continue;

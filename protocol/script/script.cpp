@@ -2,8 +2,10 @@
 
 #include <array>
 #include <fstream>
+#include <map>
 #include <utility>
 
+#include "protocol/script/line_error.hpp"
 #include "protocol/script/script_line.hpp"
 
 namespace enfilade::protocol {

@@ -6,21 +6,15 @@
 #include <stdexcept>
 #include <string>
 #include <string_view>
-#include <variant>
 #include <vector>
 
-#include "protocol/enfilade.pb.h"
+#include "protocol/script/script_action.hpp"
 
 namespace enfilade::protocol {
 
-/// Waits until all queues are empty, and then for this simulated time.
-struct GlobalWait {
-  double seconds = 0;
-};
-
 struct ScriptLine {
   std::uint32_t number = 0;  ///< line number from 1; also the command's tag
-  std::variant<v1::Command, v1::BodyCommand, GlobalWait> action;
+  ScriptAction action;
 };
 
 struct Script {

@@ -9,6 +9,7 @@
 
 #include "protocol/json_depth.hpp"
 #include "protocol/nearest_word.hpp"
+#include "protocol/script/line_error.hpp"
 #include "protocol/script/script_values.hpp"
 
 namespace enfilade::protocol {
@@ -455,8 +456,7 @@ void checkUtf8(std::string_view text) {
   }
 }
 
-std::variant<v1::Command, v1::BodyCommand, GlobalWait> parseLine(std::string_view text,
-                                                                 std::uint32_t number) {
+ScriptAction parseLine(std::string_view text, std::uint32_t number) {
   const json line = parseObject(text);
   const Verb& verb = findVerb(line);
   refuseUnknownKeys(line, verb);

@@ -5,7 +5,7 @@
 #include <cstdio>
 
 #include "protocol/json_depth.hpp"
-#include "protocol/script/script_line.hpp"
+#include "protocol/script/line_error.hpp"
 
 namespace enfilade::protocol {
 
@@ -30,10 +30,6 @@ std::string formatLimit(double limit) {
 }
 
 }  // namespace
-
-void refuse(std::string_view field, const std::string& text) {
-  throw LineError{field.empty() ? text : std::string(field) + ": " + text};
-}
 
 std::string excerpt(const json& value) {
   if (isDeeperThan(value, kMaxJsonDepth)) return "a too deeply nested value";

@@ -1,4 +1,4 @@
-// Visible items of earlier frames by camera: the first guess for the next frame.
+// VisibilityCache: visible items of earlier frames by camera, the first guess for the next frame.
 #pragma once
 
 #include <cstdint>

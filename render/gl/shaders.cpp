@@ -229,12 +229,12 @@ void main() {
 
 }  // namespace
 
-std::string surfaceVertexSource(const SurfaceVariant& variant, bool roundsVertices) {
+std::string makeSurfaceVertexSource(const SurfaceVariant& variant, bool roundsVertices) {
   return std::string(kVersion) + (variant.coloured ? "#define COLOURED\n" : "") +
          (roundsVertices ? "#define ROUNDED\n" : "") + kFrameBlock + kSurfaceVertex;
 }
 
-std::string surfaceFragmentSource(const SurfaceVariant& variant) {
+std::string makeSurfaceFragmentSource(const SurfaceVariant& variant) {
   std::string source = kVersion;
   if (variant.coloured) source += "#define COLOURED\n";
   if (variant.textured) source += "#define TEXTURED\n";
@@ -248,11 +248,11 @@ std::string surfaceFragmentSource(const SurfaceVariant& variant) {
   return source + kFrameBlock + kShadingSource + kSurfaceFragment;
 }
 
-std::string skyVertexSource() {
+std::string makeSkyVertexSource() {
   return std::string(kVersion) + kFrameBlock + kSkyVertex;
 }
 
-std::string skyFragmentSource() {
+std::string makeSkyFragmentSource() {
   return std::string(kVersion) + kFrameBlock + kShadingSource + kSkyFragment;
 }
 

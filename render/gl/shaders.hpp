@@ -20,10 +20,10 @@ struct SurfaceVariant {
 };
 
 /// `roundsVertices`: see DeviceChoice.
-std::string surfaceVertexSource(const SurfaceVariant& variant, bool roundsVertices);
-std::string surfaceFragmentSource(const SurfaceVariant& variant);
-std::string skyVertexSource();
-std::string skyFragmentSource();
+std::string makeSurfaceVertexSource(const SurfaceVariant& variant, bool roundsVertices);
+std::string makeSurfaceFragmentSource(const SurfaceVariant& variant);
+std::string makeSkyVertexSource();
+std::string makeSkyFragmentSource();
 
 /// Layout of the GLSL block `Frame` (std140) at uniform binding 0. Positions are relative to the
 /// eye, in world axes.

@@ -8,7 +8,7 @@
 #include <span>
 
 #include "collision/assert.hpp"
-#include "render/camera_basis.hpp"
+#include "render/camera.hpp"
 #include "render/gl/shaders.hpp"
 
 namespace enfilade::render {
@@ -131,7 +131,7 @@ SurfacePass::SurfacePass(bool roundsVertices, bool hasPlaneDepth)
       coplanarSlope_(hasPlaneDepth ? kCoplanarSlope : 0),
       vertexArray_(makeVertexArray()),
       uniforms_(GlBuffer::create()),
-      sky_(buildProgram("sky", skyVertexSource(), skyFragmentSource())) {
+      sky_(buildProgram("sky", makeSkyVertexSource(), makeSkyFragmentSource())) {
   glNamedBufferStorage(uniforms_.name(), sizeof(FrameUniforms), nullptr, GL_DYNAMIC_STORAGE_BIT);
   checkGl("setting up the renderer");
 }
@@ -154,8 +154,8 @@ unsigned SurfacePass::findProgram(const Batch& batch) {
     index = 2 * index + (has ? 1 : 0);
   std::optional<GlProgram>& program = surfaces_[index];
   if (!program) {
-    program = buildProgram("surface", surfaceVertexSource(variant, roundsVertices_),
-                           surfaceFragmentSource(variant));
+    program = buildProgram("surface", makeSurfaceVertexSource(variant, roundsVertices_),
+                           makeSurfaceFragmentSource(variant));
   }
   return program->name();
 }

@@ -1,4 +1,4 @@
-// Writes files that are complete at every moment.
+// Writes files atomically: a temporary file is renamed when it is complete.
 #pragma once
 
 #include <cstddef>

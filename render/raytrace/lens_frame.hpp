@@ -4,7 +4,7 @@
 #include "render/frame.hpp"
 #include "render/raytrace/ray_scene.hpp"
 #include "render/raytrace/trace.hpp"
-#include "scene/physics/thread_pool.hpp"
+#include "scene/base/thread_pool.hpp"
 
 namespace enfilade::render {
 

@@ -1,6 +1,6 @@
 #include "render/raytrace/primary_rays.hpp"
 
-#include "render/camera_basis.hpp"
+#include "render/camera.hpp"
 
 namespace enfilade::render {
 

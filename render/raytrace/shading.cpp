@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "render/camera_basis.hpp"
+#include "render/camera.hpp"
 #include "scene/model/srgb.hpp"
 
 namespace enfilade::render {
@@ -59,7 +59,7 @@ Eigen::Vector4d decodeColour(const scene::VertexColour& colour) {
 
 }  // namespace
 
-Vec3 sunDirection() {
+Vec3 computeSunDirection() {
   const vec3& sun = glsl::kSunDirection;
   return Vec3(static_cast<double>(sun.x), static_cast<double>(sun.y), static_cast<double>(sun.z))
       .normalized();

@@ -14,7 +14,7 @@ using scene::RayTree;
 using scene::TriangleBatch;
 
 /// Direction towards the sun: unit length, world.
-Vec3 sunDirection();
+Vec3 computeSunDirection();
 
 /// A triangle with its shading data, computed once for neighbouring pixels.
 struct ShadedTriangle {

@@ -316,8 +316,8 @@ void traceShadowRows(const TraceContext& trace, int y, const std::vector<float>&
   ENFILADE_ASSERT(depth.size() ==
                   static_cast<std::size_t>(rays.width) * static_cast<std::size_t>(rays.height));
   ENFILADE_ASSERT(mask.size() == depth.size());
-  const Vec3 sun = sunDirection();
-  const auto depthAt = [&](int column, int row) {
+  const Vec3 sun = computeSunDirection();
+  const auto getDepthAt = [&](int column, int row) {
     if (column >= rays.width || row >= rays.height) return std::numeric_limits<double>::quiet_NaN();
     return static_cast<double>(depth[static_cast<std::size_t>(row * rays.width + column)]);
   };
@@ -325,7 +325,7 @@ void traceShadowRows(const TraceContext& trace, int y, const std::vector<float>&
   for (int x = 0; x < rays.width; x += kTileSize) {
     for (int lane = 0; lane < kPacketSize; ++lane) {
       const int column = x + lane % kTileSize, row = y + lane / kTileSize;
-      setUpShadowRay(packet, lane, trace, column, row, depthAt(column, row), sun);
+      setUpShadowRay(packet, lane, trace, column, row, getDepthAt(column, row), sun);
     }
     for (std::size_t t = 0; t < trace.trees.size(); ++t) {
       FilterContext context = makeFilterContext(trace, t);
@@ -378,7 +378,7 @@ HitKey traceFirst(const TraceContext& trace, double x, double y, double from, do
 
 bool isInShadow(const TraceContext& trace, double x, double y, double z) {
   ShadowPacket packet;
-  setUpShadowRay(packet, 0, trace, x, y, z, sunDirection());
+  setUpShadowRay(packet, 0, trace, x, y, z, computeSunDirection());
   RTCRay ray{};
   ray.org_x = packet.ray.org_x[0], ray.org_y = packet.ray.org_y[0], ray.org_z = packet.ray.org_z[0];
   ray.dir_x = packet.ray.dir_x[0], ray.dir_y = packet.ray.dir_y[0], ray.dir_z = packet.ray.dir_z[0];

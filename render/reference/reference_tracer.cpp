@@ -8,7 +8,7 @@
 
 #include "render/raytrace/ray_scene.hpp"
 #include "render/raytrace/trace.hpp"
-#include "scene/physics/thread_pool.hpp"
+#include "scene/base/thread_pool.hpp"
 
 namespace enfilade::render {
 namespace {

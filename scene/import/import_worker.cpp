@@ -72,7 +72,7 @@ void disableFastBins() {
 }
 
 /// Prefix in ENFILADE_IMPORT_FAULT that selects this task, with the colon.
-std::string_view faultPrefix(ImportTask task) {
+std::string_view getFaultPrefix(ImportTask task) {
   switch (task) {
     case ImportTask::model:
       return "";
@@ -92,8 +92,8 @@ std::string_view faultPrefix(ImportTask task) {
 void injectFault(ImportTask task) {
   const char* wanted = std::getenv("ENFILADE_IMPORT_FAULT");
   std::string_view fault = wanted == nullptr ? "" : wanted;
-  if (!fault.starts_with(faultPrefix(task))) return;
-  fault.remove_prefix(faultPrefix(task).size());
+  if (!fault.starts_with(getFaultPrefix(task))) return;
+  fault.remove_prefix(getFaultPrefix(task).size());
   if (fault == "hang") pause();
   if (fault == "crash") {
     signal(SIGSEGV, SIG_DFL);

@@ -75,8 +75,8 @@ const std::string& describeReaderVersions() {
     return toHex(computeFileVersion(file).value_or(ContentHash{}));
   };
   static const std::string text = "program " + version("/proc/self/exe") + " assimp " +
-                                  version(assimpModulePath()) + " ifcplusplus " +
-                                  version(ifcPlusPlusModulePath());
+                                  version(findAssimpModule()) + " ifcplusplus " +
+                                  version(findIfcPlusPlusModule());
   return text;
 }
 

@@ -1,4 +1,4 @@
-// Letters of ASCII, whatever the locale.
+// ASCII case conversion, independent of the locale.
 #pragma once
 
 #include <algorithm>

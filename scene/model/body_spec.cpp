@@ -4,10 +4,8 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
-#include <set>
 
 #include "scene/model/format_number.hpp"
-#include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -97,29 +95,6 @@ OptionalError validatePhysicalProperties(const BodySpec& body) {
   return validateFieldRange("restitution", body.restitution, 0, 1);
 }
 
-OptionalError validateSpec(const BodySpec& body) {
-  if (auto error = validateFieldVector("anchor", body.anchor)) return error;
-  if (!isKinematic(body.kind)) return validatePhysicalProperties(body);
-  if (!(std::abs(body.axis.norm() - 1) <= kAxisLengthTolerance))
-    return "axis must have unit length";
-  if (auto error = validateSpeed(body.speed)) return error;
-  if (auto error = validateFieldRange("acceleration", body.acceleration, 0, kMaxCoordinate))
-    return error;
-  return getTraits(body.kind).takesKeys ? validatePath(body) : validateLimits(body);
-}
-
-OptionalError validateObjects(const BodySpec& body, const Model& model,
-                              std::vector<bool>& claimed) {
-  if (body.objects.empty()) return "objects: at least one is required";
-  for (const std::uint32_t object : body.objects) {
-    if (object >= model.objects.size()) return "objects: unknown object " + std::to_string(object);
-    if (claimed[object])
-      return "objects: '" + model.objects[object].path + "' is in two bodies, or twice in one";
-    claimed[object] = true;
-  }
-  return std::nullopt;
-}
-
 }  // namespace
 
 std::pair<double, double> getJointLimits(const BodySpec& spec) {
@@ -174,20 +149,14 @@ std::optional<std::string> validateSpeed(double speed) {
 }
 
 std::optional<std::string> validateBody(const BodySpec& body) {
-  return validateSpec(body);
-}
-
-std::optional<std::string> validateBodies(const Model& model) {
-  std::vector<bool> claimed(model.objects.size());
-  std::set<std::string> names;
-  for (const BodySpec& body : model.bodies) {
-    OptionalError error = validateObjects(body, model, claimed);
-    if (!error) error = validateSpec(body);
-    if (!error && body.name.empty()) error = "name is empty";
-    if (!error && !names.insert(body.name).second) error = "name: another body already uses it";
-    if (error) return "body '" + body.name + "': " + *error;
-  }
-  return std::nullopt;
+  if (auto error = validateFieldVector("anchor", body.anchor)) return error;
+  if (!isKinematic(body.kind)) return validatePhysicalProperties(body);
+  if (!(std::abs(body.axis.norm() - 1) <= kAxisLengthTolerance))
+    return "axis must have unit length";
+  if (auto error = validateSpeed(body.speed)) return error;
+  if (auto error = validateFieldRange("acceleration", body.acceleration, 0, kMaxCoordinate))
+    return error;
+  return getTraits(body.kind).takesKeys ? validatePath(body) : validateLimits(body);
 }
 
 }  // namespace enfilade::scene

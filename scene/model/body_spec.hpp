@@ -18,8 +18,6 @@ namespace enfilade::scene {
 
 using collision::Vec3;
 
-struct Model;
-
 enum class BodyKind : std::uint8_t {
   hinged,   ///< rotates about the axis through the anchor, between two limits
   sliding,  ///< moves along the axis, between two limits
@@ -166,8 +164,5 @@ std::optional<std::string> validateBody(const BodySpec& body);
 
 /// Validates a speed of the joint position, of a spec or a command.
 std::optional<std::string> validateSpeed(double speed);
-
-/// Validates all bodies of the model; an error text names body and field.
-std::optional<std::string> validateBodies(const Model& model);
 
 }  // namespace enfilade::scene

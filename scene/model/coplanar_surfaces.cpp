@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "collision/broad_phase/sort_and_sweep.hpp"
-#include "scene/model/draw_items.hpp"
 #include "scene/model/object_box.hpp"
 
 namespace enfilade::scene {

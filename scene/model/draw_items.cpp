@@ -56,11 +56,6 @@ std::vector<DrawItem> buildDrawItems(const Model& model, const std::vector<Copla
   return items;
 }
 
-const Material& findMaterial(const Model& model, const Mesh& mesh) {
-  static const Material plain;
-  return mesh.material < model.materials.size() ? model.materials[mesh.material] : plain;
-}
-
 Aabb transformAabb(const Eigen::Affine3d& worldFromMesh, const Aabb& box) {
   const Vec3 centre = worldFromMesh * box.centre();
   const Vec3 half = worldFromMesh.linear().cwiseAbs() * (0.5 * box.size());

@@ -1,4 +1,4 @@
-// The drawn meshes of a model, as pictures and rays see them, in one order.
+// DrawItem: one drawn mesh of one object. Pictures and rays share one list of draw items.
 #pragma once
 
 #include <cstdint>
@@ -29,9 +29,6 @@ struct DrawItem {
 /// camera, so that depth ties are resolved equally in every frame.
 /// `ranks`: as rankCoplanarObjects() returns them.
 std::vector<DrawItem> buildDrawItems(const Model& model, const std::vector<CoplanarRank>& ranks);
-
-/// The mesh's material; a default material if the mesh of a hand-made model has none.
-const Material& findMaterial(const Model& model, const Mesh& mesh);
 
 /// A box around the transformed box.
 Aabb transformAabb(const Eigen::Affine3d& worldFromMesh, const Aabb& box);

@@ -7,7 +7,7 @@
 #include <cstdio>
 #include <string>
 
-#include "scene/model/model.hpp"
+#include "collision/types.hpp"
 
 namespace enfilade::scene {
 
@@ -40,7 +40,7 @@ inline std::string formatRangeError(const std::string& field, double value, doub
 }
 
 /// "[1.5, 300, 0]", as a script takes it; rounded to a tenth of a millimetre.
-inline std::string formatPoint(const Vec3& point) {
+inline std::string formatPoint(const collision::Vec3& point) {
   constexpr double kSteps = 1e4;  // per metre
   std::string text = "[";
   for (int axis = 0; axis < 3; ++axis)

@@ -162,6 +162,12 @@ inline std::vector<const BodySpec*> mapObjectsToBodies(const Model& model) {
   return bodies;
 }
 
+/// Validates all bodies of the model; an error text names body and field.
+std::optional<std::string> validateBodies(const Model& model);
+
+/// The mesh's material; a default material if the mesh of a hand-made model has none.
+const Material& findMaterial(const Model& model, const Mesh& mesh);
+
 /// World position of a vertex. Always use this expression, so that all results agree to the last
 /// bit.
 inline Vec3 computeWorldPosition(const Object& object, const Mesh& mesh, std::uint32_t vertex) {

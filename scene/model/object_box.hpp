@@ -1,4 +1,4 @@
-// The box of an object where the model places it.
+// Computes the axis-aligned bounding box of a placed object.
 #pragma once
 
 #include <cstdint>

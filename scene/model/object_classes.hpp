@@ -1,4 +1,5 @@
-// Classes of objects, and the things that people see: for labelled images and lists of objects.
+// ObjectClasses: semantic classes and instances (things) of objects, for labelled images and lists
+// of objects.
 #pragma once
 
 #include <string>
@@ -24,7 +25,9 @@ struct ObjectClasses {
 };
 
 /// The class is the IFC class, else Object::className; a part without one has that of its whole. A
-/// thing is a body, an IFC product, an object with its parts, or the objects of Object::thing.
+/// thing is a body, an IFC product, an object with its parts, the objects of Object::thing, or the
+/// primitives of a mesh that a file splits by material into nodes, such as "bed/bed_0" and
+/// "bed/bed_1": all numbers from 0, each of another material, and named by no list or body.
 ObjectClasses computeObjectClasses(const Model& model);
 
 }  // namespace enfilade::scene

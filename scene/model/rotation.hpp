@@ -1,4 +1,4 @@
-// Deterministic headings from angles.
+// Converts angles to heading vectors, with the same bits on every machine.
 #pragma once
 
 #include "collision/motion/sine_cosine.hpp"

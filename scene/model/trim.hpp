@@ -1,4 +1,4 @@
-// Blanks at the ends of a text.
+// Trims whitespace from both ends of a text.
 #pragma once
 
 #include <string_view>

@@ -42,7 +42,30 @@ std::array<double, 2> measureSides(const WorldData& world, const AvatarShape& sh
   return widths;
 }
 
+/// Parts of a leg, each as long as the spacing of places at most.
+int countParts(const Vec3& leg) {
+  return std::max(1, static_cast<int>(std::ceil(leg.norm() / kWidthSpacing)));
+}
+
 }  // namespace
+
+std::vector<Vec3> traceFeet(Walker& walker, const std::vector<Vec3>& points) {
+  std::vector<Vec3> traced;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const Vec3 leg = points[i] - points[i - 1];
+    const int count = countParts(leg);
+    traced.push_back(points[i - 1]);
+    walker.returnTo(points[i - 1]);
+    for (int k = 1; k < count; ++k) {
+      Vec3 place = points[i - 1] + (static_cast<double>(k) / count) * leg;
+      if (walker.walkTo(place).kind != WalkOutcome::Kind::arrived) break;
+      place.y() = walker.footPosition().y();
+      traced.push_back(place);
+    }
+  }
+  if (!points.empty()) traced.push_back(points.back());
+  return traced;
+}
 
 NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agent,
                              const std::vector<Vec3>& points, const Vec3& near,
@@ -53,8 +76,9 @@ NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agen
     const Vec3 leg = points[i] - points[i - 1];
     const Vec3 direction = projectToGround(leg);
     if (direction.isZero(0)) continue;
-    const int count = std::max(1, static_cast<int>(std::ceil(leg.norm() / kWidthSpacing)));
-    for (int k = 0; k <= count; ++k) {
+    const int count = countParts(leg);
+    const int end = i + 1 == points.size() ? count + 1 : count;  // the next leg begins at its end
+    for (int k = 0; k < end; ++k) {
       const Vec3 place = points[i - 1] + (static_cast<double>(k) / count) * leg;
       if ((place - near).norm() > maxDistance) continue;
       const auto [left, right] =

@@ -1,17 +1,19 @@
-// The free space around places, measured with a thin prism above the step height.
+// Clearance around positions: NarrowPlace (narrowest position of a path), GapAxis and
+// ObstacleDistance, measured with a thin prism above the step height.
 #pragma once
 
 #include <optional>
 #include <vector>
 
 #include "scene/navigation/mesh/agent.hpp"
+#include "scene/navigation/walk/walker.hpp"
 #include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {
 
 inline constexpr double kMaxSideWidth = 3;  ///< metres to each side: larger is not measured
 
-/// The place of a path with the least space to its sides.
+/// The narrowest position of a path.
 struct NarrowPlace {
   Vec3 position = Vec3::Zero();  ///< feet, scene frame, metres
   double clearWidth = 0;         ///< metres, measured across the path above the step height
@@ -20,7 +22,7 @@ struct NarrowPlace {
 /// The line through the middle of a gap, on which its width is least.
 struct GapAxis {
   Vec3 centre = Vec3::Zero();     ///< feet, scene frame, metres
-  Vec3 direction = Vec3::Zero();  ///< horizontal unit vector: the way through the gap
+  Vec3 direction = Vec3::Zero();  ///< horizontal unit vector, through the gap
   double clearWidth = 0;          ///< metres, measured across the direction
 };
 
@@ -38,12 +40,18 @@ inline Vec3 placeThinShape(const WorldSettings& settings, const Vec3& footPositi
   return footPosition + Vec3(0, settings.stepHeight + 1e-4, 0);
 }
 
+/// The places of a walk along the points of a path, some centimetres apart, with the heights of the
+/// feet: on stairs the line between two points is above or below them. The rest of a leg that is
+/// not walked, such as a ride or a fall, is one line.
+std::vector<Vec3> traceFeet(Walker& walker, const std::vector<Vec3>& points);
+
 /// The narrowest place of a line of places, of those within `maxDistance` metres of `near`.
 /// Infinite width: none was measured.
 NarrowPlace measureNarrowest(const WorldData& world, const NavigationAgent& agent,
                              const std::vector<Vec3>& points, const Vec3& near, double maxDistance);
 
-/// The axis of the gap at `place`, within 30 degrees of the horizontal unit vector `direction`.
+/// The axis of the gap at `place` (the line of least width, GapAxis), within 30 degrees of the
+/// horizontal unit vector `direction`.
 /// nullopt: the gap is narrower than the agent, or nothing bounds it.
 std::optional<GapAxis> measureGapAxis(const WorldData& world, const NavigationAgent& agent,
                                       const Vec3& place, const Vec3& direction);

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "collision/assert.hpp"
-#include "scene/navigation/ghost.hpp"
+#include "scene/navigation/shape_separation.hpp"
 #include "scene/world/data/body.hpp"
 #include "scene/world/world.hpp"
 
@@ -114,7 +114,7 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
       return meets(state, body, swept);
     };
     // Metres along the line to where the agent touches the door, to a centimetre.
-    const auto measureWay = [&](const Snapshot& state, std::size_t body) {
+    const auto measureClearLength = [&](const Snapshot& state, std::size_t body) {
       double clear = 0, met = 1;
       while ((met - clear) * leg.norm() > kDoorDistanceError) {
         const double middle = 0.5 * (clear + met);
@@ -133,9 +133,9 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
       if (!isInTheWay && (known != doors.end() || !touches(closed, b))) continue;
       if (known != doors.end()) doors.erase(known);  // it stood further on than where it closes
       const double rest = findOpenLimit(spec) - body.jointPosition;
-      const double way = measureWay(isInTheWay ? snapshot : closed, b);
+      const double onLeg = measureClearLength(isInTheWay ? snapshot : closed, b);
       doors.push_back(
-          {body.index, i - 1, distance + way, computeMotionSeconds(spec, rest), isInTheWay});
+          {body.index, i - 1, distance + onLeg, computeMotionSeconds(spec, rest), isInTheWay});
     }
     const auto ofLeg = std::ranges::find(doors, i - 1, &DoorOnPath::point);
     std::sort(ofLeg, doors.end(), [](const DoorOnPath& a, const DoorOnPath& b) {

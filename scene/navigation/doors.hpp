@@ -1,4 +1,4 @@
-// Doors for navigation: the state in which all are open, and the closed ones on a path through it.
+// Doors for navigation: the snapshot in which all doors are open, and the closed doors on a path.
 #pragma once
 
 #include <cstdint>

@@ -8,10 +8,10 @@
 #include <set>
 #include <utility>
 
+#include "scene/base/disjoint_sets.hpp"
 #include "scene/navigation/mesh/polygon_sampler.hpp"
 #include "scene/navigation/walk/grid_search.hpp"
 #include "scene/navigation/walk/stand.hpp"
-#include "scene/physics/disjoint_sets.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
 namespace enfilade::scene {
@@ -57,8 +57,8 @@ std::optional<Vec3> findStand(const NavigationMesh& mesh, Walker& walker,
   return std::nullopt;
 }
 
-/// Whether a floor of another island lies below a polygon, or close to that, which is not under the
-/// sky itself.
+/// Whether a floor of another island lies below a polygon, or below a place close to it. Floors
+/// under the sky do not count.
 bool isAboveFloor(const NavigationMesh& mesh, const std::vector<std::uint32_t>& numberOf,
                   std::uint32_t polygon, double bottom) {
   const Vec3& centre = mesh.centre(polygon);
@@ -122,13 +122,13 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
   return list;
 }
 
-void joinIslands(IslandList& list, const PassageList& passages) {
+void joinIslands(IslandList& list, const ConnectionList& connections) {
   DisjointSets joined(list.islands.size());
-  std::set<std::pair<std::uint32_t, std::uint32_t>> ways;  // between islands, in one direction
-  for (const Passage& passage : passages.passages)
-    ways.emplace(list.numberOf[passage.fromPolygon], list.numberOf[passage.toPolygon]);
-  for (const auto& [from, to] : ways) {
-    if (from >= to || !ways.contains({to, from})) continue;
+  std::set<std::pair<std::uint32_t, std::uint32_t>> joins;  // of islands, in one direction
+  for (const OffMeshConnection& connection : connections.connections)
+    joins.emplace(list.numberOf[connection.fromPolygon], list.numberOf[connection.toPolygon]);
+  for (const auto& [from, to] : joins) {
+    if (from >= to || !joins.contains({to, from})) continue;
     joined.unite(from, to);
   }
   std::vector<std::uint32_t> order;  // of the islands that remain, the largest first

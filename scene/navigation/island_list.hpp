@@ -1,5 +1,5 @@
-// The islands of a navigation mesh: parts that no open portal joins. Lists those on which an agent
-// can stand, and finds out which of them are roofs.
+// IslandList: the islands (connected components) of a navigation mesh on which an agent can stand.
+// An island may be a roof. No open portal joins two islands.
 #pragma once
 
 #include <cstdint>
@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
-#include "scene/navigation/passages.hpp"
+#include "scene/navigation/mesh/off_mesh_connections.hpp"
 #include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::scene {
@@ -20,7 +20,7 @@ inline constexpr std::uint32_t kNoIsland = std::numeric_limits<std::uint32_t>::m
 struct Island {
   double area = 0;            ///< square metres
   Vec3 place = Vec3::Zero();  ///< where an agent stands on it: feet, scene frame, metres
-  /// Most of it has nothing above it, and floors of other islands below.
+  /// Roof: most of its area is open to the sky and above other islands.
   bool isRoof = false;
   /// Random places without an island are drawn here: no roof, and not tiny.
   bool isDrawn = false;
@@ -35,12 +35,12 @@ struct IslandList {
 /// joinIslands() decides whether an island is drawn. `bounds`: of the scene.
 IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb& bounds);
 
-/// Makes one of islands between which passages lead in both directions, and decides which are
-/// drawn.
-void joinIslands(IslandList& list, const PassageList& passages);
+/// Makes one of islands between which off-mesh connections lead in both directions, and decides
+/// which are drawn.
+void joinIslands(IslandList& list, const ConnectionList& connections);
 
 /// The number of the island on which an agent stands; nullopt: on none. The mesh ends at a distance
-/// from the rim of a floor: a place there has the island of the closest mesh to which an agent
+/// from the edge of a floor: a place there has the island of the closest mesh to which an agent
 /// walks, and back.
 std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const IslandList& list,
                                           Walker& walker, const Vec3& place);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "scene/navigation/mesh_paths.hpp"
+#include "scene/navigation/path_search.hpp"
 #include "scene/navigation/walk/stand.hpp"
 
 namespace enfilade::scene {
@@ -67,12 +68,12 @@ std::optional<std::vector<RouteStep>> findRoute(const PathFinder& finder, Links&
       if (!portal.closed)
         reach(portal.to, here.seconds + (portal.middle() - here.point).norm() / speed,
               portal.middle(), polygon, {});
-    if (finder.passages)
-      for (const Passage& passage : finder.passages->passagesFrom(polygon))
-        reach(
-            passage.toPolygon,
-            here.seconds + ((passage.points.front() - here.point).norm() + passage.length) / speed,
-            passage.points.back(), polygon, {});
+    if (finder.connections)
+      for (const OffMeshConnection& connection : finder.connections->findConnectionsFrom(polygon))
+        reach(connection.toPolygon,
+              here.seconds +
+                  ((connection.points.front() - here.point).norm() + connection.length) / speed,
+              connection.points.back(), polygon, {});
     const std::vector<PathLink>& found = links.from(polygon, finder.walker);
     for (std::size_t i = 0; i < found.size(); ++i) {
       const PathLink& link = found[i];

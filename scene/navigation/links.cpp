@@ -17,7 +17,7 @@ constexpr double kEdgeSpacing = 0.75;  // metres between places along an edge
 /// Metres of the landing beyond a place at the edge of a mesh, in addition to twice the radius: the
 /// mesh ends up to two cells further from the drop than the radius.
 constexpr std::array<double, 2> kLandings{0.25, 0.6};
-constexpr int kPhases = 3;             // starts of a drop within the way of a tick
+constexpr int kPhases = 3;             // starts of a drop within the length of a tick
 constexpr double kSameLanding = 0.01;  // metres, height
 constexpr int kExitDirections = 16;    // out of a lift
 constexpr std::size_t kMaxExits = 4;   // of a lift at a stop
@@ -101,8 +101,8 @@ std::vector<Stop> findStops(WorldData& world, Body& lift, const NavigationAgent&
     Walker walker(world, agent);  // one that has met the lift nowhere else
     std::optional<Vec3> inside;
     if (first) {
-      const double way = lift.spec->stops[i] - lift.spec->stops[first->first];
-      inside = standAt(walker, first->second + way * lift.spec->axis + Vec3(0, kStandRoom, 0));
+      const double travel = lift.spec->stops[i] - lift.spec->stops[first->first];
+      inside = standAt(walker, first->second + travel * lift.spec->axis + Vec3(0, kStandRoom, 0));
       if (inside && walker.groundEntity() != lift.id) inside.reset();
     } else if ((inside = findPlatform(lift, walker))) {
       first = {i, *inside};
@@ -147,13 +147,13 @@ void Links::collectEdges() {
 std::optional<PathLink> Links::proveDrop(const Edge& edge, Walker& walker) const {
   const auto place = standNear(walker, edge.place);
   if (!place) return std::nullopt;
-  const double way = agent_.speed * settings_.tickDuration;
+  const double stride = agent_.speed * settings_.tickDuration;
   for (const double room : kLandings) {
     const Vec3 goal = *place + (2 * agent_.radius + room) * edge.outward;
     PathLink link{.points = {*place}};
     for (int phase = 0; phase < kPhases; ++phase) {
       walker.returnTo(*place);
-      if (phase > 0) walker.walkTo(*place + (way * phase / kPhases) * edge.outward);
+      if (phase > 0) walker.walkTo(*place + (stride * phase / kPhases) * edge.outward);
       const double height = walker.footPosition().y();
       const WalkOutcome outcome = walker.dropTo(goal, options_.maxDrop);
       const double fall = height - outcome.footPosition.y();  // the walker may land far lower

@@ -1,5 +1,5 @@
-// Jumps down from edges, and rides of lifts: they join places that no walk over a mesh joins. The
-// walker proves each before it is used.
+// PathLink: a drop from an edge or a lift ride. Links connect polygons that no walk over a mesh
+// connects. The walker proves each link before it is used.
 #pragma once
 
 #include <cstdint>

@@ -15,7 +15,7 @@ namespace enfilade::scene {
 namespace {
 
 constexpr int kMaxProposals = 12;  // corridors to try on a mesh
-constexpr double kStandOff = 0.1;  // metres before an obstacle: where a way around it begins
+constexpr double kStandOff = 0.1;  // metres before an obstacle: where a path around it begins
 constexpr double kNarrowGap =
     0.1;  // metres: a gap that is wider than the agent by more needs no axis
 constexpr std::array<double, 2> kRejoinDistances{1, 3};  // metres beyond the obstacle
@@ -49,9 +49,9 @@ std::optional<GapAxis> findNarrowGap(const PathFinder& finder, const Vec3& stop,
 bool passGap(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corner,
              NavigationPath& path, Proof& proof) {
   const Vec3 from = path.points.back();
-  const Vec3 way = projectToGround(corner - from);
-  if (!(way.norm() > kStandOff)) return false;
-  const auto axis = findNarrowGap(finder, stop.footPosition, way.normalized());
+  const Vec3 toCorner = projectToGround(corner - from);
+  if (!(toCorner.norm() > kStandOff)) return false;
+  const auto axis = findNarrowGap(finder, stop.footPosition, toCorner.normalized());
   if (!axis) return false;
   const auto onAxis = [&](const Vec3& place) {
     const double along = projectToGround(place - axis->centre).dot(axis->direction);
@@ -60,13 +60,13 @@ bool passGap(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corn
     return projected;
   };
   const double stopped = computeGroundDistance(from, stop.footPosition);
-  const Vec3 before = from + std::max(0.0, stopped - kStandOff) * way.normalized();
+  const Vec3 before = from + std::max(0.0, stopped - kStandOff) * toCorner.normalized();
   finder.walker.returnTo(from);
   if (finder.walker.walkTo(onAxis(before)).kind != WalkOutcome::Kind::arrived) return false;
   const Vec3 start = finder.walker.footPosition();
   std::vector<Vec3> targets{corner};
   for (const double beyond : kRejoinDistances)
-    targets.push_back(stop.footPosition + beyond * way.normalized());
+    targets.push_back(stop.footPosition + beyond * toCorner.normalized());
   for (const Vec3& target : targets) {
     finder.walker.returnTo(start);
     const WalkOutcome outcome = finder.walker.walkTo(onAxis(target));
@@ -79,15 +79,15 @@ bool passGap(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corn
   return false;
 }
 
-/// Goes around the obstacle that stopped the walker on the way from the last place of `path` to
-/// `corner`. Appends places up to where it joins that way again, or up to the corner.
+/// Goes around the obstacle that stopped the walker on the leg from the last place of `path` to
+/// `corner`. Appends places up to where it joins that leg again, or up to the corner.
 bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corner,
               NavigationPath& path, Proof& proof) {
   const Vec3 legStart = path.points.back();
-  const Vec3 way = projectToGround(corner - legStart);
-  const double length = way.norm();
+  const Vec3 toCorner = projectToGround(corner - legStart);
+  const double length = toCorner.norm();
   if (!(length > 0)) return false;
-  const Vec3 direction = way / length;
+  const Vec3 direction = toCorner / length;
   const double stopped = computeGroundDistance(legStart, stop.footPosition);
   if (stopped > 2 * kStandOff) {  // begin shortly before the obstacle
     finder.walker.returnTo(legStart);
@@ -221,7 +221,7 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
   const auto start = mesh.findNearest(from, extent), goal = mesh.findNearest(to, extent);
   NavigationPath path;
   if (!start || !goal) return path;
-  // Quick repairs refute nothing, nor does the way off furniture.
+  // Quick repairs refute nothing, nor does the path off furniture.
   PortalClosures closures(mesh, !proof.isQuick && isAt(*start, from) && isAt(*goal, to));
   const int maxProposals = proof.isQuick ? kQuickProposals : kMaxProposals;
   for (int proposal = 0; proposal < maxProposals; ++proposal) {
@@ -252,7 +252,7 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
     }
     path.points.clear();
     if (!proof.isQuick && (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0))
-      return path;  // proves nothing
+      return path;  // a search that ended at its limits does not refute the corridor
     if (!closures.closeNearest(*corridor, proof.failedAt)) return path;
   }
   return path;

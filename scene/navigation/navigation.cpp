@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <utility>
 
+#include "scene/base/parallel_for.hpp"
 #include "scene/model/shapes/space_solid.hpp"
 #include "scene/navigation/link_routes.hpp"
-#include "scene/navigation/mesh/parallel_for.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -90,7 +90,7 @@ std::vector<std::uint8_t> Navigation::save() {
   SavedMeshes meshes{ampleTiles_, scarceTiles_, {}, {}};
   for (const Body& body : world_.data().bodies)
     meshes.bodies.push_back({body.orientation, body.position});
-  for (const auto& [key, ways] : triedGaps_) meshes.gaps.push_back({key, ways.there, ways.back});
+  for (const auto& [key, paths] : triedGaps_) meshes.gaps.push_back({key, paths.there, paths.back});
   return saveMeshes(world_.data(), agent_, meshes);
 }
 
@@ -130,9 +130,9 @@ void Navigation::assembleMeshes(int threads, const Progress& progress) {
 }
 
 void Navigation::joinIslands(int threads, const Progress& progress) {
-  passages_ = collectPassages({world_.data(), agent_, *walker_, *ample_, *scarce_, nullptr},
-                              islands_, triedGaps_, threads, progress);
-  scene::joinIslands(islands_, passages_);
+  connections_ = collectConnections({world_.data(), agent_, *walker_, *ample_, *scarce_, nullptr},
+                                    islands_, triedGaps_, threads, progress);
+  scene::joinIslands(islands_, connections_);
 }
 
 std::size_t Navigation::update(const Snapshot& snapshot, int threads, const Progress& progress) {
@@ -195,9 +195,9 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
     return *unobstructed_;
   };
   PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};
-  finder.passages = &passages_;
+  finder.connections = &connections_;
   const auto first = islandAt(from), last = islandAt(to);
-  // From furniture some places have a way down and others none: there a refusal says nothing.
+  // On furniture one failed search proves nothing about its neighbours.
   const auto isFloor = [&](std::uint32_t island) {
     return islands_.islands[island].area >= kMinFloorArea;
   };
@@ -218,16 +218,17 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
   return findLinkedPath(finder, *links, *bodies_, from, to, std::move(path));
 }
 
-NavigationPath Navigation::findWayOut(const Vec3& from,
-                                      const std::function<bool(const Vec3&)>& isWanted) {
+NavigationPath Navigation::findPathOut(const Vec3& from,
+                                       const std::function<bool(const Vec3&)>& isWanted) {
   const std::lock_guard lock(mutex_);
-  return scene::findWayOut(*walker_, from, isWanted);
+  return scene::findPathOut(*walker_, from, isWanted);
 }
 
 std::optional<NarrowPlace> Navigation::findNarrowest(const std::vector<Vec3>& points) {
   const std::lock_guard lock(mutex_);
-  const NarrowPlace narrowest = measureNarrowest(world_.data(), agent_, points, Vec3::Zero(),
-                                                 std::numeric_limits<double>::infinity());
+  const NarrowPlace narrowest =
+      measureNarrowest(world_.data(), agent_, traceFeet(*walker_, points), Vec3::Zero(),
+                       std::numeric_limits<double>::infinity());
   return narrowest.clearWidth < kMaxSideWidth ? std::optional(narrowest) : std::nullopt;
 }
 
@@ -306,7 +307,7 @@ std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance) {
   return place && (*place - point).norm() <= maxDistance ? place : std::nullopt;
 }
 
-/// Places come from the mesh alone: a place without mesh, as on the rim of a table, would have the
+/// Places come from the mesh alone: a place without mesh, as on the edge of a table, would have the
 /// island of the mesh below.
 std::optional<Vec3> Navigation::snapTo(const Vec3& point, const SnapTarget& wanted) {
   constexpr double kExact = 2e-3;  // metres

@@ -1,5 +1,5 @@
 // Navigation of one size of agent in a scene: proved paths, random places, islands. Recast proposes
-// the ways; each leg of a path is walked by the motion of avatars before it is returned.
+// paths; each leg of a path is walked by the motion of avatars before it is returned.
 #pragma once
 
 #include <cstdint>
@@ -16,14 +16,14 @@
 #include <vector>
 
 #include "scene/navigation/clear_width.hpp"
+#include "scene/navigation/connection_search.hpp"
 #include "scene/navigation/island_list.hpp"
 #include "scene/navigation/links.hpp"
 #include "scene/navigation/mesh/navigation_mesh.hpp"
 #include "scene/navigation/mesh/polygon_sampler.hpp"
-#include "scene/navigation/passage_search.hpp"
-#include "scene/navigation/path_finder.hpp"
+#include "scene/navigation/path_search.hpp"
 #include "scene/navigation/place_names.hpp"
-#include "scene/navigation/reasons.hpp"
+#include "scene/navigation/unreachable_reasons.hpp"
 #include "scene/navigation/walk/walker.hpp"
 #include "scene/world/world.hpp"
 
@@ -69,7 +69,7 @@ struct SnapTarget {
 class Navigation {
  public:
   using Progress = std::function<void(double)>;  ///< share that is done, 0..1
-  static constexpr double kTileShare = 0.8;      ///< of tiles; the rest is of islands and passages
+  static constexpr double kTileShare = 0.8;  ///< of tiles; the rest is of islands and connections
 
   /// Builds the meshes on `threads` threads. `snapshot`: poses of the bodies; null: as authored.
   /// Throws std::runtime_error.
@@ -96,12 +96,12 @@ class Navigation {
   std::string findEntityName(EntityId id) const { return world_.data().findEntityName(id); }
 
   /// A path from where an agent at `from` stands to where it stands at `to`. Both may be up to a
-  /// step above the floor. With jumps and lifts it is the quickest that is found. `progress`: of
-  /// the mesh for reasons, which the first path that is not found needs.
+  /// step above the floor. With jumps and lifts it is the quickest that is found. `progress`:
+  /// of the unobstructed mesh, which is built when a path is first not found.
   NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {},
                           const Progress& progress = {});
-  /// As scene::findWayOut().
-  NavigationPath findWayOut(const Vec3& from, const std::function<bool(const Vec3&)>& isWanted);
+  /// As scene::findPathOut().
+  NavigationPath findPathOut(const Vec3& from, const std::function<bool(const Vec3&)>& isWanted);
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
   std::optional<NarrowPlace> findNarrowest(const std::vector<Vec3>& points);
   /// The standing place in one of some named places that is horizontally closest to its middle.
@@ -154,7 +154,7 @@ class Navigation {
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
   IslandList islands_;                      ///< of `ample_`
   TriedGaps triedGaps_;
-  PassageList passages_;                                                  ///< of `ample_`
+  ConnectionList connections_;                                            ///< of `ample_`
   std::map<std::pair<std::uint32_t, std::uint32_t>, Refusals> refusals_;  ///< by islands
   PolygonSampler drawn_;  ///< of islands with Island::isDrawn
   NavigationReport report_;

@@ -1,13 +1,16 @@
-// Finds paths on the meshes of an agent, and proves them by walking.
+// PathFinder: the inputs of a path search; its result is a NavigationPath with its legs, or the
+// Obstruction.
 #pragma once
 
+#include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
-#include "scene/navigation/passages.hpp"
+#include "scene/navigation/mesh/off_mesh_connections.hpp"
 #include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::scene {
@@ -32,9 +35,10 @@ struct PathLeg {
 };
 
 struct NavigationPath {
-  std::vector<Vec3> points;  ///< feet, scene frame, metres: way points of a Walk; empty: none found
+  std::vector<Vec3> points;  ///< feet, scene frame, metres: waypoints of a Walk; empty: none found
   /// Metres that the feet move, from point to point in space: a stair between two points counts as
-  /// a slope, a step next to a point with its height. Of falls the way across, of rides nothing.
+  /// a slope, a step next to a point with its height. Of falls the distance across, of rides
+  /// nothing.
   double length = 0;
   double seconds = 0;  ///< expected, without waits for doors
   std::vector<PathLeg> legs;
@@ -64,15 +68,7 @@ struct PathFinder {
   std::size_t maxRepairWalks = 15'000;  ///< of a path: some tenths of a second
   /// Of the islands of both ends; null: these are one, or not known.
   Refusals* refusals = nullptr;
-  const PassageList* passages = nullptr;  ///< of `ample`; null: none
+  const ConnectionList* connections = nullptr;  ///< of `ample`; null: none
 };
-
-/// A path from where an agent at `from` stands to where it stands at `to`.
-NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& to);
-
-/// A walk of PathLeg::Kind::aside to the closest place that is wanted, at most some 2 m away.
-/// The reason is given only if no agent can stand at `from`.
-NavigationPath findWayOut(Walker& walker, const Vec3& from,
-                          const std::function<bool(const Vec3&)>& isWanted);
 
 }  // namespace enfilade::scene

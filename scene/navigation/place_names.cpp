@@ -69,7 +69,7 @@ NamedPlaces findObjects(const Model& model, std::string_view name, double reach)
   return objects;
 }
 
-NamedPlaces findBodies(const Model& model, std::string_view name, double reach) {
+NamedPlaces findNamedBodies(const Model& model, std::string_view name, double reach) {
   NamedPlaces bodies;
   for (std::uint32_t i = 0; i < model.bodies.size(); ++i) {
     const BodySpec& body = model.bodies[i];
@@ -113,11 +113,11 @@ std::vector<NamedPlace> findNamedPlaces(const Scene& scene, const std::string& n
   if (const auto room = after("room:")) return findRooms(model, *room);
   if (const auto storey = after("storey:")) return findStoreys(scene, *storey);
   if (const auto object = after("object:")) return findObjects(model, *object, reach);
-  if (const auto body = after("body:")) return findBodies(model, *body, reach);
+  if (const auto body = after("body:")) return findNamedBodies(model, *body, reach);
   if (NamedPlaces rooms = findRooms(model, name); !rooms.empty()) return rooms;
   if (NamedPlaces storeys = findStoreys(scene, name); !storeys.empty()) return storeys;
   if (NamedPlaces objects = findObjects(model, name, reach); !objects.empty()) return objects;
-  return findBodies(model, name, reach);
+  return findNamedBodies(model, name, reach);
 }
 
 }  // namespace enfilade::scene

@@ -1,4 +1,4 @@
-// Places by name: rooms, storeys and objects of a model as goals of navigation.
+// NamedPlace: a room, storey, object or body of a model as a goal of navigation, found by name.
 #pragma once
 
 #include <string>

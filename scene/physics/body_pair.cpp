@@ -23,6 +23,7 @@ namespace enfilade::scene {
 namespace {
 
 using collision::PlacedConvex;
+using collision::placeVertex;
 using collision::SeparationResult;
 using collision::Verdict;
 
@@ -49,11 +50,6 @@ struct ContactAxis {
   double separation = 0;        ///< metres
   Vec3 pointA = Vec3::Zero(), pointB = Vec3::Zero();
 };
-
-Vec3 computeWorldVertex(const PlacedConvex& shape, std::size_t i) {
-  return (shape.rotation ? Vec3(*shape.rotation * shape.vertices[i]) : shape.vertices[i]) +
-         shape.translation;
-}
 
 bool isTriangle(const PlacedConvex& shape) {
   return !shape.hull && shape.vertices.size() == 3;
@@ -89,7 +85,7 @@ Vec3 findFacingNormal(const PhysicsBody& body, std::uint32_t part, const PlacedC
 /// Returns the contact axis along `normal` (from A to B).
 ContactAxis makeContactAxis(const Vec3& normal, const PlacedConvex& a,
                             const collision::AxisSeparation& separation) {
-  ContactAxis axis{normal, separation.value, computeWorldVertex(a, separation.vertices.a),
+  ContactAxis axis{normal, separation.value, placeVertex(a, a.vertices[separation.vertices.a]),
                    Vec3::Zero()};
   // A manifold starts from two points that face each other.
   axis.pointB = axis.pointA + axis.separation * normal;

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "collision/assert.hpp"
-#include "scene/physics/disjoint_sets.hpp"
+#include "scene/base/disjoint_sets.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,7 +1,8 @@
 // Continuous collision: limits each body's motion to the part that is proved clear. Step 3 at the
-// head of physics_world.cpp.
+// head of physics_step.cpp.
 #pragma once
 
+#include "scene/physics/physics_world.hpp"
 #include "scene/physics/step_scratch.hpp"
 
 namespace enfilade::scene {

@@ -28,11 +28,11 @@ ConvexPart makeConvexPart(const collision::Hull& hull) {
   return part;
 }
 
-// The same expressions as in collision::updateDerived(): the results are equal to the last bit.
 void updateTransform(PhysicsBody& body) {
   ENFILADE_ASSERT(!(std::abs(body.motion.rotation.squaredNorm() - 1) > 1e-6));
-  body.rotation = body.motion.rotation.toRotationMatrix();
-  body.position = body.motion.centre - body.rotation * body.centreInFrame;
+  const auto [rotation, position] =
+      collision::placeFrame({body.motion.centre, body.motion.rotation}, body.centreInFrame);
+  body.rotation = rotation, body.position = position;
 }
 
 collision::InterpolatedMotion makeStationaryMotion(const PhysicsBody& body) {

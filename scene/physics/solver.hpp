@@ -6,9 +6,9 @@
 #include <span>
 #include <vector>
 
+#include "scene/base/thread_pool.hpp"
 #include "scene/physics/contact_constraint.hpp"
 #include "scene/physics/physics_body.hpp"
-#include "scene/physics/thread_pool.hpp"
 
 namespace enfilade::scene {
 

@@ -5,9 +5,9 @@
 #include <span>
 #include <vector>
 
+#include "scene/base/thread_pool.hpp"
 #include "scene/physics/contact_constraint.hpp"
 #include "scene/physics/simd.hpp"
-#include "scene/physics/thread_pool.hpp"
 
 namespace enfilade::scene {
 

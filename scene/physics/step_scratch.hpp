@@ -1,8 +1,15 @@
-// Working memory of one step of physics_world.hpp. Private to its files.
+// Working memory of one step (physics_step.hpp). Private to its files.
 #pragma once
 
-#include "scene/physics/physics_world.hpp"
-#include "scene/physics/thread_pool.hpp"
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "collision/motion/interpolated_motion.hpp"
+#include "scene/base/thread_pool.hpp"
+#include "scene/physics/body_pair.hpp"
+#include "scene/physics/solver.hpp"
+#include "scene/physics/step_report.hpp"
 
 namespace enfilade::scene {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <tuple>
 
-#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/contact_events.hpp"
 #include "scene/world/data/world_data.hpp"
 
 namespace enfilade::scene {

@@ -1,4 +1,4 @@
-// Contacts that are active in a world between two ticks.
+// Collects the active contacts of a world between two ticks, as events.
 #pragma once
 
 #include <vector>

@@ -15,8 +15,8 @@
 #include "scene/world/bodies/kinematic_drive.hpp"
 #include "scene/world/bodies/kinematic_motion.hpp"
 #include "scene/world/bodies/step_dynamic_bodies.hpp"
+#include "scene/world/contacts/avatar_contacts.hpp"
 #include "scene/world/contacts/body_contacts.hpp"
-#include "scene/world/contacts/contacts.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 #include "scene/world/contacts/triggers.hpp"
 

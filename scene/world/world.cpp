@@ -5,8 +5,8 @@
 #include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/kinematic_drive.hpp"
 #include "scene/world/bodies/step_dynamic_bodies.hpp"
+#include "scene/world/contacts/avatar_contacts.hpp"
 #include "scene/world/contacts/body_contacts.hpp"
-#include "scene/world/contacts/contacts.hpp"
 #include "scene/world/contacts/triggers.hpp"
 #include "scene/world/data/validation.hpp"
 #include "scene/world/data/world_data.hpp"
@@ -111,7 +111,7 @@ std::optional<std::string> submitAvatarCommand(World& world, Command command) {
   }
   if (data.queuedOrderCount + computeOrderCost(command.order) > kMaxQueuedOrders)
     return std::to_string(kMaxQueuedOrders) +
-           " orders and way points are already queued; send more when some have ended";
+           " orders and waypoints are already queued; send more when some have ended";
   data.queuedOrderCount += computeOrderCost(command.order);
   data.pendingCommands.push_back(std::move(command));
   return std::nullopt;

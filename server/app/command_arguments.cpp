@@ -392,7 +392,9 @@ void addInspectOptions(CLI::App& inspect, CommandArguments& into) {
       ->capture_default_str()
       ->needs(plan);
   inspect.footer(
-      "Of the options, --json and --strict apply to a recording.\n"
+      "Uses:\n"
+      "  enfilade inspect SCENE      contents, problems, plans\n"
+      "  enfilade inspect RECORDING  contents, damage (--json, --strict)\n"
       "Notes never fail --strict; the kinds of problems are listed by every report.\n"
       "Example: enfilade inspect house.ifc --plan out/plans --strict");
 }
@@ -418,10 +420,10 @@ void addRouteOptions(CLI::App& verb, CommandArguments& into) {
   verb.add_flag("--doors-as-they-are", into.route.doorsAsTheyAre,
                 "Doors that move stay as in the file. Default: they are open");
   verb.add_option("--drop", into.route.links.maxDrop,
-                  "Jumps down from edges, up to this height. 0: not at all")
+                  "Maximum height of jumps down from edges. 0: none")
       ->check(makeRangeValidator(0, 10, "METRES"))
       ->capture_default_str();
-  verb.add_flag("--lifts", into.route.links.lifts, "Rides lifts");
+  verb.add_flag("--lifts", into.route.links.lifts, "Allow paths that ride lifts");
   verb.add_flag("--json", into.json, "Print one JSON object");
   verb.add_option("--plan", into.plan, "Picture of the path on the plan, or of what is in the way")
       ->check(CLI::Validator(validatePng, "FILE.png"));

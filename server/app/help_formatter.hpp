@@ -1,4 +1,4 @@
-// The layout of --help.
+// HelpFormatter: the layout of --help.
 #pragma once
 
 #include <CLI/CLI.hpp>

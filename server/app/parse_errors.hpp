@@ -1,4 +1,4 @@
-// Texts for mistakes on the command line: what is wrong, and what to give.
+// Error texts of the command line parser, with remedies.
 #pragma once
 
 #include <CLI/CLI.hpp>

@@ -1,6 +1,6 @@
 #include "server/base/camera_rotation.hpp"
 
-#include "render/camera_basis.hpp"
+#include "render/camera.hpp"
 
 namespace enfilade::server {
 

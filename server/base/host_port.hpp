@@ -1,4 +1,4 @@
-// Network addresses of the command line.
+// HostPort: a network address given as HOST:PORT on the command line.
 #pragma once
 
 #include <cstdint>

@@ -34,13 +34,13 @@ struct CachedScenes {
   std::vector<CachedScene> list;
 };
 
-CachedScenes& cachedScenes() {
+CachedScenes& getSceneRegistry() {
   static CachedScenes scenes;
   return scenes;
 }
 
 void keepCache(const std::shared_ptr<const scene::Scene>& loaded, const scene::ModelCache& cache) {
-  CachedScenes& scenes = cachedScenes();
+  CachedScenes& scenes = getSceneRegistry();
   const std::lock_guard lock(scenes.mutex);
   std::erase_if(scenes.list, [](const CachedScene& one) { return one.scene.expired(); });
   scenes.list.push_back({loaded, cache});
@@ -49,7 +49,7 @@ void keepCache(const std::shared_ptr<const scene::Scene>& loaded, const scene::M
 }  // namespace
 
 std::optional<scene::ModelCache> findCache(const std::shared_ptr<const scene::Scene>& scene) {
-  CachedScenes& scenes = cachedScenes();
+  CachedScenes& scenes = getSceneRegistry();
   const std::lock_guard lock(scenes.mutex);
   for (const CachedScene& one : scenes.list)
     if (one.scene.lock() == scene) return one.cache;
@@ -59,7 +59,7 @@ std::optional<scene::ModelCache> findCache(const std::shared_ptr<const scene::Sc
 LoadedScene loadSceneTimed(const ModelOptions& options) {
   const auto start = std::chrono::steady_clock::now();
   Progress bar;
-  const auto cache = options.cache ? scene::modelCacheFromEnvironment() : std::nullopt;
+  const auto cache = options.cache ? scene::findDefaultModelCache() : std::nullopt;
   scene::LoadedModel model = scene::loadModel(
       options.file, options.import, cache,
       [&](const std::string& stage, double fraction) { bar.show(fraction, stage); });

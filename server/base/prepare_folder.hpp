@@ -1,4 +1,4 @@
-// Output folders, checked before work that takes long.
+// Creates an output folder and checks that it is writable, before long work begins.
 #pragma once
 
 #include <cerrno>

@@ -1,4 +1,4 @@
-// Error of the server's configuration or network.
+// ServerError: exception for an error of the server's configuration or network.
 #pragma once
 
 #include <stdexcept>

@@ -1,4 +1,4 @@
-// A thread that runs posted work in order.
+// WorkThread: a thread that runs posted tasks in order.
 #pragma once
 
 #include <chrono>

@@ -14,6 +14,7 @@
 #include "server/base/signal_handling.hpp"
 #include "server/base/standard_output.hpp"
 #include "server/capture/capture_folder.hpp"
+#include "server/capture/capture_plan.hpp"
 #include "server/capture/capture_progress.hpp"
 #include "server/capture/depth_reports.hpp"
 #include "server/capture/encode_queue.hpp"

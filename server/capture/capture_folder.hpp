@@ -5,7 +5,9 @@
 #include <filesystem>
 #include <string>
 
-#include "server/capture/capture_plan.hpp"
+#include "scene/world/data/scene.hpp"
+#include "server/capture/capture_frames.hpp"
+#include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {
 

@@ -1,6 +1,7 @@
 // Options of a capture, plain data from its command line.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -39,6 +40,11 @@ struct OverlayChoice {
 struct Shard {
   std::uint32_t index = 0, count = 1;
 };
+
+/// True if frame `index` belongs to the shard.
+inline bool isInShard(const Shard& shard, std::size_t index) {
+  return index % shard.count == shard.index;
+}
 
 /// All options that affect the pictures.
 struct PictureOptions {

@@ -1,7 +1,13 @@
 // Assigns snapshots of the world to the frames of a capture, by their times.
 #pragma once
 
-#include "server/capture/capture_plan.hpp"
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+#include "scene/world/data/scene.hpp"
+#include "server/capture/capture_frames.hpp"
+#include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {
 

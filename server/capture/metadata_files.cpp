@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/recording/recording.hpp"
-#include "render/camera_basis.hpp"
+#include "render/camera.hpp"
 #include "scene/import/file/content_hash.hpp"
 #include "server/base/camera_rotation.hpp"
 #include "server/base/version.hpp"
@@ -21,7 +21,7 @@ const char* toString(DepthFile depth) {
   return depth == DepthFile::zst ? "zst" : "npy";
 }
 
-Json channelNames(const CaptureChannels& channels) {
+Json listChannelNames(const CaptureChannels& channels) {
   Json names = Json::array();
   if (channels.rgb) names.push_back("rgb");
   if (channels.depth) names.push_back("depth");
@@ -106,7 +106,7 @@ std::string fileName(const std::filesystem::path& file) {
   return file.filename().string();
 }
 
-Json lensOptions(const PictureOptions& options) {
+Json makeLensJson(const PictureOptions& options) {
   Json lens;
   if (options.fovY) lens["fov_radians"] = *options.fovY;
   if (const auto& p = options.pinhole) lens["intrinsics"] = {p->fx, p->fy, p->cx, p->cy};
@@ -167,7 +167,7 @@ std::string makeTransformsJson(const std::vector<CaptureFrame>& captureFrames,
     Json frame;
     std::size_t file = 0;
     const auto files = listFrameFiles(options, i);
-    const Json channels = channelNames(options.channels);
+    const Json channels = listChannelNames(options.channels);
     for (const Json& channel : channels) {
       const std::string name = channel.get<std::string>();
       const std::string key = name == "rgb"   ? "file_path"
@@ -222,14 +222,14 @@ std::string makeManifest(const scene::Scene& scene, const std::filesystem::path&
   all["scene_file"] = makeFileHash(scene.model().source);
   all["path"] = makeFileHash(path);
   all["renderer"] = renderer;
-  all["lens"] = lensOptions(options);
+  all["lens"] = makeLensJson(options);
   all["axes"] = options.axes == CameraAxes::opencv ? "opencv" : "opengl";
   all["fps"] = options.fps;
   all["every"] = options.every;
   all["avatar"] = options.avatar;
   all["camera"] = options.camera;
   all["still"] = options.freezeScene;
-  all["channels"] = channelNames(options.channels);
+  all["channels"] = listChannelNames(options.channels);
   all["rgb"] =
       options.rgb == RgbFile::png ? Json("png") : Json("jpeg " + std::to_string(options.quality));
   all["depth"] = toString(options.depth);

@@ -2,9 +2,14 @@
 // scene, path and options, so that all shards write the same files.
 #pragma once
 
+#include <cstddef>
+#include <filesystem>
 #include <string>
+#include <vector>
 
-#include "server/capture/capture_plan.hpp"
+#include "scene/world/data/scene.hpp"
+#include "server/capture/capture_frames.hpp"
+#include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {
 

@@ -3,7 +3,8 @@
 
 #include "render/image/image.hpp"
 #include "scene/model/object_classes.hpp"
-#include "server/capture/capture_plan.hpp"
+#include "server/capture/capture_frames.hpp"
+#include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {
 

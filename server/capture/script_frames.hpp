@@ -1,7 +1,12 @@
 // A walk script as a camera path: the views of its avatars.
 #pragma once
 
-#include "server/capture/capture_plan.hpp"
+#include <filesystem>
+#include <memory>
+
+#include "scene/world/data/scene.hpp"
+#include "server/capture/capture_frames.hpp"
+#include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {
 

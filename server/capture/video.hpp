@@ -3,8 +3,10 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
-#include "server/capture/capture_plan.hpp"
+#include "server/capture/capture_frames.hpp"
+#include "server/capture/capture_options.hpp"
 
 namespace enfilade::server {
 

@@ -23,6 +23,7 @@
 #include "server/export/gzip.hpp"
 #include "server/export/scene_glb.hpp"
 #include "server/log/log.hpp"
+#include "server/messages/body_messages.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/net/page_files.hpp"
 #include "server/recording/world_from_recording.hpp"

@@ -16,6 +16,7 @@
 #include "server/diff/difference_json.hpp"
 #include "server/diff/difference_text.hpp"
 #include "server/log/log.hpp"
+#include "server/messages/body_messages.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/runs/in_process_driver.hpp"
 #include "server/runs/reported_run.hpp"

@@ -14,17 +14,17 @@
 namespace enfilade::server {
 namespace {
 
-// Scans have holes. Lines of a surface whose ends are this close are joined, if the outline that
-// results is around something solid and holes are a small share of it.
+// Scans have holes. Lines of a surface whose ends are this close are joined. The resulting outline
+// must be around something solid, and holes must be a small share of it.
 constexpr double kMaxHole = 0.25;      // metres
 constexpr double kMaxHoleShare = 0.2;  // of the length of an outline
 constexpr double kOneWinding = 0.9;    // share of a line that lies on one side of its surface
 
 using Segment = std::array<Vec3, 2>;
 
-/// Cuts a triangle. A corner at the height counts as above, so that a shared edge is cut once, and
-/// each edge is cut from its lower end, so that both its triangles get the same point. The segment
-/// runs clockwise, as seen from above with z upwards, around a solid with outward normals.
+/// Cuts a triangle. A corner at the height counts as above, so that a shared edge is cut once. Each
+/// edge is cut from its lower end, so that both its triangles get the same point. The segment runs
+/// clockwise, as seen from above with z upwards, around a solid with outward normals.
 std::optional<Segment> cutTriangle(const collision::Triangle& triangle, double height) {
   Segment ends;
   std::size_t count = 0;

@@ -1,4 +1,4 @@
-// Floors with a ceiling, as opposed to lawns, terraces and roofs.
+// Finds the height of indoor floors: those with a ceiling, unlike lawns, terraces and roofs.
 #pragma once
 
 #include <array>

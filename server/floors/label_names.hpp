@@ -1,4 +1,4 @@
-// Names of objects for people, in pictures.
+// Makes readable labels of objects for pictures, from their paths.
 #pragma once
 
 #include <string>

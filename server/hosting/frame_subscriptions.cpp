@@ -28,7 +28,7 @@ void renderAndPush(HostedWorld& hosted, ClientId id, std::uint32_t number, std::
     FrameSubscription& done = subscription->second;
     done.rendering = false;
     const bool missed = std::exchange(done.missed, false);
-    if (missed) --done.dropped;  // the picture that follows is not left out
+    if (missed) --done.dropped;  // the next due frame must not count as dropped
     if (std::exchange(done.stale, false) || missed)
       renderNext(current, id, client->second, number, done);
   };

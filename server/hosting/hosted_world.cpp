@@ -19,7 +19,7 @@ HostedWorld::HostedWorld(std::shared_ptr<const scene::Scene> sceneToHost,
       queries(queryService),
       limits(options.limits) {
   if (replay) {
-    updateActiveContacts(*this, replay->activeContactsAt(world));
+    updateActiveContacts(*this, replay->findActiveContactsAt(world));
     branchRecording = options.record;
     status.tick = options.replay->startTick;
   } else if (options.record) {

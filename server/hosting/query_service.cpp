@@ -30,12 +30,11 @@ struct QueryService::State {
   NavigationService navigation;  ///< used by its thread alone, as the next one
   FloorPlanSource floorPlans;
   std::mutex pendingMutex;
-  /// Queries of the navigation thread without an answer: also those that wait learn the share of
-  /// meshes.
+  /// Unanswered queries of the navigation thread. Waiting queries also receive mesh progress.
   std::list<std::shared_ptr<const SceneQuery>> pending;
   WorkThread thread, navigationThread;  // last members: they use the others
 
-  const scene::RayCaster& casterAt(const std::shared_ptr<const scene::Snapshot>& snapshot);
+  const scene::RayCaster& updateCaster(const std::shared_ptr<const scene::Snapshot>& snapshot);
   scene::SceneAt makeSceneAt(const SceneQuery& query);
   std::variant<v1::RayReply, v1::Error> answerRays(const SceneQuery& query,
                                                    std::vector<std::uint8_t>& attachment);
@@ -47,7 +46,7 @@ struct QueryService::State {
   EncodedMessage answerSafely(const SceneQuery& query);
 };
 
-const scene::RayCaster& QueryService::State::casterAt(
+const scene::RayCaster& QueryService::State::updateCaster(
     const std::shared_ptr<const scene::Snapshot>& snapshot) {
   if (!caster) {
     const auto start = std::chrono::steady_clock::now();
@@ -72,7 +71,7 @@ std::variant<v1::RayReply, v1::Error> QueryService::State::answerRays(
     const SceneQuery& query, std::vector<std::uint8_t>& attachment) {
   auto resolved = rayQueryFromProto(query.message.rays(), *query.snapshot, query.limits);
   if (auto* error = std::get_if<v1::Error>(&resolved)) return std::move(*error);
-  return castRays(std::get<ResolvedRayQuery>(resolved), casterAt(query.snapshot), *scene,
+  return castRays(std::get<ResolvedRayQuery>(resolved), updateCaster(query.snapshot), *scene,
                   *query.snapshot, attachment);
 }
 

@@ -36,7 +36,7 @@ class QueryService {
   /// `done` receives the encoded reply or Error on a thread of the service. Navigation queries are
   /// answered in their order, all others in theirs.
   void submit(SceneQuery query, std::function<void(EncodedMessage)> done);
-  /// The same for a path, with the reply as it is.
+  /// Answers a path query without encoding the reply.
   void submitPath(SceneQuery query,
                   std::function<void(std::variant<v1::NavigationReply, v1::Error>)> done);
   /// Waits for all queries. Do not submit queries afterwards.

@@ -30,7 +30,8 @@ void startBranchRecording(HostedWorld& hosted) {
   if (!hosted.branchRecording) return;
   RecordingOptions options = *hosted.branchRecording;
   options.choice.file = findFreeFile(options.choice.file);
-  const BranchPoint branch{hosted.replay->parent(), hosted.replay->activeContactsAt(hosted.world)};
+  const BranchPoint branch{hosted.replay->parent(),
+                           hosted.replay->findActiveContactsAt(hosted.world)};
   hosted.world.record(options, &branch);
   ++hosted.branchCount;
   logInfo("recording the branch after tick {} to {}", branch.parent.tick(),
@@ -42,7 +43,7 @@ void seekTo(HostedWorld& hosted, std::uint64_t tick) {
   scene::World world = hosted.replay->seek(tick, [&hosted](std::uint64_t) {
     if (hosted.isEnding()) throw ServerStopping{};
   });
-  const v1::TickEvents activeContacts = hosted.replay->activeContactsAt(world);
+  const v1::TickEvents activeContacts = hosted.replay->findActiveContactsAt(world);
   replaceWorld(hosted, std::move(world), activeContacts, "the recording was sought");
 }
 

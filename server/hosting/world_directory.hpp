@@ -1,4 +1,4 @@
-// The worlds of a server, as a client's request uses them.
+// WorldDirectory: interface to the worlds of a server, for the requests of clients.
 #pragma once
 
 #include <functional>

@@ -76,7 +76,7 @@ ExitCode inspect(const InspectCommand& command) {
   if (!command.plan.empty()) prepareFolder(command.plan, "--plan");
   const Inspection inspection =
       makeInspection(loadSceneTimed(command.model),
-                     command.model.cache ? scene::modelCacheFromEnvironment() : std::nullopt);
+                     command.model.cache ? scene::findDefaultModelCache() : std::nullopt);
   writeToStdout(command.json
                     ? formatInspectionJson(inspection, command.accepted, command.objects) + "\n"
                     : formatInspectionTable(inspection, command.accepted, command.objects));

@@ -1,5 +1,6 @@
 #include "server/messages/body_messages.hpp"
 
+#include <filesystem>
 #include <variant>
 
 #include "collision/assert.hpp"
@@ -67,6 +68,21 @@ v1::Body toProto(const scene::Scene& scene, std::size_t index) {
   if (spec.autoCloseDelay) message.set_closes_after(*spec.autoCloseDelay);
   message.set_loops(spec.loops);
   message.set_closed(spec.closedPosition);
+  return message;
+}
+
+v1::Scene toProto(const scene::Scene& scene) {
+  const scene::Model& model = scene.model();
+  v1::Scene message;
+  message.set_source(std::filesystem::path(model.source).filename().string());
+  message.set_hash(scene.hash());
+  message.set_objects(static_cast<std::uint32_t>(model.objects.size()));
+  *message.mutable_bounds()->mutable_min() = toProto(scene.bounds().min);
+  *message.mutable_bounds()->mutable_max() = toProto(scene.bounds().max);
+  message.set_metres_per_unit(model.metresPerUnit);
+  message.set_up(toString(model.upAxis));
+  *message.mutable_offset() = toProto(model.offset);
+  for (std::size_t i = 0; i < model.bodies.size(); ++i) *message.add_bodies() = toProto(scene, i);
   return message;
 }
 

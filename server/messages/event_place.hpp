@@ -1,4 +1,4 @@
-// The storey and the room where a contact lies.
+// EventPlace: the storey and the room of a contact.
 #pragma once
 
 #include <string>

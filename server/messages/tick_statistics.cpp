@@ -27,7 +27,7 @@ std::size_t findBucket(double seconds) {
   return std::min<std::size_t>(bucket, kBucketCount - 1);
 }
 
-double bucketMidpoint(std::size_t bucket) {
+double computeBucketMidpoint(std::size_t bucket) {
   const std::uint64_t start = (bucket + kFirstBucket) << kDroppedBits;
   constexpr std::uint64_t kHalf = std::uint64_t{1} << (kDroppedBits - 1);
   return std::bit_cast<double>(start | kHalf) * 1e-9;
@@ -73,7 +73,7 @@ double DurationHistogram::quantile(double fraction) const {
   std::uint64_t cumulative = 0;
   for (std::size_t i = 0; i < buckets_.size(); ++i) {
     cumulative += buckets_[i];
-    if (cumulative > rank) return std::min(bucketMidpoint(i), max_);
+    if (cumulative > rank) return std::min(computeBucketMidpoint(i), max_);
   }
   return max_;
 }

@@ -1,10 +1,8 @@
 #include "server/messages/world_messages.hpp"
 
 #include <cmath>
-#include <filesystem>
 
 #include "collision/assert.hpp"
-#include "server/messages/body_messages.hpp"
 #include "server/messages/event_place.hpp"
 #include "server/messages/name_suggestions.hpp"
 
@@ -288,21 +286,6 @@ v1::AvatarState toProto(const scene::World& world, const scene::AvatarSnapshot& 
     state.set_value(joint.value);
     state.set_stopped_by(joint.blockedBy);
   }
-  return message;
-}
-
-v1::Scene toProto(const scene::Scene& scene) {
-  const scene::Model& model = scene.model();
-  v1::Scene message;
-  message.set_source(std::filesystem::path(model.source).filename().string());
-  message.set_hash(scene.hash());
-  message.set_objects(static_cast<std::uint32_t>(model.objects.size()));
-  *message.mutable_bounds()->mutable_min() = toProto(scene.bounds().min);
-  *message.mutable_bounds()->mutable_max() = toProto(scene.bounds().max);
-  message.set_metres_per_unit(model.metresPerUnit);
-  message.set_up(toString(model.upAxis));
-  *message.mutable_offset() = toProto(model.offset);
-  for (std::size_t i = 0; i < model.bodies.size(); ++i) *message.add_bodies() = toProto(scene, i);
   return message;
 }
 

@@ -1,4 +1,4 @@
-// Conversion of world data to messages.
+// Converts world data to messages.
 #pragma once
 
 #include <string>
@@ -12,7 +12,6 @@ namespace enfilade::server {
 v1::ContactEvent toProto(const scene::World& world, const scene::ContactEvent& event);
 v1::Notice toProto(const scene::World& world, const scene::Notice& notice, std::uint64_t tick);
 v1::AvatarState toProto(const scene::World& world, const scene::AvatarSnapshot& avatar);
-v1::Scene toProto(const scene::Scene& scene);
 v1::Policies toProto(const scene::WorldSettings& settings);
 v1::Vec3 toProto(const scene::Vec3& v);
 scene::Vec3 vectorFromProto(const v1::Vec3& message);

@@ -35,7 +35,7 @@ std::variant<v1::NavigationQuery, v1::Error> makePathQuery(const scene::World& w
 namespace {
 
 /// The doors that the walk opens, and the lifts that it rides. `skipped`: points before the first
-/// way point.
+/// waypoint.
 void addBodies(const v1::NavigationPath& path, int skipped, v1::Walk& walk) {
   const auto addRide = [&](int point, const v1::NavigationLeg& leg, std::uint32_t level) {
     if (point >= path.points_size()) return;

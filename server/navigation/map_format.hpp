@@ -1,4 +1,4 @@
-// Maps of navigation as bytes of a reply.
+// Encodes navigation maps as bytes for a reply.
 #pragma once
 
 #include <cstdint>

@@ -11,8 +11,8 @@
 #include <string>
 
 #include "scene/navigation/doors.hpp"
-#include "scene/navigation/ghost.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
+#include "scene/navigation/shape_separation.hpp"
 #include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/navigation/island_answer.hpp"

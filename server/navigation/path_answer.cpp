@@ -29,10 +29,10 @@ scene::NavigationPath join(scene::NavigationPath path, const scene::NavigationPa
 struct PathWriter {
   const PathAnswer& answer;
 
-  std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& ways,
+  std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& navigation,
                                            const scene::NavigationPath& path) const {
-    return scene::findDoorsOnPath(answer.index(), answer.settings, answer.snapshot, ways.agent(),
-                                  path.points, path.legs);
+    return scene::findDoorsOnPath(answer.index(), answer.settings, answer.snapshot,
+                                  navigation.agent(), path.points, path.legs);
   }
 
   /// The closed doors that stand on a path through open ones.
@@ -88,7 +88,7 @@ struct PathWriter {
       std::ranges::move(more, std::back_inserter(swings));
       scene::NavigationPath aside;
       if (tries < kMaxTries)
-        aside = answer.asTheyAre().findWayOut(start, [&](const Vec3& feet) {
+        aside = answer.asTheyAre().findPathOut(start, [&](const Vec3& feet) {
           return std::ranges::none_of(swings, [&](auto& swing) { return swing.touches(feet); });
         });
       if (!aside.reason.empty()) return;  // an agent can be there only when the doors are open
@@ -209,7 +209,7 @@ struct PathWriter {
     message.set_reason("the door '" + spec.name + "' is closed: " + answer.doorRemedy);
     message.set_obstacle(spec.objects.front() + 1);
     message.set_obstacle_name(spec.name);
-    message.clear_obstacle_at();  // these are about what an agent meets on other ways
+    message.clear_obstacle_at();  // these are about what an agent meets on other paths
     message.clear_clear_width();
   }
 };

@@ -1,4 +1,4 @@
-// Checks of the fields of navigation queries, and the places that a path query names.
+// Validates the fields of navigation queries, and looks up the places of a path query.
 #pragma once
 
 #include <cstdint>

@@ -6,7 +6,6 @@
 #include "server/base/server_error.hpp"
 #include "server/log/log.hpp"
 #include "server/net/protocol_detector.hpp"
-#include "server/net/server.hpp"
 
 namespace enfilade::server {
 namespace asio = boost::asio;
@@ -30,18 +29,6 @@ tcp::endpoint resolveHostPort(const HostPort& where) {
   return {address, where.port};
 }
 
-tcp::endpoint resolveProtected(const HostPort& where, const Access& access) {
-  const tcp::endpoint endpoint = resolveHostPort(where);
-  if (endpoint.address().is_loopback()) return endpoint;
-  if (access.tokens.empty() || !access.insecure) {
-    throw ServerError("will not listen on " + formatHostPort(where) +
-                      ": other machines can reach that address, and the connection is not "
-                      "encrypted. Use 127.0.0.1 with a tunnel (ssh -L) or a TLS proxy, or give "
-                      "--token-file and --insecure");
-  }
-  return endpoint;
-}
-
 tcp::acceptor openAcceptor(asio::io_context& context, const HostPort& where, const Access& access) {
   const tcp::endpoint endpoint = resolveProtected(where, access);
   tcp::acceptor acceptor(context);
@@ -59,8 +46,16 @@ tcp::acceptor openAcceptor(asio::io_context& context, const HostPort& where, con
 
 }  // namespace
 
-void requireListenable(const HostPort& listen, const Access& access) {
-  resolveProtected(listen, access);
+tcp::endpoint resolveProtected(const HostPort& where, const Access& access) {
+  const tcp::endpoint endpoint = resolveHostPort(where);
+  if (endpoint.address().is_loopback()) return endpoint;
+  if (access.tokens.empty() || !access.insecure) {
+    throw ServerError("will not listen on " + formatHostPort(where) +
+                      ": other machines can reach that address, and the connection is not "
+                      "encrypted. Use 127.0.0.1 with a tunnel (ssh -L) or a TLS proxy, or give "
+                      "--token-file and --insecure");
+  }
+  return endpoint;
 }
 
 Listener::Listener(asio::io_context& context, const HostPort& where, WorldRegistry& worlds,

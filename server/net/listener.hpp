@@ -11,6 +11,10 @@
 
 namespace enfilade::server {
 
+/// Throws ServerError if the address is no numeric one, or reachable from other machines without
+/// permission in `access`.
+boost::asio::ip::tcp::endpoint resolveProtected(const HostPort& where, const Access& access);
+
 class Listener {
  public:
   /// Throws ServerError if it cannot listen on the address.

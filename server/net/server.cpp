@@ -33,6 +33,10 @@ struct Server::State {
   std::thread network;
 };
 
+void requireListenable(const HostPort& listen, const Access& access) {
+  resolveProtected(listen, access);
+}
+
 Server::Server(std::shared_ptr<const scene::Scene> scene, const HostPort& listen,
                ServerOptions options)
     : state_(std::make_unique<State>(std::move(scene), listen, std::move(options))) {

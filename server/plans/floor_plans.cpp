@@ -72,7 +72,7 @@ class PlanSheet {
   double width() const { return width_; }
   double height() const {
     return view_.topLeft.y + view_.height() + kBottom * view_.unit +
-           measureEntries(entries_, entriesWidth(), view_.unit);
+           measureEntries(entries_, computeEntriesWidth(), view_.unit);
   }
 
   void draw(Canvas& canvas, const FloorPlan& plan, const PlanPicture& picture) const {
@@ -84,13 +84,13 @@ class PlanSheet {
     const double below = view_.topLeft.y + view_.height();
     drawScaleBar(canvas, view_, {view_.topLeft.x, below + 42 * view_.unit}, plan.north);
     drawEntries(canvas, entries_, {view_.topLeft.x, below + (kBottom - 4) * view_.unit},
-                entriesWidth(), view_.unit);
+                computeEntriesWidth(), view_.unit);
     drawPlanHeading(canvas, heading_, view_.unit);
     reportMissingFont(canvas);
   }
 
  private:
-  double entriesWidth() const { return width_ - (kLeft + kRight) * view_.unit; }
+  double computeEntriesWidth() const { return width_ - (kLeft + kRight) * view_.unit; }
 
   double width_;
   PlanHeading heading_;

@@ -1,4 +1,4 @@
-// A walk's positions, contacts and pictures, as maps show them.
+// Data of a walk that maps show: paths of avatars, contacts and captures.
 #pragma once
 
 #include <string>

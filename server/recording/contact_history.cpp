@@ -57,7 +57,7 @@ void ContactHistory::addEvents(const v1::TickEvents& events) {
   }
 }
 
-v1::RecordedEvents ContactHistory::eventsAfter(std::uint64_t tick, std::size_t maxBytes) const {
+v1::RecordedEvents ContactHistory::findEventsAfter(std::uint64_t tick, std::size_t maxBytes) const {
   constexpr std::size_t kFieldBytes = 8;  // maximum size of an event's tag and length
   v1::RecordedEvents reply;
   reply.set_complete_to(completeTo_);
@@ -92,7 +92,7 @@ const v1::ContactEvent* ContactHistory::findLastBegin(const Key& key, std::uint6
   return firstAfter == found->second.begin() ? nullptr : &*std::prev(firstAfter);
 }
 
-v1::TickEvents ContactHistory::activeContactsAt(const scene::World& world) const {
+v1::TickEvents ContactHistory::findActiveContactsAt(const scene::World& world) const {
   const scene::Snapshot& snapshot = *world.snapshot();
   v1::TickEvents active;
   active.set_tick(snapshot.tick);

@@ -25,10 +25,10 @@ class ContactHistory {
   /// The active contacts of `world`, which must be at a recorded tick. Each contact is a KIND_BEGIN
   /// with the tick at which it began; each entity inside a trigger is a KIND_ENTER. Old recordings
   /// of branches lack the initial contacts: these get the branch's first tick, and no KIND_ENTER.
-  v1::TickEvents activeContactsAt(const scene::World& world) const;
+  v1::TickEvents findActiveContactsAt(const scene::World& world) const;
 
   /// The events that a timeline shows (RecordedEventsRequest) after a tick, up to `maxBytes`.
-  v1::RecordedEvents eventsAfter(std::uint64_t tick, std::size_t maxBytes) const;
+  v1::RecordedEvents findEventsAfter(std::uint64_t tick, std::size_t maxBytes) const;
 
  private:
   using Key = std::tuple<v1::ContactEvent::Kind, std::uint32_t, std::uint32_t>;  ///< kind, a, b

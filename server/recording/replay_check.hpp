@@ -20,14 +20,14 @@ class Replay {
   /// Returns the world after a recorded tick and continues there, unbranched. Throws Divergence,
   /// RecordingError, and exceptions of `onProgress`; the replay is unchanged then.
   scene::World seek(std::uint64_t tick, const Playback::ProgressHandler& onProgress = {});
-  /// Like ContactHistory::activeContactsAt(). `world` must not be branched.
-  v1::TickEvents activeContactsAt(const scene::World& world) const {
-    return contacts_.activeContactsAt(world);
+  /// Like ContactHistory::findActiveContactsAt(). `world` must not be branched.
+  v1::TickEvents findActiveContactsAt(const scene::World& world) const {
+    return contacts_.findActiveContactsAt(world);
   }
 
-  /// As ContactHistory::eventsAfter().
-  v1::RecordedEvents eventsAfter(std::uint64_t tick, std::size_t maxBytes) const {
-    return contacts_.eventsAfter(tick, maxBytes);
+  /// As ContactHistory::findEventsAfter().
+  v1::RecordedEvents findEventsAfter(std::uint64_t tick, std::size_t maxBytes) const {
+    return contacts_.findEventsAfter(tick, maxBytes);
   }
 
   /// Runs the next tick of `world`, which seek() returned: the recorded tick, or a free one after

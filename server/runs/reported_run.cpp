@@ -13,6 +13,7 @@
 #include "server/base/standard_output.hpp"
 #include "server/floors/plan_messages.hpp"
 #include "server/log/log.hpp"
+#include "server/messages/body_messages.hpp"
 #include "server/messages/frame_messages.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/recording/contact_history.hpp"
@@ -184,7 +185,7 @@ BranchPoint makeBranchPoint(const ReplayCommand& command, const scene::World& wo
   branch.parent.set_tick(command.from);
   branch.parent.set_run(command.run);
   branch.activeContacts =
-      ContactHistory(command.recording, command.run, command.from).activeContactsAt(world);
+      ContactHistory(command.recording, command.run, command.from).findActiveContactsAt(world);
   return branch;
 }
 

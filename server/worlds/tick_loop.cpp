@@ -79,7 +79,7 @@ void closeInbox(TickInbox& inbox, v1::Bye closeNotice) {
   inbox.closeNotice = std::move(closeNotice);
 }
 
-std::string messageFromException(const std::exception_ptr& failure) {
+std::string describeException(const std::exception_ptr& failure) {
   try {
     std::rethrow_exception(failure);
   } catch (const std::exception& error) {
@@ -178,7 +178,7 @@ v1::World TickLoop::makeStatus() const {
   world.mutable_clock()->set_has_driver(status.hasDriver);
   const std::lock_guard lock(inbox_->mutex);
   world.set_clients(static_cast<std::uint32_t>(inbox_->members.size()));
-  if (inbox_->failure) world.set_failure(messageFromException(inbox_->failure));
+  if (inbox_->failure) world.set_failure(describeException(inbox_->failure));
   return world;
 }
 

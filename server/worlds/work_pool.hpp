@@ -1,4 +1,4 @@
-// Threads that share short pieces of work.
+// WorkPool: a thread pool for short tasks.
 #pragma once
 
 #include <atomic>

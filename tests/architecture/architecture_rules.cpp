@@ -39,6 +39,7 @@ const std::vector<std::string> kRooms{
     "collision/narrow_phase",
     "collision/compound",
     "collision/motion",
+    "scene/base",
     "scene/model",
     "scene/model/shapes",
     "scene/import/file",
@@ -321,6 +322,34 @@ Faults includeDirections(const Sources& sources) {
     }
   }
   return faults;
+}
+
+Faults includeRings(const Sources& sources) {
+  const auto getModule = [](const std::string& path) { return path.substr(0, path.rfind('.')); };
+  std::map<std::string, Names> included;  // by module; without modules that include no other one
+  for (const auto& [path, text] : sources) {
+    if (!isCode(path) || getFolder(path) == "tests") continue;
+    for (const Include& include : findIncludes(text))
+      if (sources.count(include.path) != 0 && getModule(include.path) != getModule(path))
+        included[getModule(path)].insert(getModule(include.path));
+  }
+  for (std::size_t before = 0; before != included.size();) {
+    before = included.size();
+    std::erase_if(included, [&](const auto& module) {
+      return std::ranges::none_of(module.second,
+                                  [&](const auto& name) { return included.count(name) != 0; });
+    });
+  }
+  if (included.empty()) return {};
+  // Each remaining module includes another one: following includes ends in a ring.
+  std::vector<std::string> ring{included.begin()->first};
+  while (std::count(ring.begin(), ring.end(), ring.back()) == 1)
+    ring.push_back(*std::ranges::find_if(
+        included.at(ring.back()), [&](const auto& name) { return included.count(name) != 0; }));
+  std::string fault;
+  for (auto at = std::find(ring.begin(), ring.end(), ring.back()); at != ring.end(); ++at)
+    fault += (fault.empty() ? "" : " -> ") + *at;
+  return {fault};
 }
 
 Faults thirdPartiesInPublicHeaders(const Sources& sources) {

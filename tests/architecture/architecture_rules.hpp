@@ -23,6 +23,10 @@ Sources readSources(const std::filesystem::path& root);
 /// collision <- scene <- render <- server, protocol <- server, scene <- assets.
 Faults includeDirections(const Sources& sources);
 
+/// Modules, each a .hpp file and the .cpp file of the same name, that include one another in a
+/// ring. At most one ring is reported. Tests do not count.
+Faults includeRings(const Sources& sources);
+
 /// A header that another folder can reach includes nothing but the standard library, Eigen,
 /// generated messages and our own.
 Faults thirdPartiesInPublicHeaders(const Sources& sources);

@@ -31,6 +31,10 @@ TEST(Architecture, IncludesGoDownwardsOnly) {
   EXPECT_EQ(includeDirections(repository()), Faults{}) << listed(includeDirections(repository()));
 }
 
+TEST(Architecture, NoModulesIncludeOneAnotherInARing) {
+  EXPECT_EQ(includeRings(repository()), Faults{}) << listed(includeRings(repository()));
+}
+
 TEST(Architecture, NoThirdPartyShowsInAPublicHeader) {
   const Faults faults = thirdPartiesInPublicHeaders(repository());
   EXPECT_EQ(faults, Faults{}) << listed(faults);
@@ -131,6 +135,17 @@ TEST(ArchitectureRules, ARoomIncludesOnlyRoomsBelowIt) {
   EXPECT_EQ(includeDirections(sources), Faults{"scene/import/ifc/ifc_metadata.cpp:2: "
                                                "scene/import/ifc/ may not include scene/world/, "
                                                "which is above it"});
+}
+
+TEST(ArchitectureRules, ARingOfModulesIsAFault) {
+  Sources sources{{"scene/a.hpp", "#include \"scene/b.hpp\"\n"},
+                  {"scene/b.hpp", ""},
+                  {"scene/b.cpp", "#include \"scene/b.hpp\"\n#include \"scene/c.hpp\"\n"},
+                  {"scene/c.hpp", ""},
+                  {"server/d.cpp", "#include \"scene/a.hpp\"\n"}};
+  EXPECT_EQ(includeRings(sources), Faults{});
+  sources["scene/c.cpp"] = "#include \"scene/b.hpp\"\n";
+  EXPECT_EQ(includeRings(sources), Faults{"scene/b -> scene/c -> scene/b"});
 }
 
 TEST(ArchitectureRules, ANewRoomMustBeListed) {

@@ -71,7 +71,8 @@ def main():
 
 Made by `./dev bench boxes{' --quick' if quick else ''}` on {datetime.date.today()}. Machine: {machine()},
 single thread. 1,000 bodies (250 of 2,000 vertices, 50 of 10,000) turn about their own axes. All have the same hull,
-an ellipsoid with half axes of 0.2, 0.15 and 0.1 m. The methods take turns in every tick; times are medians.
+an ellipsoid with half axes of 0.2, 0.15 and 0.1 m. The methods take turns in every tick, in
+random order. Times are medians.
 
 - *sphere cube*, *vertex scan* and *climb or scan* are the three methods of `collision/bounds/bounding_box.hpp`. The
   third climbs after a small turn and scans after a large one; *hill climb* always climbs. All but the cube give the

@@ -140,8 +140,7 @@ int main(int argc, char** argv) {
     if (const auto at = name.find('@'); at != std::string::npos)
       options.metresPerUnit = std::stod(name.substr(at + 1));
     write(measure(file.filename().string(), "",
-                  scene::loadModel(file, options, scene::modelCacheFromEnvironment()).model,
-                  ticks));
+                  scene::loadModel(file, options, scene::findDefaultModelCache()).model, ticks));
   }
   return wrong == 0 ? 0 : 1;
 }

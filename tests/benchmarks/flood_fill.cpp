@@ -39,21 +39,22 @@ FloodFill::FloodFill(const scene::WorldData& world, const scene::NavigationAgent
   width_ = static_cast<std::int32_t>(std::ceil(size.x() / kSpacing));
   depth_ = static_cast<std::int32_t>(std::ceil(size.z() / kSpacing));
   first_.assign(static_cast<std::size_t>(width_) * static_cast<std::size_t>(depth_), -1);
-  scene::Walker walker(world, agent);
+  std::vector<scene::Walker> walkers;
+  for (int i = 0; i < threads_.threadCount(); ++i) walkers.emplace_back(world, agent);
   std::int32_t component = 0;
   for (const Vec3& start : starts) {
     if (places_.size() >= maxPlaces) return;
     const std::int32_t column = computeColumn(start.x(), start.z());
     if (column < 0 || findNearest(start) >= 0) continue;
     const Vec3 centre = computePosition(add(column, start.y(), component));
-    const auto standing = stepTo(walker, centre, centre.x(), centre.z());
+    const auto standing = stepTo(walkers[0], centre, centre.x(), centre.z());
     if (!standing) {
       first_[static_cast<std::size_t>(column)] = places_.back().next;
       places_.pop_back();
       continue;
     }
     places_.back().height = static_cast<float>(standing->y());
-    fill(walker, static_cast<std::int32_t>(places_.size()) - 1, maxPlaces, goal);
+    fill(walkers, static_cast<std::int32_t>(places_.size()) - 1, maxPlaces, goal);
     if (places_.size() >= maxPlaces) unfinished_ = component;
     ++component;
   }
@@ -134,28 +135,50 @@ std::optional<Vec3> FloodFill::stepTo(scene::Walker& walker, const Vec3& from, d
   return std::nullopt;
 }
 
-void FloodFill::fill(scene::Walker& walker, std::int32_t start, std::size_t maxPlaces,
+/// Where an avatar stands that steps from each of `front` to its neighbour in `direction`, unless
+/// that is known; in the order of `front`.
+std::vector<Vec3> FloodFill::stepToAll(std::vector<scene::Walker>& walkers,
+                                       const std::vector<std::int32_t>& front,
+                                       const std::pair<int, int>& direction) {
+  std::vector<std::optional<Vec3>> standings(front.size());
+  const auto [dx, dz] = direction;
+  const auto step = [&](scene::Walker& walker, std::size_t i) {
+    const Vec3 from = computePosition(front[i]);
+    const double x = from.x() + dx * kSpacing, z = from.z() + dz * kSpacing;
+    const std::int32_t column = computeColumn(x, z);
+    if (column >= 0 && findPlace(column, from.y(), step_) < 0)
+      standings[i] = stepTo(walker, from, x, z);
+  };
+  const std::size_t shares = walkers.size();  // of the front, one for each walker
+  threads_.parallelFor(shares, 1, [&](std::size_t from, std::size_t to) {
+    for (std::size_t share = from; share < to; ++share)
+      for (std::size_t i = front.size() * share / shares; i < front.size() * (share + 1) / shares;
+           ++i)
+        step(walkers[share], i);
+  });
+  std::vector<Vec3> found;
+  for (const std::optional<Vec3>& standing : standings)
+    if (standing) found.push_back(*standing);
+  return found;
+}
+
+void FloodFill::fill(std::vector<scene::Walker>& walkers, std::int32_t start, std::size_t maxPlaces,
                      const std::optional<Vec3>& goal) {
-  std::queue<std::int32_t> open;
-  open.push(start);
   const std::int32_t component = places_[static_cast<std::size_t>(start)].component;
-  while (!open.empty() && places_.size() < maxPlaces) {
-    const Vec3 from = computePosition(open.front());
-    const std::int32_t column = places_[static_cast<std::size_t>(open.front())].column;
-    open.pop();
-    for (std::size_t k = 0; k < kStraightNeighbours; ++k) {
-      const auto [dx, dz] = kNeighbours[k];
-      const double x = from.x() + dx * kSpacing, z = from.z() + dz * kSpacing;
-      if (computeColumn(x, z) < 0) continue;
-      const std::int32_t next = column + dx + dz * width_;
-      if (findPlace(next, from.y(), step_) >= 0) continue;
-      const auto standing = stepTo(walker, from, x, z);
-      if (!standing) continue;
-      open.push(add(next, standing->y(), component));
-      if (goal && (*standing - *goal).squaredNorm() < kSpacing * kSpacing &&
-          findComponent(*goal).has_value())
-        return;
-    }
+  std::vector<std::int32_t> front{start};
+  while (!front.empty()) {
+    std::vector<std::int32_t> next;
+    for (std::size_t k = 0; k < kStraightNeighbours; ++k)
+      for (const Vec3& standing : stepToAll(walkers, front, kNeighbours[k])) {
+        if (places_.size() >= maxPlaces) return;
+        const std::int32_t column = computeColumn(standing.x(), standing.z());
+        if (findPlace(column, standing.y(), step_) >= 0) continue;  // from another place of `front`
+        next.push_back(add(column, standing.y(), component));
+        if (goal && (standing - *goal).squaredNorm() < kSpacing * kSpacing &&
+            findComponent(*goal).has_value())
+          return;
+      }
+    front = std::move(next);
   }
 }
 

@@ -5,8 +5,11 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <thread>
+#include <utility>
 #include <vector>
 
+#include "scene/base/thread_pool.hpp"
 #include "scene/navigation/walk/walker.hpp"
 
 namespace enfilade::benchmarks {
@@ -67,7 +70,10 @@ class FloodFill {
   std::int32_t add(std::int32_t column, double height, std::int32_t component);
   std::optional<scene::Vec3> stepTo(scene::Walker& walker, const scene::Vec3& from, double x,
                                     double z) const;
-  void fill(scene::Walker& walker, std::int32_t start, std::size_t maxPlaces,
+  std::vector<scene::Vec3> stepToAll(std::vector<scene::Walker>& walkers,
+                                     const std::vector<std::int32_t>& front,
+                                     const std::pair<int, int>& direction);
+  void fill(std::vector<scene::Walker>& walkers, std::int32_t start, std::size_t maxPlaces,
             const std::optional<scene::Vec3>& goal);
   std::vector<std::int32_t> findWay(std::int32_t from, std::int32_t to) const;
   bool isStraight(const scene::Vec3& from, const scene::Vec3& to) const;
@@ -80,6 +86,7 @@ class FloodFill {
   std::vector<std::int32_t> first_;  ///< by column: its first place, or -1
   std::vector<Place> places_;
   std::int32_t unfinished_ = -1;  ///< component
+  scene::ThreadPool threads_{static_cast<int>(std::thread::hardware_concurrency())};
 };
 
 }  // namespace enfilade::benchmarks

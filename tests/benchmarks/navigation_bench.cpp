@@ -2,7 +2,7 @@
 // doors, by lifts and over edges; the time of a path with its proof; and its islands and lengths
 // against a flood fill.
 //
-//   navigation_bench [--quick] [--pairs N] [--only times|fill|walks] [--out FILE]
+//   navigation_bench [--quick] [--pairs N] [--places N] [--only times|fill|walks] [--out FILE]
 //                    SCENE[@METRES_PER_UNIT]..
 //
 // A path counts as wrong if its walk is blocked, leaves the scene or penetrates anything. FILE gets
@@ -26,7 +26,7 @@
 
 #include "scene/import/import_worker.hpp"
 #include "scene/navigation/doors.hpp"
-#include "scene/navigation/passages.hpp"
+#include "scene/navigation/mesh/off_mesh_connections.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/navigation/walk/walker.hpp"
 #include "scene/world/world.hpp"
@@ -44,16 +44,16 @@ using namespace enfilade;
 using namespace enfilade::benchmarks;
 using scene::Vec3;
 
-constexpr int kMaxTicks = 60 * 3600;           // an hour
-constexpr double kNearWidth = 0.005;           // metres of radius
-constexpr int kWalksOfWorld = 25;              // then doors and lifts are again as in the file
-constexpr std::size_t kMaxPlaces = 4'000'000;  // of a flood fill: 1,600 square metres
+constexpr int kMaxTicks = 60 * 3600;  // an hour
+constexpr double kNearWidth = 0.005;  // metres of radius
+constexpr int kWalksOfWorld = 25;     // then doors and lifts are again as in the file
 
 struct Effort {
   int pairs = 10'000;
-  int compared = 1000;  ///< pairs per kind that are compared with a flood fill
-  int lengths = 100;    ///< pairs of which lengths are compared
-  std::string only;     ///< part; "": all
+  int compared = 1000;             ///< pairs per kind that are compared with a flood fill
+  int lengths = 100;               ///< pairs of which lengths are compared
+  std::size_t places = 4'000'000;  ///< limit of a flood fill: 1,600 square metres
+  std::string only;                ///< part; "": all
 };
 
 struct Bench {
@@ -116,10 +116,10 @@ struct Walked {
 
 /// The ways of an order Go: all that there are, and in a sixth of them the avatar may fall by up to
 /// 2 m; or walks alone, through doors as they are.
-enum class Ways : std::uint8_t { all, walks };
+enum class GoKind : std::uint8_t { all, walks };
 
 Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const Vec3& to,
-          Ways ways) {
+          GoKind kind) {
   const std::string name = "walker" + std::to_string(number);
   scene::Spawn spawn;
   spawn.position = from;
@@ -127,10 +127,10 @@ Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const
   v1::Command command;
   command.set_avatar(name);
   *command.mutable_go()->mutable_to()->mutable_point() = server::toProto(to);
-  command.mutable_go()->set_doors(ways == Ways::all ? v1::NavigationQuery::DOORS_OPEN
-                                                    : v1::NavigationQuery::DOORS_AS_THEY_ARE);
-  command.mutable_go()->set_lifts(ways == Ways::all);
-  if (ways == Ways::all && number % 6 == 0) command.mutable_go()->set_max_drop(2);
+  command.mutable_go()->set_doors(kind == GoKind::all ? v1::NavigationQuery::DOORS_OPEN
+                                                      : v1::NavigationQuery::DOORS_AS_THEY_ARE);
+  command.mutable_go()->set_lifts(kind == GoKind::all);
+  if (kind == GoKind::all && number % 6 == 0) command.mutable_go()->set_max_drop(2);
   Walked walked;
   const auto query = server::makePathQuery(world, command);
   const v1::NavigationReply reply = bench.ask(std::get<v1::NavigationQuery>(query), world);
@@ -177,7 +177,7 @@ void measureWalks(Bench& bench, const Effort& effort, nlohmann::json& row) {
   for (std::size_t i = 0; i < pairs; ++i) {
     if (i % kWalksOfWorld == 0 && (i == 0 || !bench.scene->model().bodies.empty()))
       world.emplace(bench.scene);
-    const Walked walked = go(bench, *world, static_cast<int>(i), starts[i], goals[i], Ways::all);
+    const Walked walked = go(bench, *world, static_cast<int>(i), starts[i], goals[i], GoKind::all);
     penetration = std::max(penetration, walked.penetration);
     counts["without_reason"] += !walked.isFound && walked.text.size() < 10 ? 1 : 0;
     if (walked.isRefused || !walked.isFound) {
@@ -312,13 +312,13 @@ void comparePair(Bench& bench, const FloodFill& fill, const Vec3& from, const Ve
 /// get up: an avatar that walks the path decides, or the fill of the start alone, by walks. A pair
 /// is near if a thinner avatar passes where a path was found, or a wider one does not where none
 /// was. It is also near if two shifted grids differ.
-void judge(Bench& bench, const std::vector<Vec3>& places,
+void judge(Bench& bench, const std::vector<Vec3>& places, std::size_t maxPlaces,
            const std::vector<Disagreement>& disagreements, Comparison& result) {
   std::array<std::optional<FloodFill>, 2> others;  // for thinner avatars, and for wider ones
   for (const auto& [from, to, isFound, reason] : disagreements) {
     if (isFound) {
       scene::World world(bench.scene);
-      const Walked walked = go(bench, world, 0, from, to, Ways::walks);
+      const Walked walked = go(bench, world, 0, from, to, GoKind::walks);
       if (walked.isArrived && walked.penetration == 0) {
         ++result.walked;
         continue;
@@ -328,7 +328,7 @@ void judge(Bench& bench, const std::vector<Vec3>& places,
     scene::NavigationAgent agent;
     agent.radius += isFound ? -kNearWidth : kNearWidth;
     auto& other = others[isFound ? 0 : 1];
-    if (!other) other.emplace(bench.atRest.data(), agent, places, kMaxPlaces);
+    if (!other) other.emplace(bench.atRest.data(), agent, places, maxPlaces);
     scene::Walker walker(bench.atRest.data(), agent);
     const auto stands = [&](const Vec3& place) {
       return scene::standAt(walker, place, scene::kMaxStandDrop).has_value();
@@ -342,10 +342,10 @@ void judge(Bench& bench, const std::vector<Vec3>& places,
     bool isCutOff = false;
     for (const double shift : {0.0, 0.5 * FloodFill::kSpacing}) {
       const auto onward =
-          FloodFill::fillByWalks(bench.atRest.data(), {}, from, kMaxPlaces, to, shift);
+          FloodFill::fillByWalks(bench.atRest.data(), {}, from, maxPlaces, to, shift);
       const bool isReached = onward.findComponent(to).has_value();
       reached += isReached ? 1 : 0;
-      isCutOff |= !isReached && onward.size() >= kMaxPlaces;
+      isCutOff |= !isReached && onward.size() >= maxPlaces;
     }
     if (isCutOff) {
       --result.compared, ++result.skipped;
@@ -394,7 +394,10 @@ std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& w
 
 void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   const std::vector<Vec3> places = drawAnywhere(bench, effort.compared);
-  const FloodFill fill(bench.atRest.data(), {}, places, kMaxPlaces);
+  const auto start = Clock::now();
+  const FloodFill fill(bench.atRest.data(), {}, places, effort.places);
+  std::printf("  %zu places filled in %.0f s\n", fill.size(), secondsSince(start));
+  std::fflush(stdout);
   std::mt19937_64 random(7);
   const auto drawIndex = [&](std::size_t count) {
     return static_cast<std::size_t>(random() % count);
@@ -436,7 +439,7 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
                   from.x(), from.y(), from.z(), to.x(), to.y(), to.z(), ratios.back(),
                   feetRatios.back());
   }
-  judge(bench, places, disagreements, result);
+  judge(bench, places, effort.places, disagreements, result);
   row["fill_places"] = fill.size();
   row["reach_compared"] = result.compared;
   row["reach_skipped"] = result.skipped;
@@ -499,9 +502,11 @@ int main(int argc, char** argv) {
   for (int i = 1; i < argc; ++i) {
     const std::string argument = argv[i];
     if (argument == "--quick") {
-      effort = {200, 100, 20, effort.only};
+      effort = {200, 100, 20, effort.places, effort.only};
     } else if (argument == "--pairs" && i + 1 < argc) {
       effort.pairs = std::atoi(argv[++i]);
+    } else if (argument == "--places" && i + 1 < argc) {
+      effort.places = std::strtoull(argv[++i], nullptr, 10);
     } else if (argument == "--only" && i + 1 < argc) {
       effort.only = argv[++i];
       isUsed =
@@ -514,8 +519,8 @@ int main(int argc, char** argv) {
   }
   if (scenes.empty() || !isUsed) {
     std::fprintf(stderr,
-                 "usage: %s [--quick] [--pairs N] [--only times|fill|walks] [--out FILE] "
-                 "SCENE[@METRES_PER_UNIT]..\n",
+                 "usage: %s [--quick] [--pairs N] [--places N] [--only times|fill|walks] "
+                 "[--out FILE] SCENE[@METRES_PER_UNIT]..\n",
                  argv[0]);
     return 2;
   }

@@ -54,7 +54,7 @@ scene::Model loadNamedModel(const std::filesystem::path& file) {
   const std::string name = file.string();
   const std::size_t colon = name.find(':');
   if (colon == std::string::npos)
-    return scene::loadModel(file, {}, scene::modelCacheFromEnvironment()).model;
+    return scene::loadModel(file, {}, scene::findDefaultModelCache()).model;
   const std::string kind = name.substr(0, colon);
   const std::size_t number = std::stoul(name.substr(colon + 1));
   if (const tests::DenseScene* dense = tests::findDenseScene(kind)) return dense->make(number);

@@ -550,7 +550,7 @@ class DoorsTest(unittest.TestCase):
         ann.leave()
         bob = client.spawn("bob", at=(-3, 0, 0))  # the door stands open now
         self.assertEqual(client.navigation(doors="open").path((0.5, 0, 1), (-3, 0, 0)).legs[0].kind, "walk")
-        with self.assertRaisesRegex(enfilade.ServerError, "opens_from is 2; there are 1 way points"):
+        with self.assertRaisesRegex(enfilade.ServerError, "opens_from is 2; there are 1 waypoints"):
             bob.walk((-2, 0, 0), opens=["door"], opens_from=2)
 
     def test_a_door_that_opens_over_the_only_place_is_the_reason(self):

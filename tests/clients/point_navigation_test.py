@@ -193,6 +193,25 @@ class PointNavigation(RoomCase):
         with self.assertRaisesRegex(enfilade.EnfiladeError, "'far': no path leads"):
             env.reset(seed=1)
 
+    def test_an_episode_that_is_not_drawn_leaves_the_other_environments_usable(self):
+        vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=2, starts="anywhere", goals="anywhere",
+                                        channels=())
+        self.addCleanup(vector.close)
+        vector.envs[1].min_distance = 1000
+        with self.assertWarnsRegex(UserWarning, "^environment 1: no path of 1000 to inf m was found"):
+            _, infos = vector.reset(seed=1)
+        self.assertEqual(list(infos["tick"]), [1, None])
+        with self.assertWarnsRegex(UserWarning, "^environment 1: no path"):
+            _, _, _, truncated, infos = vector.step(np.zeros((2, 2)))
+        self.assertEqual((list(infos["tick"]), list(truncated)), ([7, None], [False, True]))
+        vector.envs[1].min_distance = 1
+        *_, infos = vector.step(np.zeros((2, 2)))
+        self.assertEqual(list(infos["tick"]), [13, 1])
+        for env in vector.envs:
+            env.min_distance = 1000
+        with self.assertRaisesRegex(enfilade.EpisodeNotFound, "^environment 0: no path"):
+            vector.reset(seed=1)
+
     def test_after_a_reset_that_failed_on_its_options_no_step_counts(self):
         env = self.environment(starts=[(2, 0, 0, 0)], goals=[(4, 0, 0)])
         for options in ({"starts": (0, 0, 0)}, {"goal": (0, 0)}, {"start": 5}, {"goal": (1000, 0, 0)}):

@@ -383,7 +383,7 @@ class Servers(RoomCase):
         self.assertEqual(caught.exception.code, "ERROR_SHUTTING_DOWN")
 
     def test_a_program_that_is_no_server_is_reported(self):
-        with self.assertRaisesRegex(enfilade.StartFailed, "no Enfilade server"):
+        with self.assertRaisesRegex(enfilade.StartFailed, "is not an Enfilade server"):
             enfilade.serve(self.scene, program="/bin/echo")
 
     def test_the_build_of_the_current_folder_is_found(self):

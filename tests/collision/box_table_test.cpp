@@ -6,6 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <string>
+#include <vector>
 
 #include "tests/collision/checked_sweep.hpp"
 
@@ -22,9 +24,23 @@ IdPairs sorted(IdPairs pairs) {
   return pairs;
 }
 
+/// With scalar comparisons, and in wide registers.
+class BoxTables : public ::testing::TestWithParam<bool> {
+ protected:
+  void SetUp() override {
+    if (GetParam() && !hasAvx())
+      GTEST_SKIP() << "this processor has no AVX: only the scalar path is compared";
+  }
+  static std::size_t checkPairs(const std::vector<Aabb>& boxes, const Aabb& query);
+};
+
+INSTANTIATE_TEST_SUITE_P(By, BoxTables, ::testing::Bool(), [](const auto& useAvx) {
+  return std::string(useAvx.param ? "Avx" : "Scalars");
+});
+
 /// Compares all pairs of the table, and those of one more box, with brute force. Returns the number
 /// of pairs.
-std::size_t checkPairs(const std::vector<Aabb>& boxes, const Aabb& query) {
+std::size_t BoxTables::checkPairs(const std::vector<Aabb>& boxes, const Aabb& query) {
   std::vector<SignedBounds> maxEndpoints;
   for (const Aabb& box : boxes) maxEndpoints.push_back(toMaxEndpoints(box));
   std::vector<Id> ids(boxes.size());
@@ -36,20 +52,18 @@ std::size_t checkPairs(const std::vector<Aabb>& boxes, const Aabb& query) {
       if (overlaps(boxes[a], boxes[b])) expected.emplace_back(a, b);
     if (overlaps(boxes[a], query)) expectedByQuery.emplace_back(a, kQuery);
   }
-  for (const bool useAvx : {false, hasAvx()}) {
-    BoxTable table;
-    table.useAvx = useAvx;
-    table.build(maxEndpoints, ids);
-    IdPairs found, foundByQuery;
-    table.findPairs(found);
-    table.findOverlaps(toMaxEndpoints(query), kQuery, foundByQuery);
-    EXPECT_EQ(sorted(found), expected) << useAvx;
-    EXPECT_EQ(sorted(foundByQuery), expectedByQuery) << useAvx;
-  }
+  BoxTable table;
+  table.useAvx = GetParam();
+  table.build(maxEndpoints, ids);
+  IdPairs found, foundByQuery;
+  table.findPairs(found);
+  table.findOverlaps(toMaxEndpoints(query), kQuery, foundByQuery);
+  EXPECT_EQ(sorted(found), expected);
+  EXPECT_EQ(sorted(foundByQuery), expectedByQuery);
   return expected.size();
 }
 
-TEST(BoxTable, FindsThePairsOfEqualBoxesInAnyDensity) {
+TEST_P(BoxTables, FindsThePairsOfEqualBoxesInAnyDensity) {
   Random random(1);
   for (const double width : {0.5, 3.0, 10.0, 40.0, 4000.0}) {
     std::vector<Aabb> boxes;
@@ -60,7 +74,7 @@ TEST(BoxTable, FindsThePairsOfEqualBoxesInAnyDensity) {
   }
 }
 
-TEST(BoxTable, FindsThePairsOfBoxesOfAllSizesAndPlaces) {
+TEST_P(BoxTables, FindsThePairsOfBoxesOfAllSizesAndPlaces) {
   Random random(2);
   std::size_t pairs = 0;
   for (int round = 0; round < 40; ++round) {
@@ -77,7 +91,7 @@ TEST(BoxTable, FindsThePairsOfBoxesOfAllSizesAndPlaces) {
   EXPECT_GT(pairs, 10000u);
 }
 
-TEST(BoxTable, FindsThePairsOfFewLargeBoxesAmongManySmallOnes) {
+TEST_P(BoxTables, FindsThePairsOfFewLargeBoxesAmongManySmallOnes) {
   Random random(3);
   std::vector<Aabb> boxes;
   for (int k = 0; k < 600; ++k)
@@ -87,7 +101,7 @@ TEST(BoxTable, FindsThePairsOfFewLargeBoxesAmongManySmallOnes) {
   EXPECT_GT(checkPairs(boxes, boxAt(Vec3::Constant(-1e9), Vec3::Constant(2e9))), 600u);
 }
 
-TEST(BoxTable, BoxesThatTouchOverlapAndThoseApartByOneRoundingDoNot) {
+TEST_P(BoxTables, BoxesThatTouchOverlapAndThoseApartByOneRoundingDoNot) {
   Random random(4);
   for (const double centre : {0.0, 0.1, -7.3, 1e6 / 3, -1e12 / 7}) {
     std::vector<Aabb> boxes;
@@ -107,7 +121,7 @@ TEST(BoxTable, BoxesThatTouchOverlapAndThoseApartByOneRoundingDoNot) {
   }
 }
 
-TEST(BoxTable, RoundingNeverPutsBoxesThatTouchTwoCellsApart) {
+TEST_P(BoxTables, RoundingNeverPutsBoxesThatTouchTwoCellsApart) {
   // Boxes as large as a cell, whose corners lie on both sides of the cells' borders: without slack
   // in the cell size, the product with its inverse would be rounded down for one and up for the
   // other.
@@ -128,7 +142,7 @@ TEST(BoxTable, RoundingNeverPutsBoxesThatTouchTwoCellsApart) {
   }
 }
 
-TEST(BoxTable, AcceptsPointsHugeCoordinatesAndDistantClusters) {
+TEST_P(BoxTables, AcceptsPointsHugeCoordinatesAndDistantClusters) {
   Random random(5);
   std::vector<Aabb> boxes;
   for (const double centre : {-1e300, -1e15, 0.0, 5e-324, 1e9, 1.7e308})
@@ -142,7 +156,7 @@ TEST(BoxTable, AcceptsPointsHugeCoordinatesAndDistantClusters) {
   EXPECT_GT(checkPairs(boxes, boxAt(Vec3::Constant(1e9), Vec3::Zero())), 100u);
 }
 
-TEST(BoxTable, FindsThePairsOfBoxesOfHundredsOfSizes) {
+TEST_P(BoxTables, FindsThePairsOfBoxesOfHundredsOfSizes) {
   std::vector<Aabb> boxes;  // no two have sizes of one level
   for (int k = -150; k < 150; ++k)
     boxes.push_back(boxAt(Vec3::Zero(), Vec3::Constant(std::ldexp(1.0, 2 * k))));
@@ -154,7 +168,7 @@ TEST(BoxTable, FindsThePairsOfBoxesOfHundredsOfSizes) {
   EXPECT_GT(checkPairs(boxes, boxes[299]), 40000u);
 }
 
-TEST(BoxTable, FindsNothingInAnEmptyTable) {
+TEST_P(BoxTables, FindsNothingInAnEmptyTable) {
   EXPECT_EQ(checkPairs({}, boxAt(Vec3::Zero(), Vec3::Ones())), 0u);
   EXPECT_EQ(checkPairs({boxAt(Vec3::Zero(), Vec3::Ones())}, boxAt(Vec3::Ones(), Vec3::Ones())), 0u);
 }

@@ -108,7 +108,7 @@ inline void CheckedSweep::updateAndCheck() {
 }
 
 inline void CheckedSweep::checkOverlaps(const Pairs& expected) {
-  std::map<ProxyId, std::vector<SortAndSweep::Overlap>> expectedOverlaps;
+  std::map<ProxyId, std::vector<ProxyOverlap>> expectedOverlaps;
   for (const ProxyPair& pair : expected) {
     expectedOverlaps[pair.proxy].push_back({pair.other, pair.otherIsDynamic});
     if (pair.otherIsDynamic) expectedOverlaps[pair.other].push_back({pair.proxy, true});

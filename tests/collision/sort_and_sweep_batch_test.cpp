@@ -2,6 +2,10 @@
 // same pairs and changes as by brute force, and a return to the endpoint lists.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
 #include "tests/collision/checked_sweep.hpp"
 
 namespace enfilade::collision {
@@ -27,12 +31,46 @@ class BatchedSweep : public ::testing::Test {
     ASSERT_NO_FATAL_FAILURE(checked_.updateAndCheck());
     batched_ = checked_.sweep().counters().batched;
   }
+  void expectTheAuditFindsInjectedFaults(ProxyId first);
 
   Random random_{7};
   CheckedSweep checked_{makeFurnishedHall(random_, 60, Vec3::Constant(10))};
   std::vector<ProxyId> ids_;
   std::uint64_t batched_ = 0;  ///< of the last update
 };
+
+/// The audit accepts the sweep, and finds faults injected at a pair of proxies from `first` on.
+void BatchedSweep::expectTheAuditFindsInjectedFaults(ProxyId first) {
+  const SortAndSweep& sweep = checked_.sweep();
+  std::vector<std::pair<ProxyId, Aabb>> boxes(checked_.dynamicBoxes().begin(),
+                                              checked_.dynamicBoxes().end());
+  const auto audit = [&] { return compareWithBruteForce(sweep, checked_.staticBoxes(), boxes); };
+  const BroadPhaseAudit untouched = audit();
+  EXPECT_GT(untouched.pairs, 0u);
+  EXPECT_EQ(untouched.pairs, sweep.pairCount());
+  EXPECT_TRUE(untouched.missed.empty() && untouched.extra.empty());
+
+  // The audit receives boxes that the sweep did not: the state of the sweep is then wrong.
+  const auto found = std::ranges::find_if(boxes, [&](const auto& proxy) {
+    const auto dynamicOverlaps = sweep.getDynamicOverlaps(proxy.first);
+    return proxy.first >= first && !dynamicOverlaps.empty() && dynamicOverlaps.back().id >= first;
+  });
+  ASSERT_NE(found, boxes.end());
+  const auto [id, box] = *found;
+  const std::size_t overlapCount = sweep.getOverlaps(id).size();
+  found->second = boxAt(Vec3::Constant(1e6), Vec3::Ones());
+  const BroadPhaseAudit gone = audit();
+  EXPECT_EQ(gone.extra.size(), overlapCount);
+  EXPECT_TRUE(std::ranges::any_of(gone.extra, &ProxyPair::otherIsDynamic));
+  EXPECT_TRUE(gone.missed.empty());
+  found->second = box;
+  const ProxyId unknown = boxes.back().first + 1;
+  boxes.emplace_back(unknown, box);
+  const BroadPhaseAudit come = audit();
+  EXPECT_EQ(come.missed.size(), overlapCount + 1) << "the proxy itself, and what it overlaps";
+  EXPECT_EQ(std::ranges::count(come.missed, ProxyPair{id, unknown, true}), 1);
+  EXPECT_TRUE(come.extra.empty());
+}
 
 TEST_F(BatchedSweep, EqualsBruteForceWhileAllProxiesMoveFast) {
   insertAll();
@@ -145,6 +183,29 @@ TEST_F(BatchedSweep, LeavesTheBatchWhenMostProxiesAreRemoved) {
     updateAndCheck();
   }
   EXPECT_EQ(batched_, 0u);
+}
+
+TEST_F(BatchedSweep, TheAuditAcceptsABatchAndFindsEachInjectedFault) {
+  insertAll();
+  for (int tick = 0; tick < 5; ++tick) {
+    for (const ProxyId id : ids_) shift(id, 0.4);
+    updateAndCheck();
+    if (HasFatalFailure()) return;
+  }
+  ASSERT_EQ(batched_, static_cast<std::uint64_t>(kProxies));
+  expectTheAuditFindsInjectedFaults(0);
+}
+
+TEST_F(BatchedSweep, TheAuditFindsFaultsOfProxiesThatRest) {
+  insertAll();
+  constexpr std::size_t kMoving = 100;
+  for (int tick = 0; tick < 100; ++tick) {
+    for (std::size_t k = 0; k < kMoving; ++k) shift(ids_[k], 0.4);
+    updateAndCheck();
+    if (HasFatalFailure()) return;
+  }
+  ASSERT_EQ(batched_, kMoving);
+  expectTheAuditFindsInjectedFaults(ids_[kMoving]);
 }
 
 TEST_F(BatchedSweep, AnIdleBatchDoesNothing) {

@@ -470,7 +470,7 @@ TEST(SortAndSweep, UsesFewBytesInAdditionToTheBoxes) {
   Random random(13);
   const SortAndSweep sweep(makeFurnishedHall(random, 50000, Vec3(150, 3, 150)));
   EXPECT_GT(sweep.staticOverheadBytes(), 50000u * 16) << "at least one cell entry per box";
-  EXPECT_LT(sweep.staticOverheadBytes(), 50000u * 64);
+  EXPECT_LT(sweep.staticOverheadBytes(), 50000u * 40);
 }
 
 TEST(SortAndSweep, ResultsDoNotDependOnTheOrderOfTheStaticBoxes) {

@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "render/camera_basis.hpp"
+#include "render/camera.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::render {

@@ -9,7 +9,6 @@
 #include <limits>
 #include <random>
 
-#include "render/camera_basis.hpp"
 #include "render/culling/box_visibility.hpp"
 
 namespace enfilade::render {

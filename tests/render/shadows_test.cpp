@@ -17,7 +17,7 @@ enum class Sun : std::uint8_t { reaches, kept, undecided };
 
 /// Whether the line from `start` towards the sun intersects the box deflated by `inwards`.
 bool passes(const PlacedBox& box, const Vec3& start, double inwards, double end) {
-  const Vec3 sun = sunDirection();
+  const Vec3 sun = computeSunDirection();
   const Vec3 half = box.size.cwiseAbs() / 2 - Vec3::Constant(inwards);
   double from = 0, to = end;
   for (int axis = 0; axis < 3; ++axis) {
@@ -64,7 +64,7 @@ FrameOptions withShadows(bool shadows = true) {
 /// Faces turned away from the sun are dark with or without other occluders.
 bool turnedToTheSun(const Frame& frame, std::size_t pixel) {
   const float* n = &frame.normals[3 * pixel];
-  return Eigen::Vector3f(n[0], n[1], n[2]).cast<double>().dot(sunDirection()) > 0.05;
+  return Eigen::Vector3f(n[0], n[1], n[2]).cast<double>().dot(computeSunDirection()) > 0.05;
 }
 
 class Shadows : public testing::TestWithParam<RendererKind> {};
@@ -88,7 +88,7 @@ TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
         const std::size_t pixel = at(shaded, x, y);
         const auto z = static_cast<double>(shaded.depth[pixel]);
         if (std::isnan(z) || !turnedToTheSun(shaded, pixel)) continue;
-        const double up = sunDirection().dot(rays.forward);
+        const double up = computeSunDirection().dot(rays.forward);
         const double end = parallel ? ((up < 0 ? camera.near : camera.far) - z) / up
                                     : std::numeric_limits<double>::infinity();
         const Vec3 point = rays.eye + rays.originAt(x, y) + z * rays.directionAt(x, y);
@@ -143,7 +143,7 @@ TEST_P(Shadows, HolesOfTexturesLetTheSunThrough) {
   RendererSelector renderer(std::make_shared<const scene::Scene>(std::move(model)), GetParam());
   // Projects a point of the square along the sun's ray to the floor.
   const auto darker = [&](double x) {
-    const Vec3 below = Vec3(x, 0, -2) - 1.5 / sunDirection().y() * sunDirection();
+    const Vec3 below = Vec3(x, 0, -2) - 1.5 / computeSunDirection().y() * computeSunDirection();
     Camera camera;
     camera.eye = below + Vec3(0, 0.5, -0.5);
     camera.forward = below - camera.eye;

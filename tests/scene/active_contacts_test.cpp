@@ -12,8 +12,8 @@ namespace enfilade::scene {
 namespace {
 
 using namespace testing;
-using Kind = ContactEvent::Kind;
-using Living = std::set<std::tuple<EntityId, EntityId, Kind>>;
+using Event = ContactEvent::Kind;
+using Living = std::set<std::tuple<EntityId, EntityId, Event>>;
 
 /// A wall, a volume, and a tower of boxes with an avatar that walks into it.
 std::shared_ptr<const Scene> towerRoom() {
@@ -31,10 +31,10 @@ std::shared_ptr<const Scene> towerRoom() {
 /// Applies begin and end events: keeps the contacts that began and did not end.
 void follow(Living& living, const std::vector<ContactEvent>& events) {
   for (const ContactEvent& event : events) {
-    if (event.kind == Kind::begin || event.kind == Kind::enter)
+    if (event.kind == Event::begin || event.kind == Event::enter)
       living.insert({event.a, event.b, event.kind});
-    if (event.kind == Kind::end) living.erase({event.a, event.b, Kind::begin});
-    if (event.kind == Kind::leave) living.erase({event.a, event.b, Kind::enter});
+    if (event.kind == Event::end) living.erase({event.a, event.b, Event::begin});
+    if (event.kind == Event::leave) living.erase({event.a, event.b, Event::enter});
   }
 }
 
@@ -53,8 +53,8 @@ TEST(ActiveContacts, AreTheReportedBeginsWithoutAnEnd) {
     Living living;
     for (const ContactEvent& event : collectActiveContacts(world)) {
       EXPECT_TRUE(living.insert({event.a, event.b, event.kind}).second);
-      entered += event.kind == Kind::enter ? 1 : 0;
-      betweenBodies += event.kind == Kind::begin && event.a <= 6 ? 1 : 0;
+      entered += event.kind == Event::enter ? 1 : 0;
+      betweenBodies += event.kind == Event::begin && event.a <= 6 ? 1 : 0;
     }
     ended += followed.size() < before ? 1 : 0;
     ASSERT_EQ(living, followed) << "tick " << tick;

@@ -16,7 +16,7 @@ namespace enfilade::scene {
 namespace {
 
 using namespace testing;
-using Kind = AuditFinding::Kind;
+using Finding = AuditFinding::Kind;
 
 const NamedBox kWall{"wall", {3, 0, -2}, {3.2, 3, 2}};
 
@@ -105,7 +105,7 @@ TEST(Audit, NamesThePairOfAWithheldStaticBox) {
   ASSERT_TRUE(report.audit);
   ASSERT_EQ(report.audit->findings.size(), 1u);
   const AuditFinding& finding = report.audit->findings[0];
-  EXPECT_EQ(finding.kind, Kind::missed);
+  EXPECT_EQ(finding.kind, Finding::missed);
   EXPECT_EQ(findEntityName(world, finding.entity), "a0");
   EXPECT_EQ(findEntityName(world, finding.other), "floor");
   EXPECT_TRUE(overlaps(finding.entityBox, finding.otherBox));
@@ -119,7 +119,7 @@ TEST(Audit, NamesThePairThatIsHeldWithoutAnOverlap) {
   const TickReport report = tickWorld(world);
   ASSERT_TRUE(report.audit);
   ASSERT_EQ(report.audit->findings.size(), 1u);
-  EXPECT_EQ(report.audit->findings[0].kind, Kind::extra);
+  EXPECT_EQ(report.audit->findings[0].kind, Finding::extra);
   EXPECT_EQ(findEntityName(world, report.audit->findings[0].other), "wall");
 }
 
@@ -131,13 +131,13 @@ TEST(Audit, AProxyMovedWithoutTheBroadPhaseIsFound) {
   const Vec3 away =
       Vec3(3, 1, 0) - avatar.footPosition;  // into the wall, off the floor, away from a0
   avatar.motionBounds = {avatar.motionBounds.min + away, avatar.motionBounds.max + away};
-  std::set<std::pair<Kind, std::string>> found;
+  std::set<std::pair<Finding, std::string>> found;
   for (const AuditFinding& finding : auditTick(state).findings) {
     const EntityId other = finding.entity == avatar.id ? finding.other : finding.entity;
     found.insert({finding.kind, findEntityName(world, other)});
   }
-  EXPECT_TRUE(found.contains({Kind::missed, "wall"}));
-  EXPECT_TRUE(found.contains({Kind::extra, "floor"}));
+  EXPECT_TRUE(found.contains({Finding::missed, "wall"}));
+  EXPECT_TRUE(found.contains({Finding::extra, "floor"}));
 }
 
 TEST(Audit, WhereItWouldTakeTooLongTheAvatarsTakeTurns) {

@@ -3,9 +3,11 @@
 
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "scene/model/box_mesh.hpp"
+#include "scene/model/shapes/shape.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::scene::testing {
@@ -26,6 +28,18 @@ inline std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
 /// Twelve triangles, wound outward.
 inline Mesh boxMesh(const Vec3& min, const Vec3& max) {
   return makeBoxMesh({min, max});
+}
+
+/// The same surface, wound the other way round.
+inline Mesh insideOut(Mesh mesh) {
+  for (std::size_t i = 0; i < mesh.indices.size(); i += 3)
+    std::swap(mesh.indices[i + 1], mesh.indices[i + 2]);
+  return mesh;
+}
+
+inline Shape shapeOfOne(const Mesh& mesh) {
+  const std::uint32_t first = 0;
+  return buildShape({&mesh, 1}, {&first, 1});
 }
 
 inline Model boxModel(const std::vector<NamedBox>& boxes) {

@@ -7,7 +7,7 @@
 
 #include "collision/narrow_phase/refine.hpp"
 #include "scene/world/active_contacts.hpp"
-#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/contact_events.hpp"
 
 namespace enfilade::scene::testing {
 

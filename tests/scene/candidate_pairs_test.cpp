@@ -1,4 +1,5 @@
-// Compares the candidate pairs of concave bodies with the double loop over their parts.
+// Compares the candidate pairs of concave bodies with the double loop over their parts: with one
+// another, with a static mesh, and with a kinematic body.
 #include "scene/world/bodies/candidate_pairs.hpp"
 
 #include <gtest/gtest.h>
@@ -81,6 +82,75 @@ TEST(CandidatePairs, OfTumblingConcaveBodiesEqualTheDoubleLoop) {
   }
   EXPECT_GT(pairs, 200u);
   EXPECT_GT(withFront, 20u);
+}
+
+/// A sheet of waves below a tumbling comb, and a second comb that slides past it on a path.
+Model combOverWaves() {
+  std::vector<NamedBox> boxes = comb("a", {0, 0.35, 0});
+  for (const NamedBox& box : comb("b", {1.4, 0.4, 0.1})) boxes.push_back(box);
+  boxes.push_back(floorBox());
+  Model model = boxModel(boxes);
+  Mesh& waves = model.meshes.back();
+  waves = {};
+  constexpr std::uint32_t kSide = 40;
+  for (std::uint32_t i = 0; i <= kSide; ++i)
+    for (std::uint32_t k = 0; k <= kSide; ++k)
+      waves.positions.emplace_back(0.1 * i - 1, (i + k) % 2 == 0 ? 0.1 : 0.0, 0.1 * k - 2);
+  for (std::uint32_t i = 0; i < kSide; ++i)
+    for (std::uint32_t k = 0; k < kSide; ++k) {
+      const std::uint32_t at = i * (kSide + 1) + k, next = at + kSide + 1;
+      for (const std::uint32_t corner : {at, at + 1, next, next, at + 1, next + 1})
+        waves.indices.push_back(corner);
+    }
+  std::vector<std::uint32_t> falling, sliding;
+  for (std::uint32_t i = 0; i < kParts; ++i) falling.push_back(i), sliding.push_back(kParts + i);
+  model.bodies.push_back(bodySpec("a", BodyKind::rigid, falling));
+  model.bodies.back().angularVelocity = Vec3(0.5, 2, 3);
+  model.bodies.push_back(bodySpec("b", BodyKind::path, sliding));
+  model.bodies.back().loops = true;
+  model.bodies.back().keys = {{0, Vec3::Zero(), 0}, {1, Vec3(-1.2, 0, 0), 0}, {2, Vec3::Zero(), 0}};
+  return model;
+}
+
+TEST(CandidatePairs, WithAMeshAndWithAKinematicBodyEqualTheDoubleLoop) {
+  BodyFixture t(combOverWaves());
+  WorldData& world = t.world.data();
+  const std::uint32_t waves = 2 * kParts;  // the object
+  const CollisionGeometry& mesh = world.scene->collisionGeometry(waves);
+  const double margin = computeContactQueryMargin(world.settings);
+  std::size_t meshPairs = 0, kinematicPairs = 0, fronts = 0;
+  for (int tick = 0; tick < 60; ++tick) {  // then it is asleep
+    t.step();
+    const auto found = collectNextPairs(world);
+    const Body &falling = world.bodies[0], &sliding = world.bodies[1];
+    const auto& physics = world.dynamicBodies.physicsWorld.bodies;
+    std::vector<PartPairKey> expectedMesh, expectedKinematic, withMesh, withKinematic;
+    for (const PartPairKey& key : found) {
+      const EntityId other = world.dynamicBodies.entities[key.b];
+      if (other == waves + 1) withMesh.push_back({0, 0, key.partA, key.partB});
+      if (other == sliding.id) withKinematic.push_back({0, 0, key.partA, key.partB});
+    }
+    for (std::uint32_t part = 0; part < kParts; ++part) {
+      const Aabb box = inflated(getPartBox(falling, part), margin + physics[0].maxStepDisplacement);
+      for (std::uint32_t i = 0; i < mesh.size(); ++i)
+        if (overlaps(mesh.box(i), falling.motionBounds) && overlaps(mesh.box(i), box))
+          expectedMesh.push_back({0, 0, part, i});
+      if (!overlaps(falling.motionBounds, sliding.motionBounds)) continue;
+      for (std::uint32_t i = 0; i < kParts; ++i)
+        if (overlaps(inflated(getPartBox(sliding, i),
+                              margin + 2 * sliding.kinematicTarget.maxDisplacement),
+                     box))
+          expectedKinematic.push_back({0, 0, part, i});
+    }
+    ASSERT_EQ(withMesh, expectedMesh) << "tick " << tick;
+    ASSERT_EQ(withKinematic, expectedKinematic) << "tick " << tick;
+    meshPairs += withMesh.size();
+    kinematicPairs += withKinematic.size();
+    fronts += world.dynamicBodies.partFronts[0].size();
+  }
+  EXPECT_GT(fronts, 20u);
+  EXPECT_GT(meshPairs, 500u);
+  EXPECT_GT(kinematicPairs, 50u);
 }
 
 }  // namespace

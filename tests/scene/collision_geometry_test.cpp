@@ -14,6 +14,8 @@ namespace enfilade::scene {
 namespace {
 
 using testing::boxMesh;
+using testing::insideOut;
+using testing::shapeOfOne;
 
 Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
   std::uniform_real_distribution<double> number(-1, 1);
@@ -23,17 +25,6 @@ Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
   }
   if ((placed.linear().determinant() < 0) != mirror) placed.linear().col(0) *= -1;
   return placed;
-}
-
-Shape shapeOfOne(const Mesh& mesh) {
-  const std::uint32_t first = 0;
-  return buildShape({&mesh, 1}, {&first, 1});
-}
-
-Mesh insideOut(Mesh mesh) {
-  for (std::size_t i = 0; i < mesh.indices.size(); i += 3)
-    std::swap(mesh.indices[i + 1], mesh.indices[i + 2]);
-  return mesh;
 }
 
 TEST(CollisionGeometry, AHullHoldsEveryCornerOfItsSurfaceHoweverItIsPlaced) {

@@ -160,7 +160,7 @@ TEST(Crowd, TwoHundredAvatarsLeaveByOneDoorAndNobodyIsStuck) {
   EXPECT_LT(hall.reversals, 200 * 12);
 }
 
-/// The way points of shortest paths touch the posts, and lead in from both sides, so that the crowd
+/// The waypoints of shortest paths touch the posts, and lead in from both sides, so that the crowd
 /// forms an arch.
 TEST(Crowd, AvatarsOnShortestPathsLeaveByOneDoorAndNobodyIsStuck) {
   for (const int avatars : {20, 200}) {

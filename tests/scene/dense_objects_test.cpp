@@ -1,5 +1,6 @@
 // Avatars among static objects of many parts, whose parts are found by their trees.
 #include <chrono>
+#include <numbers>
 #include <thread>
 
 #include "tests/scene/brute_force_contacts.hpp"
@@ -135,6 +136,32 @@ TEST(DenseObjects, AWalkOnAFineFloorAsksAsLittleAsOnACoarseOne) {
     }
     EXPECT_GT(run.feet("ann").x(), 4.9);
     EXPECT_LT(queries / 120, 15u) << steps << " steps";
+  }
+}
+
+TEST(DenseObjects, PartsLookedAtAreThoseOfTheAvatarThatIsNearThem) {
+  Model model = boxModel({floorBox()});
+  model.meshes.push_back(fineFloor(60).meshes.front());
+  Eigen::Affine3d upright(Eigen::Translation3d(4, 0, -5));  // a wall at x = 4
+  upright.rotate(Eigen::AngleAxisd(0.5 * std::numbers::pi, Vec3::UnitZ()));
+  model.objects.push_back({"fine wall", "", {1}, upright});
+  WorldFixture run(std::make_shared<const Scene>(std::move(model)));
+  run.order("ann", Spawn{Vec3(3.5, 0.1, 0)});
+  run.order("ben", Spawn{Vec3(-6, 0.1, 0)});
+  run.ticks(30);
+  for (const char* name : {"ann", "ben"}) run.order(name, Drive{{1.5, 0, 0.3}});
+  run.ticks(30);
+  EXPECT_TRUE(run.touched("fine wall"));
+  for (int i = 0; i < 60; ++i) {
+    const TickReport report = run.step();
+    ASSERT_EQ(report.avatarWork.size(), 2u);
+    const AvatarWork &near = report.avatarWork[0], &far = report.avatarWork[1];
+    ASSERT_EQ(near.id, run.view("ann").id);
+    ASSERT_EQ(far.id, run.view("ben").id);
+    EXPECT_GT(far.partsLookedAt, 0u) << "of the floor, tick " << i;
+    EXPECT_GT(near.partsLookedAt, far.partsLookedAt) << "tick " << i;
+    EXPECT_EQ(near.partsLookedAt + far.partsLookedAt, report.partsLookedAt) << "tick " << i;
+    EXPECT_EQ(near.footPosition, run.feet("ann"));
   }
 }
 

@@ -30,7 +30,7 @@ Model importNodes(const std::string& roots, const std::string& nodes,
   return importModel(folder.write("hall.gltf", text));
 }
 
-std::string catchFailure(const std::string& extras) {
+std::string catchBodyFailure(const std::string& extras) {
   try {
     importNodes("0", R"({"name":"door","mesh":0,"extras":)" + extras + "}");
   } catch (const ImportError& error) {
@@ -87,12 +87,13 @@ TEST(Extras, MistakesNameTheFileTheNodeAndTheField) {
   const auto has = [](const std::string& text, const char* part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
-  has(catchFailure(R"({"walk_kind":"hinged","walk_axis":[0,0,0]})"),
+  has(catchBodyFailure(R"({"walk_kind":"hinged","walk_axis":[0,0,0]})"),
       "hall.gltf: node 'door': extras.walk_axis: has no direction");
-  has(catchFailure(R"({"walk_kind":"hinged","walk_axes":[0,1,0]})"), "known here are walk_anchor");
-  has(catchFailure(R"({"walk_kind":"revolving"})"), "extras.walk_kind: must be hinged");
-  has(catchFailure(R"({"walk_kind":"sliding"})"), "limits is missing");
-  has(catchFailure(R"({"walk_kind":"rigid","walk_mass":-1})"), "mass is -1");
+  has(catchBodyFailure(R"({"walk_kind":"hinged","walk_axes":[0,1,0]})"),
+      "known here are walk_anchor");
+  has(catchBodyFailure(R"({"walk_kind":"revolving"})"), "extras.walk_kind: must be hinged");
+  has(catchBodyFailure(R"({"walk_kind":"sliding"})"), "limits is missing");
+  has(catchBodyFailure(R"({"walk_kind":"rigid","walk_mass":-1})"), "mass is -1");
 }
 
 TEST(Extras, AClassMakesTheObjectsBelowOneThing) {

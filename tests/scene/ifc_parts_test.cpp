@@ -28,7 +28,7 @@ std::vector<std::uint32_t> listBodies(const StepFile& file) {
   return products;
 }
 
-std::string joinRanges(const StepFile& file, const IfcPart& part) {
+std::string joinRanges(const StepFile& file, const IfcFilePart& part) {
   std::string text;
   for (const TextRange& range : part.ranges) text += file.text().substr(range.first, range.size);
   return text;
@@ -48,7 +48,7 @@ TEST(IfcParts, AProductIsInOnePartWithAllThatItsShapeNeeds) {
   const StepFile file(house.text());
   const std::vector<std::uint32_t> products = listBodies(file);
   ASSERT_EQ(products, (std::vector<std::uint32_t>{120, 320, 604}));
-  const std::vector<IfcPart> parts = divideIfc(file, products, 2);
+  const std::vector<IfcFilePart> parts = divideIfc(file, products, 2);
   ASSERT_EQ(parts.size(), 2u);
   EXPECT_EQ(parts[0].products, (std::vector<std::uint32_t>{120}));
   EXPECT_EQ(parts[1].products, (std::vector<std::uint32_t>{320, 604})) << "the lighter part";
@@ -78,8 +78,8 @@ TEST(IfcParts, WhatOthersNeedIsInAllParts) {
         std::string("#610=IFCCONNECTIONSURFACEGEOMETRY(#601,$);\n")}) {
     house.more = rug + more;
     const StepFile file(house.text());
-    const std::vector<IfcPart> parts = divideIfc(file, listBodies(file), 2);
-    for (const IfcPart& part : parts) {
+    const std::vector<IfcFilePart> parts = divideIfc(file, listBodies(file), 2);
+    for (const IfcFilePart& part : parts) {
       const StepFile read(joinRanges(file, part));
       EXPECT_NE(read.find(600), nullptr);
       EXPECT_NE(read.find(601), nullptr);
@@ -96,7 +96,7 @@ TEST(IfcParts, WhatOthersNeedIsInAllParts) {
                   "2,$);\n";
   }
   const StepFile file(house.text());
-  const std::vector<IfcPart> parts = divideIfc(file, listBodies(file), 2);
+  const std::vector<IfcFilePart> parts = divideIfc(file, listBodies(file), 2);
   std::set<std::size_t> homes;
   for (std::size_t i = 0; i < parts.size(); ++i)
     for (const std::uint32_t product : {623u, 633u, 643u, 653u})
@@ -113,7 +113,7 @@ IfcReadResult readInParts(const StepFile& file, const std::string& name,
   IfcInput input(request, count);
   WebIfcReading reading(input, 60, none);
   input.fill(file.text(), products,
-             count == 1 ? std::vector<IfcPart>() : divideIfc(file, products, count));
+             count == 1 ? std::vector<IfcFilePart>() : divideIfc(file, products, count));
   return reading.finish();
 }
 

@@ -136,7 +136,7 @@ constexpr char kStorey[] =
  </IfcSpace></RelatedObjects>
 </IfcRelAggregates>
 )";
-constexpr char kWall[] =
+constexpr char kWallXml[] =
     R"(<IfcWall id="wall" GlobalId="0000000000000000000008" Name="Wall" Tag="7"
  PredefinedType="standard">
  <ObjectPlacement ref="origin" xsi:nil="true"/>
@@ -213,13 +213,7 @@ constexpr char kSlab[] =
 
 /// `more`: further elements.
 std::string makeXml(const std::string& more = "") {
-  return std::string(kRoot) + kProject + kStorey + kWall + kSlab + more + "</ifc:ifcXML>\n";
-}
-
-std::string replaced(std::string text, const std::string& from, const std::string& to) {
-  const std::size_t at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return at == std::string::npos ? text : text.replace(at, from.size(), to);
+  return std::string(kRoot) + kProject + kStorey + kWallXml + kSlab + more + "</ifc:ifcXML>\n";
 }
 
 struct ObjectFacts {

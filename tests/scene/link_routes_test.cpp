@@ -152,7 +152,7 @@ TEST(LinkRoutes, ALiftIsCalledAndRidden) {
 }
 
 TEST(LinkRoutes, ALiftThatWouldCarryItsPassengerAgainstSomethingIsNotRidden) {
-  for (const double overlap : {-0.02, 0.02}) {  // metres, of a beam and the passenger's way
+  for (const double overlap : {-0.02, 0.02}) {  // metres, of a beam and the passenger's path
     Model model = boxModel({{"ground", {4, -0.2, -3}, {10, 0, 3}},
                             {"upper", {4.01, 2.8, -3}, {10, 3, 3}},
                             {"platform", {2, -0.1, -1}, {4, 0, 1}},
@@ -166,7 +166,7 @@ TEST(LinkRoutes, ALiftThatWouldCarryItsPassengerAgainstSomethingIsNotRidden) {
 }
 
 TEST(LinkRoutes, AWalkAfterTheRideDoesNotCrossWhereTheLiftWas) {
-  // The only way from the exit to the goal leads over the platform when it is below.
+  // The only path from the exit to the goal leads over the platform when it is below.
   Model model = boxModel({{"ground", {4.01, -0.2, -3}, {10, 0, 3}},
                           {"island", {-2, -0.2, -1}, {1.99, 0, 1}},
                           {"upper", {4.05, 2.8, -3}, {10, 3, 3}},

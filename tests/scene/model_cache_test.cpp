@@ -19,6 +19,7 @@ namespace {
 
 namespace fs = std::filesystem;
 using tests::BoxMesh;
+using tests::readContent;
 using tests::TemporaryFolder;
 
 /// A glTF file with its buffer and an image next to it, and a cache in its own folder.
@@ -46,11 +47,6 @@ class CachedModel : public ::testing::Test {
   fs::path file_;
   std::optional<ModelCache> cache_ = ModelCache{folder_.path() / "cache"};
 };
-
-std::string readContent(const fs::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 void overwrite(const fs::path& file, const std::string& content) {
   std::ofstream(file, std::ios::binary) << content;
@@ -224,7 +220,7 @@ TEST(ModelCacheFolder, FollowsTheEnvironment) {
       unsetenv(each);
     setenv("HOME", "/home/ann", 1);
     if (name != nullptr) setenv(name, value, 1);
-    return modelCacheFromEnvironment();
+    return findDefaultModelCache();
   };
   EXPECT_EQ(with(nullptr, "")->folder, "/home/ann/.cache/enfilade");
   EXPECT_EQ(with("XDG_CACHE_HOME", "/var/tmp/ann")->folder, "/var/tmp/ann/enfilade");

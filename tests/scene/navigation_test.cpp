@@ -9,6 +9,7 @@
 #include "assets/building.hpp"
 #include "scene/model/shapes/space_solid.hpp"
 #include "scene/navigation/doors.hpp"
+#include "scene/navigation/mesh/off_mesh_connections.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "scene/navigation/walk/floor_faces.hpp"
 #include "scene/world/contacts/obstacles.hpp"
@@ -46,12 +47,6 @@ Notice walkPath(World& world, const NavigationPath& path, const NavigationAgent&
   return {};
 }
 
-double measureLength(const std::vector<Vec3>& points) {
-  double length = 0;
-  for (std::size_t i = 1; i < points.size(); ++i) length += (points[i] - points[i - 1]).norm();
-  return length;
-}
-
 /// 1 if the cell at a place, in metres, is walkable.
 int getCell(const NavigationMap& map, double x, double z) {
   const auto column = static_cast<std::size_t>((x - map.corner.x()) / map.cell);
@@ -64,7 +59,10 @@ TEST(Navigation, APathThroughANarrowDoorIsWalked) {
   Navigation navigation(scene, {}, {});
   const NavigationPath path = navigation.findPath({1, 0.1, 2}, {7, 0.1, -2});
   ASSERT_TRUE(path.found()) << path.reason;
-  EXPECT_NEAR(path.length, measureLength(path.points), 1e-12);
+  double length = 0;
+  for (std::size_t i = 1; i < path.points.size(); ++i)
+    length += (path.points[i] - path.points[i - 1]).norm();
+  EXPECT_NEAR(path.length, length, 1e-12);
   EXPECT_GT(path.length, std::hypot(6, 4));
   EXPECT_LT(path.length, 1.05 * std::hypot(6, 4));
   World world(scene);
@@ -73,6 +71,23 @@ TEST(Navigation, APathThroughANarrowDoorIsWalked) {
   ASSERT_TRUE(narrowest);
   EXPECT_NEAR(narrowest->clearWidth, 0.62, 0.02);
   EXPECT_NEAR(narrowest->position.x(), 4, 0.3);
+}
+
+TEST(Navigation, TheWidthOnStairsIsMeasuredAboveTheSteps) {
+  std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {4, 0, 4}},
+                              {"landing", {5.5, -0.2, 0}, {12, 1, 4}},
+                              {"post/left", {9, 1, 0}, {9.1, 3, 1.5}},
+                              {"post/right", {9, 1, 2.5}, {9.1, 3, 4}}};
+  for (int i = 0; i < 5; ++i)
+    boxes.push_back({"stair", {4 + 0.3 * i, -0.2, 0}, {4.3 + 0.3 * i, 0.2 * (i + 1), 4}});
+  Navigation navigation(boxScene(boxes), {}, {});
+  const NavigationPath path = navigation.findPath({1, 0, 2}, {11, 1, 2});
+  ASSERT_TRUE(path.found()) << path.reason;
+  const auto narrowest = navigation.findNarrowest(path.points);
+  ASSERT_TRUE(narrowest);
+  EXPECT_NEAR(narrowest->clearWidth, 1, 0.02);
+  EXPECT_NEAR(narrowest->position.x(), 9, 0.2);
+  EXPECT_NEAR(narrowest->position.y(), 1, 0.01) << "the feet";
 }
 
 TEST(Navigation, ADoorThatIsTooNarrowIsNamedWithItsWidth) {
@@ -329,11 +344,11 @@ TEST(Navigation, APlaceOnATableWithoutMeshHasNoIsland) {
       {}, {});
   const auto floor = navigation.findIsland({2, 0, 0});
   ASSERT_TRUE(floor);
-  const auto rim = navigation.snap({4.15, 0.75, 0.15}, 0.2);
-  ASSERT_TRUE(rim);
-  ASSERT_NEAR(rim->y(), 0.7, 0.01);
-  EXPECT_FALSE(navigation.findIsland(*rim));
-  const auto below = navigation.snapTo(*rim, {Vec3(2, 4, 2), floor});
+  const auto edge = navigation.snap({4.15, 0.75, 0.15}, 0.2);
+  ASSERT_TRUE(edge);
+  ASSERT_NEAR(edge->y(), 0.7, 0.01);
+  EXPECT_FALSE(navigation.findIsland(*edge));
+  const auto below = navigation.snapTo(*edge, {Vec3(2, 4, 2), floor});
   ASSERT_TRUE(below);
   EXPECT_LT(below->y(), 0.1);
   EXPECT_EQ(navigation.findIsland(*below), floor);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "collision/shapes/hull.hpp"
+#include "scene/physics/physics_step.hpp"
 #include "scene/physics/physics_world.hpp"
 
 namespace enfilade::scene {

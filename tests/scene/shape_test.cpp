@@ -15,22 +15,13 @@ namespace enfilade::scene {
 namespace {
 
 using testing::boxMesh;
-
-Shape shapeOfOne(const Mesh& mesh) {
-  const std::uint32_t first = 0;
-  return buildShape({&mesh, 1}, {&first, 1});
-}
+using testing::insideOut;
+using testing::shapeOfOne;
 
 void append(Mesh& to, const Mesh& from) {
   const auto first = static_cast<std::uint32_t>(to.positions.size());
   to.positions.insert(to.positions.end(), from.positions.begin(), from.positions.end());
   for (const std::uint32_t i : from.indices) to.indices.push_back(first + i);
-}
-
-Mesh insideOut(Mesh mesh) {
-  for (std::size_t i = 0; i < mesh.indices.size(); i += 3)
-    std::swap(mesh.indices[i + 1], mesh.indices[i + 2]);
-  return mesh;
 }
 
 /// Each triangle with its own vertices, as exporters write flat shading.

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "scene/navigation/mesh/tile_mesh.hpp"
-#include "scene/navigation/path_finder.hpp"
+#include "scene/navigation/path_search.hpp"
 #include "tests/scene/random_room.hpp"
 
 namespace enfilade::scene::testing {
@@ -132,23 +132,23 @@ TEST(ShortestCorridor, AClosedPortalIsNotPassed) {
   }
 }
 
-TEST(ShortestCorridor, PortalsAcrossAnOpenFloorEndOnItsRimAlone) {
+TEST(ShortestCorridor, PortalsAcrossAnOpenFloorEndOnItsBoundaryAlone) {
   NavigationMesh mesh = makeMesh(World(boxScene({{"floor", {0, -0.2, 0}, {12, 0, 12}}})), {});
-  const auto isAtRim = [](const Vec3& end) {
+  const auto isOnBoundary = [](const Vec3& end) {
     return std::min({end.x(), end.z(), 12 - end.x(), 12 - end.z()}) < 0.5;
   };
   std::vector<std::pair<std::uint32_t, std::uint32_t>> within;
   for (std::uint32_t polygon = 0; polygon < mesh.polygonCount(); ++polygon)
     for (const Portal& portal : mesh.portals(polygon)) {
-      EXPECT_EQ(portal.lowIsRim, isAtRim(portal.low)) << portal.low.transpose();
-      EXPECT_EQ(portal.highIsRim, isAtRim(portal.high)) << portal.high.transpose();
-      if (!portal.lowIsRim) within.emplace_back(polygon, portal.to);
+      EXPECT_EQ(portal.lowIsOnBoundary, isOnBoundary(portal.low)) << portal.low.transpose();
+      EXPECT_EQ(portal.highIsOnBoundary, isOnBoundary(portal.high)) << portal.high.transpose();
+      if (!portal.lowIsOnBoundary) within.emplace_back(polygon, portal.to);
     }
   ASSERT_FALSE(within.empty()) << "the floor has several tiles";
   const auto [from, to] = within.front();
   mesh.closePortal(from, to);
   for (const Portal& portal : mesh.portals(from))
-    EXPECT_TRUE(portal.to != to || (portal.lowIsRim && portal.highIsRim));
+    EXPECT_TRUE(portal.to != to || (portal.lowIsOnBoundary && portal.highIsOnBoundary));
 }
 
 TEST(ShortestCorridor, AProvedPathForgetsTheFailuresOfItsPortals) {

@@ -118,7 +118,7 @@ TEST(Sidecar, AnInvalidSidecarIsReported) {
 }
 
 TEST(Sidecar, IsReadFromTheFolderOfItsModel) {
-  EXPECT_EQ(sidecarPath("a/hall.glb"), "a/hall.walk.json");
+  EXPECT_EQ(makeSidecarPath("a/hall.glb"), "a/hall.walk.json");
 }
 
 }  // namespace

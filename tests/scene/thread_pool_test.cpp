@@ -1,4 +1,4 @@
-#include "scene/physics/thread_pool.hpp"
+#include "scene/base/thread_pool.hpp"
 
 #include <gtest/gtest.h>
 

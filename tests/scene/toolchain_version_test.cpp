@@ -12,27 +12,23 @@
 namespace enfilade::scene {
 namespace {
 
+using tests::readContent;
 using tests::TemporaryFolder;
-
-std::string readContent(const std::filesystem::path& file) {
-  std::ifstream in(file, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
-}
 
 TEST(ToolchainVersion, ALibraryIsIdentifiedByItsBuildIdAlone) {
   const TemporaryFolder folder;
-  const std::string bytes = readContent(assimpModulePath());
+  const std::string bytes = readContent(findAssimpModule());
   const auto copy = folder.write("copy.so", bytes + "and more behind it");
   ASSERT_TRUE(computeFileVersion(copy));
-  EXPECT_EQ(computeFileVersion(copy), computeFileVersion(assimpModulePath()));
+  EXPECT_EQ(computeFileVersion(copy), computeFileVersion(findAssimpModule()));
   EXPECT_NE(computeFileVersion(copy), computeFileHash(copy));
-  EXPECT_NE(computeFileVersion(copy), computeFileVersion(ifcPlusPlusModulePath()));
+  EXPECT_NE(computeFileVersion(copy), computeFileVersion(findIfcPlusPlusModule()));
   EXPECT_NE(computeFileVersion(copy), computeFileVersion("/proc/self/exe"));
 }
 
 TEST(ToolchainVersion, OtherFilesAreIdentifiedByTheirContent) {
   const TemporaryFolder folder;
-  const std::string library = readContent(assimpModulePath());
+  const std::string library = readContent(findAssimpModule());
   // Truncated in the header, in the program header table, before the notes; and a header followed
   // by noise.
   for (const std::string& bytes :

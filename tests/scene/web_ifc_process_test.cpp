@@ -6,6 +6,7 @@
 #include "scene/import/import_model.hpp"
 #include "tests/scene/hand_made_files.hpp"
 #include "tests/scene/hand_made_ifc.hpp"
+#include "tests/scene/import_outcome.hpp"
 #include "tests/support/web_ifc_here.hpp"
 
 namespace enfilade::scene {
@@ -43,13 +44,6 @@ const send = (kind, body) => {
   tests::TemporaryFolder folder_;
 };
 
-std::string findExample(const Model& model, const std::string& kind) {
-  for (const Diagnostic& problem : model.diagnostics) {
-    if (problem.kind == kind) return problem.example;
-  }
-  return {};
-}
-
 TEST(WebIfcProcess, AProductThatBringsItDownIsLeftOutAndTheRestIsRead) {
   // The script dies at the first product (the wall, #120) and sends a triangle for the second (the
   // door).
@@ -69,7 +63,7 @@ setTimeout(() => {}, first === 0 ? 10000 : 0);
   const Model model = importModel(node.house());
   EXPECT_EQ(model.reader, "web-ifc");
   ASSERT_EQ(model.objects.size(), 2u);
-  EXPECT_NE(findExample(model, "openings_unverified").find("000000000000000000Wall"),
+  EXPECT_NE(diagnosticText(model, "openings_unverified").find("000000000000000000Wall"),
             std::string::npos)
       << "ifcplusplus reads the wall";
 
@@ -78,8 +72,8 @@ setTimeout(() => {}, first === 0 ? 10000 : 0);
   const Model left = importModel(node.house(), alone);
   ASSERT_EQ(left.objects.size(), 1u);
   EXPECT_EQ(left.objects[0].ifcClass, "IfcDoor");
-  EXPECT_NE(findExample(left, "missing_product").find("was killed"), std::string::npos)
-      << findExample(left, "missing_product");
+  EXPECT_NE(diagnosticText(left, "missing_product").find("was killed"), std::string::npos)
+      << diagnosticText(left, "missing_product");
 }
 
 /// A reader that gives no triangles of the wall, and a sheet for the door: x from 2.2 to 3.1, y up.
@@ -118,10 +112,11 @@ TEST(WebIfcProcess, AWallThatNoReaderCutsStaysSolidAndIsReported) {
   const Model model = importModel(node.house(makeClosedHouse(0.9, 2.1)));
   EXPECT_EQ(model.reader, "web-ifc");
   EXPECT_EQ(model.objects.size(), 2u);
-  EXPECT_NE(findExample(model, "solid_product").find("000000000000000000Wall"), std::string::npos);
-  EXPECT_NE(findExample(model, "openings_unverified").find("000000000000000000Wall"),
+  EXPECT_NE(diagnosticText(model, "solid_product").find("000000000000000000Wall"),
             std::string::npos);
-  EXPECT_EQ(findExample(model, "cut_away_product"), "");
+  EXPECT_NE(diagnosticText(model, "openings_unverified").find("000000000000000000Wall"),
+            std::string::npos);
+  EXPECT_EQ(diagnosticText(model, "cut_away_product"), "");
 }
 
 TEST(WebIfcProcess, AFramesWallThatIsNoLargerThanItsDoorIsLeftOutAndReported) {
@@ -130,10 +125,10 @@ TEST(WebIfcProcess, AFramesWallThatIsNoLargerThanItsDoorIsLeftOutAndReported) {
   const Model model = importModel(node.house(makeClosedHouse(4, 3)));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].ifcClass, "IfcDoor");
-  EXPECT_NE(findExample(model, "cut_away_product").find("000000000000000000Wall"),
+  EXPECT_NE(diagnosticText(model, "cut_away_product").find("000000000000000000Wall"),
             std::string::npos);
-  EXPECT_EQ(findExample(model, "solid_product"), "");
-  EXPECT_EQ(findExample(model, "missing_product"), "");
+  EXPECT_EQ(diagnosticText(model, "solid_product"), "");
+  EXPECT_EQ(diagnosticText(model, "missing_product"), "");
 }
 
 TEST(WebIfcProcess, ARunawayIsStoppedByItsMemoryLimit) {
@@ -147,7 +142,7 @@ for (;;) all.push(Buffer.alloc(1 << 24, 1));
   options.timeLimit = 60;
   const Model model = importModel(node.house(), options);
   EXPECT_EQ(model.reader, "ifcplusplus");
-  const std::string why = findExample(model, "ifc_reader_failed");
+  const std::string why = diagnosticText(model, "ifc_reader_failed");
   EXPECT_TRUE(why.starts_with("web-ifc: ")) << why;
   EXPECT_EQ(why.find("too long"), std::string::npos) << why;
 }
@@ -159,7 +154,7 @@ TEST(WebIfcProcess, NoiseAndSilenceAreFailures) {
     ENFILADE_NEED_WEB_IFC();
     const Model model = importModel(node.house());
     EXPECT_EQ(model.reader, "ifcplusplus") << script;
-    EXPECT_NE(findExample(model, "ifc_reader_failed"), "") << script;
+    EXPECT_NE(diagnosticText(model, "ifc_reader_failed"), "") << script;
   }
 }
 

@@ -40,7 +40,7 @@ TEST(ContactHistory, EventsOfATimelineAscendAndPagesLoseNone) {
   const auto file = folder.path() / "passing.mcap";
   recordPassing(file);
   const ContactHistory history(file);
-  const v1::RecordedEvents all = history.eventsAfter(0, 1 << 20);
+  const v1::RecordedEvents all = history.findEventsAfter(0, 1 << 20);
   EXPECT_TRUE(std::ranges::is_sorted(all.contacts(), {}, &Event::tick));
   EXPECT_GE(std::ranges::count(all.contacts(), Event::PHASE_MIN, &Event::phase), 2);
   EXPECT_GE(std::ranges::count(all.contacts(), Event::KIND_BLOCKED, &Event::kind), 1);
@@ -48,7 +48,7 @@ TEST(ContactHistory, EventsOfATimelineAscendAndPagesLoseNone) {
   std::vector<std::string> paged;
   std::uint64_t after = 0;
   for (int page = 0; page < all.contacts_size() + 1; ++page) {
-    const v1::RecordedEvents reply = history.eventsAfter(after, bytesOfAbout2);
+    const v1::RecordedEvents reply = history.findEventsAfter(after, bytesOfAbout2);
     EXPECT_LE(reply.ByteSizeLong(), bytesOfAbout2 + 16);
     for (const Event& event : reply.contacts()) paged.push_back(event.ShortDebugString());
     if (reply.complete_to() == all.complete_to()) break;

@@ -1,5 +1,6 @@
 // Tests of HTTP and WebSocket on the same port, and of streams that are neither.
 #include "server/net/http_pages.hpp"
+#include "tests/server/body_room.hpp"
 #include "tests/server/raw_connection.hpp"
 #include "tests/server/served_room.hpp"
 
@@ -148,6 +149,38 @@ TEST_F(Http, MetricsContainTheTicks) {
       std::string::npos);
 }
 
+TEST_F(Http, MetricsContainTheWorkOfTheTicks) {
+  constexpr std::uint32_t kTicks = 40;
+  serve({}, bodyRoom());
+  protocol::Client ann = client("ann");
+  ASSERT_FALSE(ann.command(spawn("ann", 3.5, 0.01, 0)));
+  ASSERT_FALSE(ann.command(walkTo("ann", 5.5, 0, 0)));
+  const v1::StepReply stepped = ann.step(kTicks, true);
+  ASSERT_EQ(stepped.avatars_size(), 1);
+  const std::uint32_t id = stepped.avatars(0).id();
+  const v1::Metrics metrics = ann.metrics();
+  EXPECT_GT(metrics.vertices_looked_at(), 0u);
+  EXPECT_GT(metrics.parts_looked_at(), 0u);
+  ASSERT_EQ(metrics.avatar_work_size(), 1);
+  EXPECT_EQ(metrics.avatar_work(0).id(), id);
+  EXPECT_EQ(metrics.avatar_work(0).tick(), kTicks);
+  EXPECT_GT(metrics.avatar_work(0).narrow_queries(), 0u);
+  EXPECT_EQ(metrics.avatar_work(0).position().x(), stepped.avatars(0).feet().x());
+  const v1::AvatarWork& costliest = metrics.costliest_avatar();
+  EXPECT_EQ(costliest.id(), id);
+  EXPECT_GE(costliest.narrow_queries(), metrics.avatar_work(0).narrow_queries());
+  const std::string page = get("/metrics");
+  const auto expectLine = [&](const std::string& name, std::uint64_t value) {
+    const std::string line =
+        "\nenfilade_" + name + "{world=\"main\"} " + std::to_string(value) + "\n";
+    EXPECT_NE(page.find(line), std::string::npos) << line << page;
+  };
+  expectLine("vertices_looked_at_total", metrics.vertices_looked_at());
+  expectLine("part_boxes_made_total", metrics.part_boxes_made());
+  expectLine("parts_looked_at_total", metrics.parts_looked_at());
+  expectLine("costliest_avatar_queries", costliest.narrow_queries());
+}
+
 TEST_F(Http, ForeignPagesAreRefused) {
   serve();
   const std::string upgrade = "GET / HTTP/1.1\r\n" + kUpgrade;
@@ -238,6 +271,24 @@ TEST_F(Http, TheEndOfTheServerEndsItsVisits) {
   raw.readText("small_room");
   server_->stop();
   EXPECT_NE(raw.readText().find("the server is stopping"), std::string::npos);
+}
+
+TEST(HttpPages, MetricsHaveALineForEachCounterOfWork) {
+  WorldMetrics hall{"hall", {}};
+  hall.metrics.set_narrow_queries(101);
+  hall.metrics.set_vertices_looked_at(102);
+  hall.metrics.set_part_boxes_made(103);
+  hall.metrics.set_parts_looked_at(104);
+  hall.metrics.mutable_costliest_avatar()->set_narrow_queries(105);
+  hall.metrics.mutable_costliest_avatar()->set_parts_looked_at(106);
+  const std::vector<WorldMetrics> worlds{hall, {"empty", {}}};
+  const std::string page = makeMetricsPage(worlds);
+  for (const char* line :
+       {"narrow_queries_total{world=\"hall\"} 101", "vertices_looked_at_total{world=\"hall\"} 102",
+        "part_boxes_made_total{world=\"hall\"} 103", "parts_looked_at_total{world=\"hall\"} 104",
+        "costliest_avatar_queries{world=\"hall\"} 105",
+        "costliest_avatar_queries{world=\"empty\"} 0"})
+    EXPECT_NE(page.find(std::string("\nenfilade_") + line + "\n"), std::string::npos) << line;
 }
 
 TEST(HttpPages, TargetsAreParsed) {

@@ -50,6 +50,34 @@ TEST(RunReport, WalksNameTheirObstacleAndItsGlobalId) {
   EXPECT_FALSE(walks[1].contains("obstacle_global_id"));
 }
 
+TEST(RunReport, TheSummaryContainsTheWorkOfTheTicksAndTheCostliestAvatar) {
+  const tests::TemporaryFolder folder;
+  RunReport report(folder.path());
+  RunSummary run;
+  run.metrics.set_narrow_queries(101);
+  run.metrics.set_vertices_looked_at(102);
+  run.metrics.set_part_boxes_made(103);
+  run.metrics.set_parts_looked_at(104);
+  const auto read = [&] { return nlohmann::json::parse(report.writeSummary(run, {})); };
+  EXPECT_FALSE(read().contains("costliest_avatar")) << "a run without avatars";
+  v1::AvatarWork& work = *run.metrics.mutable_costliest_avatar();
+  work.set_id(7);
+  work.set_tick(8);
+  work.set_narrow_queries(9);
+  work.set_parts_looked_at(10);
+  work.mutable_position()->set_x(1.5);
+  work.mutable_position()->set_z(-2);
+  const nlohmann::json summary = read();
+  EXPECT_EQ(summary.at("narrow_queries"), 101);
+  EXPECT_EQ(summary.at("vertices_looked_at"), 102);
+  EXPECT_EQ(summary.at("part_boxes_made"), 103);
+  EXPECT_EQ(summary.at("parts_looked_at"), 104);
+  EXPECT_EQ(summary.at("costliest_avatar"),
+            nlohmann::json::parse(R"({"id": 7, "tick": 8, "narrow_queries": 9,
+                                      "parts_looked_at": 10, "position": [1.5, 0.0, -2.0]})"));
+  EXPECT_EQ(nlohmann::json::parse(tests::readContent(folder.path() / "summary.json")), summary);
+}
+
 TEST(RunReport, TheMapShowsBlockedWalksAndRefusedOrders) {
   const tests::TemporaryFolder folder;
   RunReport report(folder.path());

@@ -10,7 +10,7 @@ namespace enfilade::server {
 namespace {
 
 constexpr render::Colour kPaperColour{255, 255, 255};
-constexpr unsigned kPixelsPerMetre = 40;
+constexpr unsigned kRoomPixelsPerMetre = 40;
 
 TEST(SpaceNames, OfARoomShapedLikeAnLDoNotLieInItsNeighbour) {
   // The neighbour is the notch, at more than 2 m in x and z.
@@ -20,10 +20,10 @@ TEST(SpaceNames, OfARoomShapedLikeAnLDoNotLieInItsNeighbour) {
   model.spaces[0].storey = 0;
   model.spaces[0].longName = "Corridor";
   model.spaces[0].name = "017";
-  render::Canvas canvas(6 * kPixelsPerMetre, 6 * kPixelsPerMetre, kPaperColour);
+  render::Canvas canvas(6 * kRoomPixelsPerMetre, 6 * kRoomPixelsPerMetre, kPaperColour);
   PlanView view;
   view.area = {scene::Vec3(0, 0, 0), scene::Vec3(6, 3, 6)};
-  view.unitsPerMetre = kPixelsPerMetre;
+  view.unitsPerMetre = kRoomPixelsPerMetre;
   std::vector<CaptionEntry> entries;
   CaptionList captions(view.box(), view.unit, entries);
   placeSpaceNames(captions, canvas, view, model.spaces);
@@ -32,9 +32,9 @@ TEST(SpaceNames, OfARoomShapedLikeAnLDoNotLieInItsNeighbour) {
   std::size_t inside = 0, outside = 0;
   for (std::size_t i = 0; i < image.rgb.size(); ++i) {
     if (image.rgb[i] == 255) continue;
-    const std::size_t pixel = i / 3, width = 6 * kPixelsPerMetre;
+    const std::size_t pixel = i / 3, width = 6 * kRoomPixelsPerMetre;
     const std::size_t x = pixel % width, y = pixel / width;
-    ++(x > 2 * kPixelsPerMetre && y > 2 * kPixelsPerMetre ? outside : inside);
+    ++(x > 2 * kRoomPixelsPerMetre && y > 2 * kRoomPixelsPerMetre ? outside : inside);
   }
   EXPECT_GT(inside, 100u);
   EXPECT_EQ(outside, 0u);

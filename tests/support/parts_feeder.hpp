@@ -8,8 +8,9 @@
 #include "collision/bounds/bounding_box.hpp"
 #include "collision/broad_phase/sort_and_sweep.hpp"
 #include "collision/shapes/hull.hpp"
+#include "scene/base/thread_pool.hpp"
+#include "scene/physics/physics_step.hpp"
 #include "scene/physics/physics_world.hpp"
-#include "scene/physics/thread_pool.hpp"
 
 namespace enfilade::testing {
 

@@ -6,9 +6,15 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 #include <string>
 
 namespace enfilade::tests {
+
+inline std::string readContent(const std::filesystem::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(in), {}};
+}
 
 /// A new folder, deleted by the destructor.
 class TemporaryFolder {

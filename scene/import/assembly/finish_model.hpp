@@ -1,4 +1,4 @@
-// From the nodes of a file to the objects of a Model.
+// Converts the imported nodes of a file to the objects of a Model: the last step of an import.
 #pragma once
 
 #include <filesystem>

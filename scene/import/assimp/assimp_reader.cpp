@@ -4,13 +4,13 @@
 
 namespace enfilade::scene {
 
-std::filesystem::path assimpModulePath() {
+std::filesystem::path findAssimpModule() {
   return findModule("assimp_reader.so", "ENFILADE_ASSIMP", ENFILADE_ASSIMP_READER_MODULE);
 }
 
 AssimpOutput readWithAssimp(const AssimpInput& file) {
   AssimpOutput read;
-  reinterpret_cast<AssimpReadFunction*>(openModule(assimpModulePath(), kAssimpReadSymbol))(file,
+  reinterpret_cast<AssimpReadFunction*>(openModule(findAssimpModule(), kAssimpReadSymbol))(file,
                                                                                            read);
   return read;
 }

@@ -45,7 +45,7 @@ struct AssimpOutput {
   std::string library;  ///< path of assimp's shared library
 };
 
-std::filesystem::path assimpModulePath();
+std::filesystem::path findAssimpModule();
 
 /// Sends progress messages meanwhile. Throws ImportError if the module cannot be opened.
 AssimpOutput readWithAssimp(const AssimpInput& file);

@@ -32,7 +32,7 @@ std::string readFile(const std::filesystem::path& file) {
 }
 
 Sidecar applySidecarFile(Model& model, const std::filesystem::path& file) {
-  const std::filesystem::path sidecar = sidecarPath(file);
+  const std::filesystem::path sidecar = makeSidecarPath(file);
   std::error_code problem;
   if (!std::filesystem::exists(sidecar, problem)) return {};
   return applySidecar(model, readFile(sidecar), sidecar.filename().string());

@@ -8,7 +8,7 @@
 #include "scene/import/bodies/body_precedence.hpp"
 #include "scene/import/bodies/gltf_physics.hpp"
 #include "scene/import/bodies/gltf_tree.hpp"
-#include "scene/import/bodies/sidecar.hpp"
+#include "scene/import/bodies/sidecar_error.hpp"
 #include "scene/import/file/import_options.hpp"
 #include "scene/import/gltf/encoding/gltf_json.hpp"
 #include "scene/model/add_diagnostic.hpp"

@@ -4,7 +4,7 @@
 #include <optional>
 #include <set>
 
-#include "scene/import/bodies/sidecar.hpp"
+#include "scene/import/bodies/sidecar_error.hpp"
 
 namespace enfilade::scene {
 

@@ -97,7 +97,7 @@ void addEach(Model& model, const BodySpec& body) {
   }
 }
 
-std::vector<const char*> additionalKeys(BodyKind kind) {
+std::vector<const char*> listAdditionalKeys(BodyKind kind) {
   if (isDynamic(kind)) return {"objects", "each"};
   if (isTrigger(kind)) return {"objects", "box"};
   return {"objects"};
@@ -115,7 +115,7 @@ void readBody(const JsonCursor& cursor, Model& model) {
   if (cursor.has("objects")) body.objects = readObjectList(cursor.at("objects"), model);
   if (!cursor.has("objects") && !cursor.has("box"))
     cursor.fail("objects is missing: a list of paths or GlobalIds");
-  const ExplicitBodyFields fields = readBodyFields(cursor, additionalKeys(body.kind), body);
+  const ExplicitBodyFields fields = readBodyFields(cursor, listAdditionalKeys(body.kind), body);
   if (cursor.has("objects") && cursor.has("box"))
     cursor.fail("has objects and a box: a trigger is either");
   placeAnchor(cursor, fields, model, body);
@@ -192,7 +192,7 @@ void truncateModel(Model& model, const ModelSizes& sizes) {
 
 }  // namespace
 
-std::filesystem::path sidecarPath(const std::filesystem::path& model) {
+std::filesystem::path makeSidecarPath(const std::filesystem::path& model) {
   std::filesystem::path sidecar = model;
   return sidecar.replace_extension(".walk.json");
 }

@@ -2,23 +2,19 @@
 // (SIDECAR.md).
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <set>
-#include <stdexcept>
 #include <string>
 #include <string_view>
 
+#include "scene/import/bodies/sidecar_error.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
-/// An error in a sidecar: "file.bodies[2].axis: what is wrong; remedy".
-struct SidecarError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
 /// Returns the sidecar's path: hall.walk.json for hall.glb, in the same folder.
-std::filesystem::path sidecarPath(const std::filesystem::path& model);
+std::filesystem::path makeSidecarPath(const std::filesystem::path& model);
 
 /// The content of a sidecar other than its bodies.
 struct Sidecar {

@@ -290,7 +290,7 @@ std::optional<fs::path> findCacheFolder() {
 
 }  // namespace
 
-std::optional<ModelCache> modelCacheFromEnvironment() {
+std::optional<ModelCache> findDefaultModelCache() {
   const std::optional<fs::path> folder = findCacheFolder();
   if (!folder) return std::nullopt;
   ModelCache cache{*folder};

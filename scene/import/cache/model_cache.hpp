@@ -23,7 +23,7 @@ struct ModelCache {
 /// Cache of the environment: $XDG_CACHE_HOME/enfilade, else ~/.cache/enfilade (XDG Base Directory
 /// Specification 0.8). ENFILADE_CACHE=off disables it, ENFILADE_CACHE=/a/folder sets the folder,
 /// ENFILADE_CACHE_MB the limit. nullopt: disabled, or no home directory.
-std::optional<ModelCache> modelCacheFromEnvironment();
+std::optional<ModelCache> findDefaultModelCache();
 
 /// A model, and how it was obtained.
 struct LoadedModel {

@@ -75,7 +75,7 @@ class IfcDivider {
       indexById_[file.statements()[i].id] = static_cast<std::uint32_t>(i);
   }
 
-  std::vector<IfcPart> divide() {
+  std::vector<IfcFilePart> divide() {
     for (const std::uint32_t id : products_)
       if (const StepStatement* product = find(id)) isProduct_[getIndex(*product)] = true;
     for (const std::uint32_t id : products_) assign(id);
@@ -206,7 +206,7 @@ class IfcDivider {
 
   const StepFile& file_;
   const std::vector<std::uint32_t>& products_;
-  std::vector<IfcPart> parts_;
+  std::vector<IfcFilePart> parts_;
   std::vector<std::size_t> weights_;      // by part: bytes
   std::vector<PartMask> masks_;           // by statement: the parts whose shapes refer to it
   std::vector<std::uint32_t> indexById_;  // empty: the ids are too sparse for it
@@ -216,11 +216,11 @@ class IfcDivider {
 
 }  // namespace
 
-std::vector<IfcPart> divideIfc(const StepFile& file, const std::vector<std::uint32_t>& products,
-                               std::size_t count) {
+std::vector<IfcFilePart> divideIfc(const StepFile& file, const std::vector<std::uint32_t>& products,
+                                   std::size_t count) {
   ENFILADE_ASSERT(count > 0 && count <= 8);  // bits of a PartMask
-  std::vector<IfcPart> parts = IfcDivider(file, products, count).divide();
-  if (std::ranges::any_of(parts, [](const IfcPart& part) { return part.products.empty(); }))
+  std::vector<IfcFilePart> parts = IfcDivider(file, products, count).divide();
+  if (std::ranges::any_of(parts, [](const IfcFilePart& part) { return part.products.empty(); }))
     parts.clear();
   return parts;
 }

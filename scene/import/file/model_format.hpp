@@ -1,4 +1,5 @@
-// Formats of model files, and what a file says about its coordinates.
+// ModelFormat: the formats of model files. FileMetadata: unit, up axis and scenes that a file
+// states.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-// Unzips one file of an archive, and limits what others unzip.
+// Unzips one file of a ZIP archive, and limits the unpacked size of archives that libraries unpack.
 #pragma once
 
 #include <cstddef>

@@ -18,8 +18,8 @@ bool hasPlainTextures(const nlohmann::json& gltf);
 void replaceSpecularGlossiness(nlohmann::json& gltf);
 
 /// Gives each texture without a PNG or JPEG image that of EXT_texture_webp, KHR_texture_basisu or
-/// EXT_texture_avif, and removes and reports references to textures without an image that would be
-/// drawn. To be called before meshes are rewritten.
+/// EXT_texture_avif. Removes and reports references to drawn textures that have no image. To be
+/// called before meshes are rewritten.
 void dropMissingTextures(nlohmann::json& gltf, std::vector<Diagnostic>& problems);
 
 /// Removes what is not drawn, and texture mappings, which were applied to the coordinates of

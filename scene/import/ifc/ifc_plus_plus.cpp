@@ -4,12 +4,12 @@
 
 namespace enfilade::scene {
 
-std::filesystem::path ifcPlusPlusModulePath() {
+std::filesystem::path findIfcPlusPlusModule() {
   return findModule("ifc_plus_plus.so", "ENFILADE_IFC_PLUS_PLUS", ENFILADE_IFC_PLUS_PLUS_MODULE);
 }
 
 void sendMeshesWithIfcPlusPlus(std::string text) {
-  reinterpret_cast<SendMeshesFunction*>(openModule(ifcPlusPlusModulePath(), kSendMeshesSymbol))(
+  reinterpret_cast<SendMeshesFunction*>(openModule(findIfcPlusPlusModule(), kSendMeshesSymbol))(
       text);
 }
 

@@ -10,7 +10,7 @@ namespace enfilade::scene {
 
 /// Path of the module: $ENFILADE_IFC_PLUS_PLUS, otherwise next to the program, in the install
 /// folder or in the build folder.
-std::filesystem::path ifcPlusPlusModulePath();
+std::filesystem::path findIfcPlusPlusModule();
 
 /// Sends the meshes of all products of `text`. Throws std::exception if the file cannot be read or
 /// the module cannot be opened.
@@ -19,6 +19,6 @@ void sendMeshesWithIfcPlusPlus(std::string text);
 /// The module's exported function; its symbol is kSendMeshesSymbol. Increase the number in the
 /// symbol whenever this signature or the wire format changes: a program then rejects old modules.
 using SendMeshesFunction = void(std::string& text);
-inline constexpr const char* kSendMeshesSymbol = "enfiladeSendShapes1";
+inline constexpr const char* kSendMeshesSymbol = "enfiladeSendMeshes2";
 
 }  // namespace enfilade::scene

@@ -197,7 +197,7 @@ void sendMeshes(std::string text) {
 }  // namespace
 }  // namespace enfilade::scene
 
-extern "C" [[gnu::visibility("default")]] void enfiladeSendShapes1(std::string& text) {
+extern "C" [[gnu::visibility("default")]] void enfiladeSendMeshes2(std::string& text) {
   enfilade::scene::sendMeshes(std::move(text));
 }
-static_assert(std::is_same_v<decltype(enfiladeSendShapes1), enfilade::scene::SendMeshesFunction>);
+static_assert(std::is_same_v<decltype(enfiladeSendMeshes2), enfilade::scene::SendMeshesFunction>);

@@ -54,7 +54,7 @@ void writeShared(int fd, const void* bytes, std::size_t size, const std::string&
 }
 
 /// The list for a process of web-ifc, as read_ifc.js documents it.
-std::string formatList(const IfcPart& part) {
+std::string formatList(const IfcFilePart& part) {
   const std::uint64_t count = part.ranges.size();
   std::string list;
   const auto append = [&](const auto* values, std::size_t size) {
@@ -115,7 +115,7 @@ std::string describeFailure(const ReaderStatus& status, const ImportExit& end) {
   return end.describe() + " during '" + status.stage + "'";
 }
 
-double noTimeout() {
+double getInfiniteTimeout() {
   return std::numeric_limits<double>::infinity();
 }
 
@@ -134,7 +134,7 @@ IfcInput::IfcInput(const ImportRequest& request, std::size_t parts)
 }
 
 void IfcInput::fill(const std::string& text, std::vector<std::uint32_t> wanted,
-                    std::vector<IfcPart> parts) {
+                    std::vector<IfcFilePart> parts) {
   ENFILADE_ASSERT(parts.size() <= parts_.size());
   writeShared(fileDescriptor_, text.data(), text.size(), request_.file);
   writeShared(listDescriptor_, wanted.data(), wanted.size() * sizeof wanted[0], request_.file);
@@ -237,7 +237,7 @@ IfcReadResult WebIfcReading::readPart(std::size_t part, double timeLimit) {
           input_.waitUntilFilled();  // from then on, no other thread reports progress
           return handleMessage(kind, body, progress, status, result.meshes);
         },
-        [&] { return status.trying ? kProductTimeout : noTimeout(); });
+        [&] { return status.trying ? kProductTimeout : getInfiniteTimeout(); });
     input_.waitUntilFilled();
     result.failure = describeFailure(status, end);
     const bool failedOnProduct = status.trying && *status.trying < products.size();
@@ -275,7 +275,7 @@ IfcReadResult readWithIfcPlusPlus(const IfcInput& input, double timeLimit,
       [&](ImportMessage kind, std::span<const std::byte> body) {
         return handleMessage(kind, body, progress, status, result.meshes);
       },
-      noTimeout);
+      getInfiniteTimeout);
   result.failure = describeFailure(status, end);
   return result;
 }
@@ -297,7 +297,7 @@ AssimpReadResult readIfcWithAssimp(const IfcInput& input, double timeLimit,
         }
         return status.done = true;
       },
-      noTimeout);
+      getInfiniteTimeout);
   result.failure = describeFailure(status, end);
   return result;
 }

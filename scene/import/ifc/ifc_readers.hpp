@@ -31,7 +31,8 @@ class IfcInput {
 
   /// To be called once. `parts`: of the file, as many as processes; empty: the first process reads
   /// the whole file.
-  void fill(const std::string& text, std::vector<std::uint32_t> wanted, std::vector<IfcPart> parts);
+  void fill(const std::string& text, std::vector<std::uint32_t> wanted,
+            std::vector<IfcFilePart> parts);
   /// Lets web-ifc end without products, unless the input is filled.
   void abandon();
   /// Waits for fill() or abandon().

@@ -179,7 +179,8 @@ class IfcImport {
     const std::size_t maxBytes = computeMaxTextBytes(request_.options);
     std::string text = readIfcFile(request_.file, maxBytes);
     if (isXml(text))
-      text = convertIfcXml(request_, text, {maxBytes, remainingTime()}, progress_, diagnostics_);
+      text = convertIfcXml(request_, text, {maxBytes, computeRemainingTime()}, progress_,
+                           diagnostics_);
     if (text.find("ISO-10303-21") == std::string::npos) {
       throw ImportError(request_.file + ": not an IFC file (it does not begin with " +
                         "ISO-10303-21); export it again as IFC");
@@ -202,7 +203,8 @@ class IfcImport {
     const bool divided =
         text.size() >= kMinDividedText && std::thread::hardware_concurrency() >= kReaderProcesses;
     input_.emplace(request_, divided ? kReaderProcesses : 1);
-    if (isReaderAllowed(IfcReader::webIfc)) webIfc_.emplace(*input_, readerTimeLimit(), progress_);
+    if (isReaderAllowed(IfcReader::webIfc))
+      webIfc_.emplace(*input_, computeReaderTimeLimit(), progress_);
   }
 
   /// Reads the metadata and passes the text on to the readers; it is not kept.
@@ -214,24 +216,24 @@ class IfcImport {
     std::vector<std::uint32_t> read = wanted_;
     for (const IfcProduct& product : metadata_.products)
       if (product.hasBody && product.role == IfcProduct::Role::space) read.push_back(product.id);
-    std::vector<IfcPart> parts = divideForProcesses(file, read);
+    std::vector<IfcFilePart> parts = divideForProcesses(file, read);
     input_->fill(file.text(), std::move(read), std::move(parts));
   }
 
   /// The parts that processes of web-ifc read at the same time; empty: one process reads all. A
   /// damaged file is read whole, because its readers may find other statements than the index.
-  std::vector<IfcPart> divideForProcesses(const StepFile& file,
-                                          const std::vector<std::uint32_t>& products) const {
+  std::vector<IfcFilePart> divideForProcesses(const StepFile& file,
+                                              const std::vector<std::uint32_t>& products) const {
     const std::size_t count = webIfc_ ? input_->partCount() : 1;
     const bool isWhole = metadata_.complete && file.damagedCount() == 0;
-    return count > 1 && isWhole ? divideIfc(file, products, count) : std::vector<IfcPart>();
+    return count > 1 && isWhole ? divideIfc(file, products, count) : std::vector<IfcFilePart>();
   }
 
   void reportProgress(const char* stage, double fraction) const {
     if (progress_) progress_(stage, fraction);
   }
 
-  double remainingTime() const {
+  double computeRemainingTime() const {
     return request_.options.timeLimit * kImportTimeFraction -
            std::chrono::duration<double>(Clock::now() - startTime_).count();
   }
@@ -288,10 +290,10 @@ class IfcImport {
 
   /// Time limit of the next reader, seconds: the remaining time, or a part of it if another reader
   /// may follow.
-  double readerTimeLimit() const {
+  double computeReaderTimeLimit() const {
     return request_.options.ifcReader == IfcReader::automatic
-               ? remainingTime() * kReaderTimeFraction
-               : remainingTime();
+               ? computeRemainingTime() * kReaderTimeFraction
+               : computeRemainingTime();
   }
 
   Model readMeshes() {
@@ -301,12 +303,12 @@ class IfcImport {
       if (hasTriangles(web.meshes)) return makeModel(web.meshes, "web-ifc");
     }
     if (isReaderAllowed(IfcReader::ifcPlusPlus)) {
-      IfcReadResult plus = readWithIfcPlusPlus(*input_, readerTimeLimit(), progress_);
+      IfcReadResult plus = readWithIfcPlusPlus(*input_, computeReaderTimeLimit(), progress_);
       recordFailure("ifcplusplus", plus);
       if (hasTriangles(plus.meshes)) return makeModel(plus.meshes, "ifcplusplus");
     }
     if (isReaderAllowed(IfcReader::assimp)) {
-      AssimpReadResult assimp = readIfcWithAssimp(*input_, remainingTime(), progress_);
+      AssimpReadResult assimp = readIfcWithAssimp(*input_, computeRemainingTime(), progress_);
       if (assimp.model) return addMetadata(std::move(*assimp.model));
       failures_ += (failures_.empty() ? "" : "; ") + ("assimp: " + assimp.failure);
     }
@@ -450,7 +452,7 @@ class IfcImport {
     if (whole || reader != "web-ifc" || request_.options.ifcReader != IfcReader::automatic) {
       return std::nullopt;
     }
-    IfcReadResult second = readWithIfcPlusPlus(*input_, readerTimeLimit(), progress_);
+    IfcReadResult second = readWithIfcPlusPlus(*input_, computeReaderTimeLimit(), progress_);
     recordFailure("ifcplusplus", second);
     return second;
   }

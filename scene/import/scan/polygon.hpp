@@ -1,4 +1,4 @@
-// Cuts polygons into triangles. Private to the import.
+// Triangulates polygons by ear clipping. Private to the import.
 #pragma once
 
 #include <cstdint>

@@ -4,25 +4,17 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <span>
-#include <stdexcept>
 #include <vector>
 
+#include "scene/import/worker/model_stream_error.hpp"
+#include "scene/import/worker/model_stream_sink.hpp"
 #include "scene/model/model.hpp"
 
 namespace enfilade::scene {
 
 /// Increases with every change of the layout; other versions are refused.
 inline constexpr std::uint32_t kModelStreamVersion = 9;
-
-/// Reports what is wrong and at which byte.
-struct ModelStreamError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
-
-/// Takes the bytes of a stream, block by block.
-using ModelStreamSink = std::function<void(std::span<const std::byte>)>;
 
 /// The size of the stream in bytes.
 std::uint64_t measureModelStream(const Model& model);

@@ -13,7 +13,8 @@
 #include <type_traits>
 #include <vector>
 
-#include "scene/import/worker/model_stream.hpp"
+#include "scene/import/worker/model_stream_error.hpp"
+#include "scene/import/worker/model_stream_sink.hpp"
 
 namespace enfilade::scene {
 

@@ -10,23 +10,24 @@ namespace {
 
 constexpr std::uint32_t kLeafSize = 4;  // hulls; as for triangles, see triangle_tree.cpp
 
-Vec3 placedVertex(const Shape& shape, std::uint32_t vertex, const Eigen::Affine3d& transform) {
+Vec3 placeShapeVertex(const Shape& shape, std::uint32_t vertex, const Eigen::Affine3d& transform) {
   return transform * shape.vertices[vertex].cast<double>();  // as computeWorldPosition()
 }
 
-collision::Triangle placedTriangle(const Shape& shape, std::size_t t,
-                                   const Eigen::Affine3d& transform) {
+collision::Triangle placeTriangle(const Shape& shape, std::size_t t,
+                                  const Eigen::Affine3d& transform) {
   const auto& corners = shape.triangles[t];
-  return {placedVertex(shape, corners[0], transform), placedVertex(shape, corners[1], transform),
-          placedVertex(shape, corners[2], transform)};
+  return {placeShapeVertex(shape, corners[0], transform),
+          placeShapeVertex(shape, corners[1], transform),
+          placeShapeVertex(shape, corners[2], transform)};
 }
 
 /// 3 V / A of the enclosed volume, metres.
 double computeThickness(const Shape& shape, const Shell& shell, const Eigen::Affine3d& transform) {
-  const Vec3 origin = placedVertex(shape, shape.triangles[shell.first][0], transform);
+  const Vec3 origin = placeShapeVertex(shape, shape.triangles[shell.first][0], transform);
   double sixfoldVolume = 0, doubleArea = 0;
   for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-    const auto [a, b, c] = placedTriangle(shape, t, transform);
+    const auto [a, b, c] = placeTriangle(shape, t, transform);
     const Vec3 normal = (b - a).cross(c - a);
     sixfoldVolume += (a - origin).dot(normal);
     doubleArea += normal.norm();
@@ -52,7 +53,7 @@ double findExactOrigin(double low, double high) {
 Vec3 computeOrigin(const Shape& shape, const Eigen::Affine3d& transform) {
   Aabb box;
   for (std::uint32_t v = 0; v < shape.vertices.size(); ++v)
-    box.include(placedVertex(shape, v, transform));
+    box.include(placeShapeVertex(shape, v, transform));
   if (box.empty()) return Vec3::Zero();
   return {findExactOrigin(box.min.x(), box.max.x()), findExactOrigin(box.min.y(), box.max.y()),
           findExactOrigin(box.min.z(), box.max.z())};
@@ -67,7 +68,7 @@ collision::Hull buildShellHull(const Shape& shape, const Shell& shell,
                                const Eigen::Affine3d& transform, const Vec3& origin) {
   std::vector<Vec3> points;
   for (const std::uint32_t v : collectVertices(shape, {&shell, 1}))
-    points.emplace_back(placedVertex(shape, v, transform) - origin);
+    points.emplace_back(placeShapeVertex(shape, v, transform) - origin);
   return collision::buildHull(points);
 }
 
@@ -104,7 +105,7 @@ CollisionGeometry buildCollisionGeometry(const Shape& shape, const Eigen::Affine
       continue;
     }
     for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-      const auto triangle = makeRelative(placedTriangle(shape, t, transform), geometry.origin);
+      const auto triangle = makeRelative(placeTriangle(shape, t, transform), geometry.origin);
       if (!hasNumericalArea(triangle)) continue;
       triangles.push_back(triangle);
       windingSigns.push_back(shell.bounds() ? outside : static_cast<signed char>(0));

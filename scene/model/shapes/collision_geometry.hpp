@@ -1,5 +1,5 @@
-// CollisionGeometry: an object's geometry for collision, hulls for convex solids and triangles for
-// the rest.
+// CollisionGeometry: hulls and triangle trees from an object's meshes, for collision. Convex solids
+// become hulls; the rest stays triangles.
 #pragma once
 
 #include <cstdint>

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <tuple>
+#include <vector>
 
 #include "collision/shapes/exact_orientation.hpp"
 #include "collision/shapes/hull.hpp"
@@ -10,6 +11,8 @@
 namespace enfilade::scene {
 namespace {
 
+using collision::Aabb;
+using collision::Vec3;
 using Corners = std::array<std::uint32_t, 3>;
 
 constexpr std::size_t kMaxVertices = 1 << 16;    // of a surface whose hull is worth building

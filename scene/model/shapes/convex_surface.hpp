@@ -16,11 +16,12 @@
 // H contains the surface in either case: a shape that is clear of H is clear of every triangle.
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
 #include <span>
 
-#include "scene/model/shapes/shape.hpp"
+#include "scene/model/shapes/shell.hpp"
 
 namespace enfilade::scene {
 

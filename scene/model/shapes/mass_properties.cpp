@@ -25,7 +25,7 @@ struct Integrals {
   Mat3 second = Mat3::Zero();
 };
 
-Mat3 outerProduct(const Vec3& v) {
+Mat3 computeOuterProduct(const Vec3& v) {
   return v * v.transpose();
 }
 
@@ -41,8 +41,9 @@ Integrals integrate(std::span<const collision::Triangle> triangles, const Vec3& 
     const double determinant = p.dot(q.cross(r));
     sum.volume += determinant / 6;
     sum.first += determinant / 24 * s;
-    sum.second +=
-        determinant / 120 * (outerProduct(p) + outerProduct(q) + outerProduct(r) + outerProduct(s));
+    sum.second += determinant / 120 *
+                  (computeOuterProduct(p) + computeOuterProduct(q) + computeOuterProduct(r) +
+                   computeOuterProduct(s));
   }
   return sum;
 }
@@ -71,7 +72,7 @@ MassProperties computeMeshMass(std::span<const collision::Triangle> triangles, d
   result.mass = density * sum.volume;
   const Vec3 centre = sum.first / sum.volume;
   result.centre = origin + centre;
-  result.inertia = density * computeInertia(sum.second - sum.volume * outerProduct(centre));
+  result.inertia = density * computeInertia(sum.second - sum.volume * computeOuterProduct(centre));
   return result;
 }
 
@@ -97,7 +98,7 @@ MassProperties combineMassProperties(std::span<const MassProperties> parts) {
   sum.centre /= sum.mass;
   for (const MassProperties& part : parts)
     sum.inertia +=
-        part.inertia + part.mass * computeInertia(outerProduct(part.centre - sum.centre));
+        part.inertia + part.mass * computeInertia(computeOuterProduct(part.centre - sum.centre));
   return sum;
 }
 

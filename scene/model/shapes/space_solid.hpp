@@ -1,4 +1,4 @@
-// The solid of a space, such as a room.
+// Point containment in the solid of a space, such as a room, and a point in its middle.
 #pragma once
 
 #include "scene/model/model.hpp"

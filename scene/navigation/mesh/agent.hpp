@@ -1,4 +1,4 @@
-// The size of a walker, for navigation: the upright prism of an avatar without parts and links.
+// NavigationAgent: size and speed of an agent, an upright prism without parts and links.
 #pragma once
 
 namespace enfilade::scene {

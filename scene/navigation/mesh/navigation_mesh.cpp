@@ -82,7 +82,7 @@ NavigationMesh::NavigationMesh(const TileGrid& grid, std::vector<TileMesh> tiles
   if (dtStatusFailed(detour_->query.init(&detour_->mesh, 64)))
     throw std::runtime_error("navigation: Detour cannot start");
   collectPortals();
-  findRim(grid);
+  markBoundary(grid);
 }
 
 NavigationMesh::~NavigationMesh() = default;
@@ -137,8 +137,8 @@ void NavigationMesh::collectPortals() {
   bytes_ += portals_.size() * sizeof(Portal) + centres_.size() * (sizeof(Vec3) + 16);
 }
 
-/// Decides which ends of portals are on the rim. Vertices lie on the cells of the grid.
-void NavigationMesh::findRim(const TileGrid& grid) {
+/// Decides which ends of portals are on the boundary. Vertices lie on the cells of the grid.
+void NavigationMesh::markBoundary(const TileGrid& grid) {
   const auto computeKey = [&](const Vec3& point) {
     const auto x =
         static_cast<std::uint32_t>(std::lround((point.x() - grid.origin.x()) / grid.cell));
@@ -146,7 +146,7 @@ void NavigationMesh::findRim(const TileGrid& grid) {
         static_cast<std::uint32_t>(std::lround((point.z() - grid.origin.z()) / grid.cell));
     return std::uint64_t{x} << 32 | z;
   };
-  std::unordered_set<std::uint64_t> rim;
+  std::unordered_set<std::uint64_t> boundary;
   for (std::uint32_t index = 0; index < polygonCount(); ++index) {
     const dtPoly* polygon = nullptr;
     const dtMeshTile& tile = detour_->tile(references_[index], &polygon);
@@ -160,16 +160,17 @@ void NavigationMesh::findRim(const TileGrid& grid) {
     for (std::size_t k = 0; k < polygon->vertCount; ++k) {
       if (covered[k] >= kWhole - kRoundedParts) continue;
       for (const std::size_t end : {k, (k + 1) % polygon->vertCount})
-        rim.insert(computeKey(toVec3(&tile.verts[polygon->verts[end] * 3])));
+        boundary.insert(computeKey(toVec3(&tile.verts[polygon->verts[end] * 3])));
       // A part of the edge has no neighbour: the portals of the others may end anywhere on it.
       if (covered[k] > 0)
         for (std::uint32_t p = firstPortal_[index]; p < firstPortal_[index + 1]; ++p)
-          for (const Vec3& end : {portals_[p].low, portals_[p].high}) rim.insert(computeKey(end));
+          for (const Vec3& end : {portals_[p].low, portals_[p].high})
+            boundary.insert(computeKey(end));
     }
   }
   for (Portal& portal : portals_) {
-    portal.lowIsRim = rim.contains(computeKey(portal.low));
-    portal.highIsRim = rim.contains(computeKey(portal.high));
+    portal.lowIsOnBoundary = boundary.contains(computeKey(portal.low));
+    portal.highIsOnBoundary = boundary.contains(computeKey(portal.high));
   }
 }
 
@@ -334,7 +335,7 @@ Vec3 NavigationMesh::portalMiddle(std::uint32_t from, std::uint32_t to) const {
 
 /// Shortest lines may bend at the ends of a closed portal of `polygon`: marks them in all polygons
 /// around. They stay marked when it opens again: this costs time, but no line.
-void NavigationMesh::addRim(std::uint32_t polygon, const Portal& closed) {
+void NavigationMesh::addBoundary(std::uint32_t polygon, const Portal& closed) {
   constexpr double kSame = 1e-3;  // metres
   for (const Vec3& end : {closed.low, closed.high}) {
     const auto isEnd = [&](const Vec3& point) {
@@ -345,8 +346,8 @@ void NavigationMesh::addRim(std::uint32_t polygon, const Portal& closed) {
       const std::uint32_t one = around[i];
       for (std::uint32_t p = firstPortal_[one]; p < firstPortal_[one + 1]; ++p) {
         const bool isLow = isEnd(portals_[p].low), isHigh = isEnd(portals_[p].high);
-        portals_[p].lowIsRim |= isLow;
-        portals_[p].highIsRim |= isHigh;
+        portals_[p].lowIsOnBoundary |= isLow;
+        portals_[p].highIsOnBoundary |= isHigh;
         if ((isLow || isHigh) && std::ranges::find(around, portals_[p].to) == around.end())
           around.push_back(portals_[p].to);
       }
@@ -366,7 +367,7 @@ std::vector<Portal*> NavigationMesh::findPortals(std::uint32_t a, std::uint32_t 
 void NavigationMesh::closePortal(std::uint32_t from, std::uint32_t to) {
   for (Portal* portal : findPortals(from, to)) {
     portal->closed = true;
-    addRim(from, *portal);
+    addBoundary(from, *portal);
   }
 }
 

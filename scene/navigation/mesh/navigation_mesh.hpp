@@ -1,4 +1,4 @@
-// The walkable polygons of a scene and the portals between them: proposes ways. A portal that a
+// The walkable polygons of a scene and the portals between them: proposes paths. A portal that a
 // proof refuted is closed.
 #pragma once
 
@@ -25,21 +25,22 @@ struct Corridor {
   double cost = 0;  ///< metres, through the middles of the portals
 };
 
-/// The way from a polygon to a neighbour. From inside of the polygon, `low` to `high` turns from +X
-/// towards +Z.
+/// The opening from a polygon to a neighbour. From inside of the polygon, `low` to `high` turns
+/// from +X towards +Z.
 struct Portal {
   std::uint32_t to = 0;
   Vec3 low = Vec3::Zero();
   Vec3 high = Vec3::Zero();
-  bool lowIsRim = true;  ///< the end is on the rim of the mesh: shortest lines bend at such places
-  bool highIsRim = true;
+  /// The end is on the boundary of the mesh: shortest lines bend at such places.
+  bool lowIsOnBoundary = true;
+  bool highIsOnBoundary = true;
   bool closed = false;
   std::uint8_t failures = 0;
 
   Vec3 middle() const { return 0.5 * (low + high); }
 };
 
-/// A part of the rim of the mesh.
+/// A part of the boundary of the mesh.
 struct BoundaryEdge {
   std::uint32_t polygon = 0;
   Vec3 from = Vec3::Zero(), to = Vec3::Zero();  ///< scene frame, metres
@@ -109,8 +110,8 @@ class NavigationMesh {
  private:
   struct Detour;
   void collectPortals();
-  void findRim(const TileGrid& grid);
-  void addRim(std::uint32_t polygon, const Portal& closed);
+  void markBoundary(const TileGrid& grid);
+  void addBoundary(std::uint32_t polygon, const Portal& closed);
   std::vector<Portal*> findPortals(std::uint32_t a, std::uint32_t b);
   /// The vertex of a polygon above or below a point, within `distance` metres, or the point. Detour
   /// stores the ends of portals between tiles in 255ths of an edge.

@@ -16,7 +16,7 @@ struct MeshFileError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// The ways across a gap of the rim that was tried: a TriedGaps entry.
+/// The paths across a gap of the boundary that was tried: a TriedGaps entry.
 struct SavedGap {
   std::array<double, 6> key{};  ///< coordinates of both places
   std::vector<Vec3> there, back;
@@ -34,8 +34,8 @@ std::vector<std::uint8_t> saveMeshes(const WorldData& world, const NavigationAge
                                      const SavedMeshes& meshes);
 
 /// Reads meshes of this scene, these settings and this size. Throws MeshFileError if they belong to
-/// others, or are damaged. A tile that was read is safe to use, whatever the bytes are; a
-/// way across a gap may be none that can be walked.
+/// others, or are damaged. A tile that was read is safe to use, whatever the bytes are. Loaded gap
+/// paths may be unwalkable; they are proved before use.
 SavedMeshes loadMeshes(const WorldData& world, const NavigationAgent& agent, const TileGrid& grid,
                        std::span<const std::uint8_t> bytes);
 

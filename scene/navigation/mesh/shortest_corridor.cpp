@@ -32,7 +32,7 @@ double length(const Vec3& v) {
 /// root the part is seen from `low` to `high`, with a positive cross product.
 struct Interval {
   Vec3 root = Vec3::Zero(), low = Vec3::Zero(), high = Vec3::Zero();
-  bool lowIsCorner = true;  ///< an end of the portal on the rim: a line may bend there
+  bool lowIsCorner = true;  ///< an end of the portal on the boundary: a line may bend there
   bool highIsCorner = true;
   double toRoot = 0;          ///< metres from the start
   std::uint32_t polygon = 0;  ///< beyond the portal
@@ -70,8 +70,8 @@ class CorridorSearch {
         push({.root = from_.point,
               .low = portal.low,
               .high = portal.high,
-              .lowIsCorner = portal.lowIsRim,
-              .highIsCorner = portal.highIsRim,
+              .lowIsCorner = portal.lowIsOnBoundary,
+              .highIsCorner = portal.highIsOnBoundary,
               .polygon = portal.to});
     }
     while (!open_.empty() && nodes_.size() < kMaxNodes) {
@@ -141,24 +141,24 @@ class CorridorSearch {
       if (first < last) {
         next.root = root;
         next.low = at(first), next.high = at(last);
-        next.lowIsCorner = first <= 0 && portal.lowIsRim;
-        next.highIsCorner = last >= 1 && portal.highIsRim;
+        next.lowIsCorner = first <= 0 && portal.lowIsOnBoundary;
+        next.highIsCorner = last >= 1 && portal.highIsOnBoundary;
         push(next);
       }
       if (first > 0 && interval.lowIsCorner) {
         next.root = interval.low;
         next.toRoot = interval.toRoot + length(toLow);
         next.low = portal.low, next.high = at(first);
-        next.lowIsCorner = portal.lowIsRim;
-        next.highIsCorner = first >= 1 && portal.highIsRim;
+        next.lowIsCorner = portal.lowIsOnBoundary;
+        next.highIsCorner = first >= 1 && portal.highIsOnBoundary;
         push(next);
       }
       if (last < 1 && interval.highIsCorner) {
         next.root = interval.high;
         next.toRoot = interval.toRoot + length(toHigh);
         next.low = at(last), next.high = portal.high;
-        next.lowIsCorner = last <= 0 && portal.lowIsRim;
-        next.highIsCorner = portal.highIsRim;
+        next.lowIsCorner = last <= 0 && portal.lowIsOnBoundary;
+        next.highIsCorner = portal.highIsOnBoundary;
         push(next);
       }
     }

@@ -1,4 +1,4 @@
-// The corridor of the shortest line over a navigation mesh.
+// Finds the corridor of the shortest path over a navigation mesh (Polyanya).
 #pragma once
 
 #include <optional>

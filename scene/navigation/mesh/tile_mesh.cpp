@@ -87,7 +87,7 @@ struct TileBuild {
   }
 };
 
-float maxSlopeDegrees(const WorldSettings& settings) {
+float computeMaxSlopeDegrees(const WorldSettings& settings) {
   return static_cast<float>(std::acos(settings.walkableNormalY) * collision::kDegreesPerRadian);
 }
 
@@ -102,7 +102,7 @@ Heightfield rasterize(TileBuild& build, const std::vector<float>& triangles) {
   std::vector<int> indices(static_cast<std::size_t>(vertexCount));
   for (int i = 0; i < vertexCount; ++i) indices[static_cast<std::size_t>(i)] = i;
   std::vector<unsigned char> areas(static_cast<std::size_t>(count), RC_NULL_AREA);
-  rcMarkWalkableTriangles(&build.context, maxSlopeDegrees(build.settings), triangles.data(),
+  rcMarkWalkableTriangles(&build.context, computeMaxSlopeDegrees(build.settings), triangles.data(),
                           vertexCount, indices.data(), count, areas.data());
   const int climb = makeCellSizes(build.settings, build.agent, build.grid, Clearance::ample).climb;
   build.require(

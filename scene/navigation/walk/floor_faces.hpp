@@ -1,5 +1,5 @@
-// The level upper faces of obstacles: how far a walk stays above even floor, so that one step of
-// the proof can be long.
+// FloorFace: a level upper face of an obstacle. Floor faces show how far a walk stays above even
+// floor, so that one step of the proof can be long.
 #pragma once
 
 #include <vector>

@@ -14,7 +14,7 @@ namespace enfilade::scene {
 namespace {
 
 constexpr double kLayerHeight = 1;    // metres: places of a cell closer than this are one place
-constexpr double kSameHeight = 0.05;  // metres: of feet that come to the same place on two ways
+constexpr double kSameHeight = 0.05;  // metres: of feet that come to the same place on two paths
 
 struct Cell {
   int x = 0, z = 0, storey = 0;
@@ -53,14 +53,14 @@ std::vector<Vec3> collectPlaces(const std::map<Cell, Place>& places, Cell last) 
 
 /// The place that a search looks for.
 struct Target {
-  Aabb window;                                  ///< that the way may not leave
-  std::function<double(const Vec3&)> estimate;  ///< metres to the end, at most those of the way
-  PlaceTest isReachedAt;                        ///< the way ends there
+  Aabb window;                                  ///< that the path may not leave
+  std::function<double(const Vec3&)> estimate;  ///< metres to the end, at most those of the path
+  PlaceTest isReachedAt;                        ///< the path ends there
   PlaceTest isOpen;                             ///< it may lead on from there; null: anywhere
 };
 
-std::optional<std::vector<Vec3>> findWay(Walker& walker, const Vec3& from, const Target& end,
-                                         GridSearch& search) {
+std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, const Target& end,
+                                            GridSearch& search) {
   const Grid grid{from, search.spacing};
   std::map<Cell, Place> places;
   using Entry = std::pair<double, Cell>;
@@ -124,18 +124,18 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
                             walks(walker, at, to, kSameHeight);
                    },
                    {}};
-  auto way = findWay(walker, from, end, search);
-  if (way) way->push_back(to);
-  return way;
+  auto path = searchGrid(walker, from, end, search);
+  if (path) path->push_back(to);
+  return path;
 }
 
 std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& from,
-                                                 const WayOut& out, GridSearch& search) {
+                                                 const PathOut& out, GridSearch& search) {
   const Target end{
       inflated(Aabb{from, from}, search.margin),
       [&](const Vec3& at) { return out.toward ? computeGroundDistance(*out.toward, at) : 0.0; },
       out.isWanted, out.isOpen};
-  return findWay(walker, from, end, search);
+  return searchGrid(walker, from, end, search);
 }
 
 void pullTight(Walker& walker, std::vector<Vec3>& places) {

@@ -1,4 +1,4 @@
-// Searches a way on a fine grid, where each edge is walked: finds the ways that a navigation mesh
+// Searches a path on a fine grid, where each edge is walked: finds the paths that a navigation mesh
 // is too coarse for.
 #pragma once
 
@@ -18,11 +18,11 @@ bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError)
 
 struct GridSearch {
   double spacing = 0.1;      ///< metres between places
-  double margin = 1.5;       ///< metres: how far the way may leave the box of both ends
+  double margin = 1.5;       ///< metres: how far the path may leave the box of both ends
   std::size_t maxWalks = 0;  ///< edges to walk
 };
 
-/// The places of a way between two places where the walker stood, with both; nullopt: none was
+/// The places of a path between two places where the walker stood, with both; nullopt: none was
 /// found within the limits. Each leg was walked. Subtracts the walks from `search.maxWalks`.
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
                                               GridSearch& search);
@@ -30,16 +30,16 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
 using PlaceTest = std::function<bool(const Vec3& feet)>;
 
 /// The end of a search that leads out of somewhere.
-struct WayOut {
-  PlaceTest isWanted;               ///< the way ends there
+struct PathOut {
+  PlaceTest isWanted;               ///< the path ends there
   PlaceTest isOpen = {};            ///< it may lead on from there; null: from anywhere
-  std::optional<Vec3> toward = {};  ///< the way from here over its end to this point is short
+  std::optional<Vec3> toward = {};  ///< the path from here over its end to this point is short
 };
 
 /// As findGridPath(), to the closest place that is wanted and at most `search.margin` metres away
 /// on each axis.
 std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& from,
-                                                 const WayOut& out, GridSearch& search);
+                                                 const PathOut& out, GridSearch& search);
 
 /// Lines between places of a path that are tried as shortcuts. A line that is stopped is walked
 /// tick by tick, which takes long: this pays after a search on a grid, and rarely at the corners of
@@ -50,7 +50,7 @@ enum class Shortcuts : std::uint8_t { all, free };
 /// legs can be walked.
 void pullTight(Walker& walker, std::vector<Vec3>& places);
 
-/// Leaves out places of a way as long as the legs between the others can be walked.
+/// Leaves out places of a path as long as the legs between the others can be walked.
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind);
 
 }  // namespace enfilade::scene

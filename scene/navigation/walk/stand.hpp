@@ -1,4 +1,4 @@
-// Places where an agent stands.
+// Finds standing places: positions at which an agent fits and has a floor.
 #pragma once
 
 #include <cstdint>

@@ -24,7 +24,7 @@ constexpr double kMiddle = 0.75;       // of the radius: beyond the edge of the 
 constexpr double kMinStepRise = 0.01;  // metres in a tick
 constexpr double kTickedLength = 0.5;  // metres, through a place that is too narrow for the margin
 constexpr double kEvenHeight = 1e-3;   // metres: a step that rises or sinks more is not even
-constexpr double kMaxStall = 0.5;      // seconds without progress towards the way point
+constexpr double kMaxStall = 0.5;      // seconds without progress towards the waypoint
 // Seconds. A walk that slides for longer may pass the obstacle at last, but a walk that begins a
 // millimetre aside may not.
 constexpr double kMaxSlidingStall = 0.1;
@@ -111,7 +111,7 @@ void Walker::prepareStep(const Vec3& velocity) {
   avatar_.blockedBy = 0;
 }
 
-/// Steps if the way is free and level; false, at the same place: it is not. A move of this length
+/// Steps if the path is free and level; false, at the same place: it is not. A move of this length
 /// alone would climb and pass what a walk in short steps cannot.
 bool Walker::stepEvenly(const Vec3& displacement, bool isFloorEven) {
   const Vec3 before = avatar_.footPosition;
@@ -200,17 +200,17 @@ WalkOutcome Walker::walkTo(const Vec3& goal) {
 bool Walker::isPathClear(const Vec3& goal) {
   isUneven_ = false;
   avatar_.shape = wideShape_;
-  bool isFree = true;
-  while (isFree) {
+  bool isClear = true;
+  while (isClear) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (distance <= kArrivalDistance) break;
     const double even = measureEvenFloor(goal, distance);
     const double length = std::min({distance, kMaxStep, std::max(kLongStep, even)});
-    isFree = stepEvenly(projectToGround(goal - avatar_.footPosition) * (length / distance),
-                        length <= even);
+    isClear = stepEvenly(projectToGround(goal - avatar_.footPosition) * (length / distance),
+                         length <= even);
   }
   avatar_.shape = shape_;
-  return isFree;
+  return isClear;
 }
 
 bool Walker::isRideFree(const Vec3& from, const Vec3& to, EntityId body) {

@@ -1,5 +1,5 @@
-// Walks an avatar that is in no world, to prove a path: by the same motion as in a tick, among the
-// static objects and the bodies at their present poses. Other avatars are no obstacles.
+// Walker: a simulated avatar outside any world, which proves a path by walking it. It moves as in a
+// tick, among static objects and bodies at their present poses. Other avatars are no obstacles.
 #pragma once
 
 #include <array>
@@ -40,7 +40,7 @@ class Walker {
   std::optional<std::string> place(const Vec3& footPosition, double maxDrop);
   /// Stands where it has stood before.
   void returnTo(const Vec3& footPosition);
-  /// Walks straight to the way point `goal`; its height decides nothing. Stops at the first
+  /// Walks straight to the waypoint `goal`; its height decides nothing. Stops at the first
   /// obstacle that is not a step, and where the floor ends. Keeps some millimetres from obstacles,
   /// or else walks tick by tick: a later walk along the same line differs by less than that.
   WalkOutcome walkTo(const Vec3& goal);

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "collision/assert.hpp"
-#include "scene/physics/disjoint_sets.hpp"
+#include "scene/base/disjoint_sets.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,4 +1,4 @@
-// Motion of an avatar in a tick.
+// Moves an avatar in a tick: collide-and-slide, steps, falls and flight.
 #pragma once
 
 #include "scene/world/data/tick_report.hpp"

@@ -1,4 +1,4 @@
-// Motion of the joints of a chain in a tick.
+// Moves the joints of a chain in a tick.
 #pragma once
 
 #include "scene/world/data/tick_report.hpp"

@@ -1,4 +1,4 @@
-// The place where an avatar will stand after its orders.
+// OrderEnd: the place where an avatar will stand after its orders.
 #pragma once
 
 #include <optional>

@@ -16,7 +16,7 @@
 #include "scene/world/avatars/walk_velocity.hpp"
 #include "scene/world/avatars/yielding.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
-#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/avatar_contacts.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -284,12 +284,12 @@ std::string describeBlocking(const OrderContext& context, const Vec3& goal) {
   const double up = goal.y() - context.findAvatar()->footPosition.y();
   if (!context.findAvatar()->flying &&
       computeGroundDistance(context.findAvatar()->footPosition, goal) <= kArrivalDistance)
-    return "the way point lies " + formatShortNumber(std::abs(up)) + " m " +
+    return "the waypoint lies " + formatShortNumber(std::abs(up)) + " m " +
            (up > 0 ? "above" : "below");
   return "no progress for " + formatShortNumber(context.world.settings.stuckTimeout) + " s";
 }
 
-/// True in a fall that is faster than one from a step: it passes a way point above the landing.
+/// True in a fall that is faster than one from a step: it passes a waypoint above the landing.
 bool isFallingFar(const Avatar& avatar, const WorldSettings& settings) {
   return !avatar.grounded && !avatar.flying && avatar.fallSpeed > 0 &&
          avatar.fallSpeed * avatar.fallSpeed > 2 * settings.gravity * settings.stepHeight;

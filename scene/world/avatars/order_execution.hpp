@@ -1,4 +1,4 @@
-// Execution of the avatars' orders.
+// Executes the orders at the heads of the avatars' queues in each tick, and reports their ends.
 #pragma once
 
 #include <cstddef>
@@ -8,7 +8,7 @@
 
 namespace enfilade::scene {
 
-/// Share of an order in kMaxQueuedOrders: itself and its way points.
+/// Share of an order in kMaxQueuedOrders: itself and its waypoints.
 std::size_t computeOrderCost(const Order& order);
 
 /// Enqueues the pending commands, then starts or continues the first order of each queue.

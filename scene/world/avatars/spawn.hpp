@@ -1,4 +1,4 @@
-// Shape and position of a new or teleported avatar.
+// Places a new or teleported avatar: its shape, and a free position on a floor.
 #pragma once
 
 #include <optional>

@@ -1,4 +1,4 @@
-// Turns of an avatar about the vertical through its feet.
+// Turns an avatar about the vertical axis through its feet.
 #pragma once
 
 #include "scene/world/avatars/order_context.hpp"

@@ -33,7 +33,7 @@ Aabb computeSwing(const Body& door) {
     return swing;
   }
   double radius = door.shape->radius;
-  if (std::abs(spec.axis.y()) > kUpright) {  // no farther than the farthest corner of its box
+  if (std::abs(spec.axis.y()) > kUpright) {  // bound: distance to the farthest box corner
     const Vec3 far =
         (spec.anchor - swing.min).cwiseAbs().cwiseMax((spec.anchor - swing.max).cwiseAbs());
     radius = std::min(radius, projectToGround(far).norm());

@@ -7,7 +7,7 @@
 
 namespace enfilade::scene {
 
-/// Commands the doors ahead and the lift of the next way point where necessary, and sets
+/// Commands the doors ahead and the lift of the next waypoint where necessary, and sets
 /// WalkProgress::waitsFor. A walk gives three commands for each of its bodies, and no more.
 void commandWalkBodies(WorldData& world, const Walk& walk, Avatar& avatar);
 

@@ -1,4 +1,4 @@
-// Distance and velocity of a walk to a way point.
+// Distance and velocity of a walk to a waypoint.
 #pragma once
 
 #include <algorithm>
@@ -10,8 +10,8 @@ namespace enfilade::scene {
 
 using collision::Vec3;
 
-inline constexpr double kArrivalDistance = 1e-3;  ///< metres, horizontal distance to the way point
-/// metres, vertical distance to the way point: excludes another storey
+inline constexpr double kArrivalDistance = 1e-3;  ///< metres, horizontal distance to the waypoint
+/// metres, vertical distance to the waypoint: excludes another storey
 inline constexpr double kArrivalHeight = 1.0;
 
 /// Horizontal distance, metres.

@@ -1,6 +1,6 @@
-// A walk yields to another one that is ahead of it within kFollowDistance and closer to its way
-// point. The other one must walk to the same place or in about the same direction. Among walks to
-// one place that is a strict order, so one of them always goes. Two more rules keep other walks
+// A walk yields to another one that is ahead of it within kFollowDistance and closer to its
+// waypoint. The other one must walk to the same place or in about the same direction. Among walks
+// to one place that is a strict order, so one of them always goes. Two more rules keep other walks
 // from waiting for ever: rings are opened, and walks that wedge one another step back. Walks in
 // opposite directions do not yield; they slide past each other.
 #include "scene/world/avatars/yielding.hpp"
@@ -24,7 +24,7 @@ constexpr double kMaxRetreat = -0.5;          // of the speed
 constexpr double kAheadCosine = 0.7071;       // walks in one direction: within 45 degrees of it
 constexpr double kAbreastCosine = -0.1;       // walks to one place: ahead or abreast
 constexpr double kSameDirectionCosine = 0.7;  // of two walks
-constexpr double kSamePlace = 0.5;            // metres between two way points
+constexpr double kSamePlace = 0.5;            // metres between two waypoints
 // 10 s at 60 ticks a second. The timeout of a walk stands still if the first of its queue was free
 // that recently. Longer jams end walks as blocked.
 constexpr std::uint64_t kMaxQueueTicks = 600;
@@ -84,7 +84,7 @@ double computeGapAhead(const Avatar& avatar, const GroundWalk& walk, const Avata
 }
 
 /// Walks that wedge one another, as in the arch that a crowd forms in front of a door: one that
-/// makes no progress yields to a neighbour that is closer to its own way point. Infinite: not to
+/// makes no progress yields to a neighbour that is closer to its own waypoint. Infinite: not to
 /// this one.
 double computeGapToUnwedge(const Avatar& avatar, const GroundWalk& walk, const Avatar& other,
                            const GroundWalk& otherWalk) {
@@ -124,8 +124,8 @@ Leader findLeader(const WorldData& world, const std::vector<GroundWalk>& walks,
   return leader;
 }
 
-/// Walks to different way points may wait for one another in a ring, and would do so for ever: the
-/// one closest to its way point goes.
+/// Walks to different waypoints may wait for one another in a ring, and would do so for ever: the
+/// one closest to its waypoint goes.
 void openRings(std::vector<Leader>& leaders, const std::vector<GroundWalk>& walks) {
   std::vector<std::size_t> visit(leaders.size(), kNobody);  // the first walk whose chain led here
   for (std::size_t first = 0; first < leaders.size(); ++first) {
@@ -152,7 +152,7 @@ const Avatar* findQueueAhead(const WorldData& world, const std::vector<Leader>& 
   return leaders[i].index != kNobody ? blocking : nullptr;
 }
 
-/// Negative: it steps back, as the one ahead may need the place, such as the way point itself.
+/// Negative: it steps back, as the one ahead may need the place, such as the waypoint itself.
 double computeSpeedFactor(double gap) {
   const double factor = std::max(kMaxRetreat, (gap - kMinGap) / (kFollowDistance - kMinGap));
   return std::abs(factor) < kMinSpeedFactor ? 0 : factor;
@@ -182,7 +182,7 @@ bool mayPassEarly(const WorldData& world, const Avatar& avatar, double distance,
   const bool isCrowded = avatar.walk.yields || avatar.blockedBy >= world.firstAvatarId();
   const double width = 2 * computeHalfWidth(avatar.shape->box);
   if (!isCrowded || avatar.flying || distance > width) return false;
-  // As far as beyond the corner that the way point may mark.
+  // As far as beyond the corner that the waypoint may mark.
   Vec3 onward = projectToGround(next - avatar.footPosition);
   const double length = onward.norm();
   if (length > 2 * width) onward *= 2 * width / length;

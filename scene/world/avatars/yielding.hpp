@@ -1,5 +1,5 @@
-// Walkers that follow one another: the one farther from a way point waits for the one before it. A
-// crowd thus passes a door one by one instead of wedging itself in.
+// Queueing of walkers: of two that follow one another, the one farther from the waypoint waits for
+// the other. A crowd thus passes a door one by one instead of wedging itself in.
 #pragma once
 
 #include "scene/world/data/tick_report.hpp"
@@ -11,7 +11,7 @@ namespace enfilade::scene {
 /// velocities of the tick are known.
 void yieldToWalkersAhead(WorldData& world);
 
-/// True if the avatar walks on to `next` before it reaches the way point at `distance` metres. In a
+/// True if the avatar walks on to `next` before it reaches the waypoint at `distance` metres. In a
 /// crowd it does so near the point, where there is no room for all. No static object and no body
 /// may be in the way.
 bool mayPassEarly(const WorldData& world, const Avatar& avatar, double distance, const Vec3& next,

@@ -1,6 +1,7 @@
 #include "scene/world/bodies/candidate_pairs.hpp"
 
 #include <algorithm>
+#include <map>
 #include <span>
 #include <utility>
 
@@ -35,11 +36,6 @@ double computeBoundsMargin(const WorldData& world, const Body& body) {
                   .bodies[world.dynamicBodies.physicsBodyOf[world.findBodyByProxy(body.proxy)]]
                   .maxStepDisplacement;
   return margin;
-}
-
-/// Bounds of a part's motion in this tick, with the contact margin.
-Aabb computePartBounds(const WorldData& world, const Body& body, std::uint32_t part) {
-  return inflated(getPartBox(body, part), computeBoundsMargin(world, body));
 }
 
 /// Bounds of the motion of all rigid bodies in this tick.
@@ -92,72 +88,65 @@ bool isDynamic(const DynamicBodies& dynamicBodies, std::uint32_t body) {
 struct ActiveBodyOverlaps {
   PairKeys pairs;  ///< of parts of two rigid bodies
   /// An active body, and an overlap with anything but a rigid body.
-  std::vector<std::pair<std::uint32_t, collision::SortAndSweep::Overlap>> others;
+  std::vector<std::pair<std::uint32_t, collision::ProxyOverlap>> others;
 };
 
-/// Collects the overlapping pairs of parts of an active body and other rigid bodies.
-struct DynamicPairCollector {
-  const WorldData& world;
-  const SweptBounds& bounds;
-  const std::uint32_t activeBody;
-  PartFronts& fronts;     ///< of the active body in this tick, empty at first
-  PartFronts& oldFronts;  ///< of its last active tick
-  PairKeys& keys;
+/// A body of the solver, and the bounds of the motion of its parts in this tick.
+struct MovingParts {
+  const Body& body;
+  std::uint32_t physicsBody;
+  std::span<const Aabb> boxes;  ///< of its parts, inflated by `margin`
+  double margin;                ///< metres
+};
 
-  void addBody(std::uint32_t otherBody) {
-    const std::uint32_t physicsBody = world.dynamicBodies.physicsBodyOf[activeBody],
-                        other = world.dynamicBodies.physicsBodyOf[otherBody];
-    if (!mayMeet(bounds.spheres[physicsBody], bounds.spheres[other],
-                 computeContactQueryMargin(world.settings)))
-      return;
-    const std::span<const Aabb> parts = bounds.findPartBoxes(physicsBody),
-                                others = bounds.findPartBoxes(other);
-    // The box of a body with one part may be a cube, which its tree does not contain.
-    const bool areCompounds = parts.size() > 1 && others.size() > 1;
-    if (areCompounds && parts.size() * others.size() > kMaxPairsWithoutFront)
-      return addByFront(otherBody);
-    for (std::uint32_t part = 0; part < parts.size(); ++part)
-      for (std::uint32_t otherPart = 0; otherPart < others.size(); ++otherPart)
-        if (overlaps(parts[part], others[otherPart]))
-          addPairKey(physicsBody, part, other, otherPart, keys);
-  }
+MovingParts getMovingParts(const WorldData& world, const SweptBounds& bounds, std::uint32_t body) {
+  const std::uint32_t physicsBody = world.dynamicBodies.physicsBodyOf[body];
+  return {world.bodies[body], physicsBody, bounds.findPartBoxes(physicsBody),
+          bounds.margins[physicsBody]};
+}
 
- private:
-  void addByFront(std::uint32_t otherBody) {
-    const std::uint32_t physicsBody = world.dynamicBodies.physicsBodyOf[activeBody],
-                        other = world.dynamicBodies.physicsBodyOf[otherBody];
-    collision::PartFront& front = fronts[other];
-    if (const auto old = oldFronts.find(other); old != oldFronts.end())
-      front = std::move(old->second);
-    const collision::CompoundView view = makeView(activeBody), otherView = makeView(otherBody);
+collision::CompoundView makeView(const Body& body) {
+  return {&body.shape->tree, body.rotation, body.position, {}};  // the parts are not asked for
+}
+
+/// Adds the pairs of parts whose bounds overlap. `fronts`: of `a`.
+void addPartPairs(const MovingParts& a, const MovingParts& b, PartFronts& fronts, PairKeys& keys) {
+  // The box of a body with one part may be a cube, which its tree does not contain.
+  const bool areCompounds = a.boxes.size() > 1 && b.boxes.size() > 1;
+  if (areCompounds && a.boxes.size() * b.boxes.size() > kMaxPairsWithoutFront) {
+    const collision::CompoundView viewA = makeView(a.body), viewB = makeView(b.body);
     std::vector<collision::PartPair> pairs;
-    collision::findOverlappingParts(
-        {view, bounds.findPartBoxes(physicsBody), bounds.margins[physicsBody]},
-        {otherView, bounds.findPartBoxes(other), bounds.margins[other]}, front, pairs);
+    collision::findOverlappingParts({viewA, a.boxes, a.margin}, {viewB, b.boxes, b.margin},
+                                    fronts[b.physicsBody], pairs);
     for (const auto& [part, otherPart] : pairs)
-      addPairKey(physicsBody, part, other, otherPart, keys);
+      addPairKey(a.physicsBody, part, b.physicsBody, otherPart, keys);
+    return;
   }
-
-  collision::CompoundView makeView(std::uint32_t index) const {
-    const Body& body = world.bodies[index];
-    return {&body.shape->tree, body.rotation, body.position, {}};  // the parts are not asked for
-  }
-};
+  for (std::uint32_t part = 0; part < a.boxes.size(); ++part)
+    for (std::uint32_t otherPart = 0; otherPart < b.boxes.size(); ++otherPart)
+      if (overlaps(a.boxes[part], b.boxes[otherPart]))
+        addPairKey(a.physicsBody, part, b.physicsBody, otherPart, keys);
+}
 
 void addOverlaps(WorldData& world, std::uint32_t activeBody, const SweptBounds& bounds,
                  std::span<const std::uint8_t> isActive, ActiveBodyOverlaps& found) {
   DynamicBodies& dynamicBodies = world.dynamicBodies;
-  // Only this call uses the fronts of the active body. Those without an overlap are dropped.
-  PartFronts& fronts = dynamicBodies.partFronts[dynamicBodies.physicsBodyOf[activeBody]];
+  const MovingParts active = getMovingParts(world, bounds, activeBody);
+  const double margin = computeContactQueryMargin(world.settings);
+  // No other call uses the fronts of the active body. Those without an overlap are dropped.
+  PartFronts& fronts = dynamicBodies.partFronts[active.physicsBody];
   PartFronts oldFronts = std::exchange(fronts, {});
-  DynamicPairCollector collector{world, bounds, activeBody, fronts, oldFronts, found.pairs};
-  for (const auto& overlap : world.broadPhase.getOverlaps(world.bodies[activeBody].proxy)) {
+  for (const auto& overlap : world.broadPhase.getOverlaps(active.body.proxy)) {
     const std::uint32_t otherBody = overlap.isDynamic ? world.findBodyByProxy(overlap.id) : kNoBody;
+    if (otherBody != kNoBody)
+      fronts.insert(oldFronts.extract(dynamicBodies.physicsBodyOf[otherBody]));
     if (otherBody == kNoBody || !isDynamic(dynamicBodies, otherBody)) {
       found.others.emplace_back(activeBody, overlap);
     } else if (otherBody > activeBody ||
                isActive[otherBody] == 0) {  // the first of two active ones adds the pair
-      collector.addBody(otherBody);
+      const MovingParts other = getMovingParts(world, bounds, otherBody);
+      if (mayMeet(bounds.spheres[active.physicsBody], bounds.spheres[other.physicsBody], margin))
+        addPartPairs(active, other, fronts, found.pairs);
     }
   }
 }
@@ -192,45 +181,60 @@ struct PairCollector {
   WorldData& world;
   const SweptBounds& bounds;
   PairKeys keys = {};
+  std::map<std::uint32_t, std::vector<Aabb>> kinematicBoxes = {};  ///< by body: of parts, inflated
 
-  void addOverlap(std::uint32_t activeBody, const collision::SortAndSweep::Overlap& overlap) {
-    const std::uint32_t physicsBody = world.dynamicBodies.physicsBodyOf[activeBody];
+  void addOverlap(std::uint32_t activeBody, const collision::ProxyOverlap& overlap) {
+    const MovingParts active = getMovingParts(world, bounds, activeBody);
     if (!overlap.isDynamic) {
-      addStatic(world.bodies[activeBody], physicsBody, world.scene->solidObjects()[overlap.id]);
+      addStatic(active, world.scene->solidObjects()[overlap.id]);
     } else if (const std::uint32_t otherBody = world.findBodyByProxy(overlap.id);
                otherBody == kNoBody) {
-      addAvatar(physicsBody, *world.findAvatarByProxy(overlap.id));
+      addAvatar(active, *world.findAvatarByProxy(overlap.id));
     } else if (isSolid(world.bodies[otherBody])) {
-      addKinematic(physicsBody, otherBody);
+      addKinematic(active, otherBody);
     }
   }
-  void addStatic(const Body& body, std::uint32_t physicsBody, std::uint32_t object) {
+  void addStatic(const MovingParts& active, std::uint32_t object) {
     const CollisionGeometry& parts = world.scene->collisionGeometry(object);
+    const Aabb& motionBounds = active.body.motionBounds;
     std::vector<std::uint32_t> found;
-    parts.query(body.motionBounds, found);
+    parts.query(motionBounds, found);
     if (found.empty()) return;
     const std::uint32_t other = ensureStaticObject(world, object);
-    for (const std::uint32_t part : found) addPartPairs(physicsBody, parts.box(part), other, part);
-  }
-  void addKinematic(std::uint32_t physicsBody, std::uint32_t index) {
-    Body& body = world.bodies[index];
-    makePartBoxes(body);
-    const std::uint32_t other = ensureSceneBody(world, index);
-    for (std::uint32_t part = 0; part < getPartCount(body); ++part)
-      addPartPairs(physicsBody, computePartBounds(world, body, part), other, part);
-  }
-  void addAvatar(std::uint32_t physicsBody, const Avatar& avatar) {
-    for (std::uint32_t i = 0; i < avatar.shape->parts.size(); ++i) {
-      const std::uint32_t other = ensureAvatarPart(world, avatar, i);
-      addPartPairs(physicsBody, placeBox(avatar.shape->parts[i].box, avatar.footPosition), other,
-                   0);
+    if (active.boxes.size() == 1 || active.boxes.size() * found.size() <= kMaxPairsWithoutFront) {
+      for (const std::uint32_t part : found) addBox(active, parts.box(part), other, part);
+      return;
+    }
+    for (std::uint32_t part = 0; part < active.boxes.size(); ++part) {  // each by the object's tree
+      found.clear();
+      parts.query(active.boxes[part], found);
+      for (const std::uint32_t otherPart : found)
+        if (overlaps(motionBounds, parts.box(otherPart)))
+          addPairKey(active.physicsBody, part, other, otherPart, keys);
     }
   }
-  void addPartPairs(std::uint32_t physicsBody, const Aabb& box, std::uint32_t other,
-                    std::uint32_t otherPart) {
-    const std::span<const Aabb> parts = bounds.findPartBoxes(physicsBody);
-    for (std::uint32_t part = 0; part < parts.size(); ++part)
-      if (overlaps(parts[part], box)) addPairKey(physicsBody, part, other, otherPart, keys);
+  void addKinematic(const MovingParts& active, std::uint32_t index) {
+    Body& body = world.bodies[index];
+    const double margin = computeBoundsMargin(world, body);
+    std::vector<Aabb>& boxes = kinematicBoxes[index];
+    if (boxes.empty()) {
+      makePartBoxes(body);
+      for (const Aabb& box : body.boxes.parts) boxes.push_back(inflated(box, margin));
+    }
+    addPartPairs(active, {body, ensureSceneBody(world, index), boxes, margin},
+                 world.dynamicBodies.partFronts[active.physicsBody], keys);
+  }
+  void addAvatar(const MovingParts& active, const Avatar& avatar) {
+    for (std::uint32_t i = 0; i < avatar.shape->parts.size(); ++i) {
+      const std::uint32_t other = ensureAvatarPart(world, avatar, i);
+      addBox(active, placeBox(avatar.shape->parts[i].box, avatar.footPosition), other, 0);
+    }
+  }
+  void addBox(const MovingParts& active, const Aabb& box, std::uint32_t other,
+              std::uint32_t otherPart) {
+    for (std::uint32_t part = 0; part < active.boxes.size(); ++part)
+      if (overlaps(active.boxes[part], box))
+        addPairKey(active.physicsBody, part, other, otherPart, keys);
   }
 };
 

@@ -265,7 +265,7 @@ std::string describeAcceptedCommands(const BodySpec& spec) {
 std::optional<std::string> validateBodyCommand(const WorldData& world, const BodyCommand& command) {
   using Action = BodyCommand::Action;
   if (command.body.index >= world.bodies.size())
-    return "there is no body " + std::to_string(command.body.index);
+    return "unknown body " + std::to_string(command.body.index);
   const Body& body = world.bodies[command.body.index];
   const BodySpec& spec = *body.spec;
   const std::string kind = toString(spec.kind);

@@ -19,7 +19,7 @@
 
 #include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/passengers.hpp"
-#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/contact_events.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 
 namespace enfilade::scene {

@@ -1,5 +1,7 @@
 #include "scene/world/bodies/physics_bodies.hpp"
 
+#include "collision/floating_point.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -89,7 +91,8 @@ std::uint32_t ensureAvatarPart(WorldData& world, const Avatar& avatar, std::uint
     physicsBody.teleportedDistance += 2 * physicsBody.radius;
   physicsBody.rotation = part.rotation;
   physicsBody.motion.rotation = collision::Quat(part.rotation);
-  physicsBody.teleportedDistance += (physicsBody.position - before).norm() * (1 + 0x1p-40);
+  physicsBody.teleportedDistance +=
+      (physicsBody.position - before).norm() * collision::kRoundUpFactor;
   const Vec3& velocity = avatar.desiredVelocity;
   physicsBody.targetVelocity = velocity;
   physicsBody.maxPushForce = velocity.isZero(0) ? 0 : world.settings.maxPushForce;

@@ -9,10 +9,12 @@
 
 #include <algorithm>
 
+#include "collision/floating_point.hpp"
+#include "scene/physics/physics_step.hpp"
 #include "scene/world/bodies/body_state.hpp"
 #include "scene/world/bodies/candidate_pairs.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
-#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/contact_events.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -47,8 +49,9 @@ void setKinematicPose(PhysicsBody& physicsBody, const Vec3& position,
   physicsBody.motion.rotation = orientation;
   updateTransform(physicsBody);
   physicsBody.teleportedDistance +=
-      (1 + 0x1p-40) * ((physicsBody.position - positionBefore).norm() +
-                       (physicsBody.rotation - rotationBefore).norm() * physicsBody.radius);
+      collision::kRoundUpFactor *
+      ((physicsBody.position - positionBefore).norm() +
+       (physicsBody.rotation - rotationBefore).norm() * physicsBody.radius);
 }
 
 /// Velocity in each substep of a body on a path; empty: constant velocity.

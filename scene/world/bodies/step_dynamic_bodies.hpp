@@ -1,4 +1,4 @@
-// Rigid bodies in the tick.
+// Steps the dynamic bodies in a tick: motion bounds, solver, continuous collision.
 #pragma once
 
 #include "scene/world/data/tick_report.hpp"

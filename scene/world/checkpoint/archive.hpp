@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "collision/types.hpp"
-#include "scene/world/checkpoint/checkpoint.hpp"
+#include "scene/world/checkpoint/checkpoint_error.hpp"
 #include "scene/world/data/world_settings.hpp"
 
 namespace enfilade::scene {

@@ -8,20 +8,15 @@
 #include <cstdint>
 #include <memory>
 #include <span>
-#include <stdexcept>
 #include <vector>
 
+#include "scene/world/checkpoint/checkpoint_error.hpp"
 #include "scene/world/world.hpp"
 
 namespace enfilade::scene {
 
 /// Increases with every change of the layout.
 inline constexpr std::uint32_t kCheckpointVersion = 9;
-
-/// Reason why the bytes are not a valid checkpoint, with the place.
-struct CheckpointError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
 
 /// Call between two ticks. Auditing and the number of threads are not part of a checkpoint.
 std::vector<std::uint8_t> makeCheckpoint(const World& world);

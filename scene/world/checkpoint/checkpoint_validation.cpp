@@ -8,6 +8,7 @@
 
 #include "scene/world/avatars/spawn.hpp"
 #include "scene/world/bodies/kinematic_drive.hpp"
+#include "scene/world/checkpoint/checkpoint_error.hpp"
 #include "scene/world/checkpoint/layouts.hpp"
 #include "scene/world/data/validation.hpp"
 
@@ -96,7 +97,7 @@ struct CheckpointChecker {
     require(avatar.walk.waypointIndex < (walk ? walk->waypoints.size() : 1),
             avatar.name + " has an unknown waypoint");
     require(avatar.walk.waitsFor == 0 || (walk && findBody(avatar.walk.waitsFor)),
-            avatar.name + " waits for what is no body");
+            avatar.name + " waits for an unknown body");
     const TurnProgress& turn = avatar.turn;
     require((turn.rate == 0 && turn.left == 0) || (order && std::holds_alternative<Turn>(*order)),
             avatar.name + " turns without a command");

@@ -1,6 +1,6 @@
 // Contacts between bodies: dynamic ones with static objects, with kinematic ones and with one
 // another, and kinematic ones with one another and with static objects (kinematic_contacts.cpp).
-// contacts.cpp reports the contacts of avatars.
+// avatar_contacts.cpp reports the contacts of avatars.
 // For dynamic bodies only solver pairs of moved bodies are queried that are not certified as
 // farther apart than the limit: a contact of two stationary bodies persists. A pair that touched in
 // the solver and is separated after the tick, as after a bounce, begins and ends in this tick.
@@ -11,7 +11,7 @@
 #include "collision/motion/shape_cast.hpp"
 #include "collision/narrow_phase/penetration_depth.hpp"
 #include "collision/narrow_phase/refine.hpp"
-#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/contact_events.hpp"
 #include "scene/world/contacts/kinematic_contacts.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 
@@ -215,7 +215,7 @@ void mergeContacts(const BodyContacts& added, BodyContacts& contacts) {
 }
 
 /// Iterator to the pair, or to its insertion point.
-BodyContacts::iterator lowerBoundContact(BodyContacts& contacts, const EntityPair& pair) {
+BodyContacts::iterator findContactPosition(BodyContacts& contacts, const EntityPair& pair) {
   return std::ranges::lower_bound(contacts, pair, {}, &BodyContacts::value_type::first);
 }
 
@@ -224,11 +224,11 @@ void emitTransientContacts(WorldData& world, BodyContacts& transient,
                            std::vector<ContactEvent>& events) {
   BodyContacts added;
   for (auto& [key, contact] : transient) {
-    const Contact* before = lookUpBodyContact(world, key);
+    const Contact* before = world.findBodyContact(key);
     emitContactBegin(world, key.first, before, contact, events);
     if (before) {
       emitContactEnd(world, key.first, *before, &contact, {}, events);
-      lowerBoundContact(world.bodyContacts, key)->second = contact;
+      findContactPosition(world.bodyContacts, key)->second = contact;
     } else {
       added.emplace_back(key, contact);
     }
@@ -271,12 +271,6 @@ void updateBodyContacts(WorldData& world, BodyContacts& now, const ContactDistan
 }
 
 }  // namespace
-
-const Contact* lookUpBodyContact(const WorldData& world, const EntityPair& pair) {
-  const BodyContacts& all = world.bodyContacts;
-  const auto at = std::ranges::lower_bound(all, pair, {}, &BodyContacts::value_type::first);
-  return at != all.end() && at->first == pair ? &at->second : nullptr;
-}
 
 void detectBodyContacts(WorldData& world, TickReport& report, QueryCount& count) {
   const ContactDistances distances = computeContactDistances(world.settings);

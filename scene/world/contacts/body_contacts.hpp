@@ -8,8 +8,6 @@
 
 namespace enfilade::scene {
 
-/// The current contact of a pair; null if there is no contact.
-const Contact* lookUpBodyContact(const WorldData& world, const EntityPair& pair);
 /// Updates and reports contacts between bodies and non-avatars.
 void detectBodyContacts(WorldData& world, TickReport& report, QueryCount& count);
 void endBodyContacts(WorldData& world, ContactEvent::Reason reason,

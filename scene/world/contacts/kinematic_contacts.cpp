@@ -14,7 +14,6 @@
 
 #include "collision/compound/nearest_parts.hpp"
 #include "collision/narrow_phase/refine.hpp"
-#include "scene/world/contacts/body_contacts.hpp"
 #include "scene/world/contacts/excluded_pairs.hpp"
 
 namespace enfilade::scene {
@@ -235,7 +234,7 @@ KinematicContacts findKinematicContacts(WorldData& world, const ContactDistances
                                         QueryCount& count) {
   KinematicContacts contacts;
   for (const EntityPair& key : collectMovedPairs(world)) {
-    const Contact* before = lookUpBodyContact(world, key);
+    const Contact* before = world.findBodyContact(key);
     const bool lasted = before != nullptr;
     if (!lasted && !mayTouch(world, key, distances.reportLimit)) continue;
     if (isExcluded(world, key, distances.contact)) continue;

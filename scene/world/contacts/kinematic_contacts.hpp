@@ -1,7 +1,7 @@
 // Contacts and near misses of kinematic bodies with static objects and with one another.
 #pragma once
 
-#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/contact_events.hpp"
 
 namespace enfilade::scene {
 

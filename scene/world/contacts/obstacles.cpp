@@ -269,7 +269,7 @@ void updateObstaclePose(const WorldData& world, Obstacle& obstacle) {
 bool areNeighboursStationary(const WorldData& world, const Avatar& avatar) {
   return std::ranges::none_of(
       world.broadPhase.getDynamicOverlaps(avatar.proxy),
-      [&](const collision::SortAndSweep::Overlap& overlap) { return mayMove(world, overlap.id); });
+      [&](const collision::ProxyOverlap& overlap) { return mayMove(world, overlap.id); });
 }
 
 void refreshDynamicObstacles(const WorldData& world, Avatar& avatar) {

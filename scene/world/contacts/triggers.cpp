@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "collision/assert.hpp"
-#include "scene/world/contacts/contacts.hpp"
+#include "scene/world/contacts/contact_events.hpp"
 
 namespace enfilade::scene {
 namespace {

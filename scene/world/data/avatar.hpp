@@ -16,9 +16,9 @@
 
 namespace enfilade::scene {
 
-/// Progress of a walk: the minimum distance to its current way point so far.
+/// Progress of a walk: the minimum distance to its current waypoint so far.
 struct WalkProgress {
-  std::size_t waypointIndex = 0;  ///< index of the current way point
+  std::size_t waypointIndex = 0;  ///< index of the current waypoint
   double minDistance = -1;        ///< metres, horizontal or, if flying, in space; -1: none yet
   double timeoutLeft = 0;         ///< seconds
   std::uint32_t calls = 0;        ///< commands that this walk has given to doors and lifts

@@ -12,9 +12,9 @@
 #include <span>
 #include <stdexcept>
 
+#include "scene/base/disjoint_sets.hpp"
+#include "scene/model/shapes/collision_geometry.hpp"
 #include "scene/model/shapes/mass_properties.hpp"
-#include "scene/physics/disjoint_sets.hpp"
-#include "scene/world/data/scene.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -1,4 +1,4 @@
-// Contacts as they persist from tick to tick.
+// Contact: a contact or near miss that persists from tick to tick.
 #pragma once
 
 #include <cstdint>

@@ -8,6 +8,7 @@
 
 #include "collision/compound/overlapping_parts.hpp"
 #include "scene/physics/physics_world.hpp"
+#include "scene/physics/step_report.hpp"
 #include "scene/world/data/body.hpp"
 #include "scene/world/data/snapshot.hpp"
 

@@ -1,4 +1,4 @@
-// Obstacles of an avatar, and the caches of the last queries against them.
+// ObstacleSet: the obstacles of an avatar, with the caches of the last queries against them.
 #pragma once
 
 #include <algorithm>

@@ -28,7 +28,7 @@ struct BodyHandle {
   bool operator==(const BodyHandle&) const = default;
 };
 
-/// Maximum number of queued orders and way points in one world: about 30 MB.
+/// Maximum number of queued orders and waypoints in one world: about 30 MB.
 inline constexpr std::size_t kMaxQueuedOrders = 1'000'000;
 
 /// Joint between a link and its parent, in the frame of the parent (or of the avatar).
@@ -69,13 +69,13 @@ struct Ride {
   std::uint32_t level = 0;  ///< stop number, from 0
   bool operator==(const Ride&) const = default;
 };
-/// Walks to the way points in sequence. Opens doors in its way, calls lifts, and waits for them.
+/// Walks to the waypoints in sequence. Opens doors in its way, calls lifts, and waits for them.
 struct Walk {
-  std::vector<Vec3> waypoints;         ///< way points, at least one
+  std::vector<Vec3> waypoints;         ///< waypoints, at least one
   double speed = 1.4;                  ///< metres per second, > 0
   std::vector<BodyHandle> opens = {};  ///< doors
-  std::vector<Ride> rides = {};        ///< ascending way points
-  std::size_t opensFrom = 0;           ///< way points to reach before it opens any door
+  std::vector<Ride> rides = {};        ///< ascending waypoints
+  std::size_t opensFrom = 0;           ///< waypoints to reach before it opens any door
 };
 /// Limits of a Walk order.
 inline constexpr std::size_t kMaxWalkDoors = 256, kMaxRides = 256;

@@ -1,4 +1,4 @@
-// Counts of narrow-phase work.
+// QueryCount: counters of narrow-phase work.
 #pragma once
 
 #include <cstdint>

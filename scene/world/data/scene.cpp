@@ -87,7 +87,7 @@ class Scene::Prefetcher {
   std::mutex mutex_;
   std::condition_variable_any wakeUp_;
   std::deque<std::uint32_t> queue_;
-  std::set<std::uint32_t> requested_;  ///< ever
+  std::set<std::uint32_t> requested_;  ///< all objects queued since construction
   std::jthread thread_;                ///< last: stops before the rest goes
 };
 

@@ -69,7 +69,7 @@ struct Notice {
     spawned,  ///< the avatar entered at `position`
     refused,  ///< invalid order, reason in `text`; a refused Spawn drops the queue, too
     dropped,  ///< removed from the queue before it ran; cause in `text`
-    arrived,  ///< the walk reached its last way point
+    arrived,  ///< the walk reached its last waypoint
     blocked,  ///< no progress for WorldSettings::stuckTimeout, by `obstacle` or 0
     done,     ///< completed
     capture,  ///< an image from this avatar in this tick is requested; name in `text`

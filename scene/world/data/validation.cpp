@@ -94,9 +94,9 @@ OptionalError validateOrder(const Spawn& spawn, const WorldSettings&) {
 }
 
 OptionalError validateOrder(const Walk& walk, const WorldSettings& settings) {
-  if (walk.waypoints.empty()) return "along has no way point; give at least one";
+  if (walk.waypoints.empty()) return "along has no waypoint; give at least one";
   if (walk.waypoints.size() > kMaxWaypoints)
-    return "along has more than " + std::to_string(kMaxWaypoints) + " way points";
+    return "along has more than " + std::to_string(kMaxWaypoints) + " waypoints";
   for (std::size_t i = 0; i < walk.waypoints.size(); ++i)
     if (auto error = validatePoint("along[" + std::to_string(i) + "]", walk.waypoints[i]))
       return error;
@@ -104,14 +104,14 @@ OptionalError validateOrder(const Walk& walk, const WorldSettings& settings) {
     return "opens has more than " + std::to_string(kMaxWalkDoors) + " doors";
   if (walk.opensFrom > walk.waypoints.size())
     return "opens_from is " + std::to_string(walk.opensFrom) + "; there are " +
-           std::to_string(walk.waypoints.size()) + " way points";
+           std::to_string(walk.waypoints.size()) + " waypoints";
   if (walk.rides.size() > kMaxRides)
     return "rides has more than " + std::to_string(kMaxRides) + " rides";
   for (std::size_t i = 0; i < walk.rides.size(); ++i) {
     const std::string field = "rides[" + std::to_string(i) + "].waypoint";
     if (walk.rides[i].waypoint >= walk.waypoints.size())
       return field + " is " + std::to_string(walk.rides[i].waypoint) + "; there are " +
-             std::to_string(walk.waypoints.size()) + " way points, counted from 0";
+             std::to_string(walk.waypoints.size()) + " waypoints, counted from 0";
     if (i > 0 && walk.rides[i].waypoint <= walk.rides[i - 1].waypoint)
       return field + " must be above that of the ride before";
   }

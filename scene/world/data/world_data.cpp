@@ -57,6 +57,12 @@ const Body* WorldData::findBodyByName(std::string_view name) const {
   return at == bodyIndexByName.end() ? nullptr : &bodies[at->second];
 }
 
+const Contact* WorldData::findBodyContact(const EntityPair& pair) const {
+  const auto at =
+      std::ranges::lower_bound(bodyContacts, pair, {}, &BodyContacts::value_type::first);
+  return at != bodyContacts.end() && at->first == pair ? &at->second : nullptr;
+}
+
 EntityId WorldData::insertAvatar(Avatar avatar) {
   const EntityId id = firstAvatarId() + static_cast<EntityId>(avatarNames.size());
   avatar.id = id;

@@ -41,7 +41,7 @@ struct WorldData {
   std::uint64_t hash = 0;  ///< chained over all ticks, seeded by scene and settings
 
   std::vector<Command> pendingCommands;  ///< since the last tick
-  std::size_t queuedOrderCount = 0;      ///< queued orders and way points, at least
+  std::size_t queuedOrderCount = 0;      ///< queued orders and waypoints, at least
   std::vector<OrderQueue> queues;        ///< ascending names
   std::vector<Avatar> avatars;           ///< ascending names
   /// By entity id - firstAvatarId(), of all avatars that ever were in the world: the name, and the
@@ -82,6 +82,7 @@ struct WorldData {
   Avatar* findAvatarByProxy(collision::ProxyId proxy);
   std::uint32_t findBodyByProxy(collision::ProxyId proxy) const;  ///< kNoBody: no body
   const Body* findBodyByName(std::string_view name) const;        ///< null: no body
+  const Contact* findBodyContact(const EntityPair& pair) const;   ///< in `bodyContacts`; null: none
 
   /// Adds an avatar that has a proxy, under the next id, which it returns.
   EntityId insertAvatar(Avatar avatar);

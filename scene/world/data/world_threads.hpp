@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <memory>
 
-#include "scene/physics/thread_pool.hpp"
+#include "scene/base/thread_pool.hpp"
 
 namespace enfilade::scene {
 

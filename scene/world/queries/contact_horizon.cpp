@@ -188,8 +188,9 @@ void ContactHorizons::restartUnbounded() {
       const BodyPair pair = collision::PairSchedule::makePair(avatar, id);
       if (avatar == id || tracked.restUntil <= now() || touching_.contains(pair)) continue;
       const double seconds = std::min(tracked.restUntil - now(), kMaxSearchSeconds);
-      const double speed = state_.speedWithin(avatar, seconds) + state_.speedWithin(id, seconds);
-      const double time = state_.boxTime(avatar, id, speed);
+      const double speed =
+          state_.computeMaxSpeedWithin(avatar, seconds) + state_.computeMaxSpeedWithin(id, seconds);
+      const double time = state_.computeBoxSeparatedUntil(avatar, id, speed);
       if (now() + time < tracked.restUntil) setTime(pair, now() + std::min(time, seconds));
     }
   }
@@ -269,9 +270,9 @@ void ContactHorizons::renewProof(const Entry& due) {
   const auto& [a, b] = due.pair;
   if (!options_.examineAll && isUnchanged(due.pair, false) && !touching_.contains(due.pair))
     return setTime(due.pair, now() + examined_.at(due.pair).wait);
-  const double speed =
-      state_.speedWithin(a, searchSeconds_) + state_.speedWithin(b, searchSeconds_);
-  const double boxTime = std::min(state_.boxTime(a, b, speed), searchSeconds_);
+  const double speed = state_.computeMaxSpeedWithin(a, searchSeconds_) +
+                       state_.computeMaxSpeedWithin(b, searchSeconds_);
+  const double boxTime = std::min(state_.computeBoxSeparatedUntil(a, b, speed), searchSeconds_);
   if (!options_.examineAll && boxTime >= kBoxesSuffice * searchSeconds_) {
     ++statistics_.boxChecks;
     return setTime(due.pair, now() + boxTime);

@@ -121,16 +121,16 @@ Aabb HorizonState::computeBox(EntityId entity) const {
   return scene_->staticBoxes()[static_cast<std::size_t>(at - objects.begin())];
 }
 
-double HorizonState::avatarSpeed(const AvatarSnapshot& avatar, double seconds) const {
+double HorizonState::computeMaxAvatarSpeed(const AvatarSnapshot& avatar, double seconds) const {
   const auto [known, isNew] = speeds_.try_emplace({avatar.id, seconds}, 0);
   if (!isNew) return known->second;
   return known->second = computeAvatarSpeedWithin(
              avatar, pushers_, standsOnDynamicBody(sceneAt(), avatar), settings_, seconds);
 }
 
-double HorizonState::speedWithin(EntityId entity, double seconds) const {
+double HorizonState::computeMaxSpeedWithin(EntityId entity, double seconds) const {
   if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt(), entity))
-    return avatarSpeed(*avatar, seconds);
+    return computeMaxAvatarSpeed(*avatar, seconds);
   const BodySnapshot* body = findBodySnapshot(sceneAt(), entity);
   return body ? bodies_[body->index].speed : 0;
 }
@@ -149,12 +149,13 @@ double HorizonState::computeTime(double gap, double growth, double speed) const 
   return collision::computeTimeToContact(toContact, {speed * kRoundUp, 0});
 }
 
-double HorizonState::boxTime(EntityId a, EntityId b, double speed) const {
-  return boxTime(computeBox(a), computeBox(b), getGrowthLimit(a) + getGrowthLimit(b), speed);
+double HorizonState::computeBoxSeparatedUntil(EntityId a, EntityId b, double speed) const {
+  return computeBoxSeparatedUntil(computeBox(a), computeBox(b),
+                                  getGrowthLimit(a) + getGrowthLimit(b), speed);
 }
 
-double HorizonState::boxTime(const Aabb& own, const Aabb& other, double growth,
-                             double speed) const {
+double HorizonState::computeBoxSeparatedUntil(const Aabb& own, const Aabb& other, double growth,
+                                              double speed) const {
   return computeTime(computeGap(own, other) - computeBoxRounding(own), growth, speed);
 }
 
@@ -169,7 +170,8 @@ void HorizonState::findStaticNeighbours(const AvatarSnapshot& avatar, double spe
       staticTree_, box, [&](std::uint32_t first, std::uint32_t count) {
         for (std::uint32_t item = first; item < first + count; ++item) {
           const std::uint32_t index = staticTree_.order[item];
-          const double earliest = boxTime(own, scene_->staticBoxes()[index], growth, speed);
+          const double earliest =
+              computeBoxSeparatedUntil(own, scene_->staticBoxes()[index], growth, speed);
           if (earliest < seconds)
             neighbours.push_back({scene_->solidObjects()[index] + 1, earliest});
         }
@@ -179,12 +181,12 @@ void HorizonState::findStaticNeighbours(const AvatarSnapshot& avatar, double spe
 std::vector<HorizonState::Neighbour> HorizonState::findNeighbours(const AvatarSnapshot& avatar,
                                                                   double seconds) const {
   std::vector<Neighbour> neighbours;
-  const double speed = avatarSpeed(avatar, seconds);
+  const double speed = computeMaxAvatarSpeed(avatar, seconds);
   findStaticNeighbours(avatar, speed, seconds, neighbours);
   const Aabb own = placeBoxOutward(avatar.shape->box, avatar.footPosition);
   const auto consider = [&](EntityId id, const Aabb& box, double growth, double otherSpeed) {
     const double earliest =
-        boxTime(own, box, computeGrowthLimit(avatar) + growth, speed + otherSpeed);
+        computeBoxSeparatedUntil(own, box, computeGrowthLimit(avatar) + growth, speed + otherSpeed);
     if (earliest < seconds) neighbours.push_back({id, earliest});
   };
   for (const BodySnapshot& body : *snapshot_->bodies)
@@ -193,7 +195,7 @@ std::vector<HorizonState::Neighbour> HorizonState::findNeighbours(const AvatarSn
   for (const AvatarSnapshot& other : snapshot_->avatars)
     if (other.id != avatar.id)
       consider(other.id, placeBoxOutward(other.shape->box, other.footPosition),
-               computeGrowthLimit(other), avatarSpeed(other, seconds));
+               computeGrowthLimit(other), computeMaxAvatarSpeed(other, seconds));
   return neighbours;
 }
 

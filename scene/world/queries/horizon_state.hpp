@@ -40,7 +40,7 @@ class HorizonState {
   Aabb computeBox(EntityId entity) const;
   /// Maximum speed of the entity during the next `seconds`, under any command; infinity for dynamic
   /// bodies.
-  double speedWithin(EntityId entity, double seconds) const;
+  double computeMaxSpeedWithin(EntityId entity, double seconds) const;
   /// Metres by which the entity may grow at once.
   double getGrowthLimit(EntityId entity) const;
 
@@ -55,7 +55,7 @@ class HorizonState {
   std::size_t boundedCount() const;
   /// Seconds during which the boxes of two entities prove that there is no contact. `speed`: the
   /// sum of both.
-  double boxTime(EntityId a, EntityId b, double speed) const;
+  double computeBoxSeparatedUntil(EntityId a, EntityId b, double speed) const;
   /// Time until a gap (metres, proved) closes to a contact.
   double computeTime(EntityId a, EntityId b, double gap, double speed) const;
 
@@ -77,9 +77,10 @@ class HorizonState {
   bool isConsecutive(const Snapshot& next) const;
   void updateBodies(const Snapshot& next, bool consecutive);
   void updateAvatars(const Snapshot& next, bool consecutive);
-  double boxTime(const Aabb& own, const Aabb& other, double growth, double speed) const;
+  double computeBoxSeparatedUntil(const Aabb& own, const Aabb& other, double growth,
+                                  double speed) const;
   double computeTime(double gap, double growth, double speed) const;
-  double avatarSpeed(const AvatarSnapshot& avatar, double seconds) const;
+  double computeMaxAvatarSpeed(const AvatarSnapshot& avatar, double seconds) const;
   void findStaticNeighbours(const AvatarSnapshot& avatar, double speed, double seconds,
                             std::vector<Neighbour>& neighbours) const;
 

@@ -186,7 +186,7 @@ Motion computeMotion(const SceneAt& sceneAt, EntityId entity, const WorldSetting
 struct ClosingGap {
   double gap = 0;  ///< metres, certified
   collision::ClosingBounds closing;
-  double timeToContact() const { return collision::computeTimeToContact(gap, closing); }
+  double computeSeparatedUntil() const { return collision::computeTimeToContact(gap, closing); }
 };
 
 /// `direction` has unit length.
@@ -211,7 +211,9 @@ ClosingGap computeSlowestClosingGap(const collision::NearestParts& parts, bool c
   cache.axis = separation.normal;
   const double gap = collision::computeSeparationLowerBound(parts.a, parts.b, cache);
   const ClosingGap alongNormal = computeClosingGapAlong(separation.normal, gap, a, b);
-  return alongNormal.timeToContact() > alongVelocity.timeToContact() ? alongNormal : alongVelocity;
+  return alongNormal.computeSeparatedUntil() > alongVelocity.computeSeparatedUntil()
+             ? alongNormal
+             : alongVelocity;
 }
 
 /// Seconds up to which two convex shapes in uniform motion are proved separated.
@@ -255,7 +257,7 @@ std::variant<TimeToContact, QueryError> computeTimeToContact(const SceneAt& scen
   const bool convex = placedA.partCount == 1 && placedB.partCount == 1;
   const ClosingGap closingGap = computeSlowestClosingGap(parts, convex, motionA, motionB);
   result.closing = closingGap.closing;
-  result.separatedUntil = closingGap.timeToContact();
+  result.separatedUntil = closingGap.computeSeparatedUntil();
   result.nextCheck =
       collision::scheduleCheck(closingGap.gap, closingGap.closing, minWait, settings.contactOffset);
   const bool isUniform =

@@ -1,4 +1,4 @@
-// Requests that save the state of a world, and restore it.
+// Handles the requests SaveWorld, RestoreWorld and Upload (checkpoints).
 #pragma once
 
 #include <string>

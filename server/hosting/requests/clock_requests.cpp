@@ -111,8 +111,8 @@ void handleSeek(const RequestContext& context, const v1::Seek& request) {
 void handleRecordedEvents(const RequestContext& context, const v1::RecordedEventsRequest& request) {
   if (auto error = validateHasReplay(context.hosted)) return replyError(context, std::move(*error));
   v1::ServerMessage message;
-  *message.mutable_recorded_events() =
-      context.hosted.replay->eventsAfter(request.after_tick(), context.hosted.limits.replyBytes);
+  *message.mutable_recorded_events() = context.hosted.replay->findEventsAfter(
+      request.after_tick(), context.hosted.limits.replyBytes);
   sendReply(context, std::move(message));
 }
 

@@ -1,4 +1,4 @@
-// Commands to avatars and bodies.
+// Handles the requests Command (orders of avatars) and BodyCommand.
 #pragma once
 
 #include "server/hosting/requests/request_context.hpp"

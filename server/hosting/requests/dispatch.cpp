@@ -25,7 +25,7 @@ void handleBye(const RequestContext& context) {
 }
 
 /// The lowest role that may send this navigation request.
-Role requiredRole(v1::NavigationQuery::QueryCase query) {
+Role getRequiredRole(v1::NavigationQuery::QueryCase query) {
   switch (query) {  // no `default`, as below
     case v1::NavigationQuery::kPath:
     case v1::NavigationQuery::kRandom:
@@ -45,7 +45,7 @@ Role requiredRole(v1::NavigationQuery::QueryCase query) {
 }
 
 /// The lowest role that may send this request.
-Role requiredRole(const v1::ClientMessage& message) {
+Role getRequiredRole(const v1::ClientMessage& message) {
   switch (message.body_case()) {  // no `default`: the compiler rejects a request without a role
     case v1::ClientMessage::kHello:
     case v1::ClientMessage::kSubscribe:
@@ -66,7 +66,7 @@ Role requiredRole(const v1::ClientMessage& message) {
     case v1::ClientMessage::BODY_NOT_SET:
       return Role::observe;
     case v1::ClientMessage::kNavigation:
-      return requiredRole(message.navigation().query_case());
+      return getRequiredRole(message.navigation().query_case());
     case v1::ClientMessage::kCommand:
     case v1::ClientMessage::kBodyCommand:
     case v1::ClientMessage::kStep:
@@ -98,7 +98,7 @@ void refuseUnknownEnum(const RequestContext& context, const std::string& unknown
 
 void dispatchRequest(const RequestContext& context) {
   const v1::ClientMessage& message = context.message;
-  const Role required = requiredRole(message);
+  const Role required = getRequiredRole(message);
   if (context.client.role < required) {
     return replyError(context, v1::ERROR_NOT_ALLOWED,
                       std::string("this needs a token with the role ") + toString(required) +

@@ -1,4 +1,4 @@
-// Requests for one frame.
+// Handles FrameRequest: a client's request for a single frame.
 #pragma once
 
 #include "server/hosting/requests/request_context.hpp"

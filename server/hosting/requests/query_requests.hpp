@@ -1,4 +1,4 @@
-// Queries about the last tick, names of entities, and metrics.
+// Handles queries about the last tick, names of entities, and metrics.
 #pragma once
 
 #include <functional>

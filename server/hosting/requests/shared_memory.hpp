@@ -1,4 +1,4 @@
-// Memory that another process of this machine can read.
+// SharedMemory: an anonymous memory file (memfd) that is passed to another process of this machine.
 #pragma once
 
 #include <cstddef>

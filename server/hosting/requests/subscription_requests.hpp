@@ -1,4 +1,4 @@
-// Subscriptions to states, events and frames.
+// Handles the requests Subscribe (states, events) and WatchFrames.
 #pragma once
 
 #include "server/hosting/requests/request_context.hpp"

@@ -6,6 +6,7 @@
 #include "server/base/version.hpp"
 #include "server/hosting/replay_control.hpp"
 #include "server/hosting/world_directory.hpp"
+#include "server/messages/body_messages.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {

@@ -1,4 +1,4 @@
-// The first reply to a client.
+// Makes the Welcome message, the first reply to a client.
 #pragma once
 
 #include "server/hosting/hosted_world.hpp"

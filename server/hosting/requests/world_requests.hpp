@@ -1,4 +1,4 @@
-// Requests to create, drop and list worlds.
+// Handles the requests that create, drop, list and jointly step worlds.
 #pragma once
 
 #include "server/hosting/requests/request_context.hpp"

@@ -21,7 +21,7 @@ Message toXyz(const scene::Vec3& v) {
   return message;
 }
 
-foxglove::Color materialColour(const scene::Material& material) {
+foxglove::Color toFoxgloveColour(const scene::Material& material) {
   const Eigen::Vector4f& base = material.baseColour;
   const auto encode = [](float linear) { return static_cast<float>(scene::linearToSrgb(linear)); };
   const bool isTransparent = material.alpha == scene::Material::Alpha::blend;
@@ -38,7 +38,7 @@ void addVertexColours(foxglove::TriangleListPrimitive& into, const scene::Mesh& 
       material.baseColour[c] =
           base[c] * scene::srgbByteToLinear(colour[static_cast<std::size_t>(c)]);
     material.baseColour[3] = base[3] * static_cast<float>(colour[3]) / 255;
-    *into.add_colors() = materialColour(material);
+    *into.add_colors() = toFoxgloveColour(material);
   }
 }
 
@@ -64,7 +64,7 @@ void addObjects(foxglove::SceneEntity& entity, const scene::Model& model,
       auto& list = lists[{mesh.material, !mesh.colours.empty()}];
       if (!list) {
         list = entity.add_triangles();
-        *list->mutable_color() = materialColour(material);
+        *list->mutable_color() = toFoxgloveColour(material);
       }
       addVertexColours(*list, mesh, material);
       addMesh(*list, object, mesh, origin);

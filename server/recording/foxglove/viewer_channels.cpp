@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "render/camera_basis.hpp"
+#include "render/camera.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/recording/foxglove/primitives.hpp"
 

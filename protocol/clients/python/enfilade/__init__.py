@@ -20,7 +20,8 @@ from .cameras import Camera
 from .client import Client, connect
 from .environment import WalkEnv
 from .episodes import Episode, draw_episode, read_episodes, write_episodes
-from .errors import ConnectionFailed, EnfiladeError, OrderFailed, ServerError, StartFailed
+from .errors import (ConnectionFailed, EnfiladeError, EpisodeNotFound, OrderFailed, ServerError,
+                     StartFailed)
 from .lidar import Lidar, LidarPattern, PointCloud
 from .navigation import Door, Island, Map, Navigation, Obstacle, Path, Spot
 from .plans import FloorPlan, PlanRoom, PlanShape
@@ -33,8 +34,8 @@ from .world_group import WorldGroup
 
 __all__ = [
     "Apart", "Avatar", "AvatarState", "Camera", "Client", "ConnectionFailed", "Contact", "Door",
-    "EnfiladeError", "Episode", "FloorPlan", "Frame", "Hits", "Horizon", "Island", "Lidar",
-    "LidarPattern", "Map", "Navigation", "Notice", "ObjectInfo", "Obstacle", "OrderFailed", "Pair",
+    "EnfiladeError", "Episode", "EpisodeNotFound", "FloorPlan", "Frame", "Hits", "Horizon", "Island",
+    "Lidar", "LidarPattern", "Map", "Navigation", "Notice", "ObjectInfo", "Obstacle", "OrderFailed", "Pair",
     "Path", "PlanRoom", "PlanShape", "PointCloud", "Replay", "Scan", "Server", "ServerError",
     "Spot", "StartFailed", "State", "Step", "Touching", "VectorWalkEnv", "Video", "WalkEnv",
     "World", "WorldGroup", "connect", "draw_episode", "messages", "read_episodes", "serve",

@@ -49,7 +49,7 @@ class Avatar:
         is called."""
         order = messages.Walk(
             along=[vec(point) for point in along], opens=opens, opens_from=whole(opens_from, "opens_from"),
-            rides=[messages.Walk.Ride(waypoint=whole(waypoint, "rides: the way point"), lift=lift,
+            rides=[messages.Walk.Ride(waypoint=whole(waypoint, "rides: the waypoint"), lift=lift,
                                       level=whole(level, "rides: the level"))
                    for waypoint, lift, level in rides])
         if speed is not None:

@@ -13,7 +13,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from .arguments import number, numbers
-from .errors import EnfiladeError
+from .errors import EpisodeNotFound
 from .navigation import Navigation
 
 MAX_DRAWS = 64  # of a start and a goal, for one episode
@@ -77,7 +77,7 @@ def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_dis
                  goals: Sequence[Sequence[float]] = ()) -> Episode:
     """Draws a start and a goal between which there is a path: the one given, or one of those given,
     or else a place on any island that is no roof. The goal is on the start's island. Distances are
-    geodesic. Raises EnfiladeError with the reason of the last draw if none is found."""
+    geodesic. Raises EpisodeNotFound with the reason of the last draw if none is found."""
     starts = starts if start is None else [start]
     goals = goals if goal is None else [goal]
 
@@ -86,7 +86,7 @@ def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_dis
             return tuple(map(float, given[int(random.integers(len(given)))]))
         spot = navigation.random_place(int(random.integers(0, 2 ** 63)), island=island)
         if spot is None:
-            raise EnfiladeError("no place to stand was found in this scene: is the unit right, and the radius?")
+            raise EpisodeNotFound("no place to stand was found in this scene: is the unit right, and the radius?")
         return tuple(map(float, spot.at))
 
     def island_of(point: Sequence[float]) -> Optional[int]:
@@ -103,8 +103,8 @@ def draw_episode(navigation: Navigation, random: np.random.Generator, *, min_dis
             return Episode(first[:3], float(facing), last, path.length)  # type: ignore[arg-type]
     why = path.reason if not path.found else f"it is {path.length:g} m long"
     where = " to ".join("(" + ", ".join(f"{metres:g}" for metres in end[:3]) + ")" for end in (first, last))
-    raise EnfiladeError(f"no path of {min_distance:g} to {max_distance:g} m was found in "
-                        f"{draws} {'draws' if draws > 1 else 'draw'}; the last, from {where}: {why}")
+    raise EpisodeNotFound(f"no path of {min_distance:g} to {max_distance:g} m was found in "
+                          f"{draws} {'draws' if draws > 1 else 'draw'}; the last, from {where}: {why}")
 
 
 def read_episodes(file: Union[str, Path], scene_id: Optional[str] = None) -> List[Episode]:

@@ -61,5 +61,9 @@ class OrderFailed(EnfiladeError):
     """An order was accepted but failed: a spawn without space, a blocked walk."""
 
 
+class EpisodeNotFound(EnfiladeError):
+    """No start and goal with a path of the asked length were drawn."""
+
+
 class StartFailed(EnfiladeError):
     """A server process did not start; the text has the end of its log."""

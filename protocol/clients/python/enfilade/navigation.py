@@ -26,7 +26,7 @@ _MAX_GOALS = 100
 
 @dataclass(frozen=True)
 class Path:
-    """A path, or the reason why not. `points` are the feet, N x 3: way points of a walk after
+    """A path, or the reason why not. `points` are the feet, N x 3: waypoints of a walk after
     the first."""
     found: bool
     points: np.ndarray
@@ -68,7 +68,7 @@ class Leg:
 @dataclass(frozen=True)
 class Island:
     """A part of the navigable floor. `path` is one to the island `to`, a neighbour or the largest, mostly
-    without way points: its reason, obstacle and clear width say why not. None for the largest."""
+    without waypoints: its reason, obstacle and clear width say why not. None for the largest."""
     area: float  # square metres
     at: Tuple[float, float, float]  # a place on it
     path: Optional[Path]

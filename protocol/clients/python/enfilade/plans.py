@@ -34,7 +34,7 @@ class PlanRoom:
 
 @dataclass(frozen=True)
 class FloorPlan:
-    """What a plane cuts 1.2 m above a floor; bodies are where the model has them."""
+    """A horizontal section 1.2 m above a floor; bodies are where the model has them."""
 
     floor: float  # metres
     storey: str  # the name in the file; may be empty

@@ -169,7 +169,7 @@ class Server:
             ready = json.loads(line)
             int(ready["port"])
         except (ValueError, KeyError, TypeError) as error:
-            raise StartFailed(f"{self.process.args[0]!r} is no Enfilade server: its first line is "
+            raise StartFailed(f"{self.process.args[0]!r} is not an Enfilade server: its first line is "
                               f"{line[:200]!r}") from error
         return ready
 

@@ -13,7 +13,7 @@ import numpy as np
 from . import spaces
 from .client import Client, connect
 from .environment import WalkEnv
-from .errors import OrderFailed, ServerError
+from .errors import EpisodeNotFound, OrderFailed, ServerError
 from .kept_request import KeptRequest
 from .plain_steps import PlainSteps, Result
 from .process import Server, serve
@@ -39,10 +39,10 @@ class _Batch:
 
 
 def _is_refusal(error: Exception) -> bool:
-    """Whether the environment can restart: of a start, or of a picture."""
+    """Whether the environment can restart: of a start, of a picture, or if no episode was drawn."""
     if isinstance(error, ServerError):
         return not error.fatal and error.code != "ERROR_WORLD_DROPPED"
-    return isinstance(error, OrderFailed)
+    return isinstance(error, (OrderFailed, EpisodeNotFound))
 
 
 class VectorWalkEnv(spaces.VectorEnvBase):
@@ -65,10 +65,11 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     A start that the world refuses is drawn again, as by WalkEnv, while the others wait.
 
     A wrong number of actions or seeds, or an invalid action, is a ValueError before anything is sent.
-    If the server refuses a start or a picture later, that environment alone is truncated: its observation
-    is zero, and `info` has "error". There is a warning, too. The next step() restarts it, and the others
-    go on. Other errors are raised with the number of the environment, after all replies, and so is the
-    first refusal if none remains: call reset() then. If the server ended, create all environments again.
+    If the server refuses a start or a picture later, or no episode is drawn, that environment alone is
+    truncated: its observation is zero, and `info` has "error". There is a warning, too. The next step()
+    restarts it, and the others go on. Other errors are raised with the number of the environment, after
+    all replies, and so is the first refusal if none remains: call reset() then. If the server ended,
+    create all environments again.
     """
 
     metadata: Dict[str, Any] = {"render_modes": ["rgb_array"], "autoreset_mode": spaces.NEXT_STEP}

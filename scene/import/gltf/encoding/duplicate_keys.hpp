@@ -1,5 +1,5 @@
-// Finds keys that stand twice in one object of a glTF file's JSON. Readers differ on which of the
-// values counts: nlohmann-json takes the last, assimp the first. Private to the import.
+// Finds duplicate keys in the objects of a glTF file's JSON. Readers use different values:
+// nlohmann-json takes the last, assimp the first. Private to the import.
 #pragma once
 
 #include <cstddef>

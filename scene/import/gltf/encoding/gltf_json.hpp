@@ -1,4 +1,4 @@
-// The JSON of a glTF file.
+// Reads the JSON of a glTF or GLB file, with limits on its nesting, and accesses its members.
 #pragma once
 
 #include <cstddef>

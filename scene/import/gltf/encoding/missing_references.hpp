@@ -1,4 +1,5 @@
-// References of nodes and scenes to things that a glTF file lacks. Private to the import.
+// Finds and removes dangling references in a glTF file: indices of missing nodes, meshes, cameras
+// or skins. Private to the import.
 #pragma once
 
 #include <nlohmann/json.hpp>

@@ -1,4 +1,4 @@
-// Exact relations of an entity to a shape that is in no world.
+// Exact separation of an entity and a hypothetical avatar shape, which is in no world.
 #pragma once
 
 #include <optional>

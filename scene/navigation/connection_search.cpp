@@ -1,4 +1,4 @@
-#include "scene/navigation/passage_search.hpp"
+#include "scene/navigation/connection_search.hpp"
 
 #include <algorithm>
 #include <atomic>
@@ -11,8 +11,8 @@
 #include <span>
 #include <utility>
 
+#include "scene/base/parallel_for.hpp"
 #include "scene/navigation/clear_width.hpp"
-#include "scene/navigation/mesh/parallel_for.hpp"
 #include "scene/navigation/walk/grid_search.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -21,47 +21,48 @@ namespace enfilade::scene {
 namespace {
 
 constexpr double kHeightReach = 0.6;    // metres between both sides of a gap
-constexpr double kMaxGapDetour = 6;     // metres: a longer way around a gap does not pass it
-constexpr double kSpacing = 0.12;       // metres
-constexpr double kGapMargin = 1.6;      // metres around the beginning of a way across a gap
+constexpr double kMaxGapDetour = 6;     // metres: a longer path around a gap does not pass it
+constexpr double kGridSpacing = 0.12;   // metres
+constexpr double kGapMargin = 1.6;      // metres around the beginning of a path across a gap
 constexpr double kNearStart = 0.3;      // metres
 constexpr double kMaxStraightGap = 1;   // metres
 constexpr double kLineSpacing = 0.012;  // metres
-// 0.8 m to each side. Next to the gap the closest places face each other askew, and no parallel of
-// their line passes: it is crossed from places of the next 0.5 m.
+// 0.8 m to each side. Next to the gap the closest places are not opposite each other, so no line
+// parallel to theirs passes the gap. It is crossed from places of the next 0.5 m.
 constexpr int kMaxLines = 134;
 // Axes are measured at the middle of the gap and up to 0.3 m aside: a thin prism finds a gap that
 // admits an agent from any place within it.
 constexpr double kAxisSpacing = 0.1;  // metres
 constexpr int kMaxAxes = 6;
-constexpr double kSameGap = 0.8;           // metres between ends of passages
+constexpr double kSameGap = 0.8;           // metres between ends of connections
 constexpr std::size_t kMaxWalks = 60'000;  // on grids, of all gaps: some tenths of a second
-// On the grid of one gap. A gap that takes more is given up, so that one does not use up the walks
-// of all: 60 such gaps do.
+// On the grid of one gap. A gap that takes more is given up, so that one gap cannot exhaust the
+// total (60 could).
 constexpr std::size_t kGapWalks = 1000;
 // Of the exits of small islands. Some hundred find an exit nearby, thousands one through a long
-// narrow way.
+// narrow corridor.
 constexpr std::size_t kMaxExitWalks = 50'000, kMinExitWalks = 300, kMaxWalksOfExit = 4000;
-constexpr std::size_t kMaxRepairWalks = 2000;  // of a way on the scarce mesh
+constexpr std::size_t kMaxRepairWalks = 2000;  // of a path on the scarce mesh
 constexpr double kMaxCorridor = 20;            // metres between islands
-constexpr std::size_t kGapsAtOnce = 32;  // more are tried in vain: passages of some join others
+// More are wasted: earlier connections already join them.
+constexpr std::size_t kGapsAtOnce = 32;
 
 std::array<double, 6> makeKey(const Vec3& from, const Vec3& to) {
   return {from.x(), from.y(), from.z(), to.x(), to.y(), to.z()};
 }
 
-/// The way back along a way, or else another one.
-std::vector<Vec3> findWayBack(Walker& walker, const std::vector<Vec3>& way, GridSearch search) {
-  std::vector<Vec3> back(way.rbegin(), way.rend());
+/// The path back along `path`, or else another one.
+std::vector<Vec3> findPathBack(Walker& walker, const std::vector<Vec3>& path, GridSearch search) {
+  std::vector<Vec3> back(path.rbegin(), path.rend());
   for (std::size_t i = 1; i < back.size(); ++i) {
     if (walks(walker, back[i - 1], back[i], kHeightError)) continue;
-    auto other = findGridPath(walker, way.back(), way.front(), search);
+    auto other = findGridPath(walker, path.back(), path.front(), search);
     return other ? std::move(*other) : std::vector<Vec3>{};
   }
   return back;
 }
 
-/// The way on the meshes, if it is short.
+/// The path on the meshes, if it is short.
 std::vector<Vec3> findNearPath(const PathFinder& finder, const Vec3& from, const Vec3& to) {
   NavigationPath path = findPath(finder, from, to);
   return path.length <= (to - from).norm() + kMaxGapDetour ? std::move(path.points)
@@ -74,7 +75,7 @@ struct Collection {
   const IslandList& islands;
   TriedGaps& tried;
   std::vector<std::uint32_t> scarceParts;
-  PassageList list;
+  ConnectionList list;
   std::set<std::pair<std::uint32_t, std::uint32_t>> joined;  ///< islands, in one direction
   std::size_t walksLeft = kMaxWalks;
 
@@ -86,15 +87,15 @@ struct Collection {
   }
 };
 
-/// Whether passages lead across a gap next to this one, in both directions.
-bool hasPassageAt(const PassageList& list, const RimGap& gap) {
+/// Whether connections lead across a gap next to this one, in both directions.
+bool hasConnectionAt(const ConnectionList& list, const BoundaryGap& gap) {
   const auto isAt = [&](const Vec3& end, std::uint32_t polygon, const Vec3& place,
                         std::uint32_t other) {
     return (end - place).norm() < kSameGap && list.partOf[polygon] == list.partOf[other];
   };
   const auto leads = [&](const Vec3& from, std::uint32_t fromPolygon, const Vec3& to,
                          std::uint32_t toPolygon) {
-    return std::ranges::any_of(list.passages, [&](const Passage& one) {
+    return std::ranges::any_of(list.connections, [&](const OffMeshConnection& one) {
       return isAt(one.points.front(), one.fromPolygon, from, fromPolygon) &&
              isAt(one.points.back(), one.toPolygon, to, toPolygon);
     });
@@ -103,35 +104,37 @@ bool hasPassageAt(const PassageList& list, const RimGap& gap) {
          leads(gap.to, gap.toPolygon, gap.from, gap.fromPolygon);
 }
 
-bool isOnScarceMesh(const Collection& all, const RimGap& gap) {
+bool isOnScarceMesh(const Collection& all, const BoundaryGap& gap) {
   const Vec3 extent(all.finder.agent.radius, 0.5, all.finder.agent.radius);
   const auto a = all.finder.scarce.findNearest(gap.from, extent),
              b = all.finder.scarce.findNearest(gap.to, extent);
   return a && b && all.scarceParts[a->polygon] == all.scarceParts[b->polygon];
 }
 
-/// Where one way was found, the other one leads back along it.
-GapWays completeWays(Walker& walker, GapWays ways, const GridSearch& limits) {
-  if (ways.back.empty() && !ways.there.empty()) ways.back = findWayBack(walker, ways.there, limits);
-  if (ways.there.empty() && !ways.back.empty()) ways.there = findWayBack(walker, ways.back, limits);
-  return ways;
+/// Where one path was found, the other one leads back along it.
+GapPaths completePaths(Walker& walker, GapPaths paths, const GridSearch& limits) {
+  if (paths.back.empty() && !paths.there.empty())
+    paths.back = findPathBack(walker, paths.there, limits);
+  if (paths.there.empty() && !paths.back.empty())
+    paths.there = findPathBack(walker, paths.back, limits);
+  return paths;
 }
 
-GapWays crossOnScarceMesh(const Collection& all, const RimGap& gap) {
+GapPaths crossOnScarceMesh(const Collection& all, const BoundaryGap& gap) {
   Walker& walker = all.finder.walker;
   const auto start = standNear(walker, gap.from), goal = standNear(walker, gap.to);
   if (!start || !goal) return {};
-  return completeWays(
+  return completePaths(
       walker, {findNearPath(all.finder, *start, *goal), findNearPath(all.finder, *goal, *start)},
-      {kSpacing, kGapMargin, kGapWalks});
+      {kGridSpacing, kGapMargin, kGapWalks});
 }
 
-/// 0, then ever farther to both sides in turn, metres.
+/// Offset i of the sequence 0, +d, -d, +2d, -2d, ... in metres; d is `spacing`.
 double computeOffset(int i, double spacing) {
   return (i % 2 == 0 ? -1 : 1) * ((i + 1) / 2) * spacing;
 }
 
-GapWays crossAlong(Walker& walker, const Vec3& start, const Vec3& end) {
+GapPaths crossAlong(Walker& walker, const Vec3& start, const Vec3& end) {
   const auto from = standAt(walker, start + Vec3(0, kHeightError, 0), 2 * kHeightError);
   if (!from) return {};
   walker.returnTo(*from);
@@ -142,9 +145,9 @@ GapWays crossAlong(Walker& walker, const Vec3& start, const Vec3& end) {
 }
 
 /// Walks through the middle of the gap: it may be wider than the agent by a centimetre, and the
-/// rims of the mesh do not face each other along its walls.
-GapWays crossAlongAxis(const WorldData& world, Walker& walker, const RimGap& gap,
-                       const Vec3& across, const Vec3& aside) {
+/// boundaries of the mesh do not face each other along its walls.
+GapPaths crossAlongAxis(const WorldData& world, Walker& walker, const BoundaryGap& gap,
+                        const Vec3& across, const Vec3& aside) {
   if (across.isZero(0)) return {};
   const double half = 0.5 * across.norm();
   for (int i = 0; i <= kMaxAxes; ++i) {
@@ -154,8 +157,8 @@ GapWays crossAlongAxis(const WorldData& world, Walker& walker, const RimGap& gap
     if (!axis) continue;
     Vec3 start = axis->centre - half * axis->direction, end = axis->centre + half * axis->direction;
     start.y() = gap.from.y(), end.y() = gap.to.y();
-    GapWays ways = crossAlong(walker, start, end);
-    if (!ways.there.empty()) return ways;
+    GapPaths paths = crossAlong(walker, start, end);
+    if (!paths.there.empty()) return paths;
   }
   return {};
 }
@@ -163,21 +166,22 @@ GapWays crossAlongAxis(const WorldData& world, Walker& walker, const RimGap& gap
 /// Walks straight across, along the axis of the gap or along lines that are close together: a gap
 /// may be wider than the agent by less than any grid sees.
 /// Nothing for gaps that are too wide.
-GapWays crossStraight(const WorldData& world, Walker& walker, const RimGap& gap) {
+GapPaths crossStraight(const WorldData& world, Walker& walker, const BoundaryGap& gap) {
   if (!(computeGroundDistance(gap.from, gap.to) < kMaxStraightGap)) return {};
   const Vec3 across = projectToGround(gap.to - gap.from);
   const Vec3 aside = Vec3(-across.z(), 0, across.x()).normalized();
-  GapWays ways = crossAlongAxis(world, walker, gap, across, aside);
-  for (int i = 0; i <= kMaxLines && ways.there.empty(); ++i) {
+  GapPaths paths = crossAlongAxis(world, walker, gap, across, aside);
+  for (int i = 0; i <= kMaxLines && paths.there.empty(); ++i) {
     const double offset = computeOffset(i, kLineSpacing);
-    ways = crossAlong(walker, gap.from + offset * aside, gap.to + offset * aside);
+    paths = crossAlong(walker, gap.from + offset * aside, gap.to + offset * aside);
   }
-  return ways;
+  return paths;
 }
 
-/// Searches on a grid off the mesh, from the higher side, since some ways lead down alone: the way
-/// soon comes to an end at a wall. Subtracts the walks from `maxWalks`.
-GapWays crossOnGrid(const Collection& all, Walker& walker, RimGap gap, std::size_t& maxWalks) {
+/// Searches on a grid off the mesh, from the higher side, since some paths lead down alone: the
+/// search soon comes to an end at a wall. Subtracts the walks from `maxWalks`.
+GapPaths crossOnGrid(const Collection& all, Walker& walker, BoundaryGap gap,
+                     std::size_t& maxWalks) {
   if (gap.from.y() < gap.to.y()) {
     std::swap(gap.from, gap.to);
     std::swap(gap.fromPolygon, gap.toPolygon);
@@ -195,37 +199,38 @@ GapWays crossOnGrid(const Collection& all, Walker& walker, RimGap gap, std::size
     return !polygon || all.getIsland(*polygon) == kNoIsland ||
            computeGroundDistance(feet, *start) < kNearStart;
   };
-  const GridSearch limits{kSpacing, kGapMargin, maxWalks};
+  const GridSearch limits{kGridSpacing, kGapMargin, maxWalks};
   GridSearch search = limits;
-  auto way = findGridPathOut(walker, *start, {isWanted, isOpen, gap.to}, search);
+  auto path = findGridPathOut(walker, *start, {isWanted, isOpen, gap.to}, search);
   maxWalks = search.maxWalks;
-  if (!way) return {};
-  std::vector<Vec3> back = findWayBack(walker, *way, limits);
-  return {std::move(*way), std::move(back)};
+  if (!path) return {};
+  std::vector<Vec3> back = findPathBack(walker, *path, limits);
+  return {std::move(*path), std::move(back)};
 }
 
 /// The result of a gap that was tried off the scarce mesh.
 struct GapTrial {
-  GapWays ways;
+  GapPaths paths;
   std::size_t walks = 0;  ///< on the grid
 };
 
 /// Depends on the gap alone, so several may be tried at once, each with its own walker.
-GapTrial tryGap(const Collection& all, Walker& walker, const RimGap& gap, std::size_t maxWalks) {
+GapTrial tryGap(const Collection& all, Walker& walker, const BoundaryGap& gap,
+                std::size_t maxWalks) {
   GapTrial trial;
   std::size_t left = maxWalks;
-  trial.ways = crossOnGrid(all, walker, gap, left);
+  trial.paths = crossOnGrid(all, walker, gap, left);
   trial.walks = maxWalks - left;
-  if (trial.ways.there.empty()) trial.ways = crossStraight(all.finder.world, walker, gap);
+  if (trial.paths.there.empty()) trial.paths = crossStraight(all.finder.world, walker, gap);
   return trial;
 }
 
-/// Searches on a grid from a small island, where this comes to an end soon, for a way to another
+/// Searches on a grid from a small island, where this comes to an end soon, for a path to another
 /// one and back.
-GapWays leaveIsland(const Collection& all, Walker& walker, std::uint32_t island) {
+GapPaths leaveIsland(const Collection& all, Walker& walker, std::uint32_t island) {
   const Vec3& place = all.islands.islands[island].place;
   const std::size_t share = kMaxExitWalks / all.islands.islands.size();
-  const GridSearch limits{kSpacing, kMaxGapDetour,
+  const GridSearch limits{kGridSpacing, kMaxGapDetour,
                           std::clamp(share, kMinExitWalks, kMaxWalksOfExit)};
   const auto isOther = [&](const Vec3& feet) {
     const auto polygon = findPolygonAt(all.finder.ample, feet);
@@ -233,61 +238,61 @@ GapWays leaveIsland(const Collection& all, Walker& walker, std::uint32_t island)
     return other != kNoIsland && other != island;
   };
   GridSearch out = limits;
-  auto way = findGridPathOut(walker, place, {isOther}, out);
-  if (!way) return {};
-  std::vector<Vec3> back = findWayBack(walker, *way, limits);
-  return {std::move(*way), std::move(back)};
+  auto path = findGridPathOut(walker, place, {isOther}, out);
+  if (!path) return {};
+  std::vector<Vec3> back = findPathBack(walker, *path, limits);
+  return {std::move(*path), std::move(back)};
 }
 
-void addPassages(Collection& all, const GapWays& ways) {
-  if (ways.there.empty()) return;
-  const auto from = all.findPolygon(ways.there.front()), to = all.findPolygon(ways.there.back());
+void addConnections(Collection& all, const GapPaths& paths) {
+  if (paths.there.empty()) return;
+  const auto from = all.findPolygon(paths.there.front()), to = all.findPolygon(paths.there.back());
   if (!from || !to || all.getIsland(*from) == kNoIsland || all.getIsland(*to) == kNoIsland) return;
   const auto add = [&](std::uint32_t start, std::uint32_t end, const std::vector<Vec3>& points) {
     if (points.empty()) return;
-    all.list.passages.push_back({start, end, points, computeLength(points)});
+    all.list.connections.push_back({start, end, points, computeLength(points)});
     all.joined.emplace(all.getIsland(start), all.getIsland(end));
   };
-  add(*from, *to, ways.there);
-  add(*to, *from, ways.back);
+  add(*from, *to, paths.there);
+  add(*to, *from, paths.back);
 }
 
-bool isOpen(const Collection& all, const RimGap& gap) {
+bool isOpen(const Collection& all, const BoundaryGap& gap) {
   return all.getIsland(gap.fromPolygon) != kNoIsland && all.getIsland(gap.toPolygon) != kNoIsland &&
-         !hasPassageAt(all.list, gap);
+         !hasConnectionAt(all.list, gap);
 }
 
 /// Other gaps of joined islands are found by searches on the scarce mesh.
-bool isJoined(const Collection& all, const RimGap& gap) {
+bool isJoined(const Collection& all, const BoundaryGap& gap) {
   const std::uint32_t a = all.getIsland(gap.fromPolygon), b = all.getIsland(gap.toPolygon);
   return all.joined.contains({a, b}) && all.joined.contains({b, a});
 }
 
-/// Whether a gap off the scarce mesh is so narrow that a way may lead across it.
-bool isNarrow(const RimGap& gap) {
+/// Whether a gap off the scarce mesh is so narrow that a path may lead across it.
+bool isNarrow(const BoundaryGap& gap) {
   return computeGroundDistance(gap.from, gap.to) <= kGapMargin;
 }
 
 /// `trial`: with kGapWalks walks; nullopt: not made.
-void crossGap(Collection& all, const RimGap& gap, std::optional<GapTrial> trial) {
+void crossGap(Collection& all, const BoundaryGap& gap, std::optional<GapTrial> trial) {
   if (!isOpen(all, gap)) return;
   const auto key = makeKey(gap.from, gap.to);
   if (const auto known = all.tried.find(key); known != all.tried.end())
-    return addPassages(all, known->second);
+    return addConnections(all, known->second);
   const bool isOnScarce = isOnScarceMesh(all, gap);
   if (isOnScarce ? isJoined(all, gap) : !isNarrow(gap)) return;
   Walker& walker = all.finder.walker;
-  GapWays ways;
+  GapPaths paths;
   if (isOnScarce) {
-    ways = crossOnScarceMesh(all, gap);
-    if (ways.there.empty()) ways = crossStraight(all.finder.world, walker, gap);
+    paths = crossOnScarceMesh(all, gap);
+    if (paths.there.empty()) paths = crossStraight(all.finder.world, walker, gap);
   } else if (all.walksLeft > 0) {  // a gap that is given up counts as tried
     if (!trial || trial->walks > all.walksLeft)
       trial = tryGap(all, walker, gap, std::min(kGapWalks, all.walksLeft));
     all.walksLeft -= trial->walks;
-    ways = std::move(trial->ways);
+    paths = std::move(trial->paths);
   }
-  addPassages(all, all.tried.emplace(key, std::move(ways)).first->second);
+  addConnections(all, all.tried.emplace(key, std::move(paths)).first->second);
 }
 
 /// Walkers of threads that work at once.
@@ -308,16 +313,16 @@ void forEachWithWalker(Walkers& walkers, std::size_t count, const Work& work) {
   });
 }
 
-/// Crosses all gaps in their order. The next ones are tried at once on several threads; passages
+/// Crosses all gaps in their order. The next ones are tried at once on several threads; connections
 /// and the walks that are left decide afterwards, so that threads change no result.
-void crossGaps(Collection& all, std::span<const RimGap> gaps, Walkers& walkers,
+void crossGaps(Collection& all, std::span<const BoundaryGap> gaps, Walkers& walkers,
                const std::function<void()>& report) {
   for (std::size_t first = 0; first < gaps.size(); first += kGapsAtOnce) {
     const auto block = gaps.subspan(first, std::min(kGapsAtOnce, gaps.size() - first));
     std::vector<std::optional<GapTrial>> trials(block.size());
     if (all.walksLeft > 0 && walkers.size() > 1)
       forEachWithWalker(walkers, block.size(), [&](std::size_t i, Walker& walker) {
-        const RimGap& gap = block[i];
+        const BoundaryGap& gap = block[i];
         if (isOpen(all, gap) && isNarrow(gap) && !all.tried.contains(makeKey(gap.from, gap.to)) &&
             !isOnScarceMesh(all, gap))
           trials[i] = tryGap(all, walker, gap, kGapWalks);
@@ -329,7 +334,7 @@ void crossGaps(Collection& all, std::span<const RimGap> gaps, Walkers& walkers,
   }
 }
 
-/// The way from a polygon of the scarce mesh to the closest island.
+/// The path from a polygon of the scarce mesh to the closest island.
 struct IslandReach {
   double distance = std::numeric_limits<double>::infinity();  ///< metres
   std::uint32_t source = 0;                                   ///< polygon of the ample mesh there
@@ -368,14 +373,10 @@ std::vector<IslandReach> reachFromIslands(const Collection& all) {
 
 /// Pairs of islands that a corridor of the scarce mesh joins, as gaps between polygons of the ample
 /// mesh at its ends; the shortest first. Ends of a long corridor do not face each other as a gap.
-std::vector<RimGap> findLongGaps(const Collection& all) {
+std::vector<BoundaryGap> findLongGaps(const Collection& all) {
   const NavigationMesh &ample = all.finder.ample, &scarce = all.finder.scarce;
   const std::vector<IslandReach> reached = reachFromIslands(all);
-  struct LongGap {
-    double length = std::numeric_limits<double>::infinity();
-    RimGap gap;
-  };
-  std::map<std::pair<std::uint32_t, std::uint32_t>, LongGap> shortest;  // by islands
+  std::map<std::pair<std::uint32_t, std::uint32_t>, MeasuredGap> shortest;  // by islands
   for (std::uint32_t polygon = 0; polygon < scarce.polygonCount(); ++polygon)
     for (const Portal& portal : scarce.portals(polygon)) {
       const IslandReach &from = reached[polygon], &to = reached[portal.to];
@@ -385,15 +386,10 @@ std::vector<RimGap> findLongGaps(const Collection& all) {
       shortest[{a, b}] = {
           length, {from.source, to.source, ample.centre(from.source), ample.centre(to.source)}};
     }
-  std::vector<LongGap> sorted;
-  for (const auto& [islands, one] : shortest) sorted.push_back(one);
-  std::ranges::stable_sort(sorted, {}, &LongGap::length);
-  std::vector<RimGap> gaps;
-  for (const LongGap& one : sorted) gaps.push_back(one.gap);
-  return gaps;
+  return listByLength(shortest);
 }
 
-/// Small islands without a way to another one and back.
+/// Small islands without a path to another one and back.
 std::vector<std::uint32_t> listClosedIslands(const Collection& all) {
   std::set<std::uint32_t> left;
   for (const auto& [from, to] : all.joined)
@@ -407,13 +403,13 @@ std::vector<std::uint32_t> listClosedIslands(const Collection& all) {
 
 }  // namespace
 
-PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedGaps& tried,
-                            int threads, const std::function<void(double)>& progress) {
+ConnectionList collectConnections(PathFinder finder, const IslandList& islands, TriedGaps& tried,
+                                  int threads, const std::function<void(double)>& progress) {
   finder.maxRepairWalks = kMaxRepairWalks;
   Collection all{finder, islands, tried, finder.scarce.findIslands(), listParts(finder.ample), {}};
   for (std::uint32_t polygon = 0; polygon < islands.numberOf.size(); ++polygon)
     if (all.getIsland(polygon) == kNoIsland) all.list.areas[all.list.partOf[polygon]] = 0;
-  const std::vector<RimGap> gaps = findRimGaps(
+  const std::vector<BoundaryGap> gaps = findBoundaryGaps(
       finder.ample, all.list.partOf, kWallAndDoor + 2 * finder.agent.radius, kHeightReach);
   Walkers walkers = makeWalkers(finder, threads);
   const std::size_t count = gaps.size() + islands.islands.size();
@@ -423,9 +419,9 @@ PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedG
   };
   if (progress) progress(0);
   crossGaps(all, gaps, walkers, report);
-  for (const RimGap& gap : findLongGaps(all)) crossGap(all, gap, std::nullopt);
+  for (const BoundaryGap& gap : findLongGaps(all)) crossGap(all, gap, std::nullopt);
   const std::vector<std::uint32_t> closed = listClosedIslands(all);
-  std::vector<GapWays> exits(closed.size());
+  std::vector<GapPaths> exits(closed.size());
   const auto makeExitKey = [&](std::size_t i) {
     const Vec3& place = islands.islands[closed[i]].place;
     return makeKey(place, place);
@@ -434,15 +430,15 @@ PassageList collectPassages(PathFinder finder, const IslandList& islands, TriedG
     if (!tried.contains(makeExitKey(i))) exits[i] = leaveIsland(all, walker, closed[i]);
   });
   for (std::size_t i = 0; i < closed.size(); ++i)
-    addPassages(all, tried.emplace(makeExitKey(i), std::move(exits[i])).first->second);
+    addConnections(all, tried.emplace(makeExitKey(i), std::move(exits[i])).first->second);
   if (progress) progress(1);
-  std::ranges::stable_sort(all.list.passages, {}, &Passage::fromPolygon);
+  std::ranges::stable_sort(all.list.connections, {}, &OffMeshConnection::fromPolygon);
   return std::move(all.list);
 }
 
 void forgetGaps(TriedGaps& tried, const Aabb& box) {
   std::erase_if(tried, [&](const auto& one) {
-    const auto& [key, ways] = one;
+    const auto& [key, paths] = one;
     const Vec3 from(key[0], key[1], key[2]), to(key[3], key[4], key[5]);
     const Aabb around{from.cwiseMin(to), from.cwiseMax(to)};
     return overlaps(inflated(around, kMaxGapDetour + 1), box);

@@ -1,4 +1,4 @@
-#include "scene/navigation/ghost.hpp"
+#include "scene/navigation/shape_separation.hpp"
 
 #include <limits>
 
@@ -9,14 +9,14 @@ namespace enfilade::scene {
 std::optional<collision::SeparationResult> computeSeparationFromShape(
     EntityIndex& index, const Snapshot& snapshot, std::shared_ptr<const AvatarShape> shape,
     const Vec3& footPosition, EntityId entity) {
-  AvatarSnapshot ghost;
-  ghost.id = std::numeric_limits<EntityId>::max();
-  ghost.footPosition = footPosition;
-  ghost.shape = std::move(shape);
+  AvatarSnapshot avatar;
+  avatar.id = std::numeric_limits<EntityId>::max();
+  avatar.footPosition = footPosition;
+  avatar.shape = std::move(shape);
   Snapshot with = snapshot;
-  with.avatars = {ghost};
+  with.avatars = {avatar};
   std::size_t budget = kMaxQueryWork;
-  const auto found = computePairProximity({index, with}, ghost.id, entity, false, budget);
+  const auto found = computePairProximity({index, with}, avatar.id, entity, false, budget);
   if (const auto* pair = std::get_if<PairProximity>(&found)) return pair->separation;
   return std::nullopt;
 }

@@ -1,4 +1,4 @@
-// Contact events of any two entities, and the contacts of avatars after the motion.
+// Makes and emits the events of contacts and near misses of any two entities.
 #pragma once
 
 #include <functional>
@@ -20,6 +20,9 @@ ContactDistances computeContactDistances(const WorldSettings& settings);
 /// Creates an event of this tick, reported by `a`.
 ContactEvent makeContactEvent(const WorldData& world, ContactEvent::Kind kind, EntityId a,
                               const Contact& contact);
+/// Creates an event of the near miss `contact` of `a`.
+ContactEvent makeNearMissEvent(const WorldData& world, EntityId a, const Contact& contact,
+                               ContactEvent::Phase phase);
 /// Reports the contact or near miss of `a` that began. `before`: of the previous tick, or null.
 void emitContactBegin(const WorldData& world, EntityId a, const Contact* before, Contact& now,
                       std::vector<ContactEvent>& events);
@@ -28,14 +31,5 @@ void emitContactBegin(const WorldData& world, EntityId a, const Contact* before,
 void emitContactEnd(const WorldData& world, EntityId a, const Contact& before, const Contact* now,
                     const std::function<collision::SeparationResult()>& separationAtEnd,
                     std::vector<ContactEvent>& events);
-
-/// Updates the contacts of avatars, and reports those that began or ended.
-void detectAvatarContacts(WorldData& world, TickReport& report);
-/// Reports a blocked avatar: the entity that blocked it last, and the current separation.
-void emitBlocked(const WorldData& world, Avatar& avatar, TickReport& report, QueryCount& count);
-
-/// Ends all contacts of `avatar` and those of others with it.
-void endAvatarContacts(WorldData& world, Avatar& avatar, ContactEvent::Reason reason,
-                       std::vector<ContactEvent>& events);
 
 }  // namespace enfilade::scene

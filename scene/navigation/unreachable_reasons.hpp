@@ -1,4 +1,4 @@
-// Why an agent cannot get from one place to another: what stops it there, and what it would need.
+// Explains an unreachable goal: the obstruction on the way, and the clearance, step or drop there.
 #pragma once
 
 #include <cstdint>
@@ -14,7 +14,7 @@ namespace enfilade::scene {
 struct PartGap {
   std::uint32_t fromPart = 0, toPart = 0;
   Vec3 from = Vec3::Zero(), to = Vec3::Zero();  ///< scene frame, metres
-  Vec3 across = Vec3::UnitX();                  ///< horizontal, unit: the way out of `fromPart`
+  Vec3 across = Vec3::UnitX();                  ///< horizontal, unit, out of `fromPart`
   bool hasRoom = true;  ///< an agent fits near both ends: not on a ledge, say
 
   /// metres; gaps between places with room come first
@@ -34,7 +34,7 @@ UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh, const NavigationMesh&
 
 /// The end of a walk that did not arrive, as the reason of `path`: the entity, and its clear width
 /// or height, the step or the drop. `direction`: of the walk, horizontal, unit. `line`: the places
-/// around, along the way.
+/// around, along the path.
 void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& direction,
                  const std::vector<Vec3>& line, NavigationPath& path);
 

@@ -1,6 +1,6 @@
-// Passages: ways off the mesh through gaps that an agent just passes, routes of several passages,
+// Off-mesh connections: paths through gaps that an agent just passes, routes of several of them,
 // and places of a mesh.
-#include "scene/navigation/passages.hpp"
+#include "scene/navigation/mesh/off_mesh_connections.hpp"
 
 #include <gtest/gtest.h>
 
@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
+#include "scene/navigation/connection_search.hpp"
 #include "scene/navigation/navigation.hpp"
-#include "scene/navigation/passage_search.hpp"
 #include "tests/scene/random_room.hpp"
 
 namespace enfilade::scene::testing {
@@ -43,7 +43,7 @@ std::vector<NamedBox> roomsWithFarGap(double gap, double at = 21) {
 }
 
 /// The closest places of both rooms are anywhere along the wall; the gap is far from most of them.
-TEST(Passages, AGapFarFromTheClosestPlacesJoinsIslands) {
+TEST(OffMeshConnections, AGapFarFromTheClosestPlacesJoinsIslands) {
   for (const double gap : {0.62, 0.59}) {
     Navigation navigation(boxScene(roomsWithFarGap(gap)), {}, {});
     const Vec3 left(3, 0, 2), right(5, 0, 2);
@@ -56,7 +56,7 @@ TEST(Passages, AGapFarFromTheClosestPlacesJoinsIslands) {
 }
 
 /// Grids miss some of these gaps, and voxels others.
-TEST(Passages, AGapIsFoundWhereverItLiesOnTheGrid) {
+TEST(OffMeshConnections, AGapIsFoundWhereverItLiesOnTheGrid) {
   for (int shift = 0; shift < 12; ++shift) {
     Navigation navigation(boxScene(roomsWithFarGap(0.62, 20.95 + 0.01 * shift)), {}, {});
     EXPECT_EQ(navigation.islands().size(), 1u) << shift;
@@ -64,7 +64,7 @@ TEST(Passages, AGapIsFoundWhereverItLiesOnTheGrid) {
 }
 
 /// The scarce mesh has no gap here, and grids miss it: straight lines alone cross it.
-TEST(Passages, AGapIsFoundAsideOfThePlacesThatFaceEachOther) {
+TEST(OffMeshConnections, AGapIsFoundAsideOfThePlacesThatFaceEachOther) {
   const NamedBox floor{"floor", {0, -0.2, 0}, {12, 0, 12}};
   const NavigationAgent agent;
   NavigationMesh scarce =
@@ -78,13 +78,13 @@ TEST(Passages, AGapIsFoundAsideOfThePlacesThatFaceEachOther) {
     Walker walker(world.data(), agent);
     const IslandList islands = collectIslands(ample, walker, world.scene().bounds());
     TriedGaps tried;
-    const PassageList list = collectPassages({world.data(), agent, walker, ample, scarce, nullptr},
-                                             islands, tried, 2, {});
-    EXPECT_FALSE(list.passages.empty()) << shift;
+    const ConnectionList list = collectConnections(
+        {world.data(), agent, walker, ample, scarce, nullptr}, islands, tried, 2, {});
+    EXPECT_FALSE(list.connections.empty()) << shift;
   }
 }
 
-/// A wall of 15 cm at any angle to the grid, with a gap. Its rims face each other askew.
+/// A wall of 15 cm at any angle to the grid, with a gap. Its sides face each other askew.
 std::shared_ptr<const Scene> roomWithTurnedWall(double angle, double at, double gap) {
   Model model = boxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}},
                           {"wall/a", {-8, 0, -0.075}, {at - gap / 2, 2.5, 0.075}},
@@ -94,7 +94,7 @@ std::shared_ptr<const Scene> roomWithTurnedWall(double angle, double at, double 
   return std::make_shared<const Scene>(std::move(model));
 }
 
-TEST(Passages, AGapInATurnedWallIsFoundIfItIsACentimetreWiderThanTheAgent) {
+TEST(OffMeshConnections, AGapInATurnedWallIsFoundIfItIsACentimetreWiderThanTheAgent) {
   for (const double angle : {0.08, 0.35, 1.45}) {
     for (const double at : {-0.4, 1.31}) {
       const Vec3 side = Eigen::AngleAxisd(angle, Vec3::UnitY()) * Vec3(0, 0, 2.5);
@@ -107,7 +107,7 @@ TEST(Passages, AGapInATurnedWallIsFoundIfItIsACentimetreWiderThanTheAgent) {
   }
 }
 
-TEST(Passages, AnAnswerDoesNotDependOnEarlierOnes) {
+TEST(OffMeshConnections, AnAnswerDoesNotDependOnEarlierOnes) {
   Navigation navigation(boxScene(roomsWithFarGap(0.61)), {}, {});
   std::mt19937 random(9);
   std::uniform_real_distribution<double> x(0.5, 3.3), z(0.5, 18);
@@ -119,7 +119,7 @@ TEST(Passages, AnAnswerDoesNotDependOnEarlierOnes) {
 
 /// A narrow door at the end of an alcove in each storey: it is the only gap, and those of other
 /// storeys lie above and below it.
-TEST(Passages, GapsOfEachStoreyAreTried) {
+TEST(OffMeshConnections, GapsOfEachStoreyAreTried) {
   constexpr double kDoor = 0.61;
   std::vector<NamedBox> boxes;
   for (int storey = 0; storey < 3; ++storey) {
@@ -141,7 +141,7 @@ TEST(Passages, GapsOfEachStoreyAreTried) {
 }
 
 /// The wall has another thickness every metre, so that the closest places are anywhere.
-TEST(Passages, AGapInAnIrregularWallIsFound) {
+TEST(OffMeshConnections, AGapInAnIrregularWallIsFound) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> thickness(0.05, 0.3), shift(0, 1);
   for (int room = 0; room < 8; ++room) {
@@ -170,7 +170,7 @@ std::shared_ptr<const Scene> roomsWithCorridor(double width, double at) {
                    {"wall/far", {3.5, 0, at + width}, {6.5, 2.5, 6}}});
 }
 
-TEST(Passages, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
+TEST(OffMeshConnections, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
   const Vec3 left(1, 0, 3), right(9, 0, 3);
   for (const double at : {3.0, 3.017, 3.031})
     for (const double width : {0.611, 0.58, 0.62, 0.66}) {
@@ -181,8 +181,8 @@ TEST(Passages, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
     }
 }
 
-/// The bytes have the meshes and the ways across all gaps that were tried.
-TEST(Passages, ThreadsChangeNoResult) {
+/// The bytes have the meshes and the paths across all gaps that were tried.
+TEST(OffMeshConnections, ThreadsChangeNoResult) {
   for (const auto& scene : {roomWithTurnedWall(0.35, -0.4, 0.61), boxScene(roomsWithFarGap(0.62)),
                             roomsWithCorridor(0.62, 3)}) {
     Navigation built(scene, {}, {}, nullptr, 1);
@@ -194,8 +194,8 @@ TEST(Passages, ThreadsChangeNoResult) {
   }
 }
 
-/// The tiles are the first part of the work, and the passages most of the rest.
-TEST(Passages, TheirSearchReportsProgress) {
+/// The tiles are the first part of the work, and the connections most of the rest.
+TEST(OffMeshConnections, TheirSearchReportsProgress) {
   const auto scene = boxScene(roomsWithFarGap(0.61));
   std::vector<double> built, loaded;
   Navigation navigation(scene, {}, {}, nullptr, 2, [&](double share) { built.push_back(share); });
@@ -211,29 +211,31 @@ TEST(Passages, TheirSearchReportsProgress) {
   EXPECT_EQ(loaded.back(), 1);
 }
 
-Passage makePassage(std::uint32_t from, std::uint32_t to, const Vec3& start, const Vec3& end) {
+OffMeshConnection makeConnection(std::uint32_t from, std::uint32_t to, const Vec3& start,
+                                 const Vec3& end) {
   return {from, to, {start, end}, (end - start).norm()};
 }
 
 /// Each polygon is a part of its own.
-TEST(Passages, TheShortestRouteAvoidsExcludedPassages) {
-  const PassageList list{
+TEST(OffMeshConnections, TheShortestRouteAvoidsExcludedConnections) {
+  const ConnectionList list{
       {0, 1, 2},
       {10, 10, 10},
-      {makePassage(0, 1, {1, 0, 0}, {2, 0, 0}), makePassage(1, 2, {3, 0, 0}, {4, 0, 0}),
-       makePassage(0, 2, {0, 0, 9}, {4, 0, 9}), makePassage(2, 0, {4, 0, 0}, {1, 0, 0})}};
+      {makeConnection(0, 1, {1, 0, 0}, {2, 0, 0}), makeConnection(1, 2, {3, 0, 0}, {4, 0, 0}),
+       makeConnection(0, 2, {0, 0, 9}, {4, 0, 9}), makeConnection(2, 0, {4, 0, 0}, {1, 0, 0})}};
   const MeshPoint from{0, {0, 0, 0}}, to{2, {5, 0, 0}};
   std::vector<bool> excluded(4, false);
-  const PassageRoute straight = findPassageRoute(list, from, to, excluded);
-  EXPECT_EQ(straight.passages, (std::vector<std::size_t>{0, 1}));
+  const ConnectionRoute straight = findConnectionRoute(list, from, to, excluded);
+  EXPECT_EQ(straight.connections, (std::vector<std::size_t>{0, 1}));
   EXPECT_NEAR(straight.length, 5, 1e-12);
   excluded[1] = true;
-  const PassageRoute around = findPassageRoute(list, from, to, excluded);
-  EXPECT_EQ(around.passages, (std::vector<std::size_t>{2}));
+  const ConnectionRoute around = findConnectionRoute(list, from, to, excluded);
+  EXPECT_EQ(around.connections, (std::vector<std::size_t>{2}));
   EXPECT_NEAR(around.length, 9 + 4 + (Vec3(5, 0, 0) - Vec3(4, 0, 9)).norm(), 1e-12);
   excluded[2] = true;
-  EXPECT_TRUE(findPassageRoute(list, from, to, excluded).passages.empty());
-  EXPECT_EQ(findPassageRoute(list, to, from, excluded).passages, (std::vector<std::size_t>{3}))
+  EXPECT_TRUE(findConnectionRoute(list, from, to, excluded).connections.empty());
+  EXPECT_EQ(findConnectionRoute(list, to, from, excluded).connections,
+            (std::vector<std::size_t>{3}))
       << "one direction alone";
 }
 

@@ -1,4 +1,4 @@
-#include "scene/navigation/mesh/parallel_for.hpp"
+#include "scene/base/parallel_for.hpp"
 
 #include <atomic>
 #include <exception>

@@ -1,6 +1,6 @@
 // A loop of the solver takes microseconds. A waiting worker therefore spins for about the time that
 // a wake-up takes, and only then sleeps.
-#include "scene/physics/thread_pool.hpp"
+#include "scene/base/thread_pool.hpp"
 
 #include <system_error>
 

@@ -1,4 +1,5 @@
-// A loop over numbers on several threads, as over the tiles of a mesh.
+// Parallel loop over long tasks with progress, for example over the tiles of a mesh. ThreadPool is
+// for the short loops of a tick.
 #pragma once
 
 #include <cstddef>

@@ -1,4 +1,4 @@
-#include "scene/navigation/reasons.hpp"
+#include "scene/navigation/unreachable_reasons.hpp"
 
 #include <algorithm>
 #include <array>
@@ -12,7 +12,7 @@
 
 #include "collision/assert.hpp"
 #include "scene/navigation/clear_width.hpp"
-#include "scene/navigation/passages.hpp"
+#include "scene/navigation/mesh/off_mesh_connections.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -24,7 +24,7 @@ constexpr double kMaxGap = 2.1;            // metres: a thick wall, and the agen
 constexpr double kMaxGapHeight = 3;        // metres: a storey
 constexpr double kMinAcross = 0.05;        // metres: less has no direction
 constexpr double kRoomReach = 0.5;         // metres from an end of a gap to where an agent fits
-constexpr double kRimSpacing = 0.5;        // metres along the rim
+constexpr double kBoundarySpacing = 0.5;   // metres along the boundary
 constexpr double kMaxRise = 1.2;           // metres: higher obstacles are walls, not steps
 constexpr double kMaxDepth = 10;           // metres: deeper falls have no number
 constexpr double kMinHeadroom = 0.6;       // metres: less is no passage to stoop through
@@ -117,7 +117,7 @@ std::vector<PartGap> findClosestGaps(const NavigationMesh& mesh,
         known->second = gap;
     }
   };
-  forEachRimPlace(mesh, kRimSpacing, addGapsAt);
+  forEachBoundaryPlace(mesh, kBoundarySpacing, addGapsAt);
   std::vector<PartGap> gaps;
   for (const auto& [parts, gap] : closest) {
     gaps.push_back(gap);
@@ -162,7 +162,7 @@ std::vector<PartGap> findGapsTo(const UnobstructedMesh& unobstructed, std::uint3
 }  // namespace
 
 double PartGap::cost() const {
-  constexpr double kWithoutRoom = 10;  // metres: a way along the gaps of rooms is no longer
+  constexpr double kWithoutRoom = 10;  // metres: a route along the gaps of rooms is no longer
   return (to - from).norm() + (hasRoom ? 0 : kWithoutRoom);
 }
 
@@ -206,8 +206,8 @@ bool explainGaps(const PathFinder& finder, const MeshPoint& from, const MeshPoin
       start = standAtEnd(finder, gap.from);
     }
     if (!start) continue;
-    const double way = (gap.to - *start).dot(gap.across) + 2 * finder.agent.radius;
-    const Vec3 goal = *start + way * gap.across;
+    const double length = (gap.to - *start).dot(gap.across) + 2 * finder.agent.radius;
+    const Vec3 goal = *start + length * gap.across;
     finder.walker.returnTo(*start);
     const WalkOutcome outcome = finder.walker.walkTo(goal);
     if (outcome.kind == WalkOutcome::Kind::arrived) continue;

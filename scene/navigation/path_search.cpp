@@ -1,4 +1,4 @@
-#include "scene/navigation/path_finder.hpp"
+#include "scene/navigation/path_search.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <utility>
 
 #include "scene/navigation/mesh_paths.hpp"
-#include "scene/navigation/reasons.hpp"
+#include "scene/navigation/unreachable_reasons.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -14,12 +14,14 @@ namespace enfilade::scene {
 namespace {
 
 constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
-constexpr int kMaxPassageRoutes = 4;
+constexpr int kMaxConnectionRoutes = 4;
 constexpr double kOnMesh = 0.1;  // metres
 constexpr const char* kNotFound = "no way was found within the limits of the search";
-constexpr double kMaxConnection = 3;  // metres between places that are connected without a mesh
-constexpr GridSearch kCoarseConnection{kCoarseSpacing, 2.5, 4000};
-constexpr GridSearch kFineConnection{0.02, 2.5, 16000};
+constexpr double kMaxGridDistance = 3;  // metres between places that are connected without a mesh
+// From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
+constexpr double kMaxExit = 5;  // metres
+constexpr GridSearch kCoarseGrid{kCoarseSpacing, kMaxExit, 4000};
+constexpr GridSearch kFineGrid{0.02, 2.5, 16000};
 
 /// The corners of a line on a mesh.
 struct Line {
@@ -47,19 +49,19 @@ std::optional<Line> findUnobstructedLine(const PathFinder& finder, const MeshPoi
   return line;
 }
 
-/// The ways to the passages of a route, and through them. Returns the first part that fails, or
-/// nullopt: `points` are the whole way.
-std::optional<std::size_t> walkRoute(const PathFinder& finder, const PassageRoute& route,
+/// The paths to the connections of a route, and through them. Returns the first part that fails, or
+/// nullopt: `points` are the whole path.
+std::optional<std::size_t> walkRoute(const PathFinder& finder, const ConnectionRoute& route,
                                      const Vec3& start, const Vec3& goal, Proof& proof,
                                      std::vector<Vec3>& points) {
   points = {start};
   const auto append = [&](const std::vector<Vec3>& more) {
     points.insert(points.end(), more.begin() + 1, more.end());
   };
-  for (std::size_t i = 0; i <= route.passages.size(); ++i) {
-    const bool isLast = i == route.passages.size();
+  for (std::size_t i = 0; i <= route.connections.size(); ++i) {
+    const bool isLast = i == route.connections.size();
     const std::vector<Vec3>* through =
-        isLast ? nullptr : &finder.passages->passages[route.passages[i]].points;
+        isLast ? nullptr : &finder.connections->connections[route.connections[i]].points;
     const Vec3& end = isLast ? goal : through->front();
     if (computeGroundDistance(points.back(), end) > kArrivalDistance) {
       const NavigationPath path = findPathByMeshes(finder, points.back(), end, proof);
@@ -71,13 +73,14 @@ std::optional<std::size_t> walkRoute(const PathFinder& finder, const PassageRout
   return std::nullopt;
 }
 
-/// Makes a path of a way of which each leg was walked, as short as it can be walked without a stop.
-NavigationPath proveWay(const PathFinder& finder, const std::vector<Vec3>& way, Proof& proof) {
-  std::vector<Vec3> shortened = shortenPath(finder.walker, way, Shortcuts::all);
+/// Makes a path of places whose legs were walked, as short as it can be walked without a stop.
+NavigationPath provePath(const PathFinder& finder, const std::vector<Vec3>& places, Proof& proof) {
+  std::vector<Vec3> shortened = shortenPath(finder.walker, places, Shortcuts::all);
   std::vector<Vec3> tight = shortened;
   pullTight(finder.walker, tight);
   NavigationPath path;
-  for (const std::vector<Vec3>* points : {&std::as_const(tight), &std::as_const(shortened), &way}) {
+  for (const std::vector<Vec3>* points :
+       {&std::as_const(tight), &std::as_const(shortened), &places}) {
     if (!walksOn(finder.walker, *points, proof)) continue;
     path.points = *points;
     path.length = computeLength(path.points);
@@ -86,25 +89,25 @@ NavigationPath proveWay(const PathFinder& finder, const std::vector<Vec3>& way, 
   return path;
 }
 
-NavigationPath findPathByPassages(const PathFinder& finder, const Vec3& start, const Vec3& goal,
-                                  Proof& proof) {
+NavigationPath findPathByConnections(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                     Proof& proof) {
   const auto findNear = [&](const Vec3& place) {
     const auto near = finder.ample.findNearest(place, {kOnMesh, kHeightError, kOnMesh});
     return near ? near : finder.ample.findNearest(place, computeMeshReach(finder));
   };
   const auto from = findNear(start), to = findNear(goal);
-  if (!finder.passages || !from || !to) return {};
-  std::vector<bool> excluded(finder.passages->passages.size(), false);
-  for (int i = 0; i < kMaxPassageRoutes; ++i) {
-    const PassageRoute route = findPassageRoute(*finder.passages, *from, *to, excluded);
-    if (route.passages.empty()) break;
-    std::vector<Vec3> way;
-    const auto failed = walkRoute(finder, route, start, goal, proof, way);
+  if (!finder.connections || !from || !to) return {};
+  std::vector<bool> excluded(finder.connections->connections.size(), false);
+  for (int i = 0; i < kMaxConnectionRoutes; ++i) {
+    const ConnectionRoute route = findConnectionRoute(*finder.connections, *from, *to, excluded);
+    if (route.connections.empty()) break;
+    std::vector<Vec3> places;
+    const auto failed = walkRoute(finder, route, start, goal, proof, places);
     if (!failed) {
-      NavigationPath path = proveWay(finder, way, proof);
+      NavigationPath path = provePath(finder, places, proof);
       if (path.found()) return path;
     }
-    excluded[route.passages[std::min(failed.value_or(0), route.passages.size() - 1)]] = true;
+    excluded[route.connections[std::min(failed.value_or(0), route.connections.size() - 1)]] = true;
   }
   return {};
 }
@@ -114,30 +117,30 @@ NavigationPath findPathOnMeshes(const PathFinder& finder, const Vec3& start, con
   NavigationPath path = findPathByMeshes(finder, start, goal, proof);
   if (path.found()) return path;
   Proof own(finder.maxRepairWalks);  // the search before may have used up its walks
-  return findPathByPassages(finder, start, goal, own);
+  return findPathByConnections(finder, start, goal, own);
 }
 
-/// Whether a place is on a part of the mesh that is not small. The rim of furniture may be above a
+/// Whether a place is on a part of the mesh that is not small. The edge of furniture may be above a
 /// polygon of the floor by about a step.
 bool isOnMesh(const PathFinder& finder, const Vec3& place) {
   const auto polygon = findPolygonAt(finder.ample, place);
-  return polygon && !(finder.passages && finder.passages->isSmallPart(*polygon)) &&
+  return polygon && !(finder.connections && finder.connections->isSmallPart(*polygon)) &&
          std::abs(finder.ample.closestPoint(*polygon, place).y() - place.y()) < kMaxMeshHeight;
 }
 
-/// Replaces the part of a way that begins and ends on the mesh by a path there, if this is shorter.
-void rejoinMesh(const PathFinder& finder, std::vector<Vec3>& way) {
+/// Replaces the part of a path that begins and ends on the mesh by one there, if this is shorter.
+void rejoinMesh(const PathFinder& finder, std::vector<Vec3>& places) {
   const auto isOn = [&](const Vec3& place) { return isOnMesh(finder, place); };
-  const auto first = std::ranges::find_if(way, isOn);
-  const auto end = std::find_if(way.rbegin(), way.rend(), isOn).base();  // after the last
+  const auto first = std::ranges::find_if(places, isOn);
+  const auto end = std::find_if(places.rbegin(), places.rend(), isOn).base();  // after the last
   if (end - first < 3) return;
   Proof proof(finder.maxRepairWalks);
   const NavigationPath path = findPathOnMeshes(finder, *first, *std::prev(end), proof);
   if (!path.found() || path.length >= computeLength({first, end})) return;
-  std::vector<Vec3> rest(end, way.end());
-  way.erase(first, way.end());
-  way.insert(way.end(), path.points.begin(), path.points.end());
-  way.insert(way.end(), rest.begin(), rest.end());
+  std::vector<Vec3> rest(end, places.end());
+  places.erase(first, places.end());
+  places.insert(places.end(), path.points.begin(), path.points.end());
+  places.insert(places.end(), rest.begin(), rest.end());
 }
 
 /// Walks along the line of the mesh for anything thinner and without bodies. Finds what is in the
@@ -178,49 +181,56 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
   path.reason = kNotFound;
   if (std::abs(places.back().y() - to.y()) > kHeightError) return path;
   rejoinMesh(finder, places);
-  NavigationPath proved = proveWay(finder, places, proof);
+  NavigationPath proved = provePath(finder, places, proof);
   if (proved.found()) return proved;
   path.obstruction = proof.met.back();
   return path;
 }
 
-/// Places without a mesh, as narrow ones on furniture, or on a small part of one, are connected
-/// with it by walks on a grid. Places that are near are connected with one another.
+using Places = std::optional<std::vector<Vec3>>;
+
+/// A path on the coarse grid, else on the fine one.
+Places findPathOnGrids(Walker& walker, const Vec3& from, const Vec3& to) {
+  GridSearch coarse = kCoarseGrid, fine = kFineGrid;
+  Places places = findGridPath(walker, from, to, coarse);
+  return places ? places : findGridPath(walker, from, to, fine);
+}
+
+/// A path on the grids to the mesh, on the side of `toward`. If the coarse search in that direction
+/// takes all its walks, as among many holes, it leads to the closest place of the mesh.
+Places findPathToMesh(const PathFinder& finder, const Vec3& place, const Vec3& toward) {
+  const auto isOn = [&](const Vec3& at) { return isOnMesh(finder, at); };
+  if (isOn(place)) return std::vector<Vec3>{place};
+  GridSearch coarse = kCoarseGrid, nearest = kCoarseGrid, fine = kFineGrid;
+  Places places = findGridPathOut(finder.walker, place, {isOn, {}, toward}, coarse);
+  if (!places && coarse.maxWalks == 0)
+    places = findGridPathOut(finder.walker, place, {isOn}, nearest);
+  return places ? places : findGridPathOut(finder.walker, place, {isOn, {}, toward}, fine);
+}
+
+/// Places without a mesh, such as narrow ones on furniture, or on a small part of one, are
+/// connected with it by walks on a grid. Places that are near are connected with one another.
 NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal) {
   Walker& walker = finder.walker;
   Proof proof(finder.maxRepairWalks);
-  const auto isOn = [&](const Vec3& place) { return isOnMesh(finder, place); };
-  NavigationPath path;
-  if (isOn(start) && isOn(goal)) return path;
-  const auto search = [](const auto& find) {
-    std::optional<std::vector<Vec3>> way;
-    for (GridSearch grid : {kCoarseConnection, kFineConnection})
-      if (!way) way = find(grid);
-    return way;
-  };
-  const auto connect = [&](const Vec3& from, const Vec3& to) {
-    return search([&](GridSearch& grid) { return findGridPath(walker, from, to, grid); });
-  };
-  const auto leave = [&](const Vec3& place, const Vec3& toward) {
-    if (isOn(place)) return std::optional(std::vector<Vec3>{place});
-    return search([&](GridSearch& grid) {
-      return findGridPathOut(walker, place, {isOn, {}, toward}, grid);
-    });
-  };
-  std::optional<std::vector<Vec3>> way;
-  if (computeGroundDistance(start, goal) < kMaxConnection) way = connect(start, goal);
-  if (!way) {
-    way = leave(start, goal);
-    // A walk may lead down where none leads up: the way back from the mesh is walked, too.
-    const auto fromGoal = way ? leave(goal, start) : std::nullopt;
-    const auto last = fromGoal ? connect(fromGoal->back(), goal) : std::nullopt;
-    if (!last) return path;
-    const NavigationPath middle = findPathOnMeshes(finder, way->back(), last->front(), proof);
-    if (!middle.found()) return path;
-    way->insert(way->end(), middle.points.begin() + 1, middle.points.end());
-    way->insert(way->end(), last->begin() + 1, last->end());
+  if (isOnMesh(finder, start) && isOnMesh(finder, goal)) return {};
+  if (walks(walker, start, goal, kHeightError)) {
+    NavigationPath straight = provePath(finder, {start, goal}, proof);
+    if (straight.found()) return straight;
   }
-  return proveWay(finder, *way, proof);
+  if (computeGroundDistance(start, goal) < kMaxGridDistance)
+    if (const Places places = findPathOnGrids(walker, start, goal))
+      return provePath(finder, *places, proof);
+  Places places = findPathToMesh(finder, start, goal);
+  // A walk may lead down where none leads up: the path back from the mesh is walked, too.
+  const Places fromGoal = places ? findPathToMesh(finder, goal, start) : std::nullopt;
+  const Places last = fromGoal ? findPathOnGrids(walker, fromGoal->back(), goal) : std::nullopt;
+  if (!last) return {};
+  const NavigationPath middle = findPathOnMeshes(finder, places->back(), last->front(), proof);
+  if (!middle.found()) return {};
+  places->insert(places->end(), middle.points.begin() + 1, middle.points.end());
+  places->insert(places->end(), last->begin() + 1, last->end());
+  return provePath(finder, *places, proof);
 }
 
 }  // namespace
@@ -252,17 +262,17 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
   return best;
 }
 
-NavigationPath findWayOut(Walker& walker, const Vec3& from,
-                          const std::function<bool(const Vec3&)>& isWanted) {
+NavigationPath findPathOut(Walker& walker, const Vec3& from,
+                           const std::function<bool(const Vec3&)>& isWanted) {
   NavigationPath path;
   if (const auto error = walker.place(from, kMaxStandDrop)) {
     path.reason = "at the start " + *error;
     return path;
   }
   GridSearch search{kCoarseSpacing, 2, 20'000};
-  const auto way = findGridPathOut(walker, walker.footPosition(), {isWanted}, search);
-  if (!way) return path;
-  path.points = shortenPath(walker, *way, Shortcuts::all);
+  const auto places = findGridPathOut(walker, walker.footPosition(), {isWanted}, search);
+  if (!places) return path;
+  path.points = shortenPath(walker, *places, Shortcuts::all);
   path.length = computeLength(path.points);
   path.seconds = path.length / walker.agent().speed;
   path.legs.push_back({PathLeg::Kind::aside, 0, path.length, path.seconds});

@@ -1,5 +1,5 @@
 // Reasons why no path leads somewhere.
-#include "scene/navigation/reasons.hpp"
+#include "scene/navigation/unreachable_reasons.hpp"
 
 #include <gtest/gtest.h>
 
@@ -13,7 +13,7 @@
 namespace enfilade::scene::testing {
 namespace {
 
-TEST(Reasons, NameWhatStopsTheAgentAndWhatItWouldNeed) {
+TEST(UnreachableReasons, NameWhatStopsTheAgentAndWhatItWouldNeed) {
   const NamedBox floor{"floor", {0, -0.2, 0}, {10, 0, 5}};
   const auto findReason = [](const std::vector<NamedBox>& boxes, const Vec3& goal) {
     return Navigation(boxScene(boxes), {}, {}).findPath({2, 0, 2}, goal).reason;
@@ -30,7 +30,7 @@ TEST(Reasons, NameWhatStopsTheAgentAndWhatItWouldNeed) {
             "no floor, step or stair leads there");
 }
 
-TEST(Reasons, AreThoseOfTheFirstRoomOnTheWay) {
+TEST(UnreachableReasons, AreThoseOfTheFirstRoomOnTheWay) {
   std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {15, 0, 5}},
                               {"kerb", {5, 0, -1}, {5.4, 0.5, 6}},
                               {"wall", {10, 0, -1}, {10.2, 2.5, 6}}};
@@ -41,7 +41,7 @@ TEST(Reasons, AreThoseOfTheFirstRoomOnTheWay) {
 }
 
 /// A strip of floor belongs to the other room and runs behind a panel of this one: no agent fits.
-TEST(Reasons, AreOfPlacesWhereAnAgentFits) {
+TEST(UnreachableReasons, AreOfPlacesWhereAnAgentFits) {
   Navigation navigation(boxScene({{"floor", {0, -0.2, -1}, {10, 0, 5}},
                                   {"facade", {-1, 0, -1}, {11, 2.5, 0}},
                                   {"panel", {-1, 0, 0.15}, {5, 2.5, 0.2}},
@@ -53,7 +53,7 @@ TEST(Reasons, AreOfPlacesWhereAnAgentFits) {
   }
 }
 
-TEST(Reasons, TheFirstPathThatIsNotFoundReportsTheirMesh) {
+TEST(UnreachableReasons, TheFirstPathThatIsNotFoundReportsTheirMesh) {
   Navigation navigation(
       boxScene({{"floor", {0, -0.2, 0}, {40, 0, 5}}, {"wall", {5, 0, -1}, {5.2, 2.5, 6}}}), {}, {});
   std::vector<double> shares;
