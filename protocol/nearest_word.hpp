@@ -33,10 +33,10 @@ inline std::size_t computeEditDistance(std::string_view a, std::string_view b) {
 /// The nearest of `words`; empty if none is within a third of its letters, or one edit.
 inline std::string findNearestWord(std::string_view typed, std::span<const std::string> words) {
   std::string nearest;
-  std::size_t least = typed.size() < 64 ? std::max<std::size_t>(1, typed.size() / 3) + 1 : 0;
+  std::size_t minDistance = typed.size() < 64 ? std::max<std::size_t>(1, typed.size() / 3) + 1 : 0;
   for (const std::string& word : words) {
     const std::size_t distance = computeEditDistance(typed.substr(0, 64), word);
-    if (distance < least) least = distance, nearest = word;
+    if (distance < minDistance) minDistance = distance, nearest = word;
   }
   return nearest;
 }

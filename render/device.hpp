@@ -1,8 +1,8 @@
 // Selection and probing of rendering devices.
 #pragma once
 
+#include <cstddef>
 #include <string>
-#include <vector>
 
 namespace enfilade::render {
 
@@ -35,11 +35,10 @@ struct DeviceProbe {
   std::string failure;    ///< reason for no OpenGL 4.5 core context; empty: usable
 };
 
-/// The results of all devices.
-struct DeviceReport {
-  std::string clientExtensions;  ///< of EGL itself
-  std::string failure;           ///< reason why EGL is unavailable; empty: available
-  std::vector<DeviceProbe> devices;
+/// The devices of this machine, in the order of the indices of `DeviceChoice::device`.
+struct DeviceList {
+  std::size_t count = 0;
+  std::string failure;  ///< reason why EGL has no devices; empty: it has
 };
 
 }  // namespace enfilade::render

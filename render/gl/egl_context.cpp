@@ -161,7 +161,7 @@ std::mutex& deviceProbeMutex() {
 }
 
 /// Creates a current context and fills `probe`; EGL_NO_CONTEXT on failure.
-EGLContext probeDevice(const DisplayCandidate& candidate, DeviceProbe& probe) {
+EGLContext openDevice(const DisplayCandidate& candidate, DeviceProbe& probe) {
   probe.platform = candidate.platform;
   probe.name = candidate.name;
   probe.software = candidate.onCpu;
@@ -180,22 +180,26 @@ bool isNumber(const std::string& text) {
          std::all_of(text.begin(), text.end(), [](char c) { return c >= '0' && c <= '9'; });
 }
 
+/// The reason why the device is not even tried: another one is chosen by its number.
+std::string explainNumber(const DeviceChoice& choice, std::size_t index) {
+  const bool isOther = isNumber(choice.device) && std::stoul(choice.device) != index;
+  return isOther ? "is not number " + choice.device : "";
+}
+
 /// The reason why the device does not match `choice`; empty: it matches.
-std::string explainRejection(const DeviceChoice& choice, std::size_t index,
-                             const DeviceProbe& probe) {
+std::string explainRejection(const DeviceChoice& choice, const DeviceProbe& probe) {
   if (choice.requireGpu && probe.software) return "draws on the CPU, but a GPU is required";
   const std::string wanted = scene::toLowerCase(choice.device);
-  if (wanted.empty()) return "";
-  if (isNumber(wanted)) return std::stoul(wanted) == index ? "" : "is not number " + wanted;
+  if (wanted.empty() || isNumber(wanted)) return "";
   const std::string uuid = scene::toLowerCase(probe.uuid);
   const bool byUuid = !uuid.empty() && (wanted == uuid || wanted == "gpu-" + uuid);
   if (byUuid || scene::toLowerCase(probe.name).find(wanted) != std::string::npos) return "";
   return "is named \"" + probe.name + "\", not \"" + choice.device + "\"";
 }
 
-std::string formatProbeLine(std::size_t index, const DeviceProbe& probe,
+std::string formatProbeLine(std::size_t index, const std::string& platform,
                             const std::string& reason) {
-  return "\n  " + std::to_string(index) + ": " + probe.platform + ": " + reason;
+  return "\n  " + std::to_string(index) + ": " + platform + ": " + reason;
 }
 
 /// A missing library, or "". libepoxy loads them on first use and aborts the program if one is
@@ -226,10 +230,14 @@ EglContext::EglContext(const DeviceChoice& choice) {
   const std::vector<DisplayCandidate> all =
       enumerateDisplays(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS));
   for (std::size_t i = 0; i < all.size(); ++i) {
+    if (const std::string reason = explainNumber(choice, i); !reason.empty()) {
+      tried += formatProbeLine(i, all[i].platform, reason);
+      continue;
+    }
     DeviceProbe probe;
-    const EGLContext context = probeDevice(all[i], probe);
+    const EGLContext context = openDevice(all[i], probe);
     const std::string reason =
-        probe.failure.empty() ? explainRejection(choice, i, probe) : probe.failure;
+        probe.failure.empty() ? explainRejection(choice, probe) : probe.failure;
     if (reason.empty()) {
       display_ = all[i].display;
       context_ = context;
@@ -242,9 +250,9 @@ EglContext::EglContext(const DeviceChoice& choice) {
       return;
     }
     if (context != EGL_NO_CONTEXT) destroyContext(all[i].display, context);
-    tried += formatProbeLine(i, probe, reason);
+    tried += formatProbeLine(i, probe.platform, reason);
     if (!probe.software && !probe.failure.empty())
-      hardwareFailures += formatProbeLine(i, probe, reason);
+      hardwareFailures += formatProbeLine(i, probe.platform, reason);
   }
   if (tried.empty()) tried.append("\n  ").append(kNoPlatform);
   std::string wanted = choice.device.empty() ? "" : " \"" + choice.device + "\"";
@@ -288,20 +296,28 @@ void EglContext::release() noexcept {
   context_ = nullptr;
 }
 
-DeviceReport probeDevices() {
-  DeviceReport report;
-  report.failure = findMissingLibrary();
-  if (!report.failure.empty()) return report;
+DeviceList listDevices() {
+  DeviceList list{0, findMissingLibrary()};
+  if (!list.failure.empty()) return list;
   const std::lock_guard lock(deviceProbeMutex());
-  const char* extensions = eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS);
-  report.clientExtensions = toStringOrEmpty(extensions);
-  for (const DisplayCandidate& candidate : enumerateDisplays(extensions)) {
-    DeviceProbe& probe = report.devices.emplace_back();
-    const EGLContext context = probeDevice(candidate, probe);
-    if (context != EGL_NO_CONTEXT) destroyContext(candidate.display, context);
+  list.count = enumerateDisplays(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS)).size();
+  if (list.count == 0) list.failure = kNoPlatform;
+  return list;
+}
+
+DeviceProbe probeDevice(std::size_t index) {
+  DeviceProbe probe;
+  probe.failure = findMissingLibrary();
+  if (!probe.failure.empty()) return probe;
+  const std::lock_guard lock(deviceProbeMutex());
+  const auto all = enumerateDisplays(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS));
+  if (index >= all.size()) {
+    probe.failure = "there is no device " + std::to_string(index);
+    return probe;
   }
-  if (report.devices.empty()) report.failure = kNoPlatform;
-  return report;
+  const EGLContext context = openDevice(all[index], probe);
+  if (context != EGL_NO_CONTEXT) destroyContext(all[index].display, context);
+  return probe;
 }
 
 }  // namespace enfilade::render

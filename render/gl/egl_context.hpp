@@ -36,8 +36,10 @@ class EglContext {
   bool software_ = false;
 };
 
-/// Probes all devices in the order of the indices of `DeviceChoice::device`. Never throws: without
-/// EGL, the report has no devices and states the reason.
-DeviceReport probeDevices();
+/// Never throws.
+DeviceList listDevices();
+
+/// Creates a context on a device of the list, and destroys it. Never throws.
+DeviceProbe probeDevice(std::size_t index);
 
 }  // namespace enfilade::render

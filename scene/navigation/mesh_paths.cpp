@@ -171,11 +171,11 @@ class PortalClosures {
     const auto& polygons = corridor.polygons;
     if (polygons.size() < 2) return false;
     std::size_t at = 0;
-    double least = std::numeric_limits<double>::infinity();
+    double minDistance = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i + 1 < polygons.size(); ++i) {
       const double distance =
           (mesh_.portalMiddle(polygons[i], polygons[i + 1]) - failure).squaredNorm();
-      if (distance < least) least = distance, at = i;
+      if (distance < minDistance) minDistance = distance, at = i;
     }
     mesh_.closePortal(polygons[at], polygons[at + 1]);
     if (!refutes_ || mesh_.countFailure(polygons[at], polygons[at + 1]) < kRefutations)

@@ -232,6 +232,11 @@ std::optional<NarrowPlace> Navigation::findNarrowest(const std::vector<Vec3>& po
   return narrowest.clearWidth < kMaxSideWidth ? std::optional(narrowest) : std::nullopt;
 }
 
+std::vector<PathStep> Navigation::findSteps(const std::vector<Vec3>& points) {
+  const std::lock_guard lock(mutex_);
+  return scene::findSteps(world_.data(), agent_, traceFeet(*walker_, points));
+}
+
 Aabb Navigation::computeBox(const NamedPlace& named) const {
   return named.body == kNoBody
              ? named.box

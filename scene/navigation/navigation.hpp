@@ -24,6 +24,7 @@
 #include "scene/navigation/path_search.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "scene/navigation/unreachable_reasons.hpp"
+#include "scene/navigation/walk/path_steps.hpp"
 #include "scene/navigation/walk/walker.hpp"
 #include "scene/world/world.hpp"
 
@@ -104,6 +105,8 @@ class Navigation {
   NavigationPath findPathOut(const Vec3& from, const std::function<bool(const Vec3&)>& isWanted);
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
   std::optional<NarrowPlace> findNarrowest(const std::vector<Vec3>& points);
+  /// The steps of a path, in order.
+  std::vector<PathStep> findSteps(const std::vector<Vec3>& points);
   /// The standing place in one of some named places that is horizontally closest to its middle.
   /// `start`: named places on the island of that place are preferred, then the closest to it.
   std::optional<Vec3> findPlaceIn(std::span<const NamedPlace> named,

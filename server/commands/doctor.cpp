@@ -5,11 +5,15 @@
 #include <chrono>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <sstream>
+#include <stdexcept>
+#include <string>
 
 #include "render/gl/egl_context.hpp"
 #include "render/gl/gl_renderer.hpp"
 #include "render/image/image.hpp"
 #include "server/base/standard_output.hpp"
+#include "server/commands/child_call.hpp"
 #include "server/commands/egl_vendors.hpp"
 #include "server/commands/self_test_scene.hpp"
 
@@ -20,6 +24,7 @@ using Json = nlohmann::ordered_json;
 using Clock = std::chrono::steady_clock;
 
 constexpr int kWidth = 640, kHeight = 480;
+constexpr const char* kRight = "right";  // a proof that succeeded
 constexpr double kMeasureSeconds = 0.5;  // duration of the frame rate measurement
 
 struct SelfTest {
@@ -53,8 +58,9 @@ SelfTest runSelfTest(std::size_t device) {
 }
 
 /// Suggests the packages to install.
-std::string suggestRemedy(const render::DeviceReport& report, bool gpuWorks, bool anyWorks) {
-  if (!report.failure.empty() && report.devices.empty()) return report.failure;
+std::string suggestRemedy(const Json& devices, const std::string& failure, bool gpuWorks,
+                          bool anyWorks) {
+  if (devices.empty() && !failure.empty()) return failure;
   if (!anyWorks)
     return "to draw on the CPU install libegl-mesa0, libgl1-mesa-dri and libopengl0; for an "
            "NVIDIA GPU its driver with libEGL_nvidia (in a container: "
@@ -84,12 +90,56 @@ Json toJson(std::size_t index, const render::DeviceProbe& probe, const SelfTest&
           {"software", probe.software},
           {"failure", probe.failure},
           {"proof",
-           probe.failure.empty() ? (selfTest.failure.empty() ? "right" : selfTest.failure) : ""},
+           probe.failure.empty() ? (selfTest.failure.empty() ? kRight : selfTest.failure) : ""},
           {"frames_per_second", std::round(10 * selfTest.framesPerSecond) / 10}};
+}
+
+std::string dump(const Json& json, int indent) {
+  return json.dump(indent, ' ', false, Json::error_handler_t::replace);
 }
 
 std::string getString(const Json& value) {
   return value.get<std::string>();
+}
+
+bool isRight(const Json& device) {
+  return device["failure"] == "" && device["proof"] == kRight;
+}
+
+/// Lists the devices in a child process: a crash of a driver ends that alone.
+render::DeviceList listDevicesInChild() {
+  const ChildAnswer answer = callInChild([](const Send& send) {
+    const render::DeviceList list = render::listDevices();
+    send(dump({{"count", list.count}, {"failure", list.failure}}, -1));
+  });
+  if (!answer.failure.empty()) return {0, "EGL " + answer.failure + " while it listed devices"};
+  const Json list = Json::parse(answer.text);
+  return {list["count"].get<std::size_t>(), list["failure"].get<std::string>()};
+}
+
+/// Probes and tests a device in a child process. Writes the picture to `out` if it is right and
+/// `out` is not empty. Throws std::runtime_error if it cannot be written.
+Json testDeviceInChild(std::size_t index, const std::filesystem::path& out) {
+  const ChildAnswer answer = callInChild([&](const Send& send) {
+    const render::DeviceProbe probe = render::probeDevice(index);
+    send(dump(toJson(index, probe, {}), -1) + "\n");
+    if (!probe.failure.empty()) return;
+    const SelfTest selfTest = runSelfTest(index);
+    Json device = toJson(index, probe, selfTest);
+    try {
+      if (isRight(device) && !out.empty()) render::writePng(out, render::toImage(selfTest.frame));
+    } catch (const std::exception& error) {
+      device["error"] = error.what();
+    }
+    send(dump(device, -1) + "\n");
+  });
+  std::istringstream lines(answer.text);
+  Json device = toJson(index, {}, {});
+  for (std::string line; std::getline(lines, line);) device = Json::parse(line);
+  if (device.contains("error")) throw std::runtime_error(getString(device["error"]));
+  if (!answer.failure.empty())
+    device[answer.text.empty() ? "failure" : "proof"] = "the driver " + answer.failure;
+  return device;
 }
 
 std::string formatTable(const Json& report) {
@@ -122,24 +172,20 @@ std::string formatTable(const Json& report) {
 }  // namespace
 
 ExitCode doctor(const DoctorCommand& command) {
-  const render::DeviceReport devices = render::probeDevices();
+  const render::DeviceList list = listDevicesInChild();
   Json report{{"vendors", vendorsToJson()}, {"devices", Json::array()}};
   bool gpuWorks = false, anyWorks = false;
-  for (std::size_t i = 0; i < devices.devices.size(); ++i) {
-    const render::DeviceProbe& probe = devices.devices[i];
-    const SelfTest selfTest = probe.failure.empty() ? runSelfTest(i) : SelfTest{};
-    report["devices"].push_back(toJson(i, probe, selfTest));
-    if (!probe.failure.empty() || !selfTest.failure.empty()) continue;
-    if (!anyWorks && !command.out.empty())
-      render::writePng(command.out, render::toImage(selfTest.frame));
+  for (std::size_t i = 0; i < list.count; ++i) {
+    const Json device = testDeviceInChild(i, anyWorks ? "" : command.out);
+    report["devices"].push_back(device);
+    if (!isRight(device)) continue;
     anyWorks = true;
-    gpuWorks = gpuWorks || !probe.software;
+    gpuWorks = gpuWorks || !device["software"].get<bool>();
   }
-  report["remedy"] = suggestRemedy(devices, gpuWorks, anyWorks);
+  report["remedy"] = suggestRemedy(report["devices"], list.failure, gpuWorks, anyWorks);
   const bool canDraw = command.requireGpu ? gpuWorks : anyWorks;
   report["can_draw"] = canDraw;
-  const auto replace = Json::error_handler_t::replace;
-  writeToStdout(command.json ? report.dump(2, ' ', false, replace) + "\n" : formatTable(report));
+  writeToStdout(command.json ? dump(report, 2) + "\n" : formatTable(report));
   return canDraw ? ExitCode::success : ExitCode::runtimeError;
 }
 

@@ -10,6 +10,8 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "server/commands/child_call.hpp"
+
 namespace enfilade::server {
 namespace {
 
@@ -46,11 +48,12 @@ EglVendor loadVendor(const std::string& file) {
     return vendor;
   }
   vendor.library = json.at(path).get<std::string>();
-  // Stays loaded, as in normal use of EGL.
-  if (!dlopen(vendor.library.c_str(), RTLD_LAZY | RTLD_LOCAL)) {
+  const ChildAnswer answer = callInChild([&](const Send& send) {
+    if (dlopen(vendor.library.c_str(), RTLD_LAZY | RTLD_LOCAL)) return;
     const char* reason = dlerror();
-    vendor.failure = reason ? reason : "cannot be loaded";
-  }
+    send(reason ? reason : "cannot be loaded");
+  });
+  vendor.failure = answer.failure.empty() ? answer.text : answer.failure;
   return vendor;
 }
 

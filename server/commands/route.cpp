@@ -2,7 +2,9 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <charconv>
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <optional>
 #include <stdexcept>
@@ -124,6 +126,9 @@ Json makeReport(const RouteCommand& command, const v1::NavigationPath& path,
     if (path.has_narrowest_at())
       report["narrowest"] = {{"at", toJson(path.narrowest_at())},
                              {"clear_width", path.clear_width()}};
+    report["steps"] = Json::array();
+    for (const v1::NavigationPath::Step& step : path.steps())
+      report["steps"].push_back({{"at", toJson(step.at())}, {"rise", step.rise()}});
   } else {
     report["reason"] = path.reason();
     if (path.has_obstacle_at() || path.obstacle() != 0)
@@ -142,14 +147,28 @@ Json makeReport(const RouteCommand& command, const v1::NavigationPath& path,
   return report;
 }
 
+/// Metres with two digits; never -0.00.
+std::string formatPlace(const v1::Vec3& at) {
+  const auto round = [](double metres) { return std::round(100 * metres) / 100 + 0.0; };
+  return fmt::format("{:.2f}, {:.2f}, {:.2f}", round(at.x()), round(at.y()), round(at.z()));
+}
+
+double getHeight(const v1::NavigationPath::Step& step) {
+  return std::abs(step.rise());
+}
+
 std::string formatText(const RouteCommand& command, const v1::NavigationPath& path) {
   if (!path.found())
     return fmt::format("no way from {} to {}: {}\n", command.from, command.to, path.reason());
   std::string text = fmt::format("{:.2f} m from {} to {}, {:.1f} s at {:.1f} m/s\n", path.length(),
                                  command.from, command.to, path.seconds(), command.agent.speed);
   if (path.has_narrowest_at())
-    text += fmt::format("narrowest: {:.3f} m at {:.2f}, {:.2f}, {:.2f}\n", path.clear_width(),
-                        path.narrowest_at().x(), path.narrowest_at().y(), path.narrowest_at().z());
+    text += fmt::format("narrowest: {:.3f} m at {}\n", path.clear_width(),
+                        formatPlace(path.narrowest_at()));
+  const auto highest = std::ranges::max_element(path.steps(), {}, getHeight);
+  if (highest != path.steps().end())
+    text += fmt::format("steps: {}, the highest {:.3f} m at {}\n", path.steps_size(),
+                        getHeight(*highest), formatPlace(highest->at()));
   for (const v1::NavigationLeg& leg : path.legs()) {
     const int first = static_cast<int>(leg.first());
     if (leg.kind() == v1::NavigationLeg::KIND_DROP)
@@ -255,7 +274,7 @@ ExitCode route(const RouteCommand& command) {
                     showProgress,
                     "leave out --doors-as-they-are, or open it in the model"};
   v1::NavigationPath path;
-  writePath(answer, from, to, command.links, true, path);
+  writePath(answer, from, to, command.links, {.narrowest = true, .steps = true}, path);
   bar.clear();
   constexpr auto kReplace = Json::error_handler_t::replace;
   writeToStdout(

@@ -1,4 +1,4 @@
-// `enfilade route SCENE FROM TO`: a proved path, its length and its narrowest place.
+// `enfilade route SCENE FROM TO`: a proved path, its length, its steps and its narrowest place.
 #pragma once
 
 #include <filesystem>

@@ -32,7 +32,7 @@ Separation findSeparation(const PathAnswer& answer, std::uint32_t island,
   Separation best;
   const auto attempt = [&](const scene::Vec3& from, const scene::Vec3& to, std::uint32_t number) {
     Separation found;
-    writePath(answer, from, to, {}, false, found.path);
+    writePath(answer, from, to, {}, {}, found.path);
     found.to = number;
     found.worth = judgeReason(found.path);
     if (found.path.found() && number > island) found.worth = 0;  // a smaller one, joined to this

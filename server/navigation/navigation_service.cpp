@@ -85,8 +85,8 @@ struct Answer {
       const auto to = resolve(places.to[static_cast<std::size_t>(i)], query.to(i),
                               "path.to[" + std::to_string(i) + "]", std::get<Vec3>(from));
       if (const auto* error = std::get_if<v1::Error>(&to)) return *error;
-      writePath(paths(), std::get<Vec3>(from), std::get<Vec3>(to), options, query.narrowest(),
-                *reply.add_paths());
+      writePath(paths(), std::get<Vec3>(from), std::get<Vec3>(to), options,
+                {query.narrowest(), query.steps()}, *reply.add_paths());
     }
     return std::nullopt;
   }

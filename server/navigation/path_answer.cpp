@@ -229,7 +229,8 @@ std::optional<Vec3> findPlaceIn(scene::Navigation& navigation,
 }
 
 void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
-               const scene::PathOptions& options, bool measuresWidth, v1::NavigationPath& message) {
+               const scene::PathOptions& options, const PathMeasures& measures,
+               v1::NavigationPath& message) {
   const PathWriter writer{answer};
   scene::NavigationPath path = answer.navigation.findPath(from, to, options, answer.progress);
   std::vector<scene::DoorOnPath> doors;
@@ -250,7 +251,13 @@ void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
   if (!path.found()) return writer.explainByDoors(from, to, options, message);
   writer.addDoors(doors, message);
   writer.addLegs(path, doors, message);
-  if (!measuresWidth) return;
+  if (measures.steps)
+    for (const scene::PathStep& step : answer.navigation.findSteps(path.points)) {
+      v1::NavigationPath::Step& one = *message.add_steps();
+      *one.mutable_at() = toProto(step.position);
+      one.set_rise(step.rise);
+    }
+  if (!measures.narrowest) return;
   const auto narrowest = answer.navigation.findNarrowest(path.points);
   if (!narrowest) return;
   message.set_clear_width(narrowest->clearWidth);

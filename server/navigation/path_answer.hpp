@@ -42,8 +42,14 @@ std::optional<scene::Vec3> findPlaceIn(scene::Navigation& navigation,
                                        std::span<const scene::NamedPlace> named,
                                        const std::optional<scene::Vec3>& start);
 
-/// The path from one place to another. `measuresWidth`: also its narrowest place.
+/// The measures of a path that is found.
+struct PathMeasures {
+  bool narrowest = false, steps = false;
+};
+
+/// The path from one place to another.
 void writePath(const PathAnswer& answer, const scene::Vec3& from, const scene::Vec3& to,
-               const scene::PathOptions& options, bool measuresWidth, v1::NavigationPath& message);
+               const scene::PathOptions& options, const PathMeasures& measures,
+               v1::NavigationPath& message);
 
 }  // namespace enfilade::server

@@ -6,7 +6,6 @@
 #include <functional>
 #include <limits>
 #include <queue>
-#include <unordered_map>
 #include <utility>
 
 #include "scene/navigation/walk/stand.hpp"
@@ -191,12 +190,11 @@ std::optional<FloodFill::Component> FloodFill::findComponent(const Vec3& place) 
 
 /// A* over the filled places; with both ends, or empty.
 std::vector<std::int32_t> FloodFill::findWay(std::int32_t from, std::int32_t to) const {
-  struct Known {
-    double length;
-    std::int32_t before;
-  };
+  const auto index = [](std::int32_t place) { return static_cast<std::size_t>(place); };
   const Vec3 goal = computePosition(to);
-  std::unordered_map<std::int32_t, Known> known{{from, {0, -1}}};
+  std::vector<double> lengths(places_.size(), std::numeric_limits<double>::infinity());
+  std::vector<std::int32_t> before(places_.size(), -1);
+  lengths[index(from)] = 0;
   using Entry = std::pair<double, std::int32_t>;  // length through the place, place
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open;
   open.emplace((goal - computePosition(from)).norm(), from);
@@ -204,23 +202,23 @@ std::vector<std::int32_t> FloodFill::findWay(std::int32_t from, std::int32_t to)
     const auto [through, at] = open.top();
     open.pop();
     const Vec3 here = computePosition(at);
-    const double length = known[at].length;
+    const double length = lengths[index(at)];
     if (through > length + (goal - here).norm() + 1e-9) continue;  // a longer way to it
     for (const auto& [dx, dz] : kNeighbours) {
-      const std::int32_t next = findPlace(
-          places_[static_cast<std::size_t>(at)].column + dx + dz * width_, here.y(), step_);
+      const std::int32_t next =
+          findPlace(places_[index(at)].column + dx + dz * width_, here.y(), step_);
       if (next < 0) continue;
       const Vec3 there = computePosition(next);
       const double longer = length + (there - here).norm();
-      const auto [entry, isNew] = known.try_emplace(next, Known{longer, at});
-      if (!isNew && entry->second.length <= longer) continue;
-      entry->second = {longer, at};
+      if (lengths[index(next)] <= longer) continue;
+      lengths[index(next)] = longer;
+      before[index(next)] = at;
       open.emplace(longer + (goal - there).norm(), next);
     }
   }
   std::vector<std::int32_t> way;
   if (open.empty()) return way;
-  for (std::int32_t at = to; at >= 0; at = known.at(at).before) way.push_back(at);
+  for (std::int32_t at = to; at >= 0; at = before[index(at)]) way.push_back(at);
   std::reverse(way.begin(), way.end());
   return way;
 }

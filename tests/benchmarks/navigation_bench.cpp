@@ -1,8 +1,9 @@
 // Benchmark of navigation: avatars go between random places as clients' avatars do, through closed
 // doors, by lifts and over edges; the time of a path with its proof; and its islands and lengths
-// against a flood fill.
+// against a flood fill and Detour's lines.
 //
-//   navigation_bench [--quick] [--pairs N] [--places N] [--only times|fill|walks] [--out FILE]
+//   navigation_bench [--quick] [--pairs N] [--places N] [--only times|fill|lengths|walks] [--out
+//   FILE]
 //                    SCENE[@METRES_PER_UNIT]..
 //
 // A path counts as wrong if its walk is blocked, leaves the scene or penetrates anything. FILE gets
@@ -47,11 +48,17 @@ using scene::Vec3;
 constexpr int kMaxTicks = 60 * 3600;  // an hour
 constexpr double kNearWidth = 0.005;  // metres of radius
 constexpr int kWalksOfWorld = 25;     // then doors and lifts are again as in the file
+constexpr double kMinCompared = 1;    // metres: of a shorter way, millimetres would count
+constexpr double kLongShare = 1.02;   // of the length of another way
+
+bool isLong(double share) {
+  return share > kLongShare;
+}
 
 struct Effort {
   int pairs = 10'000;
   int compared = 1000;             ///< pairs per kind that are compared with a flood fill
-  int lengths = 100;               ///< pairs of which lengths are compared
+  int lengths = 1000;              ///< pairs of which lengths are compared with a flood fill
   std::size_t places = 4'000'000;  ///< limit of a flood fill: 1,600 square metres
   std::string only;                ///< part; "": all
 };
@@ -213,20 +220,30 @@ scene::NavigationMesh buildMesh(const scene::World& world) {
   return {grid, std::move(tiles)};
 }
 
-/// Microseconds of each query of the mesh for a corridor and the corners of its shortest line,
-/// without a proof.
+/// Detour's line between two places: the corners of the shortest line in a corridor, without a
+/// proof. nullopt: the mesh has none.
+std::optional<std::vector<Vec3>> findLine(const scene::NavigationMesh& mesh, const Vec3& start,
+                                          const Vec3& goal) {
+  const Vec3 extent(0.3, 0.5, 0.3);
+  const auto from = mesh.findNearest(start, extent), to = mesh.findNearest(goal, extent);
+  if (!from || !to) return std::nullopt;
+  const auto corridor = mesh.findCorridor(*from, *to);
+  if (!corridor) return std::nullopt;
+  std::vector<Vec3> line = mesh.straighten(*corridor, from->point, to->point);
+  if (line.size() < 2) return std::nullopt;
+  line.front() = start;
+  line.back() = goal;
+  return line;
+}
+
+/// Microseconds of each query of the mesh that finds a line.
 std::vector<double> timeMeshQueries(const scene::NavigationMesh& mesh,
                                     const std::vector<Vec3>& starts,
                                     const std::vector<Vec3>& goals) {
-  const Vec3 extent(0.3, 0.5, 0.3);
   std::vector<double> times;
   for (std::size_t i = 0; i < std::min(starts.size(), goals.size()); ++i) {
     const auto start = Clock::now();
-    const auto from = mesh.findNearest(starts[i], extent), to = mesh.findNearest(goals[i], extent);
-    if (!from || !to) continue;
-    const auto corridor = mesh.findCorridor(*from, *to);
-    if (!corridor) continue;
-    const bool isLine = mesh.straighten(*corridor, from->point, to->point).size() >= 2;
+    const bool isLine = findLine(mesh, starts[i], goals[i]).has_value();
     const double seconds = secondsSince(start);
     if (isLine) times.push_back(1e6 * seconds);
   }
@@ -392,6 +409,46 @@ std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& w
   return std::nullopt;
 }
 
+/// Lengths of paths as shares of those of other ways, where an avatar walks those.
+struct LengthComparison {
+  std::vector<double> shares, feetShares;
+  int unwalkable = 0;  ///< no avatar walks the other way, or it is missing
+};
+
+std::vector<Vec3> getPoints(const v1::NavigationPath& path) {
+  std::vector<Vec3> points;
+  for (const v1::Vec3& point : path.points()) points.push_back(server::vectorFromProto(point));
+  return points;
+}
+
+void printLong(const Vec3& from, const Vec3& to, double share, double feetShare) {
+  if (std::max(share, feetShare) <= kLongShare) return;
+  std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f, feet %.4f\n", from.x(),
+              from.y(), from.z(), to.x(), to.y(), to.z(), share, feetShare);
+}
+
+/// Compares the path between two places with the shortest way in the fill.
+void compareLength(Bench& bench, const FloodFill& fill, const Vec3& from, const Vec3& to,
+                   LengthComparison& lengths, int& wrong) {
+  const v1::NavigationPath path = bench.findPath(from, to, v1::NavigationQuery::DOORS_AS_THEY_ARE);
+  if (!path.found()) return;
+  const std::vector<Vec3> way = fill.findShortest(from, to);
+  const auto shortest = way.empty() ? std::nullopt : measureWalk(bench, way);
+  if (!shortest) ++lengths.unwalkable;
+  if (!shortest || *shortest < kMinCompared) return;
+  const std::vector<Vec3> points = getPoints(path);
+  const auto walked = measureWalk(bench, points);
+  if (!walked) {
+    ++wrong;
+    std::printf("  not walked: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g)\n", from.x(),
+                from.y(), from.z(), to.x(), to.y(), to.z());
+    return;
+  }
+  lengths.shares.push_back(scene::computeLength(points) / scene::computeLength(way));
+  lengths.feetShares.push_back(*walked / *shortest);
+  printLong(from, to, lengths.shares.back(), lengths.feetShares.back());
+}
+
 void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   const std::vector<Vec3> places = drawAnywhere(bench, effort.compared);
   const auto start = Clock::now();
@@ -404,8 +461,7 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   };
   Comparison result;
   std::vector<Disagreement> disagreements;
-  std::vector<double> ratios, feetRatios;
-  int unwalkable = 0;
+  LengthComparison lengths;
   for (int i = 0; i < 2 * effort.compared && !places.empty() && fill.size() > 0; ++i) {
     const bool isOfFill = i % 2 == 1;
     // Places of the fill are kept in single precision: a little above the floor.
@@ -415,29 +471,8 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
     };
     const Vec3 from = draw(), to = draw();
     comparePair(bench, fill, from, to, result, disagreements);
-    if (isOfFill || static_cast<int>(ratios.size()) >= effort.lengths) continue;
-    const v1::NavigationPath path =
-        bench.findPath(from, to, v1::NavigationQuery::DOORS_AS_THEY_ARE);
-    if (!path.found()) continue;
-    const std::vector<Vec3> way = fill.findShortest(from, to);
-    const auto shortest = way.empty() ? std::nullopt : measureWalk(bench, way);
-    if (!shortest) ++unwalkable;
-    if (!shortest || *shortest < 1) continue;
-    std::vector<Vec3> points;
-    for (const v1::Vec3& point : path.points()) points.push_back(server::vectorFromProto(point));
-    const auto walked = measureWalk(bench, points);
-    if (!walked) {
-      ++result.wrong;
-      std::printf("  not walked: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g)\n", from.x(),
-                  from.y(), from.z(), to.x(), to.y(), to.z());
-      continue;
-    }
-    ratios.push_back(scene::computeLength(points) / scene::computeLength(way));
-    feetRatios.push_back(*walked / *shortest);
-    if (std::max(ratios.back(), feetRatios.back()) > 1.02)
-      std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f, feet %.4f\n",
-                  from.x(), from.y(), from.z(), to.x(), to.y(), to.z(), ratios.back(),
-                  feetRatios.back());
+    if (!isOfFill && static_cast<int>(lengths.shares.size()) < effort.lengths)
+      compareLength(bench, fill, from, to, lengths, result.wrong);
   }
   judge(bench, places, effort.places, disagreements, result);
   row["fill_places"] = fill.size();
@@ -447,14 +482,63 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   row["reach_walked"] = result.walked;
   row["reach_wrong"] = result.wrong;
   row["islands_wrong"] = result.islandsWrong;
-  row["lengths"] = ratios.size();
-  row["lengths_unwalkable"] = unwalkable;
-  row["length_median"] = number(quantile(ratios, 0.5));
-  row["length_max"] = number(quantile(ratios, 1));
-  const auto isLong = [](double ratio) { return ratio > 1.02; };
-  row["length_above"] = std::ranges::count_if(ratios, isLong);
-  row["feet_max"] = number(quantile(feetRatios, 1));
-  row["feet_above"] = std::ranges::count_if(feetRatios, isLong);
+  row["lengths"] = lengths.shares.size();
+  row["lengths_unwalkable"] = lengths.unwalkable;
+  row["length_median"] = number(quantile(lengths.shares, 0.5));
+  row["length_max"] = number(quantile(lengths.shares, 1));
+  row["length_above"] = std::ranges::count_if(lengths.shares, isLong);
+  row["feet_max"] = number(quantile(lengths.feetShares, 1));
+  row["feet_above"] = std::ranges::count_if(lengths.feetShares, isLong);
+}
+
+/// Where an avatar comes to that walks along the corners of Detour's line; nullopt: it does not
+/// walk that line to its end.
+std::optional<std::vector<Vec3>> walkAlong(scene::Walker& walker, const std::vector<Vec3>& line) {
+  if (walker.place(line.front(), scene::kMaxStandDrop)) return std::nullopt;
+  std::vector<Vec3> points{walker.footPosition()};
+  for (std::size_t i = 1; i < line.size(); ++i) {
+    if (walker.walkTo(line[i]).kind != scene::WalkOutcome::Kind::arrived) return std::nullopt;
+    points.push_back(walker.footPosition());
+  }
+  if (std::abs(points.back().y() - line.back().y()) > scene::kHeightError) return std::nullopt;
+  return points;
+}
+
+/// Compares paths with Detour's string-pulled line on the mesh that proposes them.
+void compareWithDetour(Bench& bench, const Effort& effort, nlohmann::json& row) {
+  const auto doors = v1::NavigationQuery::DOORS_AS_THEY_ARE;
+  const auto starts = bench.drawPlaces(effort.pairs, 8, doors);
+  const auto goals = bench.drawPlaces(effort.pairs, 9, doors);
+  const scene::NavigationMesh mesh = buildMesh(bench.atRest);
+  scene::Walker walker(bench.atRest.data(), {});
+  LengthComparison lengths;
+  std::size_t found = 0, noLine = 0;
+  const std::size_t pairs = std::min(starts.size(), goals.size());
+  for (std::size_t i = 0; i < pairs; ++i) {
+    const v1::NavigationPath path = bench.findPath(starts[i], goals[i], doors);
+    if (!path.found()) continue;
+    ++found;
+    const auto line = findLine(mesh, starts[i], goals[i]);
+    if (!line) {
+      ++noLine;
+      continue;
+    }
+    const auto walked = walkAlong(walker, *line);
+    if (!walked) ++lengths.unwalkable;
+    const double length = walked ? scene::computeLength(*walked) : 0;
+    if (length < kMinCompared) continue;
+    lengths.shares.push_back(scene::computeLength(getPoints(path)) / length);
+    printLong(starts[i], goals[i], lengths.shares.back(), 0);
+  }
+  row["detour_pairs"] = pairs;
+  row["detour_found"] = found;
+  row["detour_no_line"] = noLine;
+  row["detour_unwalkable"] = lengths.unwalkable;
+  row["detour_compared"] = lengths.shares.size();
+  row["detour_median"] = number(quantile(lengths.shares, 0.5));
+  row["detour_min"] = number(quantile(lengths.shares, 0));
+  row["detour_max"] = number(quantile(lengths.shares, 1));
+  row["detour_above"] = std::ranges::count_if(lengths.shares, isLong);
 }
 
 void measureMeshes(Bench& bench, const Effort&, nlohmann::json& row) {
@@ -488,6 +572,7 @@ void measure(const std::string& file, const Effort& effort, std::ofstream& out) 
     measureTimes(arguments...);
   });
   run("fill", compareWithFill);
+  run("lengths", compareWithDetour);
   run("walks", measureWalks);
 }
 
@@ -509,8 +594,8 @@ int main(int argc, char** argv) {
       effort.places = std::strtoull(argv[++i], nullptr, 10);
     } else if (argument == "--only" && i + 1 < argc) {
       effort.only = argv[++i];
-      isUsed =
-          isUsed && (effort.only == "times" || effort.only == "fill" || effort.only == "walks");
+      isUsed = isUsed && (effort.only == "times" || effort.only == "fill" ||
+                          effort.only == "lengths" || effort.only == "walks");
     } else if (argument == "--out" && i + 1 < argc) {
       out = argv[++i];
     } else {
@@ -519,7 +604,7 @@ int main(int argc, char** argv) {
   }
   if (scenes.empty() || !isUsed) {
     std::fprintf(stderr,
-                 "usage: %s [--quick] [--pairs N] [--places N] [--only times|fill|walks] "
+                 "usage: %s [--quick] [--pairs N] [--places N] [--only times|fill|lengths|walks] "
                  "[--out FILE] SCENE[@METRES_PER_UNIT]..\n",
                  argv[0]);
     return 2;

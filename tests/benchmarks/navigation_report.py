@@ -30,6 +30,12 @@ def make_fill_row(row):
             format_ratio(row["length_max"]), row["length_above"], format_ratio(row.get("feet_max")), row.get("feet_above", "–")]
 
 
+def make_length_row(row):
+    return [row["scene"], f"{row['detour_pairs']:,}", f"{row['detour_found']:,}", row["detour_no_line"], row["detour_unwalkable"],
+            f"{row['detour_compared']:,}", format_ratio(row["detour_min"]), format_ratio(row["detour_median"]),
+            format_ratio(row["detour_max"]), row["detour_above"]]
+
+
 def make_time_row(row):
     return [row["scene"], short(row["area"]), row["islands"], short(row["build_seconds"]), short(row["mesh_bytes"] / 1e6),
             short(row["mesh_us"]), short(row["median_us"]), short(row["p99_us"]), short(row["not_found_p99_us"])]
@@ -41,7 +47,7 @@ def main():
     for row in read(results, "navigation"):
         scenes.setdefault(row["scene"], {}).update(row)
     rows = list(scenes.values())
-    parts = {part: [row for row in rows if part in row] for part in ("pairs", "reach_compared", "median_us")}
+    parts = {part: [row for row in rows if part in row] for part in ("pairs", "reach_compared", "detour_pairs", "median_us")}
     report.mkdir(parents=True, exist_ok=True)
     (report / "navigation.md").write_text(f"""# Navigation: paths that are walked
 
@@ -69,11 +75,20 @@ of radius, or a shift of the grid by one centimetre, changes the answer.
 *Skipped*: an end is at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight, where an avatar can walk that. In brackets are those where it cannot, or of
-which the fill has not both ends. They are measured along the points of both. *By feet*: an avatar walks both, and the
+which the fill has not both ends. Ways of a metre and more are compared. They are measured along the points of both. *By feet*: an avatar walks both, and the
 metres that its feet move are compared, tick by tick. A step up or down then counts with its height. –: not measured.
 
 {table(["scene", "places of the fill", "compared", "wrong", "walked", "near", "skipped", "islands", "lengths", "median share",
         "largest", "above 1.02", "by feet: largest", "above"], [make_fill_row(row) for row in parts["reach_compared"]])}
+
+## Length against Detour
+
+Lengths of paths as a share of Detour's string-pulled line on the mesh that proposes them, where an avatar walks that line
+to its end. *No line*: the mesh has none, as where a connection leads from one of its parts to another. *Not walked*: an
+avatar is stopped on the line. Lines of a metre and more are compared.
+
+{table(["scene", "pairs", "paths", "no line", "not walked", "compared", "smallest share", "median", "largest", "above 1.02"],
+       [make_length_row(row) for row in parts["detour_pairs"]])}
 
 ## Time
 

@@ -105,10 +105,10 @@ bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks
   for (; asleepAfter < kMaxTicksToSleep && still.report().awake > 0; asleepAfter += kJudgeEvery)
     off.worst = worse(off.worst, run(still, feederCheck, kJudgeEvery, false, watchEnergy).worst);
   OurFeeder driven(plan, kThreads), alone(plan, 1);
-  std::uint64_t shortened = 0, squeezed = 0, solids = 0;
+  std::uint64_t shortened = 0, crushed = 0, solids = 0;
   const auto count = [&] {
     shortened += driven.report().reducedMotions;
-    squeezed += driven.report().crushed;
+    crushed += driven.report().crushed;
     solids += plan.parts.size() * static_cast<std::uint64_t>(plan.looks);
   };
   const int last = std::max(kJudgeEvery, ticks / 10);
@@ -124,7 +124,7 @@ bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks
       "  energy with the drive off: at most %.6f of its start; reduced: %.2f %%"
       " of all motions, %llu crushed pairs\n",
       most / start, 100.0 * static_cast<double>(shortened) / static_cast<double>(solids),
-      static_cast<unsigned long long>(squeezed));
+      static_cast<unsigned long long>(crushed));
   std::printf("  with the drive off the heap sleeps after %.1f s at most\n", asleepAfter / 60.0);
   bool all = check(still.report().awake == 0, "drive off: the whole heap sleeps within 10 s");
   all &= check(most <= 1.001 * start, "drive off: energy never above its start + 0.1 %");

@@ -66,6 +66,17 @@ class NavigationTest(RoomCase):
         self.client.run_until_idle()
         self.assertEqual([one.kind for one in self.client.notices()][-1], "arrived")
 
+    def test_steps_of_a_path_have_their_heights(self):
+        self.assertEqual(self.navigation.path((2, 0, 0), (8, 0, 0), steps=True).steps, ())
+        scene = self.folder / "kerb.obj"
+        scene.write_text(obj({"street": ((0, -0.5, 0), (4, 0, 4)), "pavement": ((4, -0.5, 0), (8, 0.12, 4))}))
+        with enfilade.serve(scene) as server, server.connect() as client:
+            navigation = client.navigation()
+            self.assertEqual(navigation.path((1, 0, 2), (7, 0.12, 2)).steps, ())
+            (step,) = navigation.path((7, 0.12, 2), (1, 0, 2), steps=True).steps
+            self.assertAlmostEqual(step.rise, -0.12, places=2)
+            self.assertAlmostEqual(step.at[0], 4, delta=0.4)
+
     def test_go_walks_to_a_point_and_to_an_object(self):
         ann = self.client.spawn("ann", at=(2, 0, 0))
         ann.go((8, 0, 0), speed=3)

@@ -129,14 +129,14 @@ TEST(NarrowPhaseExtremes, AmongTheLeastNumbersDistancesAndDepthsAreRounded) {
     const std::vector<Vec3> a = testing::latticePoints(random, 5, 3);
     const std::vector<Vec3> b = testing::latticePoints(random, 5, 3);
     const RefinedSeparation large = refineSeparationCold({a, at}, {b});
-    const std::vector<Vec3> leastA = scaled(a, kMinPositive), leastB = scaled(b, kMinPositive);
-    const RefinedSeparation small = refineSeparationCold({leastA, kMinPositive * at}, {leastB});
+    const std::vector<Vec3> smallA = scaled(a, kMinPositive), smallB = scaled(b, kMinPositive);
+    const RefinedSeparation small = refineSeparationCold({smallA, kMinPositive * at}, {smallB});
     ASSERT_EQ(small.verdict, large.verdict) << i;
     EXPECT_EQ(small.distance, std::nearbyint(large.distance) * kMinPositive) << i;
     EXPECT_EQ(small.penetration, std::nearbyint(large.penetration) * kMinPositive) << i;
     FeatureCache cache;
     const SeparationResult decided =
-        computeSeparation({leastA, kMinPositive * at}, {leastB}, cache);
+        computeSeparation({smallA, kMinPositive * at}, {smallB}, cache);
     EXPECT_LE(std::abs(decided.distance / kMinPositive - large.distance),
               decided.errorBound / kMinPositive + 1e-14)
         << i;

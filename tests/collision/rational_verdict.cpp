@@ -59,13 +59,13 @@ struct Support {
 Support findSupport(const Point& direction, const std::vector<Point>& a,
                     const std::vector<Point>& b) {
   const Point* bestA = &a.front();
-  Rational mostA = dot(direction, *bestA);
+  Rational maxA = dot(direction, *bestA);
   for (const Point& p : a)
-    if (Rational d = dot(direction, p); d > mostA) mostA = d, bestA = &p;
+    if (Rational d = dot(direction, p); d > maxA) maxA = d, bestA = &p;
   const Point* bestB = &b.front();
-  Rational leastB = dot(direction, *bestB);
+  Rational minB = dot(direction, *bestB);
   for (const Point& p : b)
-    if (Rational d = dot(direction, p); d < leastB) leastB = d, bestB = &p;
+    if (Rational d = dot(direction, p); d < minB) minB = d, bestB = &p;
   return {*bestB - *bestA, *bestA};
 }
 

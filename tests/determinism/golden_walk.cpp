@@ -194,9 +194,9 @@ void clashes() {
   cart.keys = {{0, Vec3::Zero(), 0}, {0.2, {6, 0, 0}, 2}, {0.5, Vec3::Zero(), 0}};
   cart.loops = true;
   b.model.bodies.push_back(cart);
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.1;
-  World world(std::make_shared<const Scene>(b.model), lengths);
+  WorldSettings settings;
+  settings.nearMissDistance = 0.1;
+  World world(std::make_shared<const Scene>(b.model), settings);
   for (int k = 0; k < 40; ++k) {
     BodyCommand swing;
     swing.body = "leaf" + std::to_string(k % 6);

@@ -209,9 +209,9 @@ TEST(MoveResult, BlockedIsReportedOnceEachTimeItBegins) {
 }
 
 TEST(Sliding, StopLeavesNothingOfAMoveAlongAWall) {
-  WorldSettings lengths;
-  lengths.sliding = Sliding::stop;
-  WorldFixture run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}}, lengths);
+  WorldSettings settings;
+  settings.sliding = Sliding::stop;
+  WorldFixture run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}}, settings);
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", to(3, 6));
   run.untilIdle();

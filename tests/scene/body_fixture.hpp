@@ -56,8 +56,8 @@ inline std::string whoPenetrates(const World& world) {
 }
 
 struct BodyFixture : WorldControls<BodyFixture> {
-  explicit BodyFixture(Model model, const WorldSettings& lengths = {})
-      : world(std::make_shared<const Scene>(std::move(model)), lengths) {}
+  explicit BodyFixture(Model model, const WorldSettings& settings = {})
+      : world(std::make_shared<const Scene>(std::move(model)), settings) {}
 
   void submit(BodyCommand command) {
     const auto why = submitBodyCommand(world, std::move(command));

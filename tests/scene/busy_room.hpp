@@ -57,17 +57,17 @@ inline Spawn foldedArm(const Vec3& at) {
   return spawn;
 }
 
-inline WorldSettings busyLengths() {
-  WorldSettings lengths;
-  lengths.maxSpeed = 4;  // so that bounds over all possible orders are finite and useful
-  lengths.maxJointSpeed = 2;
-  return lengths;
+inline WorldSettings busySettings() {
+  WorldSettings settings;
+  settings.maxSpeed = 4;  // so that bounds over all possible orders are finite and useful
+  settings.maxJointSpeed = 2;
+  return settings;
 }
 
 /// All kinds of moving entities at once, with new orders now and then.
 struct BusyRoom {
   explicit BusyRoom(std::uint32_t seed)
-      : random(seed), world(std::make_shared<const Scene>(busyRoom()), busyLengths()) {
+      : random(seed), world(std::make_shared<const Scene>(busyRoom()), busySettings()) {
     order("rider", Spawn{Vec3(-4, 0.11, -4), 0});
     order("walker", Spawn{Vec3(-2, 0.001, -1), 0});
     order("pushed", Spawn{Vec3(0.5, 0.001, 0.4), 0});

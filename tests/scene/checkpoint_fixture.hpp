@@ -85,11 +85,11 @@ inline std::string difference(const TickReport& a, const TickReport& b) {
 
 /// Runs a world by the commands in `commands` until tick `until`. At each tick of `at` a copy is
 /// made, which runs in parallel for `duration` ticks and must report the same.
-inline void compareCopies(const std::shared_ptr<const Scene>& scene, const WorldSettings& lengths,
+inline void compareCopies(const std::shared_ptr<const Scene>& scene, const WorldSettings& settings,
                           const std::map<std::uint64_t, TickCommands>& commands,
                           std::uint64_t until, const std::vector<std::uint64_t>& at,
                           std::uint64_t duration) {
-  World world(scene, lengths);
+  World world(scene, settings);
   struct Copy {
     std::uint64_t from;
     World world;

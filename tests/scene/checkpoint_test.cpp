@@ -149,9 +149,9 @@ std::map<std::uint64_t, TickCommands> roomCommands(unsigned seed, std::uint64_t 
 }
 
 WorldSettings watchful() {
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.1;
-  return lengths;
+  WorldSettings settings;
+  settings.nearMissDistance = 0.1;
+  return settings;
 }
 
 TEST(Checkpoint, ACopyFromAnyTickOfABusyRoomIsBitEqual) {

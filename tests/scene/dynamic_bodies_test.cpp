@@ -69,9 +69,9 @@ TEST(DynamicBodies, ABoxFallsOntoTheFloorRestsThereAndCostsNothingAsleep) {
 
 TEST(DynamicBodies, ABoxThatRestsKeepsItsContactHoweverFarNearMissesAreLookedFor) {
   for (const double nearMiss : {0.0, 0.05, 0.3, 3.0}) {
-    WorldSettings lengths;
-    lengths.nearMissDistance = nearMiss;
-    BodyFixture t(loose({{"box", {-0.2, 0.7, -0.2}, {0.2, 1.1, 0.2}}}), lengths);
+    WorldSettings settings;
+    settings.nearMissDistance = nearMiss;
+    BodyFixture t(loose({{"box", {-0.2, 0.7, -0.2}, {0.2, 1.1, 0.2}}}), settings);
     t.untilIdle();
     t.ticks(10);
     EXPECT_TRUE(t.body("box").asleep);
@@ -238,11 +238,11 @@ TEST(DynamicBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
     const Vec3 before = t.body("box").position;
     t.submit({"door", BodyCommand::Action::moveTo, -1.2, 0, {}});
     for (int i = 0; i < 180; ++i) {
-      const std::uint32_t squeezed = t.step().crushedBodies;
+      const std::uint32_t crushed = t.step().crushedBodies;
       // The motion of a fast leaf is not proven clear of the bodies that it carries along, but it
       // is clear.
       if (speed < 2) {
-        EXPECT_EQ(squeezed, 0u) << speed << " tick " << i;
+        EXPECT_EQ(crushed, 0u) << speed << " tick " << i;
       }
       ASSERT_FALSE(anyBodyPenetrates(t.world)) << speed << " tick " << i;
     }
@@ -268,11 +268,11 @@ Model pressing(const std::vector<NamedBox>& boxes, const Vec3& way, double secon
 /// Runs six laps. No box penetrates the post or is flung away; after the first lap none is farther
 /// than `astray` metres from its start. Returns the number of crushed pairs.
 std::uint32_t pressSixTimes(BodyFixture& t, double seconds, double astray) {
-  std::uint32_t squeezed = 0;
+  std::uint32_t crushed = 0;
   std::vector<Vec3> held;
   const int lap = static_cast<int>(120 * seconds);
   for (int i = 0; i < 6 * lap; ++i) {
-    squeezed += tickWorld(t.world).crushedBodies;
+    crushed += tickWorld(t.world).crushedBodies;
     for (std::size_t k = 0; k + 1 < t.world.data().bodies.size(); ++k) {
       const Body& box = t.world.data().bodies[k];
       EXPECT_FALSE(isIn(t.world, box, 1)) << box.spec->name << " in the post, tick " << i;
@@ -281,10 +281,10 @@ std::uint32_t pressSixTimes(BodyFixture& t, double seconds, double astray) {
       if (i > lap) {
         EXPECT_LT((box.position - held[k]).norm(), astray) << box.spec->name << ", " << i;
       }
-      if (::testing::Test::HasFailure()) return squeezed;
+      if (::testing::Test::HasFailure()) return crushed;
     }
   }
-  return squeezed;
+  return crushed;
 }
 
 TEST(DynamicBodies, AShuttleThatPressesABoxAgainstAPostGoesThroughItAndLeavesItThere) {

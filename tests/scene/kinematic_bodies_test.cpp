@@ -442,9 +442,9 @@ TEST(KinematicBodies, AvatarThatLeavesTheWorldLeavesItsTriggers) {
 }
 
 TEST(KinematicBodies, ANearMissBeginsIsClosestAndEnds) {
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.2;
-  BodyFixture t(boxModel({floorBox(), {"pillar", {-0.1, 0, 0.4}, {0.1, 2, 0.6}}}), lengths);
+  WorldSettings settings;
+  settings.nearMissDistance = 0.2;
+  BodyFixture t(boxModel({floorBox(), {"pillar", {-0.1, 0, 0.4}, {0.1, 2, 0.6}}}), settings);
   t.order("ann", Spawn{{-2, 0.01, 0}, 0, 0.3, 1.75});
   t.order("ann", Walk{{{2, 0, 0}}, 1.5});
   t.untilIdle();

@@ -102,9 +102,9 @@ TEST(KinematicContacts, APathBodyReportsAPenetratedShelf) {
   BodySpec cart = bodySpec("cart", BodyKind::path, {1});
   cart.keys = {{0, Vec3::Zero(), 0}, {4, {8, 0, 0}, 0}};
   model.bodies = {cart};
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.2;
-  BodyFixture t(std::move(model), lengths);
+  WorldSettings settings;
+  settings.nearMissDistance = 0.2;
+  BodyFixture t(std::move(model), settings);
   t.untilIdle();
   std::vector<std::pair<Event, Phase>> reported;
   for (const ContactEvent& e : between(t, "cart", "shelf")) reported.emplace_back(e.kind, e.phase);
@@ -125,15 +125,15 @@ TEST(KinematicContacts, AnObjectPassedBetweenTwoTicksBeginsAndEnds) {
   cart.axis = Vec3::UnitX();
   cart.high = 8, cart.speed = 60;
   model.bodies = {cart};
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.05;
-  BodyFixture t(std::move(model), lengths);
+  WorldSettings settings;
+  settings.nearMissDistance = 0.05;
+  BodyFixture t(std::move(model), settings);
   t.submit({"cart", Action::open, 0, 0, {}});
   t.untilIdle();
   ASSERT_EQ(t.events.size(), 2u);
   EXPECT_EQ(findEntityName(t.world, t.events[0].b), "sheet");
   EXPECT_EQ(t.events[0].kind, Event::begin);
-  EXPECT_LT(t.events[0].separation.distance, 2 * lengths.contactOffset);
+  EXPECT_LT(t.events[0].separation.distance, 2 * settings.contactOffset);
   EXPECT_EQ(t.events[1].kind, Event::end);
   EXPECT_EQ(t.events[0].tick, t.events[1].tick);
 }
@@ -236,9 +236,9 @@ BodyFixture trayThatSlid(Model model, double high) {
   tray.axis = Vec3::UnitX();
   tray.high = high;
   model.bodies = {tray};
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.3;
-  BodyFixture t(std::move(model), lengths);
+  WorldSettings settings;
+  settings.nearMissDistance = 0.3;
+  BodyFixture t(std::move(model), settings);
   t.submit({"tray", Action::open, 0, 0, {}});
   t.untilIdle();
   return t;
@@ -301,9 +301,9 @@ TEST(KinematicContacts, BodiesThatStandAreNotLookedAt) {
     leaf.anchor.z() = 0.55;
     model.bodies.push_back(leaf);
   }
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.5;
-  BodyFixture t(std::move(model), lengths);
+  WorldSettings settings;
+  settings.nearMissDistance = 0.5;
+  BodyFixture t(std::move(model), settings);
   for (int i = 0; i < 5; ++i) EXPECT_EQ(t.step().narrowQueries, 0u);
   EXPECT_TRUE(t.world.data().excludedPairCache.empty());
   t.submit({"door3", Action::open, 0, 0, {}});
@@ -600,9 +600,9 @@ TEST(KinematicContacts, AreThoseThatBruteForceFindsInBusyYards) {
   constexpr int kYards = tests::kSanitized ? 3 : 12;
   for (unsigned seed = 1; seed <= kYards; ++seed) {
     Chance chance(seed);
-    WorldSettings lengths;
-    lengths.nearMissDistance = seed % 2 == 0 ? 0.15 : 0;
-    World world(std::make_shared<const Scene>(busyYard(chance)), lengths);
+    WorldSettings settings;
+    settings.nearMissDistance = seed % 2 == 0 ? 0.15 : 0;
+    World world(std::make_shared<const Scene>(busyYard(chance)), settings);
     ReferenceEvents reference(world);
     for (int i = 0; i < 200 && !::testing::Test::HasFailure(); ++i) {
       if (i % 3 == 0) give(world, someCommand(chance, world.scene().model()));
@@ -621,10 +621,10 @@ TEST(KinematicContacts, AreThoseThatBruteForceFindsInBusyYards) {
 
 TEST(KinematicContacts, ARestoredWorldContinuesIdentically) {
   Chance chance(22);
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.15;
+  WorldSettings settings;
+  settings.nearMissDistance = 0.15;
   const auto scene = std::make_shared<const Scene>(busyYard(chance));
-  World world(scene, lengths);
+  World world(scene, settings);
   std::optional<World> copy;
   std::size_t reported = 0;
   for (int i = 0; i < 240; ++i) {

@@ -153,8 +153,8 @@ struct CellFixture {
   std::vector<Cell> cells;
   int moves = 0, outside = 0, penetrating = 0, blocked = 0;
 
-  CellFixture(const Model& model, std::vector<Cell> inside, const WorldSettings& lengths = {})
-      : world(std::make_shared<const Scene>(model), lengths), cells(std::move(inside)) {}
+  CellFixture(const Model& model, std::vector<Cell> inside, const WorldSettings& settings = {})
+      : world(std::make_shared<const Scene>(model), settings), cells(std::move(inside)) {}
 
   std::string name(std::size_t i) const { return "a" + std::to_string(100 + i); }
 

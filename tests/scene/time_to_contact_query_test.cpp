@@ -194,39 +194,39 @@ TEST(TimeToContact, OfDynamicBodiesNothingIsKnownUnderAnyCommand) {
 }
 
 /// Motion of every entity in one tick.
-struct Ways {
-  struct Way {
+struct Motions {
+  struct Motion {
     Vec3 moved;  ///< metres
     bool falls;
     double height;  ///< of an avatar
   };
-  std::map<EntityId, Way> avatars;
+  std::map<EntityId, Motion> avatars;
   std::shared_ptr<const std::vector<BodySnapshot>> bodies;
 };
 
-Ways waysBetween(const Snapshot& before, const Snapshot& after) {
-  Ways ways;
-  ways.bodies = after.bodies;
+Motions computeMotions(const Snapshot& before, const Snapshot& after) {
+  Motions motions;
+  motions.bodies = after.bodies;
   for (const AvatarSnapshot& now : after.avatars)
     for (const AvatarSnapshot& then : before.avatars)
       if (then.id == now.id)
-        ways.avatars[now.id] = {now.footPosition - then.footPosition, !now.grounded && !now.flying,
-                                now.height};
-  return ways;
+        motions.avatars[now.id] = {now.footPosition - then.footPosition,
+                                   !now.grounded && !now.flying, now.height};
+  return motions;
 }
 
 /// Whether an entity that moved as `first` describes still does so `ticks` later.
-bool goesOnAsBefore(EntityId id, const Ways& first, const Ways& now, int ticks,
-                    const WorldSettings& lengths) {
+bool goesOnAsBefore(EntityId id, const Motions& first, const Motions& now, int ticks,
+                    const WorldSettings& settings) {
   constexpr double kSame = 1e-9;
-  const double fallen = lengths.gravity * lengths.tickDuration * ticks;  // metres per second
+  const double fallen = settings.gravity * settings.tickDuration * ticks;  // metres per second
   if (const auto was = first.avatars.find(id); was != first.avatars.end()) {
     const auto is = now.avatars.find(id);
     if (is == now.avatars.end() || is->second.falls != was->second.falls ||
         is->second.height != was->second.height)
       return false;
     const Vec3 due =
-        was->second.moved - Vec3(0, was->second.falls ? fallen * lengths.tickDuration : 0, 0);
+        was->second.moved - Vec3(0, was->second.falls ? fallen * settings.tickDuration : 0, 0);
     return (is->second.moved - due).norm() <= kSame;
   }
   for (std::size_t i = 0; i < now.bodies->size(); ++i) {
@@ -245,7 +245,7 @@ struct Watch {
   MotionAssumption assume;
   std::uint64_t since;
   TimeToContact said;
-  Ways ways;
+  Motions motions;
 };
 
 /// Counts of the results of all watches.
@@ -256,18 +256,18 @@ struct Tally {
 };
 
 /// Checks one watch; false if the watch is over.
-bool look(const Watch& watch, const Ways& now, const World& world, EntityIndex& index,
+bool look(const Watch& watch, const Motions& now, const World& world, EntityIndex& index,
           Tally& tally) {
-  const WorldSettings& lengths = world.settings();
+  const WorldSettings& settings = world.settings();
   const int ticks = static_cast<int>(world.snapshot()->tick - watch.since);
   if (watch.assume == MotionAssumption::presentMotion) {
     for (const EntityId id : {watch.a, watch.b})
-      if (!goesOnAsBefore(id, watch.ways, now, ticks, lengths)) return false;
+      if (!goesOnAsBefore(id, watch.motions, now, ticks, settings)) return false;
   }
   std::size_t work = kMaxQueryWork;
   const auto state = std::get<PairProximity>(
       computePairProximity({index, *world.snapshot()}, watch.a, watch.b, false, work));
-  const double time = ticks * lengths.tickDuration,
+  const double time = ticks * settings.tickDuration,
                distance = watch.said.proximity.separation.distance;
   const auto& [speed, acceleration] = watch.said.closing;
   const double allowed = speed * time + 0.5 * acceleration * time * time;
@@ -299,9 +299,9 @@ TEST(TimeToContact, InABusyRoomNoPairTouchesBeforeTheReportedTime) {
       if (i % 40 == 5) room.sendRandomCommand();
       tickWorld(room.world);
       const auto after = room.world.snapshot();
-      const Ways ways = waysBetween(*before, *after);
+      const Motions motions = computeMotions(*before, *after);
       std::erase_if(watches, [&](const Watch& watch) {
-        return !look(watch, ways, room.world, index, tally);
+        return !look(watch, motions, room.world, index, tally);
       });
       before = after;
       for (int k = 0; k < 4; ++k) {
@@ -315,7 +315,7 @@ TEST(TimeToContact, InABusyRoomNoPairTouchesBeforeTheReportedTime) {
         const MotionAssumption assume =
             k % 2 == 0 ? MotionAssumption::presentMotion : MotionAssumption::anyCommand;
         const TimeToContact said = apartAt(room.world, index, a, b, assume);
-        if (said.bounded) watches.push_back({a, b, assume, after->tick, said, ways});
+        if (said.bounded) watches.push_back({a, b, assume, after->tick, said, motions});
       }
     }
   }

@@ -15,10 +15,10 @@ namespace enfilade::scene::testing {
 
 /// A world and all events that its ticks reported.
 struct WorldFixture : WorldControls<WorldFixture> {
-  explicit WorldFixture(const std::vector<NamedBox>& boxes, const WorldSettings& lengths = {})
-      : WorldFixture(boxScene(boxes), lengths) {}
-  explicit WorldFixture(std::shared_ptr<const Scene> scene, const WorldSettings& lengths = {})
-      : world(std::move(scene), lengths) {}
+  explicit WorldFixture(const std::vector<NamedBox>& boxes, const WorldSettings& settings = {})
+      : WorldFixture(boxScene(boxes), settings) {}
+  explicit WorldFixture(std::shared_ptr<const Scene> scene, const WorldSettings& settings = {})
+      : world(std::move(scene), settings) {}
 
   TickReport step() {
     TickReport report = tickWorld(world);

@@ -105,7 +105,7 @@ TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
 }
 
 /// The highest ledge that an avatar can walk up.
-double highestClimbed(const WorldSettings& lengths, const std::vector<double>& ledges) {
+double highestClimbed(const WorldSettings& settings, const std::vector<double>& ledges) {
   constexpr double kApart = 2;
   std::vector<NamedBox> boxes{{"ground", {-1, -1, -1}, {4, 0, 20}}};
   double z = 0;
@@ -113,7 +113,7 @@ double highestClimbed(const WorldSettings& lengths, const std::vector<double>& l
     boxes.push_back({"ledge" + std::to_string(height), {1, 0, z - 0.95}, {3, height, z + 0.95}});
     z += kApart;
   }
-  WorldFixture run(boxes, lengths);
+  WorldFixture run(boxes, settings);
   z = 0;
   for (const double height : ledges) {
     run.order("of" + std::to_string(height), Spawn{{0, 0, z}});
@@ -126,7 +126,7 @@ double highestClimbed(const WorldSettings& lengths, const std::vector<double>& l
   for (const double height : ledges) {
     const double feet = run.feet("of" + std::to_string(height)).y();
     if (feet < 0.5 * height) continue;
-    EXPECT_NEAR(feet, height, 2 * lengths.contactOffset);
+    EXPECT_NEAR(feet, height, 2 * settings.contactOffset);
     highest = std::max(highest, height);
   }
   return highest;
@@ -141,9 +141,9 @@ TEST(World, NoLedgeHigherThanAStepIsClimbed) {
 
 TEST(World, StepsAreClimbedWhateverSlopeIs) {
   for (const double degrees : {1.0, 5.0, 20.0, 33.0, 34.0}) {
-    WorldSettings lengths;
-    lengths.walkableNormalY = std::cos(degrees * 0.017453292519943295);
-    EXPECT_EQ(highestClimbed(lengths, {0.01, 0.05, 0.17, 0.25, 0.295, 0.305, 0.33}), 0.295)
+    WorldSettings settings;
+    settings.walkableNormalY = std::cos(degrees * 0.017453292519943295);
+    EXPECT_EQ(highestClimbed(settings, {0.01, 0.05, 0.17, 0.25, 0.295, 0.305, 0.33}), 0.295)
         << degrees;
   }
 }
@@ -511,9 +511,9 @@ TEST(World, ARestingAvatarCostsNoQueries) {
 }
 
 TEST(World, NearMissesAreReportedOncePerApproach) {
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.05;
-  WorldFixture run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, lengths);
+  WorldSettings settings;
+  settings.nearMissDistance = 0.05;
+  WorldFixture run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, settings);
   run.order("ann", Spawn{{-2, 0, 0}});
   run.order("ann", to(2, 0));
   run.untilIdle();
@@ -526,9 +526,9 @@ TEST(World, NearMissesAreReportedOncePerApproach) {
 }
 
 TEST(World, ANearMissEndsWithItsMinimumWhenTheAvatarLeaves) {
-  WorldSettings lengths;
-  lengths.nearMissDistance = 0.05;
-  WorldFixture run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, lengths);
+  WorldSettings settings;
+  settings.nearMissDistance = 0.05;
+  WorldFixture run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, settings);
   run.order("ann", Spawn{{-2, 0, 0}});
   run.order("ann", to(0, 0));
   run.untilIdle();

@@ -24,8 +24,8 @@ WalkEvent at(double x, double time) {
 using IndexPairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
 /// Minimum cost of pairing two lists in order, by exhaustive search.
-double leastCost(const std::vector<WalkEvent>& before, std::size_t i,
-                 const std::vector<WalkEvent>& after, std::size_t j) {
+double computeMinCost(const std::vector<WalkEvent>& before, std::size_t i,
+                      const std::vector<WalkEvent>& after, std::size_t j) {
   const auto left = static_cast<double>(before.size() - i + after.size() - j);
   double best = left * kMaxMatchDistance / 2;
   for (std::size_t k = i; k < before.size(); ++k) {
@@ -33,7 +33,7 @@ double leastCost(const std::vector<WalkEvent>& before, std::size_t i,
       const double apart = (before[k].point - after[l].point).norm();
       if (apart >= kMaxMatchDistance) continue;
       const double skipped = static_cast<double>(k - i + l - j) * kMaxMatchDistance / 2;
-      best = std::min(best, skipped + apart + leastCost(before, k + 1, after, l + 1));
+      best = std::min(best, skipped + apart + computeMinCost(before, k + 1, after, l + 1));
     }
   }
   return best;
@@ -80,7 +80,7 @@ TEST(AlignEvents, NoMatchingIsCheaper) {
       after.push_back(at(place(random), static_cast<double>(after.size())));
     const IndexPairs pairs = alignEvents(before, after);
     // Times break ties between equal positions at a cost of one millimetre a second.
-    EXPECT_NEAR(computeCost(pairs, before, after), leastCost(before, 0, after, 0), 0.1);
+    EXPECT_NEAR(computeCost(pairs, before, after), computeMinCost(before, 0, after, 0), 0.1);
     paired += static_cast<int>(pairs.size());
     possible += static_cast<int>(std::min(before.size(), after.size()));
   }

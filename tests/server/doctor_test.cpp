@@ -1,11 +1,13 @@
-// Tests of `enfilade doctor`: the self-test image and EGL's vendor files.
+// Tests of `enfilade doctor`: the self-test image, EGL's vendor files and calls in a child process.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cstdlib>
+#include <stdexcept>
 
 #include "render/gl/gl_renderer.hpp"
 #include "render/raytrace/ray_renderer.hpp"
+#include "server/commands/child_call.hpp"
 #include "server/commands/egl_vendors.hpp"
 #include "server/commands/self_test_scene.hpp"
 #include "tests/support/temporary_folder.hpp"
@@ -53,6 +55,25 @@ TEST(Doctor, VendorFilesAreReadAndMissingFieldsReported) {
   EXPECT_NE(vendors[1].failure.find("libEGL_missing"), std::string::npos);
   EXPECT_EQ(vendors[1].library, "libEGL_missing.so.0");
   EXPECT_NE(vendors[2].failure, "");
+}
+
+TEST(ChildCall, AnswersWithWhatTheChildSentAlsoBeforeACrash) {
+  const std::string big(1 << 20, 'a');
+  const ChildAnswer whole = callInChild([&](const Send& send) {
+    send("first ");
+    send(big);
+  });
+  EXPECT_EQ(whole.failure, "");
+  EXPECT_TRUE(whole.text == "first " + big);
+  const ChildAnswer crashed = callInChild([](const Send& send) {
+    send("before");
+    std::abort();
+  });
+  EXPECT_EQ(crashed.failure, "crashed (Aborted)");
+  EXPECT_EQ(crashed.text, "before");
+  const ChildAnswer thrown =
+      callInChild([](const Send&) { throw std::runtime_error("an error of the child"); });
+  EXPECT_EQ(thrown.failure, "exited with 1");
 }
 
 }  // namespace

@@ -25,13 +25,13 @@ scene::WorldSettings readSettings(std::vector<const char*> options) {
 }
 
 TEST(MotionOptions, SetTheWorldSettingsAndArePolicies) {
-  const scene::WorldSettings lengths =
+  const scene::WorldSettings settings =
       readSettings({"--step-height", "0.2", "--epsilon", "0.001", "--slope", "30", "--sliding",
                     "stop", "--speed-limit", "2.5"});
-  EXPECT_EQ(lengths.stepHeight, 0.2);
-  EXPECT_EQ(lengths.contactOffset, 0.001);
-  EXPECT_EQ(lengths.maxSpeed, 2.5);
-  const v1::Policies policies = toProto(lengths);
+  EXPECT_EQ(settings.stepHeight, 0.2);
+  EXPECT_EQ(settings.contactOffset, 0.001);
+  EXPECT_EQ(settings.maxSpeed, 2.5);
+  const v1::Policies policies = toProto(settings);
   EXPECT_EQ(policies.speed_limit(), 2.5);
   EXPECT_NEAR(policies.walkable_slope(), 30 * 3.14159265358979 / 180, 1e-12);
   EXPECT_EQ(policies.sliding(), "stop");

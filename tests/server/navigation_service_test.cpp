@@ -7,6 +7,7 @@
 #include <cstdlib>
 
 #include "server/base/load_scene.hpp"
+#include "server/messages/world_messages.hpp"
 #include "tests/scene/body_fixture.hpp"
 #include "tests/scene/roofed_rooms.hpp"
 #include "tests/server/program_fixture.hpp"
@@ -170,6 +171,22 @@ TEST(NavigationService, ANamedGoalBehindAClosedDoorHasTheDoorAsReason) {
   const Answered answered = ask(std::make_shared<const scene::Scene>(std::move(model)), query);
   ASSERT_EQ(answered.reply.paths_size(), 1) << answered.error.message();
   EXPECT_EQ(answered.reply.paths(0).obstacle_name(), "door") << answered.reply.paths(0).reason();
+}
+
+TEST(NavigationService, StepsAreListedIfTheyAreAskedFor) {
+  const auto scene = scene::testing::boxScene(
+      {{"floor", {0, -0.2, 0}, {4, 0, 4}}, {"kerb", {4, -0.2, 0}, {8, 0.15, 4}}});
+  v1::NavigationQuery query;
+  *query.mutable_path()->mutable_from()->mutable_point() = toProto(scene::Vec3(1, 0, 2));
+  *query.mutable_path()->add_to()->mutable_point() = toProto(scene::Vec3(7, 0.15, 2));
+  EXPECT_EQ(ask(scene, query).reply.paths(0).steps_size(), 0);
+  query.mutable_path()->set_steps(true);
+  const v1::NavigationPath path = ask(scene, query).reply.paths(0);
+  ASSERT_TRUE(path.found()) << path.reason();
+  ASSERT_EQ(path.steps_size(), 1);
+  EXPECT_NEAR(path.steps(0).rise(), 0.15, 2e-3);
+  EXPECT_NEAR(path.steps(0).at().x(), 4, 0.4);
+  EXPECT_FALSE(path.has_narrowest_at());
 }
 
 TEST(NavigationService, MapsAreBytesBitsOrAPicture) {

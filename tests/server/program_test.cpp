@@ -201,6 +201,19 @@ TEST_F(Program, AFailedWriteToStdoutExitsWithOne) {
   }
 }
 
+TEST_F(Program, ADriverThatCrashesIsReportedByDoctor) {
+  write(path("vendor.json"),
+        R"({"file_format_version":"1.0.0","ICD":{"library_path":")" ENFILADE_CRASHING_EGL R"("}})");
+  setenv("__EGL_VENDOR_LIBRARY_FILENAMES", path("vendor.json").c_str(), 1);
+  const Ended ended = run({"doctor", "--json"});
+  unsetenv("__EGL_VENDOR_LIBRARY_FILENAMES");
+  EXPECT_EQ(ended.code, 1);
+  const auto report = nlohmann::json::parse(ended.out);
+  EXPECT_EQ(report["vendors"][0]["failure"], "") << "it loads";
+  EXPECT_TRUE(report["devices"].empty());
+  EXPECT_EQ(report["remedy"], "EGL crashed (Aborted) while it listed devices");
+}
+
 TEST_F(Program, AFileBeyondTheLimitIsAnErrorNotADeath) {
   rlimit before{};
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);

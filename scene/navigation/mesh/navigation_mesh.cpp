@@ -243,13 +243,13 @@ Vec3 NavigationMesh::closestPoint(std::uint32_t polygon, const Vec3& point) cons
 
 std::optional<MeshPoint> NavigationMesh::findNearest(const Vec3& point, const Vec3& extent) const {
   std::optional<MeshPoint> best;
-  double least = std::numeric_limits<double>::infinity();
+  double minDistance = std::numeric_limits<double>::infinity();
   for (const std::uint32_t polygon : findPolygons(point, extent)) {
     const Vec3 candidate = closestPoint(polygon, point), aside = candidate - point;
     const double distance = aside.squaredNorm();
     // Of a slanted polygon, the box may be near alone.
-    if (!(distance < least) || (aside.array().abs() > extent.array()).any()) continue;
-    least = distance;
+    if (!(distance < minDistance) || (aside.array().abs() > extent.array()).any()) continue;
+    minDistance = distance;
     best = MeshPoint{polygon, candidate};
   }
   return best;
@@ -430,8 +430,9 @@ void NavigationMesh::rasterize(
   for (const Vec3& corner : makeTriangles(index)) box.include(corner);
   if (box.max.y() < lowest || box.min.y() > highest) return;
   const bool isInside = box.min.y() >= lowest && box.max.y() <= highest;
-  const auto first = [&](double least, double origin) {
-    return static_cast<std::uint32_t>(std::max(0.0, std::floor((least - origin) / grid.cell)));
+  const auto first = [&](double minCoordinate, double origin) {
+    return static_cast<std::uint32_t>(
+        std::max(0.0, std::floor((minCoordinate - origin) / grid.cell)));
   };
   for (std::uint32_t row = first(box.min.z(), grid.z);
        row < grid.height && grid.z + row * grid.cell <= box.max.z(); ++row) {

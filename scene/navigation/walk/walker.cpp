@@ -44,15 +44,15 @@ int countTicks(double seconds, double tickDuration) {
 
 /// Notices when a walk comes no closer to its goal.
 struct StallWatch {
-  double minGain;  ///< metres
-  int maxTicks;    ///< without such a gain
-  double least;    ///< distance at the last gain
-  int ticks = 0;   ///< since then
+  double minGain;      ///< metres
+  int maxTicks;        ///< without such a gain
+  double minDistance;  ///< distance at the last gain
+  int ticks = 0;       ///< since then
 
   bool isStalledAt(double distance) {
-    const bool gains = distance < least - minGain;
+    const bool gains = distance < minDistance - minGain;
     ticks = gains ? 0 : ticks + 1;
-    if (gains) least = distance;
+    if (gains) minDistance = distance;
     return ticks > maxTicks;
   }
 };
@@ -179,7 +179,7 @@ WalkOutcome Walker::walkTo(const Vec3& goal) {
   const double stepHeight = world_.settings.stepHeight;
   const Vec3 start = avatar_.footPosition;
   hasStepped_ = isUneven_ = false;
-  for (double least = std::numeric_limits<double>::infinity();;) {
+  for (double minDistance = std::numeric_limits<double>::infinity();;) {
     avatar_.shape = wideShape_;
     WalkOutcome outcome = walkWithMargin(goal);
     avatar_.shape = shape_;
@@ -192,8 +192,8 @@ WalkOutcome Walker::walkTo(const Vec3& goal) {
     outcome = walkByTicks(goal, kTickedLength, false, stepHeight);
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (outcome.kind != WalkOutcome::Kind::arrived) return outcome;
-    if (distance <= kArrivalDistance || !(distance < least)) return outcome;
-    least = distance;
+    if (distance <= kArrivalDistance || !(distance < minDistance)) return outcome;
+    minDistance = distance;
   }
 }
 

@@ -40,6 +40,7 @@ class Path:
     doors: Tuple["Door", ...] = ()  # with doors="open": the closed ones on the path, in order
     legs: Tuple["Leg", ...] = ()  # in order, of all points
     seconds: float = math.inf  # expected: walking, falling, doors, waiting for lifts and riding
+    steps: Tuple["Step", ...] = ()  # with steps=True: in order, also those of stairs
 
 
 @dataclass(frozen=True)
@@ -50,6 +51,13 @@ class Door:
     distance: float  # metres from the start of the path
     seconds: float  # that it takes to open
     by_touch: bool  # an avatar that walks into it opens it
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of 2 cm and more on a path."""
+    at: Tuple[float, float, float]  # on the floor before it
+    rise: float  # metres; negative: down
 
 
 @dataclass(frozen=True)
@@ -126,7 +134,8 @@ def _path(one: Any) -> Path:
         legs=tuple(Leg(messages.NavigationLeg.Kind.Name(leg.kind)[len("KIND_"):].lower(), leg.first,
                        leg.length, leg.seconds, leg.id, leg.name, leg.from_level, leg.to_level)
                    for leg in one.legs),
-        seconds=one.seconds if one.found else math.inf)
+        seconds=one.seconds if one.found else math.inf,
+        steps=tuple(Step(_xyz(step.at), step.rise) for step in one.steps))
 
 
 def _spot(one: Any) -> Optional[Spot]:
@@ -171,20 +180,22 @@ class Navigation:
         return messages.NavigationQuery(**self._options, progress=True, path=messages.NavigationQuery.Path(
             **{"from": first}, to=[_place(goal) for goal in goals]))
 
-    def path(self, start: Place, goal: Place, *, narrowest: bool = False, max_drop: float = 0.0,
-             lifts: bool = False) -> Path:
-        """Returns the path from one place to another. `narrowest`: also measures its clear width. With
-        `max_drop` metres it may fall from edges, and with `lifts` it may ride: then it is the quickest."""
-        return self.paths(start, [goal], narrowest=narrowest, max_drop=max_drop, lifts=lifts)[0]
+    def path(self, start: Place, goal: Place, *, narrowest: bool = False, steps: bool = False,
+             max_drop: float = 0.0, lifts: bool = False) -> Path:
+        """Returns the path from one place to another. `narrowest`: also measures its clear width. `steps`:
+        also lists its steps. With `max_drop` metres it may fall from edges, and with `lifts` it may ride:
+        then it is the quickest."""
+        return self.paths(start, [goal], narrowest=narrowest, steps=steps, max_drop=max_drop,
+                          lifts=lifts)[0]
 
     def paths(self, start: Place, goals: Sequence[Place], *, narrowest: bool = False,
-              max_drop: float = 0.0, lifts: bool = False) -> List[Path]:
+              steps: bool = False, max_drop: float = 0.0, lifts: bool = False) -> List[Path]:
         """Returns the paths from one place to many, in their order; options as for path()."""
         found: List[Path] = []
         for first in range(0, len(goals), _MAX_GOALS):
             reply, _ = self._ask(path=messages.NavigationQuery.Path(
                 **{"from": _place(start)}, to=[_place(goal) for goal in goals[first:first + _MAX_GOALS]],
-                narrowest=narrowest, max_drop=max_drop, lifts=lifts))
+                narrowest=narrowest, steps=steps, max_drop=max_drop, lifts=lifts))
             found += [_path(one) for one in reply.paths]
         return found
 

@@ -94,12 +94,13 @@ class CopyCounter {
   }
 
   /// `node` stands at several places, so it or a node above it is listed several times.
-  void limit(std::size_t node, std::uint64_t value, std::uint64_t most, const char* what) const {
-    if (value <= most) return;
+  void limit(std::size_t node, std::uint64_t value, std::uint64_t maxValue,
+             const char* what) const {
+    if (value <= maxValue) return;
     while (tallies_[node].listings == 1 && tallies_[node].parent != kNoIndex)
       node = tallies_[node].parent;
     throw ImportError(file_ + "nodes that are listed several times, such as nodes[" +
-                      std::to_string(node) + "], make more than " + std::to_string(most) + " " +
+                      std::to_string(node) + "], make more than " + std::to_string(maxValue) + " " +
                       what + "; list each node once and share meshes, or export it again");
   }
 

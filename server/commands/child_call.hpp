@@ -1,0 +1,20 @@
+// callInChild(): runs code that may crash, such as a graphics driver, in a child process.
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace enfilade::server {
+
+struct ChildAnswer {
+  std::string text;     ///< what the child sent, also before a crash
+  std::string failure;  ///< why the child ended early: "crashed (..)"; empty: it returned
+};
+
+using Send = std::function<void(const std::string& text)>;
+
+/// Calls `function` in a copy of this process and waits for its end. Call it before any thread
+/// starts: the child has only the calling thread. Throws std::system_error.
+ChildAnswer callInChild(const std::function<void(const Send&)>& function);
+
+}  // namespace enfilade::server
