@@ -8,6 +8,11 @@ if(EXISTS ${SOURCE}/.git)  # an exported tree inside another repository has no c
                   RESULT_VARIABLE failed)
   if(NOT failed)
     set(commit ${head})
+    execute_process(COMMAND git diff-index --quiet HEAD WORKING_DIRECTORY ${SOURCE}
+                    ERROR_QUIET RESULT_VARIABLE changed)
+    if(changed)
+      string(APPEND commit "-dirty")
+    endif()
   endif()
 endif()
 if(NOT BUILD_TYPE)

@@ -36,7 +36,7 @@ Vec3 blend(const Vec3& standing, const Vec3& deepest, double crouch) {
   return standing + crouch * (deepest - standing);
 }
 
-/// The closed surface through rings of equally many points, counter-clockwise around the way from
+/// The closed surface through rings of equally many points, counter-clockwise around the line from
 /// the first pole to the last one.
 struct Surface {
   Vec3 first, last;  ///< poles
@@ -76,11 +76,11 @@ struct Ball {
 
 /// The convex hull of two spheres, neither of which contains the other.
 void addLimb(scene::Mesh& mesh, const Ball& from, const Ball& to) {
-  const Vec3 way = to.centre - from.centre;
-  const Vec3 along = way.normalized();
+  const Vec3 axis = to.centre - from.centre;
+  const Vec3 along = axis.normalized();
   const Vec3 across = along.unitOrthogonal(), aside = along.cross(across);
-  // The cone touches both spheres where their normal has this angle to the way.
-  const double tangent = std::acos(std::clamp((from.radius - to.radius) / way.norm(), -1.0, 1.0));
+  // The cone touches both spheres where their normal has this angle to the axis.
+  const double tangent = std::acos(std::clamp((from.radius - to.radius) / axis.norm(), -1.0, 1.0));
   const auto at = [&](const Ball& ball, double angle, double turn) {
     return Vec3(ball.centre + ball.radius * (std::cos(angle) * along +
                                              std::sin(angle) * (std::cos(turn) * across +

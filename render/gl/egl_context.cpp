@@ -160,7 +160,7 @@ std::mutex& deviceProbeMutex() {
   return mutex;
 }
 
-/// Creates a current context and fills `probe`; EGL_NO_CONTEXT on failure.
+/// Creates a current context on a device and fills `probe` about it; EGL_NO_CONTEXT on failure.
 EGLContext openDevice(const DisplayCandidate& candidate, DeviceProbe& probe) {
   probe.platform = candidate.platform;
   probe.name = candidate.name;
@@ -181,7 +181,7 @@ bool isNumber(const std::string& text) {
 }
 
 /// The reason why the device is not even tried: another one is chosen by its number.
-std::string explainNumber(const DeviceChoice& choice, std::size_t index) {
+std::string explainOtherNumber(const DeviceChoice& choice, std::size_t index) {
   const bool isOther = isNumber(choice.device) && std::stoul(choice.device) != index;
   return isOther ? "is not number " + choice.device : "";
 }
@@ -230,7 +230,7 @@ EglContext::EglContext(const DeviceChoice& choice) {
   const std::vector<DisplayCandidate> all =
       enumerateDisplays(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS));
   for (std::size_t i = 0; i < all.size(); ++i) {
-    if (const std::string reason = explainNumber(choice, i); !reason.empty()) {
+    if (const std::string reason = explainOtherNumber(choice, i); !reason.empty()) {
       tried += formatProbeLine(i, all[i].platform, reason);
       continue;
     }

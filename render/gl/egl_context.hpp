@@ -36,7 +36,7 @@ class EglContext {
   bool software_ = false;
 };
 
-/// Never throws.
+/// Counts the devices, in the order in which they are tried. Never throws.
 DeviceList listDevices();
 
 /// Creates a context on a device of the list, and destroys it. Never throws.

@@ -58,7 +58,11 @@ std::vector<Vec3> traceFeet(Walker& walker, const std::vector<Vec3>& points) {
     walker.returnTo(points[i - 1]);
     for (int k = 1; k < count; ++k) {
       Vec3 place = points[i - 1] + (static_cast<double>(k) / count) * leg;
-      if (walker.walkTo(place).kind != WalkOutcome::Kind::arrived) break;
+      const Vec3 stood = walker.footPosition();
+      if (walker.walkTo(place).kind != WalkOutcome::Kind::arrived) {
+        walker.returnTo(stood);  // a walk passes places where it cannot stand, as on a riser
+        continue;
+      }
       place.y() = walker.footPosition().y();
       traced.push_back(place);
     }

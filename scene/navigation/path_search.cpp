@@ -16,7 +16,7 @@ namespace {
 constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
 constexpr int kMaxConnectionRoutes = 4;
 constexpr double kOnMesh = 0.1;  // metres
-constexpr const char* kNotFound = "no way was found within the limits of the search";
+constexpr const char* kNotFound = "no path was found within the limits of the search";
 constexpr double kMaxGridDistance = 3;  // metres between places that are connected without a mesh
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
 constexpr double kMaxExit = 5;  // metres

@@ -4,10 +4,13 @@
 
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <stdexcept>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "render/gl/egl_context.hpp"
 #include "render/gl/gl_renderer.hpp"
@@ -72,12 +75,12 @@ std::string suggestRemedy(const Json& devices, const std::string& failure, bool 
   return "";
 }
 
-Json vendorsToJson() {
-  Json vendors = Json::array();
-  for (const EglVendor& vendor : listEglVendors())
-    vendors.push_back(
+Json toJson(const std::vector<EglVendor>& vendors) {
+  Json all = Json::array();
+  for (const EglVendor& vendor : vendors)
+    all.push_back(
         {{"file", vendor.file}, {"library", vendor.library}, {"failure", vendor.failure}});
-  return vendors;
+  return all;
 }
 
 Json toJson(std::size_t index, const render::DeviceProbe& probe, const SelfTest& selfTest) {
@@ -106,15 +109,38 @@ bool isRight(const Json& device) {
   return device["failure"] == "" && device["proof"] == kRight;
 }
 
+/// The devices that EGL lists, or how a driver ended the list: "crashed (..)".
+struct ListedDevices {
+  render::DeviceList list;
+  std::string crash;
+};
+
 /// Lists the devices in a child process: a crash of a driver ends that alone.
-render::DeviceList listDevicesInChild() {
+ListedDevices listDevicesInChild() {
   const ChildAnswer answer = callInChild([](const Send& send) {
     const render::DeviceList list = render::listDevices();
     send(dump({{"count", list.count}, {"failure", list.failure}}, -1));
   });
-  if (!answer.failure.empty()) return {0, "EGL " + answer.failure + " while it listed devices"};
-  const Json list = Json::parse(answer.text);
-  return {list["count"].get<std::size_t>(), list["failure"].get<std::string>()};
+  const Json list = Json::parse(answer.text, nullptr, false);
+  if (!answer.failure.empty()) return {{}, answer.failure};
+  if (list.is_discarded()) return {{}, "exited"};
+  return {{list["count"].get<std::size_t>(), list["failure"].get<std::string>()}, ""};
+}
+
+/// Finds the vendor libraries that crash or hang while EGL lists their devices, and says so in
+/// `vendors`. EGL of this process then has the others alone. Returns what to do.
+std::string leaveOutBrokenVendors(std::vector<EglVendor>& vendors) {
+  constexpr const char* kVendorFiles = "__EGL_VENDOR_LIBRARY_FILENAMES";  // libglvnd's
+  std::string usable, broken;
+  for (EglVendor& vendor : vendors) {
+    if (!vendor.failure.empty()) continue;
+    setenv(kVendorFiles, vendor.file.c_str(), 1);
+    vendor.failure = listDevicesInChild().crash;
+    std::string& files = vendor.failure.empty() ? usable : broken;
+    files += (files.empty() ? "" : ":") + vendor.file;
+  }
+  setenv(kVendorFiles, usable.c_str(), 1);
+  return "no program can use EGL until this is removed or updated: " + broken;
 }
 
 /// Probes and tests a device in a child process. Writes the picture to `out` if it is right and
@@ -122,10 +148,11 @@ render::DeviceList listDevicesInChild() {
 Json testDeviceInChild(std::size_t index, const std::filesystem::path& out) {
   const ChildAnswer answer = callInChild([&](const Send& send) {
     const render::DeviceProbe probe = render::probeDevice(index);
-    send(dump(toJson(index, probe, {}), -1) + "\n");
+    Json device = toJson(index, probe, {"was not tested", 0, {}});
+    send(dump(device, -1) + "\n");
     if (!probe.failure.empty()) return;
     const SelfTest selfTest = runSelfTest(index);
-    Json device = toJson(index, probe, selfTest);
+    device = toJson(index, probe, selfTest);
     try {
       if (isRight(device) && !out.empty()) render::writePng(out, render::toImage(selfTest.frame));
     } catch (const std::exception& error) {
@@ -135,10 +162,15 @@ Json testDeviceInChild(std::size_t index, const std::filesystem::path& out) {
   });
   std::istringstream lines(answer.text);
   Json device = toJson(index, {}, {});
-  for (std::string line; std::getline(lines, line);) device = Json::parse(line);
+  bool isProbed = false;
+  for (std::string line; std::getline(lines, line);)
+    if (Json read = Json::parse(line, nullptr, false); !read.is_discarded()) {
+      device = std::move(read);
+      isProbed = true;
+    }
   if (device.contains("error")) throw std::runtime_error(getString(device["error"]));
-  if (!answer.failure.empty())
-    device[answer.text.empty() ? "failure" : "proof"] = "the driver " + answer.failure;
+  const std::string failure = answer.failure.empty() && !isProbed ? "exited" : answer.failure;
+  if (!failure.empty()) device[isProbed ? "proof" : "failure"] = "the driver " + failure;
   return device;
 }
 
@@ -172,17 +204,25 @@ std::string formatTable(const Json& report) {
 }  // namespace
 
 ExitCode doctor(const DoctorCommand& command) {
-  const render::DeviceList list = listDevicesInChild();
-  Json report{{"vendors", vendorsToJson()}, {"devices", Json::array()}};
+  std::vector<EglVendor> vendors = listEglVendors();
+  ListedDevices listed = listDevicesInChild();
+  std::string remedy;
+  if (!listed.crash.empty()) {
+    remedy = leaveOutBrokenVendors(vendors);
+    listed = listDevicesInChild();
+  }
+  Json report{{"vendors", toJson(vendors)}, {"devices", Json::array()}};
   bool gpuWorks = false, anyWorks = false;
-  for (std::size_t i = 0; i < list.count; ++i) {
+  for (std::size_t i = 0; i < listed.list.count; ++i) {
     const Json device = testDeviceInChild(i, anyWorks ? "" : command.out);
     report["devices"].push_back(device);
     if (!isRight(device)) continue;
     anyWorks = true;
     gpuWorks = gpuWorks || !device["software"].get<bool>();
   }
-  report["remedy"] = suggestRemedy(report["devices"], list.failure, gpuWorks, anyWorks);
+  report["remedy"] = remedy.empty()
+                         ? suggestRemedy(report["devices"], listed.list.failure, gpuWorks, anyWorks)
+                         : remedy;
   const bool canDraw = command.requireGpu ? gpuWorks : anyWorks;
   report["can_draw"] = canDraw;
   writeToStdout(command.json ? dump(report, 2) + "\n" : formatTable(report));

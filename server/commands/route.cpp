@@ -159,7 +159,7 @@ double getHeight(const v1::NavigationPath::Step& step) {
 
 std::string formatText(const RouteCommand& command, const v1::NavigationPath& path) {
   if (!path.found())
-    return fmt::format("no way from {} to {}: {}\n", command.from, command.to, path.reason());
+    return fmt::format("no path from {} to {}: {}\n", command.from, command.to, path.reason());
   std::string text = fmt::format("{:.2f} m from {} to {}, {:.1f} s at {:.1f} m/s\n", path.length(),
                                  command.from, command.to, path.seconds(), command.agent.speed);
   if (path.has_narrowest_at())
@@ -210,7 +210,7 @@ WalkTrace makeTrace(const RouteCommand& command, const v1::NavigationPath& path,
     trace.paths = {makeWalkedPath(path), {"goal", {to}, 2}};
     return trace;
   }
-  trace.title = fmt::format("no way from {} to {}: {}", command.from, command.to, path.reason());
+  trace.title = fmt::format("no path from {} to {}: {}", command.from, command.to, path.reason());
   trace.paths = {{"start", {from}, 1}, {"goal", {to}, 2}};
   if (path.has_obstacle_at()) {
     trace.floors.push_back(path.obstacle_at().y());

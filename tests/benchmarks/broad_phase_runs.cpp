@@ -58,7 +58,7 @@ void runInTurns(std::vector<BroadPhaseRun>& runs, const RecordedBoxes& recorded,
 }
 
 /// Takes the minimum of two runs of a method, tick by tick.
-void takeLeast(BroadPhaseRun& best, const BroadPhaseRun& again) {
+void takeMinima(BroadPhaseRun& best, const BroadPhaseRun& again) {
   best.buildSeconds = std::min(best.buildSeconds, again.buildSeconds);
   best.firstTick = std::min(best.firstTick, again.firstTick);
   best.wrong = std::max(best.wrong, again.wrong);
@@ -83,7 +83,7 @@ std::vector<BroadPhaseRun> runMethods(std::span<const BroadPhaseMethod* const> m
     }
     runInTurns(again, recorded, secondsAMethod);
     for (const BroadPhaseRun& run : again) {
-      takeLeast(
+      takeMinima(
           *std::ranges::find(best, run.method, [](const BroadPhaseRun& b) { return b.method; }),
           run);
     }

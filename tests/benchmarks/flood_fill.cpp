@@ -75,12 +75,12 @@ Vec3 FloodFill::computePosition(std::int32_t place) const {
 /// The place of a column that is closest to `height`, and at most `reach` metres from it; -1: none.
 std::int32_t FloodFill::findPlace(std::int32_t column, double height, double reach) const {
   std::int32_t best = -1;
-  double least = reach;
+  double minDifference = reach;
   for (std::int32_t at = first_[static_cast<std::size_t>(column)]; at >= 0;
        at = places_[static_cast<std::size_t>(at)].next) {
     const double difference = std::abs(places_[static_cast<std::size_t>(at)].height - height);
-    if (difference > least) continue;
-    least = difference;
+    if (difference > minDifference) continue;
+    minDifference = difference;
     best = at;
   }
   return best;
@@ -91,14 +91,14 @@ std::int32_t FloodFill::findNearest(const Vec3& point) const {
   if (column < 0) return -1;
   if (const std::int32_t here = findPlace(column, point.y(), kSameFloor); here >= 0) return here;
   std::int32_t best = -1;
-  double least = 0.03;
+  double minDistance = 0.03;
   for (const auto& [dx, dz] : kNeighbours) {
     const std::int32_t place = findPlace(column + dx + dz * width_, point.y(), kSameFloor);
     if (place < 0) continue;
     const Vec3 away = computePosition(place) - point;
     const double distance = std::hypot(away.x(), away.z());
-    if (distance >= least) continue;
-    least = distance;
+    if (distance >= minDistance) continue;
+    minDistance = distance;
     best = place;
   }
   return best;

@@ -47,7 +47,7 @@ class FloodFill {
   std::optional<Component> findComponent(const scene::Vec3& place) const;
 
   /// The shortest way on the grid, pulled straight where all places below the straight line are
-  /// filled. Empty: no way.
+  /// filled. Empty: no path.
   std::vector<scene::Vec3> findShortest(const scene::Vec3& from, const scene::Vec3& to) const;
 
  private:

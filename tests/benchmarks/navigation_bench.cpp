@@ -2,10 +2,9 @@
 // doors, by lifts and over edges; the time of a path with its proof; and its islands and lengths
 // against a flood fill and Detour's lines.
 //
-//   navigation_bench [--quick] [--pairs N] [--places N] [--only times|fill|lengths|walks] [--out
-//   FILE]
-//                    SCENE[@METRES_PER_UNIT]..
+//   navigation_bench [--quick] [--pairs N] [--places N] [--only PART] [--out FILE] SCENE..
 //
+// SCENE may end in @METRES_PER_UNIT. PART: times, fill, lengths or walks.
 // A path counts as wrong if its walk is blocked, leaves the scene or penetrates anything. FILE gets
 // a JSON line per scene and part.
 #include <algorithm>
@@ -174,6 +173,11 @@ Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const
   return walked;
 }
 
+/// Whether a text says what is in the way, and not only that a search ended.
+bool hasReason(const std::string& text) {
+  return text.size() >= 10 && text.find("within the limits of the search") == std::string::npos;
+}
+
 void measureWalks(Bench& bench, const Effort& effort, nlohmann::json& row) {
   const auto starts = bench.drawPlaces(effort.pairs, 1, v1::NavigationQuery::DOORS_OPEN);
   const auto goals = bench.drawPlaces(effort.pairs, 2, v1::NavigationQuery::DOORS_OPEN);
@@ -186,7 +190,7 @@ void measureWalks(Bench& bench, const Effort& effort, nlohmann::json& row) {
       world.emplace(bench.scene);
     const Walked walked = go(bench, *world, static_cast<int>(i), starts[i], goals[i], GoKind::all);
     penetration = std::max(penetration, walked.penetration);
-    counts["without_reason"] += !walked.isFound && walked.text.size() < 10 ? 1 : 0;
+    counts["without_reason"] += !walked.isFound && !hasReason(walked.text) ? 1 : 0;
     if (walked.isRefused || !walked.isFound) {
       counts["starts_refused"] += walked.isRefused ? 1 : 0;
       continue;
@@ -421,10 +425,10 @@ std::vector<Vec3> getPoints(const v1::NavigationPath& path) {
   return points;
 }
 
-void printLong(const Vec3& from, const Vec3& to, double share, double feetShare) {
-  if (std::max(share, feetShare) <= kLongShare) return;
-  std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f, feet %.4f\n", from.x(),
-              from.y(), from.z(), to.x(), to.y(), to.z(), share, feetShare);
+void printLong(const Vec3& from, const Vec3& to, double share) {
+  if (!isLong(share)) return;
+  std::printf("  long: (%.17g, %.17g, %.17g) to (%.17g, %.17g, %.17g): %.4f\n", from.x(), from.y(),
+              from.z(), to.x(), to.y(), to.z(), share);
 }
 
 /// Compares the path between two places with the shortest way in the fill.
@@ -446,7 +450,7 @@ void compareLength(Bench& bench, const FloodFill& fill, const Vec3& from, const 
   }
   lengths.shares.push_back(scene::computeLength(points) / scene::computeLength(way));
   lengths.feetShares.push_back(*walked / *shortest);
-  printLong(from, to, lengths.shares.back(), lengths.feetShares.back());
+  printLong(from, to, std::max(lengths.shares.back(), lengths.feetShares.back()));
 }
 
 void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
@@ -524,11 +528,14 @@ void compareWithDetour(Bench& bench, const Effort& effort, nlohmann::json& row) 
       continue;
     }
     const auto walked = walkAlong(walker, *line);
-    if (!walked) ++lengths.unwalkable;
-    const double length = walked ? scene::computeLength(*walked) : 0;
+    if (!walked) {
+      ++lengths.unwalkable;
+      continue;
+    }
+    const double length = scene::computeLength(*walked);
     if (length < kMinCompared) continue;
     lengths.shares.push_back(scene::computeLength(getPoints(path)) / length);
-    printLong(starts[i], goals[i], lengths.shares.back(), 0);
+    printLong(starts[i], goals[i], lengths.shares.back());
   }
   row["detour_pairs"] = pairs;
   row["detour_found"] = found;

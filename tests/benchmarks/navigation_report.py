@@ -60,7 +60,8 @@ An agent of 0.3 m radius and 1.75 m height.
 An avatar enters at a random place and goes to another one with the order `go`, which opens doors and rides
 lifts. In every sixth pair it may fall by up to 2 m. Doors and lifts are as in the file again after 25 walks. A walk is
 *wrong* if it is blocked, leaves the scene or penetrates anything. Walks through doors
-are counted by themselves, too. *Refused*: a closed door stands at the start. *Silent*: no path and no reason.
+are counted by themselves, too. *Refused*: a closed door stands at the start. *Silent*: no path and no reason, or only that the search
+ended at its limits.
 
 {table(["scene", "pairs", "refused", "paths", "wrong", "silent", "penetration m", "with doors (wrong)",
         "with lifts", "with drops"], [make_walk_row(row) for row in parts["pairs"]])}

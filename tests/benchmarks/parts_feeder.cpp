@@ -98,8 +98,8 @@ bool check(bool holds, const char* what) {
 bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks) {
   OurFeeder still(plan, kThreads);
   const double start = still.energy();
-  double most = start;
-  const auto watchEnergy = [&] { most = std::max(most, still.energy()); };
+  double maxEnergy = start;
+  const auto watchEnergy = [&] { maxEnergy = std::max(maxEnergy, still.energy()); };
   Row off = run(still, feederCheck, ticks, false, watchEnergy);
   int asleepAfter = ticks;  // the run continues untimed until the whole heap sleeps
   for (; asleepAfter < kMaxTicksToSleep && still.report().awake > 0; asleepAfter += kJudgeEvery)
@@ -123,11 +123,11 @@ bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks
   std::printf(
       "  energy with the drive off: at most %.6f of its start; reduced: %.2f %%"
       " of all motions, %llu crushed pairs\n",
-      most / start, 100.0 * static_cast<double>(shortened) / static_cast<double>(solids),
+      maxEnergy / start, 100.0 * static_cast<double>(shortened) / static_cast<double>(solids),
       static_cast<unsigned long long>(crushed));
   std::printf("  with the drive off the heap sleeps after %.1f s at most\n", asleepAfter / 60.0);
   bool all = check(still.report().awake == 0, "drive off: the whole heap sleeps within 10 s");
-  all &= check(most <= 1.001 * start, "drive off: energy never above its start + 0.1 %");
+  all &= check(maxEnergy <= 1.001 * start, "drive off: energy never above its start + 0.1 %");
   all &= check(off.worst.outside + on.worst.outside == 0, "all parts inside");
   all &= check(std::max(off.worst.deepest, on.worst.deepest) <= driven.epsilon(),
                "penetration <= epsilon");
@@ -144,9 +144,9 @@ bool checkScene(const FeederPlan& plan, int ticks) {
     const testing::Vec3& at = body.pose.translation;
     return std::abs(at.x()) < plan.inner && std::abs(at.z()) < plan.inner && at.y() > 0.8;
   };
-  const auto go = [&](int most) {
+  const auto go = [&](int tickCount) {
     Row row;
-    for (int i = 0; i < most; ++i) {
+    for (int i = 0; i < tickCount; ++i) {
       const double cpu = cpuSeconds();
       const auto start = std::chrono::steady_clock::now();
       const scene::TickReport report = tickWorld(world);

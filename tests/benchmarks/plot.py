@@ -16,13 +16,13 @@ class Axis:
 
     def __init__(self, values, low, high, log=True):
         self.low, self.high, self.log = low, high, log
-        least, most = min(values), max(values)
+        minimum, maximum = min(values), max(values)
         if log:
-            self.first = math.floor(math.log10(least) + 1e-9)
-            self.last = math.ceil(math.log10(most) - 1e-9)
+            self.first = math.floor(math.log10(minimum) + 1e-9)
+            self.last = math.ceil(math.log10(maximum) - 1e-9)
             self.last = max(self.last, self.first + 1)
         else:
-            self.first, self.last = least, most if most > least else least + 1
+            self.first, self.last = minimum, maximum if maximum > minimum else minimum + 1
 
     def at(self, value):
         x = math.log10(value) if self.log else value

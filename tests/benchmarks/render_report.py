@@ -85,8 +85,8 @@ def speed_error(rows, out, scene, size, report):
     for row in rows:
         if row["scene"] != scene or row["size"] != size:
             continue
-        most = row["depth"]["away_from_edges"]["max_mm"]
-        points.append((row["method"], max(MIN_ERROR, most), row["ms"], ""))
+        max_error = row["depth"]["away_from_edges"]["max_mm"]
+        points.append((row["method"], max(MIN_ERROR, max_error), row["ms"], ""))
     name = f"{report}_{scene.replace(' ', '_')}"
     title = f"Speed against error of depth: {scene}, {size.replace('x', '×')}"
     plot.marks(out / f"{name}.svg", title, "maximum error away from edges, mm",

@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
                               "assets/building.glb";
   Soak soak(server::loadScene(model));
   const std::uint64_t sampleEvery = std::max<std::uint64_t>(1, ticks / 20), warm = ticks / 10;
-  double afterWarmUp = 0, most = 0;
+  double afterWarmUp = 0, maxResident = 0;
   const auto start = std::chrono::steady_clock::now();
   for (std::uint64_t tick = 0; tick < ticks; ++tick) {
     soak.step(tick);
@@ -144,7 +144,7 @@ int main(int argc, char** argv) {
     ::malloc_trim(0);  // memory cached by the allocator is not growth
     const double resident = static_cast<double>(tests::footprint().residentBytes);
     if (tick < warm) afterWarmUp = resident;
-    most = std::max(most, tick >= warm ? resident : 0);
+    maxResident = std::max(maxResident, tick >= warm ? resident : 0);
     if (tick >= warm && afterWarmUp == 0) afterWarmUp = resident;
     std::printf("tick %llu: %.1f MB resident, %.0f ticks a second\n",
                 static_cast<unsigned long long>(tick), 1e-6 * resident,
@@ -152,7 +152,7 @@ int main(int argc, char** argv) {
     std::fflush(stdout);
   }
   soak.printRow();
-  const bool flat = most <= afterWarmUp + kGrowthAllowed;
-  std::printf("memory after the warm-up: %+.1f MB\n", 1e-6 * (most - afterWarmUp));
+  const bool flat = maxResident <= afterWarmUp + kGrowthAllowed;
+  std::printf("memory after the warm-up: %+.1f MB\n", 1e-6 * (maxResident - afterWarmUp));
   return soak.right() && flat ? 0 : 3;
 }

@@ -128,8 +128,8 @@ class Refusals(RoomCase):
         self.assertEqual(self.client.step().tick, 1)
 
     def test_whole_numbers_are_refused_with_name_and_range_before_anything_is_sent(self):
-        most = self.client.limits.max_ticks_per_step
-        with self.assertRaisesRegex(ValueError, f"ticks: give a whole number from 1 to {most}, not -1"):
+        max_ticks = self.client.limits.max_ticks_per_step
+        with self.assertRaisesRegex(ValueError, f"ticks: give a whole number from 1 to {max_ticks}, not -1"):
             self.client.step(-1)
         with self.assertRaisesRegex(ValueError, "ticks: give a whole number, not 1.5"):
             self.client.step(1.5)

@@ -227,13 +227,13 @@ class CompatTest(RoomCase):
         self.assertEqual(raised.exception.field, "navigation.map.tolerance")
 
     def test_obstacles_are_searched_from_the_surface_and_capped(self):
-        for place, most, expected in (((3, 0, 0), 2.0, 1.9), ((3.05, 0, 0), 2.0, 1.85), ((0, 0, 0), 2.0, 2.0),
-                                      ((0, 0, 0), 5.0, 4.9), ((3, 0, 0), 1.9, 1.9), ((3, 0, 0), 0.05, 0.05)):
-            distance = self.finder.distance_to_closest_obstacle(place, most)
-            hit = self.finder.closest_obstacle_surface_point(place, most)
+        for place, max_radius, expected in (((3, 0, 0), 2.0, 1.9), ((3.05, 0, 0), 2.0, 1.85), ((0, 0, 0), 2.0, 2.0),
+                                            ((0, 0, 0), 5.0, 4.9), ((3, 0, 0), 1.9, 1.9), ((3, 0, 0), 0.05, 0.05)):
+            distance = self.finder.distance_to_closest_obstacle(place, max_radius)
+            hit = self.finder.closest_obstacle_surface_point(place, max_radius)
             self.assertAlmostEqual(distance, expected, delta=1e-3)
             self.assertEqual(hit.hit_dist, distance)
-            self.assertEqual(bool(np.isnan(hit.hit_pos).any()), distance == most)
+            self.assertEqual(bool(np.isnan(hit.hit_pos).any()), distance == max_radius)
         hit = self.finder.closest_obstacle_surface_point((3.05, 0, 0))  # 1.95 from the axis
         self.assertAlmostEqual(hit.hit_pos[0], 5, delta=1e-3)
         np.testing.assert_allclose(hit.hit_normal, (-1, 0, 0), atol=1e-6)

@@ -142,9 +142,9 @@ TEST(ContactManifold, OnlyAsManyPointsAsWantedAndTheDeepestAmongThem) {
   const Mat3 rotation = rotationAt(1e-5, Vec3(1, 0, 2));
   const PlacedConvex floor = makeConvex(kFloor, kFloorAt),
                      b = makeConvex(hull, {0, 1e-4, 0}, &rotation);
-  for (const std::size_t most : {1u, 3u, 8u}) {
-    const auto m = computeManifold(floor, b, 1e-3, most);
-    ASSERT_EQ(m.size, most);
+  for (const std::size_t maxPoints : {1u, 3u, 8u}) {
+    const auto m = computeManifold(floor, b, 1e-3, maxPoints);
+    ASSERT_EQ(m.size, maxPoints);
     FeatureCache cold;
     EXPECT_NEAR(m.points[0].separation, computeSeparation(floor, b, cold).distance, 1e-12);
   }

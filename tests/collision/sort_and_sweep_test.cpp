@@ -448,7 +448,7 @@ TEST(SortAndSweep, AStraightWalkRarelyRebuildsTheWindow) {
     sweep.insert(boxes.back());
   }
   sweep.update();
-  std::uint64_t laid = 0, most = 0, swaps = 0;
+  std::uint64_t laid = 0, maxWindows = 0, swaps = 0;
   for (int tick = 0; tick < 300; ++tick) {
     for (ProxyId id = 0; id < boxes.size(); ++id) {
       const Vec3 step(0.02, 0, 0.015);
@@ -457,13 +457,13 @@ TEST(SortAndSweep, AStraightWalkRarelyRebuildsTheWindow) {
     }
     sweep.update();
     laid += sweep.counters().windowsBuilt;
-    most = std::max(most, sweep.counters().windowsBuilt);
+    maxWindows = std::max(maxWindows, sweep.counters().windowsBuilt);
     swaps += sweep.counters().swaps;
   }
   EXPECT_GT(swaps, 1000u);
   EXPECT_GT(laid, 50u);
   EXPECT_LT(laid, 300u * 50 / 20) << "a cell lasts for more than 20 ticks";
-  EXPECT_LT(most, 10u) << "few windows are built in one tick";
+  EXPECT_LT(maxWindows, 10u) << "few windows are built in one tick";
 }
 
 TEST(SortAndSweep, UsesFewBytesInAdditionToTheBoxes) {

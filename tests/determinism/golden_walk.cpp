@@ -31,9 +31,9 @@ void print(const char* name, const World& world) {
               world.snapshot()->avatars.size());
 }
 
-Vec3 anyVelocity(Seeded& random, double most, bool flies) {
-  const double x = random.uniform(-most, most), z = random.uniform(-most, most);
-  return {x, flies ? random.uniform(-most, most) : 0, z};
+Vec3 anyVelocity(Seeded& random, double maxSpeed, bool flies) {
+  const double x = random.uniform(-maxSpeed, maxSpeed), z = random.uniform(-maxSpeed, maxSpeed);
+  return {x, flies ? random.uniform(-maxSpeed, maxSpeed) : 0, z};
 }
 
 void stairs() {

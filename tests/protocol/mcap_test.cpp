@@ -124,7 +124,7 @@ TEST(Mcap, ATruncatedFileIsReadUpToTheLastCompleteChunk) {
   const std::string bytes = closedFile(items);
   const auto file = fileFor("cut");
   std::mt19937 random(11);
-  std::size_t most = 0;
+  std::size_t maxItems = 0;
   for (int i = 0; i < 300; ++i) {
     const std::size_t length = 40 + random() % (bytes.size() - 40);
     put(file, bytes.substr(0, length));
@@ -133,9 +133,9 @@ TEST(Mcap, ATruncatedFileIsReadUpToTheLastCompleteChunk) {
     ASSERT_FALSE(read.closed);
     ASSERT_LE(read.whole, length);
     ASSERT_TRUE(isPrefix(read.items, items)) << "cut after " << length;
-    most = std::max(most, read.items.size());
+    maxItems = std::max(maxItems, read.items.size());
   }
-  EXPECT_GT(most, items.size() / 2);
+  EXPECT_GT(maxItems, items.size() / 2);
 }
 
 TEST(Mcap, AFlippedBitIsReported) {

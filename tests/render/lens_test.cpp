@@ -40,7 +40,8 @@ std::pair<double, double> projectFisheye(const Vec3& point, const Pinhole& pinho
   return {pinhole.fx * scale * point.x() + pinhole.cx, pinhole.fy * scale * point.y() + pinhole.cy};
 }
 
-/// A direction in OpenCV's camera frame (x right, y down, z ahead), seen by a camera.
+/// The direction, in the scene's frame, of a point in OpenCV's camera frame (x right, y down, z
+/// ahead).
 Vec3 toSceneDirection(const Camera& camera, const Vec3& point) {
   const Vec3 forward = camera.forward.normalized(), right = forward.cross(camera.up).normalized(),
              down = forward.cross(right);
@@ -205,13 +206,13 @@ TEST(Lens, CornersAreDarkerThanTheMiddleOfWalls) {
     const Frame frame = renderer.render({}, camera, options);
     const LensMapping lens(camera);
     const auto greyAlong = [&](double up) {  // of the wall, at this height
-      double least = 1e9;
+      double minDifference = 1e9;
       const Vec3 target(3, up, 0);
       int at = -1;
       for (int pixel = 0; pixel < 400 * 200; ++pixel) {
         const auto direction = lens.directionAt(pixel % 400 + 0.5, pixel / 400 + 0.5);
-        if (direction && (*direction - target.normalized()).norm() < least)
-          least = (*direction - target.normalized()).norm(), at = pixel;
+        if (direction && (*direction - target.normalized()).norm() < minDifference)
+          minDifference = (*direction - target.normalized()).norm(), at = pixel;
       }
       return int{frame.rgb[3 * static_cast<std::size_t>(at)]};
     };

@@ -37,7 +37,7 @@ inline Mesh insideOut(Mesh mesh) {
   return mesh;
 }
 
-inline Shape shapeOfOne(const Mesh& mesh) {
+inline Shape buildMeshShape(const Mesh& mesh) {
   const std::uint32_t first = 0;
   return buildShape({&mesh, 1}, {&first, 1});
 }

@@ -41,7 +41,7 @@ inline Model busyRoom() {
 }
 
 /// Three folded arms; stretched out they are three times as long.
-inline Spawn foldedArm(const Vec3& at) {
+inline Spawn makeFoldedArm(const Vec3& at) {
   Spawn spawn;
   spawn.position = at;
   spawn.flying = true;
@@ -75,7 +75,7 @@ struct BusyRoom {
     Spawn flyer{Vec3(2, 2, -2), 0};
     flyer.flying = true;
     order("flyer", flyer);
-    order("arm", foldedArm({-2, 0.5, 5}));
+    order("arm", makeFoldedArm({-2, 0.5, 5}));
   }
 
   void order(const std::string& who, Order what) {

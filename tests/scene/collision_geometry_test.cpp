@@ -14,8 +14,8 @@ namespace enfilade::scene {
 namespace {
 
 using testing::boxMesh;
+using testing::buildMeshShape;
 using testing::insideOut;
-using testing::shapeOfOne;
 
 Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
   std::uniform_real_distribution<double> number(-1, 1);
@@ -29,7 +29,7 @@ Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
 
 TEST(CollisionGeometry, AHullHoldsEveryCornerOfItsSurfaceHoweverItIsPlaced) {
   std::mt19937 random(5);
-  const Shape shape = shapeOfOne(boxMesh({0, 0, 0}, {0.3, 2, 5}));
+  const Shape shape = buildMeshShape(boxMesh({0, 0, 0}, {0.3, 2, 5}));
   for (int i = 0; i < 100; ++i) {
     const Eigen::Affine3d placed = randomPlacement(random, i % 2 == 1);
     const CollisionGeometry parts = buildCollisionGeometry(shape, placed);
@@ -59,7 +59,7 @@ TEST(CollisionGeometry, QueriesEqualBruteForce) {
     for (const std::uint32_t index : box.indices) mesh.indices.push_back(first + index);
   }
   const CollisionGeometry parts =
-      buildCollisionGeometry(shapeOfOne(mesh), Eigen::Affine3d::Identity());
+      buildCollisionGeometry(buildMeshShape(mesh), Eigen::Affine3d::Identity());
   EXPECT_EQ(parts.localHulls.size(), 30u);
   EXPECT_EQ(parts.localTriangles.triangles().size(), 110u);
   std::size_t hits = 0;
@@ -86,7 +86,7 @@ TEST(CollisionGeometry, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
   const Mesh mesh = boxMesh({0, 0, 0}, {0.3, 2, 5});
   Mesh open = mesh;
   open.indices.resize(33);
-  const Shape shape = shapeOfOne(mesh), sheets = shapeOfOne(open);
+  const Shape shape = buildMeshShape(mesh), sheets = buildMeshShape(open);
   for (int i = 0; i < 100; ++i) {
     Eigen::Affine3d placed = randomPlacement(random, false);
     placed.linear() *= 0.1;
@@ -110,9 +110,9 @@ TEST(CollisionGeometry, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
 
 TEST(CollisionGeometry, InsideOutWallsAreSolidAndInsideOutRoomsAreRooms) {
   const Eigen::Affine3d as = Eigen::Affine3d::Identity();
-  const Shape wall = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {5, 3, 0.2})));
+  const Shape wall = buildMeshShape(insideOut(boxMesh({0, 0, 0}, {5, 3, 0.2})));
   EXPECT_EQ(buildCollisionGeometry(wall, as).localHulls.size(), 1u);
-  const Shape room = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {5, 3, 4})));
+  const Shape room = buildMeshShape(insideOut(boxMesh({0, 0, 0}, {5, 3, 4})));
   EXPECT_EQ(buildCollisionGeometry(room, as).localHulls.size(), 0u);
   EXPECT_EQ(buildCollisionGeometry(room, as).localTriangles.triangles().size(), 12u);
   EXPECT_EQ(buildCollisionGeometry(room, Eigen::Affine3d(Eigen::Scaling(0.05))).localHulls.size(),

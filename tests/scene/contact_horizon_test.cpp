@@ -44,7 +44,7 @@ class Checker {
     horizons.select(std::nullopt);
   }
 
-  void look(const TickReport& report) {
+  void checkTick(const TickReport& report) {
     horizons.update(world_.snapshot());
     horizons.validate();
     const double now = world_.snapshot()->time;
@@ -127,7 +127,7 @@ TEST(ContactHorizon, InABusyRoomNoContactBeginsBeforeItsHorizon) {
       if (i % 40 == 5) room.sendRandomCommand();
       if (i % 90 == 30) room.order("guest" + std::to_string(i / 90), Spawn{Vec3(-3, 0.001, 3), 0});
       if (i % 90 == 70) room.order("guest" + std::to_string(i / 90), Leave{});
-      checker.look(tickWorld(room.world));
+      checker.checkTick(tickWorld(room.world));
     }
     EXPECT_GT(checker.claims, 5'000) << seed;
     EXPECT_GT(checker.farClaims, 1'000) << seed;
@@ -202,7 +202,7 @@ TEST(ContactHorizon, TwoCrowdsMeetNoEarlierAndFewPairsAreExamined) {
   Checker checker(crowds.run.world);
   for (int i = 0; i < 600; ++i) {
     if (i % 120 == 0) crowds.turn();
-    checker.look(crowds.run.step());
+    checker.checkTick(crowds.run.step());
   }
   EXPECT_GT(checker.contacts, 20);
   const auto& counts = checker.all().statistics();
@@ -262,7 +262,7 @@ TEST(ContactHorizon, WithoutEnoughWorkItIsEarlierAndNeverWrong) {
   Checker checker(crowds.run.world, little);
   for (int i = 0; i < 300; ++i) {
     if (i % 120 == 0) crowds.turn();
-    checker.look(crowds.run.step());
+    checker.checkTick(crowds.run.step());
   }
   EXPECT_GT(checker.all().statistics().postponed, 100u);
   EXPECT_GT(checker.claims, 1'000);
@@ -288,14 +288,14 @@ TEST(ContactHorizon, AtTheSpeedLimitAHorizonIsHalfOfTheTrueTime) {
   Checker checker(run.world);
   run.order("ann", Drive{{4, 0, 0}});
   run.order("bob", Drive{{-4, 0, 0}});
-  checker.look(run.step());
+  checker.checkTick(run.step());
   const EntityId ann = run.view("ann").id, bob = run.view("bob").id;
   const double start = run.world.snapshot()->time;
   const ContactHorizon& first = checker.all().horizons().at(ann);
   ASSERT_EQ(first.approaches[0].entity, bob);
   const double proved = first.notBefore() - start;
   while (!run.open.contains({ann, bob}) && run.world.snapshot()->time < start + 5)
-    checker.look(run.step());
+    checker.checkTick(run.step());
   const double taken = run.world.snapshot()->time - start;
   EXPECT_GT(proved, 0.45 * taken - 0.02);
   EXPECT_EQ(checker.contacts, 2) << "each of the other";
@@ -314,7 +314,7 @@ TEST(ContactHorizon, ABodyPushesAnAvatarFasterThanItsSpeedLimit) {
   t.ticks(20);
   Checker checker(t.world);
   t.submit({"ram", BodyCommand::Action::moveTo, 3.6, 0, {}});
-  for (int i = 0; i < 120; ++i) checker.look(t.step());
+  for (int i = 0; i < 120; ++i) checker.checkTick(t.step());
   EXPECT_GT(t.feet("ann").x(), 1.4) << "it was pushed";
   EXPECT_GT(checker.farClaims, 5);
   EXPECT_EQ(checker.contacts, 2) << "of the ram and of the wall";
@@ -330,9 +330,9 @@ TEST(ContactHorizon, AnAvatarThatStandsUpWasExpectedTo) {
   run.ticks(240);
   ASSERT_LT(run.view("ann").height, 1);
   Checker checker(run.world);
-  for (int i = 0; i < 10; ++i) checker.look(run.step());
+  for (int i = 0; i < 10; ++i) checker.checkTick(run.step());
   run.order("ann", Crouch{});
-  for (int i = 0; i < 10; ++i) checker.look(run.step());
+  for (int i = 0; i < 10; ++i) checker.checkTick(run.step());
   EXPECT_TRUE(run.touched("beam"));
 }
 

@@ -531,7 +531,7 @@ TEST(DynamicBodies, ABoxThatSleepsOnSomeonesHeadFallsWhenHeGoesOrLeavesOrCrouche
 
 TEST(DynamicBodies, AvatarsThatLeaveFreeTheirMemory) {
   BodyFixture t(loose({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}}));
-  std::size_t most = 0;
+  std::size_t maxSolids = 0;
   for (int i = 0; i < 30; ++i) {
     t.order("ann", Spawn{.position = {0, 0.001, 0}});
     t.order("ann", Walk{{{0.3, 0, 0}}, 1});
@@ -539,8 +539,8 @@ TEST(DynamicBodies, AvatarsThatLeaveFreeTheirMemory) {
     t.order("ann", Leave{});
     t.ticks(3);
     const std::size_t solids = t.world.data().dynamicBodies.physicsWorld.bodies.size();
-    if (i == 0) most = solids;
-    EXPECT_LE(solids, most) << i;
+    if (i == 0) maxSolids = solids;
+    EXPECT_LE(solids, maxSolids) << i;
   }
 }
 

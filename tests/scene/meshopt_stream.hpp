@@ -27,7 +27,7 @@ class MeshoptStreamWriter {
 
   MeshoptStream write() {
     const std::size_t count = elements_.size() / stride_;
-    const std::size_t most = std::min<std::size_t>(8192 / stride_ / 16 * 16, 256);
+    const std::size_t maxElements = std::min<std::size_t>(8192 / stride_ / 16 * 16, 256);
     std::string baseline, channels;
     for (std::size_t i = 0; i < stride_; ++i) baseline += static_cast<char>(random_());
     for (std::size_t i = 0; i < stride_ / 4; ++i) {
@@ -37,8 +37,8 @@ class MeshoptStreamWriter {
     }
     elements_.insert(0, baseline);
     stream_.bytes = "\xa1";
-    for (std::size_t first = 0; first < count; first += most)
-      writeBlock(first, std::min(most, count - first), channels);
+    for (std::size_t first = 0; first < count; first += maxElements)
+      writeBlock(first, std::min(maxElements, count - first), channels);
     const std::size_t tail = stride_ + stride_ / 4;
     stream_.bytes.append(tail < 24 ? 24 - tail : 0, '\0');
     stream_.bytes += baseline + channels;

@@ -29,16 +29,16 @@ TEST(PartsFeeder, WithTheDriveOffEnergyNeverGrowsAndTheWholeHeapSleepsWithinTenS
   const FeederCheck check(plan);
   Feeder feeder(plan);
   const double start = feeder.energy();
-  double most = start;
+  double maxEnergy = start;
   for (int i = 0; i < 600 && (i < 120 || feeder.report().awake > 0); ++i) {
     feeder.tick(false);
-    most = std::max(most, feeder.energy());
+    maxEnergy = std::max(maxEnergy, feeder.energy());
     if (i % 20 != 0) continue;
     const FeederFindings findings = check.evaluate(feeder.parts(), feeder.tray());
     ASSERT_EQ(findings.penetrating, 0u) << i;
     ASSERT_EQ(findings.outside, 0u) << i;
   }
-  EXPECT_LE(most, 1.001 * start);
+  EXPECT_LE(maxEnergy, 1.001 * start);
   EXPECT_LT(feeder.energy(), 0.5 * start) << "the parts fell";
   EXPECT_EQ(feeder.report().awake, 0u);
   EXPECT_EQ(countFloating(feeder), 0u);

@@ -25,19 +25,69 @@ TEST(PathSteps, AStairAKerbAndAThresholdHaveTheirHeights) {
   std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {4, 0, 4}},
                               {"landing", {5.5, -0.2, 0}, {9, 1, 4}},
                               {"yard", {9, -0.2, 0}, {14, 0.9, 4}},
-                              {"threshold", {11, 0.9, 0}, {11.1, 0.93, 4}}};
+                              {"threshold", {11, 0.9, 0}, {11.1, 0.92, 4}}};
   for (int i = 0; i < 5; ++i)
     boxes.push_back({"stair", {4 + 0.3 * i, -0.2, 0}, {4.3 + 0.3 * i, 0.2 * (i + 1), 4}});
   Navigation navigation(boxScene(boxes), {}, {});
   const NavigationPath path = navigation.findPath({1, 0, 2}, {13, 0.9, 2});
   ASSERT_TRUE(path.found()) << path.reason;
   const std::vector<PathStep> steps = navigation.findSteps(path.points);
-  expectRises(steps, {0.2, 0.2, 0.2, 0.2, 0.2, -0.1, 0.03, -0.03});
+  expectRises(steps, {0.2, 0.2, 0.2, 0.2, 0.2, -0.1, 0.02, -0.02});
   for (int i = 0; i < 5; ++i)
     EXPECT_NEAR(steps[static_cast<std::size_t>(i)].position.x(), 4 + 0.3 * i, 0.4);
   const NavigationPath back = navigation.findPath({13, 0.9, 2}, {1, 0, 2});
   ASSERT_TRUE(back.found()) << back.reason;
-  expectRises(navigation.findSteps(back.points), {0.03, -0.03, 0.1, -0.2, -0.2, -0.2, -0.2, -0.2});
+  expectRises(navigation.findSteps(back.points), {0.02, -0.02, 0.1, -0.2, -0.2, -0.2, -0.2, -0.2});
+}
+
+TEST(PathSteps, AWideAgentStandsHighAboveTheFloorOfAStair) {
+  std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {4, 0, 4}}};
+  for (int i = 0; i < 8; ++i)
+    boxes.push_back({"stair", {4 + 0.25 * i, -0.2, 0}, {12, 0.18 * (i + 1), 4}});
+  Navigation navigation(boxScene(boxes), {}, {.radius = 0.5});
+  const NavigationPath path = navigation.findPath({1, 0, 2}, {9, 1.44, 2});
+  ASSERT_TRUE(path.found()) << path.reason;
+  expectRises(navigation.findSteps(path.points), std::vector<double>(8, 0.18));
+}
+
+/// A kerb with an inclined riser: from (6, 0) to (6 + `run`, 0.15).
+Model makeInclinedKerb(float run) {
+  Model model =
+      boxModel({{"street", {0, -0.2, 0}, {6.2, 0, 4}}, {"kerb", {6, -0.2, 0}, {12, 0.15, 4}}});
+  for (Eigen::Vector3f& corner : model.meshes.back().positions)
+    if (corner.x() < 7 && corner.y() > 0) corner.x() += run;
+  return model;
+}
+
+TEST(PathSteps, AnInclinedRiserIsOneStep) {
+  for (const float run : {0.013f, 0.026f, 0.04f, 0.09f}) {
+    SCOPED_TRACE(run);
+    Navigation navigation(std::make_shared<const Scene>(makeInclinedKerb(run)), {}, {});
+    for (const double end : {0.6, 3.4}) {
+      SCOPED_TRACE(end);
+      const NavigationPath up = navigation.findPath({4, 0, 2}, {8, 0.15, end});
+      ASSERT_TRUE(up.found()) << up.reason;
+      expectRises(navigation.findSteps(up.points), {0.15});
+      const NavigationPath down = navigation.findPath({8, 0.15, end}, {4, 0, 2});
+      ASSERT_TRUE(down.found()) << down.reason;
+      expectRises(navigation.findSteps(down.points), {-0.15});
+    }
+  }
+}
+
+TEST(PathSteps, AJointInARampIsNoStep) {
+  const float slope = 0.25f;
+  Model model = boxModel({{"floor", {0, -0.2, 0}, {4, 0, 4}},
+                          {"ramp/a", {4, -0.2, 0}, {6, 0, 4}},
+                          {"ramp/b", {6.05, -0.2, 0}, {8, 0, 4}},
+                          {"under", {5, -0.2, 0}, {7, 0.2, 4}}});
+  for (std::size_t i = 1; i < 3; ++i)
+    for (Eigen::Vector3f& corner : model.meshes[i].positions)
+      corner.y() += slope * (corner.x() - 4);
+  Navigation navigation(std::make_shared<const Scene>(std::move(model)), {}, {});
+  const NavigationPath path = navigation.findPath({1, 0, 2}, {7, 0.9, 2});
+  ASSERT_TRUE(path.found()) << path.reason;
+  expectRises(navigation.findSteps(path.points), {});
 }
 
 TEST(PathSteps, ARampAndANarrowGapAreNoSteps) {

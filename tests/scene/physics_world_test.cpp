@@ -119,13 +119,13 @@ TEST(PhysicsWorld, EnergyOfBouncingAndTumblingBodiesNeverGrows) {
     if (round > 9) scene.body(box).restitution = 0.9;
     scene.pairAll();
     const double start = scene.energy();
-    double most = start;
+    double maxEnergy = start;
     for (int i = 0; i < 240; ++i) {
       scene.run(1);
-      most = std::max(most, scene.energy());
+      maxEnergy = std::max(maxEnergy, scene.energy());
       ASSERT_FALSE(scene.anyPenetrates());
     }
-    EXPECT_LE(most, start * 1.001) << round;
+    EXPECT_LE(maxEnergy, start * 1.001) << round;
   }
 }
 

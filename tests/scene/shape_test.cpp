@@ -15,8 +15,8 @@ namespace enfilade::scene {
 namespace {
 
 using testing::boxMesh;
+using testing::buildMeshShape;
 using testing::insideOut;
-using testing::shapeOfOne;
 
 void append(Mesh& to, const Mesh& from) {
   const auto first = static_cast<std::uint32_t>(to.positions.size());
@@ -73,7 +73,7 @@ Mesh prism(int sides, double radius, double height) {
 TEST(Shape, ABoxIsOneConvexSolidHoweverItsCornersAreStored) {
   const Mesh box = boxMesh({-1, 0, 2}, {3, 0.5, 7});
   for (const Mesh& mesh : {box, unwelded(box)}) {
-    const Shape shape = shapeOfOne(mesh);
+    const Shape shape = buildMeshShape(mesh);
     EXPECT_EQ(shape.vertices.size(), 8u);
     EXPECT_EQ(shape.triangles.size(), 12u);
     ASSERT_EQ(shape.shells.size(), 1u);
@@ -94,8 +94,8 @@ TEST(Shape, ABoxOfSeveralMeshesIsOneSolid) {
   const Shape shape = buildShape(meshes, both);
   ASSERT_EQ(shape.shells.size(), 1u);
   EXPECT_TRUE(shape.shells[0].isConvex());
-  EXPECT_EQ(shapeOfOne(sides).shells[0].kind, Shell::Kind::open);
-  EXPECT_EQ(shapeOfOne(sides).boundaryEdges, 4u);
+  EXPECT_EQ(buildMeshShape(sides).shells[0].kind, Shell::Kind::open);
+  EXPECT_EQ(buildMeshShape(sides).boundaryEdges, 4u);
 }
 
 TEST(Shape, TurnedBoxesAndPrismsAreConvexUpToTheRoundingOfTheirFloats) {
@@ -105,7 +105,7 @@ TEST(Shape, TurnedBoxesAndPrismsAreConvexUpToTheRoundingOfTheirFloats) {
     const Mesh mesh =
         turned(i % 2 ? boxMesh({-4, 0, -0.1}, {4, 2.7, 0.1}) : prism(3 + i % 60, 1, 2), random,
                i % 3 ? 500 : 0);
-    const Shape shape = shapeOfOne(mesh);
+    const Shape shape = buildMeshShape(mesh);
     ASSERT_EQ(shape.shells.size(), 1u);
     EXPECT_TRUE(shape.shells[0].isConvex()) << i;
     EXPECT_FALSE(shape.shells[0].inward) << i;
@@ -122,7 +122,7 @@ TEST(Shape, ADentDeeperThanRoundingIsNotConvex) {
     mesh.positions.push_back(Vec3(0.5, 1 - depth, 0.5).cast<float>());
     for (const auto& [a, b] : {std::pair{2, 6}, {6, 7}, {7, 3}, {3, 2}})
       mesh.indices.insert(mesh.indices.end(), {8u, std::uint32_t(a), std::uint32_t(b)});
-    const Shape shape = shapeOfOne(mesh);
+    const Shape shape = buildMeshShape(mesh);
     ASSERT_EQ(shape.shells.size(), 1u) << depth;
     const Shell::Kind expected = depth == 0     ? Shell::Kind::convex
                                  : depth < 3e-7 ? Shell::Kind::nearlyConvex
@@ -153,7 +153,7 @@ TEST(Shape, SplitFacesAndPointsInsideOfFacesDoNoHarm) {
       }
     }
   }
-  const Shape shape = shapeOfOne(mesh);
+  const Shape shape = buildMeshShape(mesh);
   ASSERT_EQ(shape.shells.size(), 1u);
   EXPECT_EQ(shape.shells[0].kind, Shell::Kind::convex);
   EXPECT_EQ(shape.vertices.size(), 98u);
@@ -166,7 +166,7 @@ TEST(Shape, TrianglesWithoutAreaAndRepeatedOnesAreCountedAndLeftOut) {
                                                                 // reversed corners
   mesh.positions.emplace_back(0.5f, 0.0f, 0.0f);
   mesh.indices.insert(mesh.indices.end(), {0, 1, 8});  // collinear corners
-  const Shape shape = shapeOfOne(mesh);
+  const Shape shape = buildMeshShape(mesh);
   EXPECT_EQ(shape.degenerate, 3u);
   EXPECT_EQ(shape.duplicate, 2u);
   EXPECT_EQ(shape.triangles.size(), 12u);
@@ -175,7 +175,7 @@ TEST(Shape, TrianglesWithoutAreaAndRepeatedOnesAreCountedAndLeftOut) {
 }
 
 TEST(Shape, InsideOutSolidsAreRecognised) {
-  const Shape shape = shapeOfOne(insideOut(boxMesh({0, 0, 0}, {1, 2, 3})));
+  const Shape shape = buildMeshShape(insideOut(boxMesh({0, 0, 0}, {1, 2, 3})));
   ASSERT_EQ(shape.shells.size(), 1u);
   EXPECT_TRUE(shape.shells[0].isConvex());
   EXPECT_TRUE(shape.shells[0].inward);
@@ -185,7 +185,7 @@ TEST(Shape, FacesWoundAgainstTheRestAreTurned) {
   Mesh mesh = boxMesh({0, 0, 0}, {1, 2, 3});
   std::swap(mesh.indices[4], mesh.indices[5]);
   std::swap(mesh.indices[22], mesh.indices[23]);
-  const Shape shape = shapeOfOne(mesh);
+  const Shape shape = buildMeshShape(mesh);
   EXPECT_EQ(shape.flippedTriangles, 2u);
   ASSERT_EQ(shape.shells.size(), 1u);
   EXPECT_EQ(shape.shells[0].kind, Shell::Kind::convex);
@@ -196,7 +196,7 @@ TEST(Shape, ACavityMakesTheSolidAroundItHollow) {
   Mesh mesh = boxMesh({0, 0, 0}, {5, 3, 5});
   append(mesh, insideOut(boxMesh({0.2, 0.2, 0.2}, {4.8, 2.8, 4.8})));
   append(mesh, boxMesh({10, 0, 0}, {11, 1, 1}));
-  const Shape shape = shapeOfOne(mesh);
+  const Shape shape = buildMeshShape(mesh);
   ASSERT_EQ(shape.shells.size(), 3u);
   EXPECT_TRUE(shape.shells[0].hollow);
   EXPECT_TRUE(shape.shells[1].inward);
@@ -207,12 +207,12 @@ TEST(Shape, ACavityMakesTheSolidAroundItHollow) {
 TEST(Shape, SolidsThatShareAnEdgeOrACornerAreNotOneSolid) {
   Mesh corner = boxMesh({0, 0, 0}, {1, 1, 1});
   append(corner, boxMesh({1, 1, 1}, {2, 2, 2}));
-  const Shape two = shapeOfOne(corner);
+  const Shape two = buildMeshShape(corner);
   ASSERT_EQ(two.shells.size(), 2u);
   EXPECT_TRUE(two.shells[0].isConvex() && two.shells[1].isConvex());
   Mesh edge = boxMesh({0, 0, 0}, {1, 1, 1});
   append(edge, boxMesh({1, 1, 0}, {2, 2, 1}));
-  const Shape crowded = shapeOfOne(edge);
+  const Shape crowded = buildMeshShape(edge);
   EXPECT_EQ(crowded.nonManifoldEdges, 1u);
   for (const Shell& shell : crowded.shells) EXPECT_FALSE(shell.isConvex());
 }
@@ -235,14 +235,14 @@ TEST(Shape, ConcaveAndFlatSurfacesBoundNoConvexSolid) {
     stairs.indices.insert(stairs.indices.end(), {2 * a, 2 * c, 2 * b});
     stairs.indices.insert(stairs.indices.end(), {2 * a + 1, 2 * b + 1, 2 * c + 1});
   }
-  const Shape concave = shapeOfOne(stairs);
+  const Shape concave = buildMeshShape(stairs);
   ASSERT_EQ(concave.shells.size(), 1u);
   EXPECT_EQ(concave.shells[0].kind, Shell::Kind::closed);
   EXPECT_FALSE(concave.shells[0].inward);
   Mesh pillow;  // both sides of a square, split along different diagonals
   pillow.positions = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
   pillow.indices = {0, 1, 2, 0, 2, 3, 0, 3, 1, 1, 3, 2};
-  EXPECT_FALSE(shapeOfOne(pillow).shells.at(0).isConvex());
+  EXPECT_FALSE(buildMeshShape(pillow).shells.at(0).isConvex());
 }
 
 }  // namespace

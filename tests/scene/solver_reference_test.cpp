@@ -90,9 +90,9 @@ class ReferenceSolver {
       armA += point.armA, armB += point.armB;
     }
     armA /= size, armB /= size;
-    int least = 0;
-    patch.normal.cwiseAbs().minCoeff(&least);
-    const Vec3 first = patch.normal.cross(Vec3::Unit(least)).normalized();
+    int minAxis = 0;
+    patch.normal.cwiseAbs().minCoeff(&minAxis);
+    const Vec3 first = patch.normal.cross(Vec3::Unit(minAxis)).normalized();
     const Vec3 second = patch.normal.cross(first);
     row.first = Jacobian(first, armA.cross(first), armB.cross(first), a, b);
     row.second = Jacobian(second, armA.cross(second), armB.cross(second), a, b);
@@ -157,21 +157,21 @@ class ReferenceSolver {
     double normalImpulse = 0;
     for (const ReferencePoint& point : row.points)
       normalImpulse += point.impulse + point.motorImpulse;
-    const double most = row.patch->friction * normalImpulse;
+    const double maxFriction = row.patch->friction * normalImpulse;
     const double speed1 = speed(row.first, velocities), speed2 = speed(row.second, velocities);
     double tangent1 = row.tangent1 - (row.m11 * speed1 + row.m12 * speed2);
     double tangent2 = row.tangent2 - (row.m12 * speed1 + row.m22 * speed2);
     const double squared = tangent1 * tangent1 + tangent2 * tangent2;
-    ++(most * most < squared ? happened_.slid : happened_.held);
-    if (most * most < squared) {
-      const double part = most / std::sqrt(squared);
+    ++(maxFriction * maxFriction < squared ? happened_.slid : happened_.held);
+    if (maxFriction * maxFriction < squared) {
+      const double part = maxFriction / std::sqrt(squared);
       tangent1 *= part, tangent2 *= part;
     }
     applyImpulse(row, row.first, tangent1 - row.tangent1, velocities);
     applyImpulse(row, row.second, tangent2 - row.tangent2, velocities);
     row.tangent1 = tangent1, row.tangent2 = tangent2;
     const double turning = product(row.patch->normal, velocities.spinB - velocities.spinA);
-    const double widest = most * row.arm;
+    const double widest = maxFriction * row.arm;
     const double twist = std::clamp(row.twist - row.twistMass * turning, -widest, widest);
     applyMoment(row, twist - row.twist, velocities);
     row.twist = twist;
@@ -179,9 +179,9 @@ class ReferenceSolver {
 
   double velocityError(const ReferencePoint& point, double now) const {
     const double room = point.separation - step_.contactOffset;
-    const double least = std::min(0.0, -room / seconds_),
-                 most = room < step_.contactOffset ? 0 : least;
-    return now < least ? least - now : std::min(0.0, most - now);
+    const double minSpeed = std::min(0.0, -room / seconds_),
+                 maxSpeed = room < step_.contactOffset ? 0 : minSpeed;
+    return now < minSpeed ? minSpeed - now : std::min(0.0, maxSpeed - now);
   }
 
   void iterate(ReferenceConstraint& row) {
@@ -266,10 +266,10 @@ class ReferenceSolver {
   void applyRestitution(ReferenceConstraint& row) {
     const double e = row.patch->restitution;
     if (e == 0) return;
-    const double least = 4 * step_.gravity.norm() * step_.seconds;
+    const double minArrivalSpeed = 4 * step_.gravity.norm() * step_.seconds;
     Velocities velocities = getVelocities(row);
     for (const ReferencePoint& point : row.points) {
-      if (point.sum <= 0 || point.arrival > -least) continue;
+      if (point.sum <= 0 || point.arrival > -minArrivalSpeed) continue;
       const double lacks = -e * point.arrival - speed(point.normal, velocities);
       const double back = std::clamp(point.mass * lacks, 0.0, e * point.sum);
       applyImpulse(row, point.normal, back, velocities);

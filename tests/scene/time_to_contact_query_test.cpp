@@ -13,11 +13,11 @@ namespace {
 using Action = BodyCommand::Action;
 
 TimeToContact apartAt(const World& world, EntityIndex& index, EntityId a, EntityId b,
-                      MotionAssumption assume, double least = 0) {
+                      MotionAssumption assume, double minWait = 0) {
   std::size_t work = kMaxQueryWork;
   const SceneAt then{index, *world.snapshot()};
   return std::get<TimeToContact>(
-      computeTimeToContact(then, world.settings(), a, b, assume, least, work));
+      computeTimeToContact(then, world.settings(), a, b, assume, minWait, work));
 }
 
 TEST(TimeToContact, AWalkerReachesTheWallWhenItWasSaid) {
@@ -216,8 +216,8 @@ Motions computeMotions(const Snapshot& before, const Snapshot& after) {
 }
 
 /// Whether an entity that moved as `first` describes still does so `ticks` later.
-bool goesOnAsBefore(EntityId id, const Motions& first, const Motions& now, int ticks,
-                    const WorldSettings& settings) {
+bool keepsMotion(EntityId id, const Motions& first, const Motions& now, int ticks,
+                 const WorldSettings& settings) {
   constexpr double kSame = 1e-9;
   const double fallen = settings.gravity * settings.tickDuration * ticks;  // metres per second
   if (const auto was = first.avatars.find(id); was != first.avatars.end()) {
@@ -256,13 +256,13 @@ struct Tally {
 };
 
 /// Checks one watch; false if the watch is over.
-bool look(const Watch& watch, const Motions& now, const World& world, EntityIndex& index,
-          Tally& tally) {
+bool checkWatch(const Watch& watch, const Motions& now, const World& world, EntityIndex& index,
+                Tally& tally) {
   const WorldSettings& settings = world.settings();
   const int ticks = static_cast<int>(world.snapshot()->tick - watch.since);
   if (watch.assume == MotionAssumption::presentMotion) {
     for (const EntityId id : {watch.a, watch.b})
-      if (!goesOnAsBefore(id, watch.motions, now, ticks, settings)) return false;
+      if (!keepsMotion(id, watch.motions, now, ticks, settings)) return false;
   }
   std::size_t work = kMaxQueryWork;
   const auto state = std::get<PairProximity>(
@@ -301,7 +301,7 @@ TEST(TimeToContact, InABusyRoomNoPairTouchesBeforeTheReportedTime) {
       const auto after = room.world.snapshot();
       const Motions motions = computeMotions(*before, *after);
       std::erase_if(watches, [&](const Watch& watch) {
-        return !look(watch, motions, room.world, index, tally);
+        return !checkWatch(watch, motions, room.world, index, tally);
       });
       before = after;
       for (int k = 0; k < 4; ++k) {

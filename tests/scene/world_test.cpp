@@ -105,7 +105,7 @@ TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
 }
 
 /// The highest ledge that an avatar can walk up.
-double highestClimbed(const WorldSettings& settings, const std::vector<double>& ledges) {
+double findHighestClimbedLedge(const WorldSettings& settings, const std::vector<double>& ledges) {
   constexpr double kApart = 2;
   std::vector<NamedBox> boxes{{"ground", {-1, -1, -1}, {4, 0, 20}}};
   double z = 0;
@@ -133,17 +133,18 @@ double highestClimbed(const WorldSettings& settings, const std::vector<double>& 
 }
 
 TEST(World, NoLedgeHigherThanAStepIsClimbed) {
-  EXPECT_EQ(highestClimbed({}, {0.05, 0.25, 0.295, 0.3, 0.305, 0.33, 0.35}), 0.3);
+  EXPECT_EQ(findHighestClimbedLedge({}, {0.05, 0.25, 0.295, 0.3, 0.305, 0.33, 0.35}), 0.3);
   WorldSettings low;
   low.stepHeight = 0.1;
-  EXPECT_EQ(highestClimbed(low, {0.01, 0.06, 0.095, 0.1, 0.105, 0.13, 0.15}), 0.1);
+  EXPECT_EQ(findHighestClimbedLedge(low, {0.01, 0.06, 0.095, 0.1, 0.105, 0.13, 0.15}), 0.1);
 }
 
 TEST(World, StepsAreClimbedWhateverSlopeIs) {
   for (const double degrees : {1.0, 5.0, 20.0, 33.0, 34.0}) {
     WorldSettings settings;
     settings.walkableNormalY = std::cos(degrees * 0.017453292519943295);
-    EXPECT_EQ(highestClimbed(settings, {0.01, 0.05, 0.17, 0.25, 0.295, 0.305, 0.33}), 0.295)
+    EXPECT_EQ(findHighestClimbedLedge(settings, {0.01, 0.05, 0.17, 0.25, 0.295, 0.305, 0.33}),
+              0.295)
         << degrees;
   }
 }

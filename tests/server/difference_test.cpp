@@ -265,8 +265,8 @@ TEST(ComparedWalks, AClearanceIsTheMinimumAndNotTheFirstReport) {
     return Recorded(name, near(distance, phase), {.nearMiss = radius}).go(20).close();
   };
   using Event = v1::ContactEvent;
-  const auto least = recorded("near", 0.2, Event::PHASE_MIN);
-  const auto nearer = compareWalks(least, recorded("nearer", 0.1, Event::PHASE_MIN), 1e-3);
+  const auto atMinimum = recorded("near", 0.2, Event::PHASE_MIN);
+  const auto nearer = compareWalks(atMinimum, recorded("nearer", 0.1, Event::PHASE_MIN), 1e-3);
   EXPECT_EQ(nearer.worse, 1u);
   ASSERT_EQ(nearer.clearances.size(), 1u);
   EXPECT_NEAR(nearer.clearances[0].minChange, -0.1, 1e-12);
@@ -275,8 +275,8 @@ TEST(ComparedWalks, AClearanceIsTheMinimumAndNotTheFirstReport) {
                   .isEmpty());
   // A walk that reports only distances below 0.15 m would not have reported it.
   const auto blind = recorded("blind", 0.14, Event::PHASE_BEGIN, 0.15);
-  EXPECT_TRUE(compareWalks(blind, least, 1e-3).isEmpty());
-  EXPECT_TRUE(compareWalks(least, blind, 1e-3).isEmpty());
+  EXPECT_TRUE(compareWalks(blind, atMinimum, 1e-3).isEmpty());
+  EXPECT_TRUE(compareWalks(atMinimum, blind, 1e-3).isEmpty());
 }
 
 TEST(ComparedWalks, ABranchIsComparedFromWhereItLeft) {

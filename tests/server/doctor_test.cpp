@@ -1,7 +1,10 @@
 // Tests of `enfilade doctor`: the self-test image, EGL's vendor files and calls in a child process.
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <csignal>
 #include <cstdlib>
 #include <stdexcept>
 
@@ -73,7 +76,24 @@ TEST(ChildCall, AnswersWithWhatTheChildSentAlsoBeforeACrash) {
   EXPECT_EQ(crashed.text, "before");
   const ChildAnswer thrown =
       callInChild([](const Send&) { throw std::runtime_error("an error of the child"); });
-  EXPECT_EQ(thrown.failure, "exited with 1");
+  EXPECT_EQ(thrown.failure, "failed");
+  EXPECT_EQ(thrown.text, "an error of the child");
+}
+
+TEST(ChildCall, KillsAChildThatHangs) {
+  const ChildAnswer answer = callInChild(
+      [](const Send& send) {
+        send("before");
+        for (;;) pause();
+      },
+      std::chrono::seconds(1));
+  EXPECT_EQ(answer.failure, "did not answer within 1 s");
+  EXPECT_EQ(answer.text, "before");
+}
+
+TEST(ChildCall, AnswersAlsoIfTheParentIgnoredTheEndsOfChildren) {
+  std::signal(SIGCHLD, SIG_IGN);
+  EXPECT_EQ(callInChild([](const Send& send) { send("text"); }).text, "text");
 }
 
 }  // namespace

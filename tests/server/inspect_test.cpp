@@ -258,7 +258,8 @@ TEST_F(Inspect, TheVersionHasCommitAndBuildType) {
   EXPECT_EQ(printed.out, formatVersion() + "\n");
   EXPECT_TRUE(std::regex_match(
       printed.out,
-      std::regex(R"(enfilade \d+\.\d+\.\d+ \(commit ([0-9a-f]{10,}|unknown), [\w ]+\)\n)")))
+      std::regex(
+          R"(enfilade \d+\.\d+\.\d+ \(commit ([0-9a-f]{10,}(-dirty)?|unknown), [\w ]+\)\n)")))
       << printed.out;
   EXPECT_EQ(printed.err, "");
 }

@@ -40,11 +40,11 @@ v1::TouchingQuery near(const A& which, double within) {
   return query;
 }
 
-v1::CannotTouchQuery apart(const std::string& a, const std::string& b, double least = 0) {
+v1::CannotTouchQuery apart(const std::string& a, const std::string& b, double minWait = 0) {
   v1::CannotTouchQuery query;
   *query.mutable_a() = entity(a);
   *query.mutable_b() = entity(b);
-  query.set_least(least);
+  query.set_least(minWait);
   return query;
 }
 
@@ -202,8 +202,8 @@ TEST_F(Pairs, InvalidQueriesAreRefusedByTheirField) {
   for (const double within : {-1.0, std::nan(""), 1001.0, std::numeric_limits<double>::infinity()})
     expect(catchRefusal([&] { ann.touching(near("ann", within)); }), v1::ERROR_BAD_MESSAGE,
            "touching.within");
-  for (const double least : {-1.0, std::nan(""), 3601.0})
-    expect(catchRefusal([&] { ann.cannotTouch(apart("ann", "left", least)); }),
+  for (const double minWait : {-1.0, std::nan(""), 3601.0})
+    expect(catchRefusal([&] { ann.cannotTouch(apart("ann", "left", minWait)); }),
            v1::ERROR_BAD_MESSAGE, "cannot_touch.least");
   EXPECT_EQ(ann.distances(between("left", "end")).pairs_size(), 1) << "the connection continues";
 }

@@ -193,7 +193,7 @@ std::vector<scene::TickReport> runDenseRoom() {
   return reports;
 }
 
-v1::Metrics makeMetricsOf(const std::vector<scene::TickReport>& reports) {
+v1::Metrics makeMetrics(const std::vector<scene::TickReport>& reports) {
   TickStatistics statistics;
   for (const scene::TickReport& report : reports) statistics.addTick(report);
   return statistics.makeMetrics();
@@ -221,7 +221,7 @@ TEST(TickStatistics, SumTheWorkOfAllTicks) {
   }
   EXPECT_GT(reports.back().verticesLookedAt, 0u) << "the body still turns";
   EXPECT_GE(boxes, 80u) << "of the bars next to the post";
-  const v1::Metrics metrics = makeMetricsOf(reports);
+  const v1::Metrics metrics = makeMetrics(reports);
   EXPECT_EQ(metrics.narrow_queries(), queries);
   EXPECT_EQ(metrics.vertices_looked_at(), vertices);
   EXPECT_EQ(metrics.part_boxes_made(), boxes);
@@ -233,7 +233,7 @@ TEST(TickStatistics, ListTheWorkOfTheAvatarsInTheLastTickByAscendingIds) {
   const scene::TickReport& last = reports.back();
   ASSERT_FALSE(std::ranges::is_sorted(last.avatarWork, {}, &scene::AvatarWork::id))
       << "the order of the report is that of the names";
-  const v1::Metrics metrics = makeMetricsOf(reports);
+  const v1::Metrics metrics = makeMetrics(reports);
   ASSERT_EQ(metrics.avatar_work_size(), 3);
   std::uint64_t parts = 0;
   for (int i = 0; i < 3; ++i) {
@@ -249,12 +249,12 @@ TEST(TickStatistics, ListTheWorkOfTheAvatarsInTheLastTickByAscendingIds) {
 
 TEST(TickStatistics, TheCostliestAvatarIsTheOneWithTheMostQueriesInATick) {
   const std::vector<scene::TickReport> reports = runDenseRoom();
-  std::uint32_t most = 0;
+  std::uint32_t maxQueries = 0;
   for (const scene::TickReport& report : reports)
     for (const scene::AvatarWork& work : report.avatarWork)
-      most = std::max(most, work.narrowQueries);
-  const v1::AvatarWork costliest = makeMetricsOf(reports).costliest_avatar();
-  EXPECT_EQ(costliest.narrow_queries(), most);
+      maxQueries = std::max(maxQueries, work.narrowQueries);
+  const v1::AvatarWork costliest = makeMetrics(reports).costliest_avatar();
+  EXPECT_EQ(costliest.narrow_queries(), maxQueries);
   ASSERT_TRUE(costliest.tick() >= 1 && costliest.tick() <= kWorkTicks) << costliest.tick();
   expectReportedWork(costliest, reports[costliest.tick() - 1]);
   const auto& avatars = reports.back().snapshot->avatars;

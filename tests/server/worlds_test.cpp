@@ -430,15 +430,16 @@ std::size_t residentBytes() {
 constexpr std::size_t kMiB = 1u << 20;
 
 TEST(WorldRegistry, AllAreCreatedAndDroppedRepeatedlyInConstantMemory) {
-  const std::uint32_t most = ServerLimits().worlds;
+  const std::uint32_t maxWorlds = ServerLimits().worlds;
   WorldRegistry worlds({smallRoom()}, {}, {});
   std::vector<std::size_t> after;
   for (int round = 0; round < 8; ++round) {
-    for (std::uint32_t i = 1; i < most; ++i)
+    for (std::uint32_t i = 1; i < maxWorlds; ++i)
       ASSERT_TRUE(std::holds_alternative<v1::World>(made(worlds, "w" + std::to_string(i))));
-    EXPECT_EQ(worlds.allWorlds().size(), most);
+    EXPECT_EQ(worlds.allWorlds().size(), maxWorlds);
     EXPECT_EQ(std::get<v1::Error>(made(worlds, "one-more")).code(), v1::ERROR_TOO_LARGE);
-    for (std::uint32_t i = 1; i < most; ++i) ASSERT_FALSE(dropped(worlds, "w" + std::to_string(i)));
+    for (std::uint32_t i = 1; i < maxWorlds; ++i)
+      ASSERT_FALSE(dropped(worlds, "w" + std::to_string(i)));
     after.push_back(residentBytes());
   }
   EXPECT_EQ(worlds.allWorlds().size(), 1u);

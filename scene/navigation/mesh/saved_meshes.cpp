@@ -196,7 +196,7 @@ SavedMeshes loadMeshes(const WorldData& world, const NavigationAgent& agent, con
       file.refuse("its lists do not fit the scene");
     for (const SavedGap& gap : meshes.gaps)
       if (std::max(gap.there.size(), gap.back.size()) > kMaxPathPoints)
-        file.refuse("a way across a gap is too long");
+        file.refuse("a path across a gap is too long");
     for (const auto* list : {&meshes.ample, &meshes.scarce})
       for (const TileMesh& tile : *list)
         if (!tile.empty() && !isTileSafe(tile, grid)) file.refuse("a tile is invalid");

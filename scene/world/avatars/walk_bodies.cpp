@@ -48,12 +48,13 @@ Aabb computeSwing(const Body& door) {
 bool crosses(const Aabb& box, const Vec3& from, const Vec3& to) {
   double enter = 0, leave = 1;
   for (int axis = 0; axis < 3; ++axis) {
-    const double way = to[axis] - from[axis];
-    if (way == 0) {
+    const double difference = to[axis] - from[axis];
+    if (difference == 0) {
       if (from[axis] < box.min[axis] || from[axis] > box.max[axis]) return false;
       continue;
     }
-    const double a = (box.min[axis] - from[axis]) / way, b = (box.max[axis] - from[axis]) / way;
+    const double a = (box.min[axis] - from[axis]) / difference,
+                 b = (box.max[axis] - from[axis]) / difference;
     enter = std::max(enter, std::min(a, b));
     leave = std::min(leave, std::max(a, b));
   }
@@ -127,12 +128,12 @@ void prepareDoor(WorldData& world, const Walk& walk, Avatar& avatar, const BodyH
       world.pendingBodyCommands.push_back(makeOpenCommand(handle));
     return;
   }
-  const double way =
+  const double distance =
       walk.speed * (kEarly + computeMotionSeconds(*door.spec, open - door.drive.jointPosition));
   const Vec3 across = projectToGround(swing.size());
-  if (!isAhead(walk, avatar, swingOfFeet, way) ||
+  if (!isAhead(walk, avatar, swingOfFeet, distance) ||
       !isAhead(walk, avatar, growForFeet(door.boxes.whole, avatar, world.settings.contactOffset),
-               way + across.norm()))
+               distance + across.norm()))
     return;
   if (!door.drive.moving || door.drive.target != open)
     call(world, walk, avatar, makeOpenCommand(handle));

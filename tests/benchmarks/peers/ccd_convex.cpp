@@ -24,11 +24,11 @@ void support(const void* object, const ccd_vec3_t* direction, ccd_vec3_t* result
   const Shape& shape = *static_cast<const Shape*>(object);
   const Vec3 local = shape.at->rotation.transpose() * toVector(*direction);
   const Vec3* best = &shape.vertices.front();
-  double most = best->dot(local);
+  double maxHeight = best->dot(local);
   for (const Vec3& vertex : shape.vertices) {
     const double height = vertex.dot(local);
-    if (height > most) {
-      most = height;
+    if (height > maxHeight) {
+      maxHeight = height;
       best = &vertex;
     }
   }
