@@ -160,6 +160,7 @@ class Visitor {
     ask(std::move(message), [this](const protocol::Reply& reply) {
       for (const v1::ContactEvent& live : reply.message.subscribe().live()) {
         open_.insert({live.a(), live.b()});
+        ++result_.begins;  // an avatar that came before has landed already
       }
     });
   }
