@@ -44,7 +44,7 @@ TEST(PathSteps, AWideAgentStandsHighAboveTheFloorOfAStair) {
   std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {4, 0, 4}}};
   for (int i = 0; i < 8; ++i)
     boxes.push_back({"stair", {4 + 0.25 * i, -0.2, 0}, {12, 0.18 * (i + 1), 4}});
-  Navigation navigation(boxScene(boxes), {}, {.radius = 0.5});
+  Navigation navigation(boxScene(boxes), {}, {.radius = 0.8});
   const NavigationPath path = navigation.findPath({1, 0, 2}, {9, 1.44, 2});
   ASSERT_TRUE(path.found()) << path.reason;
   expectRises(navigation.findSteps(path.points), std::vector<double>(8, 0.18));
@@ -73,6 +73,30 @@ TEST(PathSteps, AnInclinedRiserIsOneStep) {
       expectRises(navigation.findSteps(down.points), {-0.15});
     }
   }
+}
+
+TEST(PathSteps, ARiserThatIsCrossedObliquelyIsAStep) {
+  const auto scene = std::make_shared<const Scene>(makeInclinedKerb(0.07f));  // 65 degrees
+  const World world(scene);
+  std::vector<Vec3> traced;  // the line rises by 48 degrees there
+  for (int i = 0; i <= 40; ++i) {
+    const double x = 5.2 + 0.045 * i;
+    traced.emplace_back(x, x < 5.8 ? 0 : 0.15, 0.5 + 0.075 * i);
+  }
+  expectRises(findSteps(world.data(), {}, traced), {0.15});
+}
+
+TEST(PathSteps, AGrooveBetweenTheFeetIsNoStep) {
+  Navigation navigation(boxScene({{"floor", {0, -0.2, 0}, {3, 0, 4}},
+                                  {"left", {3, -0.2, 0}, {6, 0, 1.9}},
+                                  {"right", {3, -0.2, 2.1}, {6, 0, 4}},
+                                  {"bottom", {3, -0.2, 1.9}, {6, -0.1, 2.1}},
+                                  {"behind", {6, -0.2, 0}, {9, 0, 4}}}),
+                        {}, {});
+  const NavigationPath path = navigation.findPath({1, 0, 2}, {8, 0, 2});
+  ASSERT_TRUE(path.found()) << path.reason;
+  EXPECT_NEAR(path.length, 7, 1e-3) << "along the groove";
+  expectRises(navigation.findSteps(path.points), {});
 }
 
 TEST(PathSteps, AJointInARampIsNoStep) {

@@ -201,34 +201,45 @@ TEST_F(Program, AFailedWriteToStdoutExitsWithOne) {
   }
 }
 
-TEST_F(Program, ADriverThatCrashesIsReportedByDoctor) {
-  write(path("vendor.json"),
-        R"({"file_format_version":"1.0.0","ICD":{"library_path":")" ENFILADE_CRASHING_EGL R"("}})");
-  setenv("__EGL_VENDOR_LIBRARY_FILENAMES", path("vendor.json").c_str(), 1);
-  const Ended ended = run({"doctor", "--json"});
-  unsetenv("__EGL_VENDOR_LIBRARY_FILENAMES");
-  EXPECT_EQ(ended.code, 1);
-  const auto report = nlohmann::json::parse(ended.out);
+class DoctorBesideACrash : public ProgramFixture {
+ protected:
+  void SetUp() override {
+    ProgramFixture::SetUp();
+    write(vendor_, R"({"file_format_version":"1.0.0","ICD":{"library_path":")" ENFILADE_CRASHING_EGL
+                   R"("}})");
+  }
+
+  /// The report with EGL drivers from `files` alone, separated by colons.
+  nlohmann::json diagnose(const std::string& files, int code) const {
+    setenv("__EGL_VENDOR_LIBRARY_FILENAMES", files.c_str(), 1);
+    const Ended ended = run({"doctor", "--json"});
+    unsetenv("__EGL_VENDOR_LIBRARY_FILENAMES");
+    EXPECT_EQ(ended.code, code) << ended.err;
+    return nlohmann::json::parse(ended.out);
+  }
+
+  const std::string vendor_ = path("vendor.json");
+};
+
+TEST_F(DoctorBesideACrash, NamesTheDriverThatCrashes) {
+  const auto report = diagnose(vendor_, 1);
   EXPECT_EQ(report["vendors"][0]["failure"], "crashed (Aborted)");
   EXPECT_TRUE(report["devices"].empty());
-  EXPECT_TRUE(report["remedy"].get<std::string>().ends_with(path("vendor.json")));
+  EXPECT_TRUE(report["remedy"].get<std::string>().ends_with(vendor_));
 }
 
-TEST_F(Program, BesideADriverThatCrashesDoctorTestsTheOthers) {
-  const char* mesa = "/usr/share/glvnd/egl_vendor.d/50_mesa.json";
-  if (!std::filesystem::exists(mesa)) GTEST_SKIP() << "no " << mesa;
-  write(path("vendor.json"),
-        R"({"file_format_version":"1.0.0","ICD":{"library_path":")" ENFILADE_CRASHING_EGL R"("}})");
-  const std::string files = path("vendor.json") + ":" + mesa;
-  setenv("__EGL_VENDOR_LIBRARY_FILENAMES", files.c_str(), 1);
-  const Ended ended = run({"doctor", "--json"});
-  unsetenv("__EGL_VENDOR_LIBRARY_FILENAMES");
-  EXPECT_EQ(ended.code, 0) << ended.err;
-  const auto report = nlohmann::json::parse(ended.out);
+TEST_F(DoctorBesideACrash, TestsTheOtherDrivers) {
+  const std::string mesa = "/usr/share/glvnd/egl_vendor.d/50_mesa.json";
+  if (!std::filesystem::exists(mesa)) {
+    ASSERT_EQ(std::getenv("CI"), nullptr) << "no " << mesa << ": install libegl-mesa0";
+    GTEST_SKIP() << "no " << mesa << ": install libegl-mesa0";
+  }
+  const auto report = diagnose(vendor_ + ":" + mesa, 0);
   EXPECT_EQ(report["vendors"][0]["failure"], "crashed (Aborted)");
   EXPECT_EQ(report["vendors"][1]["failure"], "");
   ASSERT_FALSE(report["devices"].empty());
   EXPECT_EQ(report["devices"][0]["proof"], "right");
+  EXPECT_TRUE(report["remedy"].get<std::string>().ends_with(vendor_));
 }
 
 TEST_F(Program, AFileBeyondTheLimitIsAnErrorNotADeath) {
