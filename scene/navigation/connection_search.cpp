@@ -21,7 +21,8 @@ namespace enfilade::scene {
 namespace {
 
 constexpr double kHeightReach = 0.6;    // metres between both sides of a gap
-constexpr double kMaxGapDetour = 6;     // metres: a longer path around a gap does not pass it
+constexpr double kMaxGapDetour = 3;     // metres: a longer path around a gap does not pass it
+constexpr double kMaxExitDistance = 6;  // metres from a small island
 constexpr double kGridSpacing = 0.12;   // metres
 constexpr double kGapMargin = 1.6;      // metres around the beginning of a path across a gap
 constexpr double kNearStart = 0.3;      // metres
@@ -104,11 +105,15 @@ bool hasConnectionAt(const ConnectionList& list, const BoundaryGap& gap) {
          leads(gap.to, gap.toPolygon, gap.from, gap.fromPolygon);
 }
 
+/// Whether the scarce mesh leads through the gap, and not around it.
 bool isOnScarceMesh(const Collection& all, const BoundaryGap& gap) {
+  const NavigationMesh& scarce = all.finder.scarce;
   const Vec3 extent(all.finder.agent.radius, 0.5, all.finder.agent.radius);
-  const auto a = all.finder.scarce.findNearest(gap.from, extent),
-             b = all.finder.scarce.findNearest(gap.to, extent);
-  return a && b && all.scarceParts[a->polygon] == all.scarceParts[b->polygon];
+  const auto a = scarce.findNearest(gap.from, extent), b = scarce.findNearest(gap.to, extent);
+  if (!a || !b || all.scarceParts[a->polygon] != all.scarceParts[b->polygon]) return false;
+  const auto corridor = scarce.findCorridor(*a, *b);
+  return corridor && computeLength(scarce.straighten(*corridor, a->point, b->point)) <=
+                         (gap.to - gap.from).norm() + kMaxGapDetour;
 }
 
 /// Where one path was found, the other one leads back along it.
@@ -230,7 +235,7 @@ GapTrial tryGap(const Collection& all, Walker& walker, const BoundaryGap& gap,
 GapPaths leaveIsland(const Collection& all, Walker& walker, std::uint32_t island) {
   const Vec3& place = all.islands.islands[island].place;
   const std::size_t share = kMaxExitWalks / all.islands.islands.size();
-  const GridSearch limits{kGridSpacing, kMaxGapDetour,
+  const GridSearch limits{kGridSpacing, kMaxExitDistance,
                           std::clamp(share, kMinExitWalks, kMaxWalksOfExit)};
   const auto isOther = [&](const Vec3& feet) {
     const auto polygon = findPolygonAt(all.finder.ample, feet);
@@ -403,6 +408,14 @@ std::vector<std::uint32_t> listClosedIslands(const Collection& all) {
 
 }  // namespace
 
+std::size_t measureBytes(const TriedGaps& tried) {
+  constexpr std::size_t kNode = 4 * sizeof(void*);  // of a std::map
+  std::size_t bytes = tried.size() * (kNode + sizeof(TriedGaps::value_type));
+  for (const auto& [key, paths] : tried)
+    bytes += (paths.there.size() + paths.back.size()) * sizeof(Vec3);
+  return bytes;
+}
+
 ConnectionList collectConnections(PathFinder finder, const IslandList& islands, TriedGaps& tried,
                                   int threads, const std::function<void(double)>& progress) {
   finder.maxRepairWalks = kMaxRepairWalks;
@@ -437,11 +450,14 @@ ConnectionList collectConnections(PathFinder finder, const IslandList& islands, 
 }
 
 void forgetGaps(TriedGaps& tried, const Aabb& box) {
+  constexpr double kAround = 1;  // metres: the agent, and what its walk meets
+  constexpr double kRepairs = 1.5;
   std::erase_if(tried, [&](const auto& one) {
     const auto& [key, paths] = one;
     const Vec3 from(key[0], key[1], key[2]), to(key[3], key[4], key[5]);
     const Aabb around{from.cwiseMin(to), from.cwiseMax(to)};
-    return overlaps(inflated(around, kMaxGapDetour + 1), box);
+    const double reach = from == to ? kMaxExitDistance : 0.5 * kMaxGapDetour + kRepairs;
+    return overlaps(inflated(around, reach + kAround), box);
   });
 }
 

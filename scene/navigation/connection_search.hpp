@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <functional>
 #include <map>
 #include <vector>
@@ -20,6 +21,8 @@ struct GapPaths {
 /// Gaps that were tried, by the coordinates of both places: most stay as they are when a body
 /// moves. The exit of a small island has its place twice.
 using TriedGaps = std::map<std::array<double, 6>, GapPaths>;
+
+std::size_t measureBytes(const TriedGaps& tried);
 
 /// All off-mesh connections of `finder.ample`, the same for any number of threads. `islands`: as
 /// collectIslands() returns them. `progress`, which may be empty, gets the share that is done.

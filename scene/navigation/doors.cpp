@@ -134,8 +134,8 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
       if (known != doors.end()) doors.erase(known);  // it stood further on than where it closes
       const double rest = findOpenLimit(spec) - body.jointPosition;
       const double onLeg = measureClearLength(isInTheWay ? snapshot : closed, b);
-      doors.push_back(
-          {body.index, i - 1, distance + onLeg, computeMotionSeconds(spec, rest), isInTheWay});
+      doors.push_back({body.index, i - 1, distance + onLeg, onLeg, computeMotionSeconds(spec, rest),
+                       isInTheWay});
     }
     const auto ofLeg = std::ranges::find(doors, i - 1, &DoorOnPath::point);
     std::sort(ofLeg, doors.end(), [](const DoorOnPath& a, const DoorOnPath& b) {

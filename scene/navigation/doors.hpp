@@ -29,6 +29,7 @@ struct DoorOnPath {
   std::uint32_t body = 0;    ///< index into Model::bodies
   std::size_t point = 0;     ///< index of the first point of the line on which it stands
   double distance = 0;       ///< metres along the points from the start of the path to its contact
+  double onLine = 0;         ///< metres of it from that point
   double secondsToOpen = 0;  ///< at its own speed, from where it is
   bool isInTheWay = false;   ///< as it is now
 };

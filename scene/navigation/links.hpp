@@ -2,6 +2,7 @@
 // connects. The walker proves each link before it is used.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -41,6 +42,7 @@ class Links {
         const PathOptions& options);
 
   const PathOptions& options() const { return options_; }
+  std::size_t memoryBytes() const { return bytes_; }
   const std::vector<PathLink>& from(std::uint32_t polygon, Walker& walker);
 
  private:
@@ -60,6 +62,7 @@ class Links {
   const PathOptions options_;
   std::map<std::uint32_t, std::vector<Edge>> edges_;      ///< not yet proved, by polygon
   std::map<std::uint32_t, std::vector<PathLink>> links_;  ///< by polygon of the first point
+  std::size_t bytes_ = 0;                                 ///< with all drops that may be proved
 };
 
 }  // namespace enfilade::scene

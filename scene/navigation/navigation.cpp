@@ -95,12 +95,12 @@ std::vector<std::uint8_t> Navigation::save() {
 }
 
 void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress) {
-  parallelFor(tiles.size(), threads, progress, [&](std::size_t i) {
-    const auto tile = static_cast<std::size_t>(tiles[i]);
-    auto built = buildTileMeshes(world_.data(), agent_, grid_, tiles[i] % grid_.tilesX,
-                                 tiles[i] / grid_.tilesX, {Clearance::ample, Clearance::scarce});
-    ampleTiles_[tile] = std::move(built[0]);
-    scarceTiles_[tile] = std::move(built[1]);
+  parallelFor(2 * tiles.size(), threads, progress, [&](std::size_t i) {  // two also for one tile
+    const int tile = tiles[i / 2];
+    const bool isAmple = i % 2 == 0;
+    auto& built = (isAmple ? ampleTiles_ : scarceTiles_)[static_cast<std::size_t>(tile)];
+    built = buildTileMesh(world_.data(), agent_, grid_, tile % grid_.tilesX, tile / grid_.tilesX,
+                          isAmple ? Clearance::ample : Clearance::scarce);
   });
 }
 
@@ -125,7 +125,9 @@ void Navigation::assembleMeshes(int threads, const Progress& progress) {
     report_.area += island.area;
   }
   report_.polygons = ample_->polygonCount();
-  report_.bytes = 2 * (ample_->memoryBytes() + scarce_->memoryBytes());
+  report_.bytes = 2 * (ample_->memoryBytes() + scarce_->memoryBytes()) +
+                  connections_.memoryBytes() + measureBytes(triedGaps_) +
+                  islands_.numberOf.size() * sizeof(islands_.numberOf[0]);
   if (progress) progress(1);
 }
 
@@ -173,15 +175,18 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads, const Prog
 
 NavigationReport Navigation::report() {
   const std::lock_guard lock(mutex_);
-  return report_;
+  NavigationReport report = report_;
+  if (unobstructed_) report.bytes += unobstructed_->memoryBytes();
+  for (const Links& links : links_) report.bytes += links.memoryBytes();
+  return report;
 }
 
 NavigationMesh Navigation::buildUnobstructed(int threads, const Progress& progress) const {
   std::vector<TileMesh> tiles(ampleTiles_.size());
   parallelFor(tiles.size(), threads, progress, [&](std::size_t i) {
     const int tile = static_cast<int>(i);
-    tiles[i] = std::move(buildTileMeshes(world_.data(), agent_, grid_, tile % grid_.tilesX,
-                                         tile / grid_.tilesX, {Clearance::none})[0]);
+    tiles[i] = buildTileMesh(world_.data(), agent_, grid_, tile % grid_.tilesX, tile / grid_.tilesX,
+                             Clearance::none);
   });
   return {grid_, std::move(tiles)};
 }

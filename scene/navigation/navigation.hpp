@@ -34,8 +34,8 @@ struct NavigationReport {
   std::size_t polygons = 0;         ///< of the mesh for ample clearance
   double area = 0;                  ///< square metres, of all islands
   std::vector<double> islandAreas;  ///< square metres, by number: descending
-  std::size_t bytes = 0;
-  double seconds = 0;  ///< to build or load the meshes
+  std::size_t bytes = 0;            ///< of memory, with connections, drops, lifts and tried gaps
+  double seconds = 0;               ///< to build or load the meshes
 };
 
 inline constexpr double kMapTolerance = 0.5;  ///< metres: habitat-sim's default

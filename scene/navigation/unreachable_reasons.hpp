@@ -1,6 +1,7 @@
 // Explains an unreachable goal: the obstruction on the way, and the clearance, step or drop there.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -28,6 +29,10 @@ struct UnobstructedMesh {
   NavigationMesh mesh;
   std::vector<std::uint32_t> partOf;  ///< by polygon
   std::vector<PartGap> gaps;  ///< at most one from a part to another; ascending by `fromPart`
+
+  std::size_t memoryBytes() const {
+    return mesh.memoryBytes() + partOf.size() * sizeof(partOf[0]) + gaps.size() * sizeof(PartGap);
+  }
 };
 /// `walkable`: the mesh where agents fit.
 UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh, const NavigationMesh& walkable);

@@ -34,9 +34,9 @@ std::variant<v1::NavigationQuery, v1::Error> makePathQuery(const scene::World& w
 
 namespace {
 
-/// The doors that the walk opens, and the lifts that it rides. `skipped`: points before the first
-/// waypoint.
-void addBodies(const v1::NavigationPath& path, int skipped, v1::Walk& walk) {
+/// The doors that the walk opens, if it does, and the lifts that it rides. `skipped`: points before
+/// the first waypoint.
+void addBodies(const v1::NavigationPath& path, bool opensDoors, int skipped, v1::Walk& walk) {
   const auto addRide = [&](int point, const v1::NavigationLeg& leg, std::uint32_t level) {
     if (point >= path.points_size()) return;
     v1::Walk::Ride& ride = *walk.add_rides();
@@ -49,7 +49,7 @@ void addBodies(const v1::NavigationPath& path, int skipped, v1::Walk& walk) {
   for (const v1::NavigationLeg& leg : path.legs()) {
     const int first = static_cast<int>(leg.first());
     // Also a door that a touch would open: its leaf may swing towards the walker.
-    if (leg.kind() == v1::NavigationLeg::KIND_DOOR) walk.add_opens(leg.name());
+    if (opensDoors && leg.kind() == v1::NavigationLeg::KIND_DOOR) walk.add_opens(leg.name());
     if (leg.kind() != v1::NavigationLeg::KIND_LIFT) continue;
     addRide(first, leg, leg.from_level());  // in
     addRide(first + 1, leg, leg.to_level());
@@ -73,7 +73,7 @@ std::variant<v1::Command, v1::Error> makeGoOrder(
   v1::Walk& walk = *order.mutable_walk();
   const int skipped = std::min(1, path.points_size() - 1);
   for (int i = skipped; i < path.points_size(); ++i) *walk.add_along() = path.points(i);
-  addBodies(path, skipped, walk);
+  addBodies(path, command.go().doors() == v1::NavigationQuery::DOORS_OPEN, skipped, walk);
   if (command.go().has_speed()) walk.set_speed(command.go().speed());
   return order;
 }

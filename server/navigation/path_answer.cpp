@@ -31,6 +31,7 @@ struct PathWriter {
 
   std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& navigation,
                                            const scene::NavigationPath& path) const {
+    if (!scene::hasDoors(answer.scene)) return {};  // without an index
     return scene::findDoorsOnPath(answer.index(), answer.settings, answer.snapshot,
                                   navigation.agent(), path.points, path.legs);
   }
@@ -146,8 +147,9 @@ struct PathWriter {
       // Doors on the same line, as the leaves of one, are legs without a length but for the last.
       const bool isLast = scene::isLastOnLine(doors, i);
       const double length = isLast ? computeLength(door.point, door.point + 1) : 0;
-      addLeg(v1::NavigationLeg::KIND_DOOR, door.point, length,
-             length / speed + (isLast ? door.secondsToOpen : 0), door.body, message);
+      const double wait = isLast && answer.doorsOpen ? door.secondsToOpen : 0;
+      addLeg(v1::NavigationLeg::KIND_DOOR, door.point, length, length / speed + wait, door.body,
+             message);
       if (isLast) at = door.point + 1;
     }
     walkTo(end);
@@ -181,19 +183,21 @@ struct PathWriter {
     }
   }
 
-  /// The first closed door on a path through open ones.
-  std::optional<std::uint32_t> findClosedDoor(const Vec3& from, const Vec3& to,
-                                              const scene::PathOptions& options) const {
+  /// The first door on a path through open ones that stops an agent as it is.
+  std::optional<ClosedDoor> findClosedDoor(const Vec3& from, const Vec3& to,
+                                           const scene::PathOptions& options) const {
     scene::Navigation& open = answer.withOpenDoors();
     const scene::NavigationPath through = open.findPath(from, to, options, answer.progress);
     if (!through.found()) return std::nullopt;
     const auto doors = findDoors(open, through);
     const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
-    return first == doors.end() ? std::nullopt : std::optional(first->body);
+    if (first == doors.end()) return std::nullopt;
+    const Vec3 &start = through.points[first->point], &end = through.points[first->point + 1];
+    return ClosedDoor{first->body, start + first->onLine * (end - start).normalized()};
   }
 
-  /// Gives a closed door as the reason, if a path leads through it when it is open. Of two islands
-  /// it is sought once.
+  /// Gives a door as the reason, if a path leads through it when it is open. Of two islands it is
+  /// sought once.
   void explainByDoors(const Vec3& from, const Vec3& to, const scene::PathOptions& options,
                       v1::NavigationPath& message) const {
     if (answer.doorsOpen || !answer.withOpenDoors) return;
@@ -205,12 +209,15 @@ struct PathWriter {
                                                         : findClosedDoor(from, to, options);
     if (!door) return;
     if (isOfIslands) answer.closedDoors.emplace(islands, *door);
-    const scene::BodySpec& spec = answer.scene.model().bodies[*door];
-    message.set_reason("the door '" + spec.name + "' is closed: " + answer.doorRemedy);
+    const scene::BodySpec& spec = answer.scene.model().bodies[door->body];
+    const bool isClosed =
+        (*answer.snapshot.bodies)[door->body].jointPosition == spec.closedPosition;
+    message.set_reason("the door '" + spec.name + "' " +
+                       (isClosed ? "is closed: " : "is not open far enough: ") + answer.doorRemedy);
     message.set_obstacle(spec.objects.front() + 1);
     message.set_obstacle_name(spec.name);
-    message.clear_obstacle_at();  // these are about what an agent meets on other paths
-    message.clear_clear_width();
+    *message.mutable_obstacle_at() = toProto(door->at);
+    message.clear_clear_width();  // that of what an agent meets on other paths
   }
 };
 
@@ -234,10 +241,8 @@ void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
   const PathWriter writer{answer};
   scene::NavigationPath path = answer.navigation.findPath(from, to, options, answer.progress);
   std::vector<scene::DoorOnPath> doors;
-  if (path.found() && answer.doorsOpen) {
-    doors = writer.findDoors(answer.navigation, path);
-    writer.stepAside(to, options, path, doors);
-  }
+  if (path.found()) doors = writer.findDoors(answer.navigation, path);
+  if (path.found() && answer.doorsOpen) writer.stepAside(to, options, path, doors);
   message.set_found(path.found());
   for (const Vec3& point : path.points) *message.add_points() = toProto(point);
   message.set_length(path.length);
@@ -249,7 +254,7 @@ void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
     message.set_clear_width(path.obstruction->clearWidth);
   }
   if (!path.found()) return writer.explainByDoors(from, to, options, message);
-  writer.addDoors(doors, message);
+  if (answer.doorsOpen) writer.addDoors(doors, message);
   writer.addLegs(path, doors, message);
   if (measures.steps)
     for (const scene::PathStep& step : answer.navigation.findSteps(path.points)) {

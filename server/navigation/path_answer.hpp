@@ -15,9 +15,14 @@
 
 namespace enfilade::server {
 
-/// Doors that are the reason why no path leads from one island to another one, as indices into
-/// Model::bodies.
-using ClosedDoors = std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint32_t>;
+/// A door that stands on a path through open ones.
+struct ClosedDoor {
+  std::uint32_t body = 0;                ///< index into Model::bodies
+  scene::Vec3 at = scene::Vec3::Zero();  ///< where an agent meets it: feet, scene frame, metres
+};
+
+/// The reasons why no path leads from one island to another one.
+using ClosedDoors = std::map<std::pair<std::uint32_t, std::uint32_t>, ClosedDoor>;
 
 /// The means to find the paths of a query.
 struct PathAnswer {

@@ -219,8 +219,8 @@ scene::NavigationMesh buildMesh(const scene::World& world) {
   std::vector<scene::TileMesh> tiles;
   for (int z = 0; z < grid.tilesZ; ++z)
     for (int x = 0; x < grid.tilesX; ++x)
-      tiles.push_back(std::move(
-          scene::buildTileMeshes(world.data(), agent, grid, x, z, {scene::Clearance::ample})[0]));
+      tiles.push_back(
+          scene::buildTileMesh(world.data(), agent, grid, x, z, scene::Clearance::ample));
   return {grid, std::move(tiles)};
 }
 

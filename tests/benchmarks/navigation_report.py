@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """Makes the report of navigation: navigation.md.
 
-navigation_report.py RESULTS_FOLDER REPORT_FOLDER [--quick]
+navigation_report.py RESULTS_FOLDER REPORT_FOLDER
 
-Reads navigation.jsonl, as navigation_bench writes it.
+Reads navigation.jsonl, as navigation_bench writes it, and the present report. A part of a scene that was not measured
+again keeps its row, which has its date. Paragraphs that begin with "Note:" stay in their section.
 """
 
 import datetime
@@ -41,18 +42,46 @@ def make_time_row(row):
             short(row["mesh_us"]), short(row["median_us"]), short(row["p99_us"]), short(row["not_found_p99_us"])]
 
 
-def main():
-    results, report = Path(sys.argv[1]), Path(sys.argv[2])
-    scenes = {}
-    for row in read(results, "navigation"):
-        scenes.setdefault(row["scene"], {}).update(row)
-    rows = list(scenes.values())
-    parts = {part: [row for row in rows if part in row] for part in ("pairs", "reach_compared", "detour_pairs", "median_us")}
-    report.mkdir(parents=True, exist_ok=True)
-    (report / "navigation.md").write_text(f"""# Navigation: paths that are walked
+class Section:
+    """The rows and the notes of a section of the present report."""
 
-Made by `./dev bench navigation{" --quick" if "--quick" in sys.argv else ""}` on \
-{datetime.date.today().isoformat()}. Machine: {machine()}.
+    def __init__(self, report, title):
+        text = report.partition(f"\n## {title}\n")[2].partition("\n## ")[0]
+        self.notes = "".join(one.strip() + "\n\n" for one in text.split("\n\n") if one.startswith("Note:"))
+        lines = [line for line in text.splitlines() if line.startswith("| ")][1:]
+        self.rows = {cells[0]: cells for cells in ([cell.strip() for cell in line.strip("| ").split("|")] for line in lines)}
+
+    def write(self, head, measured, make_row):
+        """The table: rows of this run replace those of their scenes."""
+        today = datetime.date.today().isoformat()
+        rows = {**self.rows, **{row["scene"]: [*make_row(row), today] for row in measured}}
+        return self.notes + table([*head, "date"], [row for row in rows.values() if len(row) == len(head) + 1])
+
+
+WALKS = ["scene", "pairs", "refused", "paths", "wrong", "silent", "penetration m", "with doors (wrong)", "with lifts", "with drops"]
+REACH = ["scene", "places of the fill", "compared", "wrong", "walked", "near", "skipped", "islands", "lengths", "median share",
+         "largest", "above 1.02", "by feet: largest", "above"]
+DETOUR = ["scene", "pairs", "paths", "no line", "not walked", "compared", "smallest share", "median", "largest", "above 1.02"]
+TIMES = ["scene", "navigable m²", "islands", "build s", "MB", "µs on the mesh, median", "µs a path, median", "99 %",
+         "µs without a path, 99 %"]
+
+
+def main():
+    results, folder = Path(sys.argv[1]), Path(sys.argv[2])
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "navigation.md"
+    before = path.read_text() if path.exists() else ""
+    parts = {}
+    for row in read(results, "navigation"):
+        parts.setdefault(row["part"], []).append(row)
+
+    def write(title, part, head, make_row):
+        return Section(before, title).write(head, parts.get(part, []), make_row)
+
+    path.write_text(f"""# Navigation: paths that are walked
+
+Made by `./dev bench navigation`, or by its parts (`navigation_bench --only times|fill|lengths|walks`); each row has its
+date. Machine of the last run: {machine()}.
 An agent of 0.3 m radius and 1.75 m height.
 
 ## Walks
@@ -60,12 +89,10 @@ An agent of 0.3 m radius and 1.75 m height.
 An avatar enters at a random place and goes to another one with the order `go`, which opens doors and rides
 lifts. In every sixth pair it may fall by up to 2 m. Doors and lifts are as in the file again after 25 walks. A walk is
 *wrong* if it is blocked, leaves the scene or penetrates anything. Walks through doors
-are counted by themselves, too. *Refused*: a closed door stands at the start. *Silent*: no path and no reason, or only that the search
-ended at its limits.
+are counted by themselves, too. *Refused*: a closed door stands at the start. *Silent*: no path and no reason, or only
+that the search ended at its limits.
 
-{table(["scene", "pairs", "refused", "paths", "wrong", "silent", "penetration m", "with doors (wrong)",
-        "with lifts", "with drops"], [make_walk_row(row) for row in parts["pairs"]])}
-
+{write("Walks", "walks", WALKS, make_walk_row)}
 ## Reach and length
 
 A flood fill tries every place of a grid of 2 cm by standing there (`flood_fill.hpp`): it uses no navigation
@@ -76,29 +103,24 @@ of radius, or a shift of the grid by one centimetre, changes the answer.
 *Skipped*: an end is at no place of the fill, or the fill of a large scene ended at its limit. *Islands*: paths are
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight, where an avatar can walk that. In brackets are those where it cannot, or of
-which the fill has not both ends. Ways of a metre and more are compared. They are measured along the points of both. *By feet*: an avatar walks both, and the
-metres that its feet move are compared, tick by tick. A step up or down then counts with its height. –: not measured.
+which the fill has not both ends. Ways of a metre and more are compared. They are measured along the points of both. *By
+feet*: an avatar walks both, and the metres that its feet move are compared, tick by tick. A step up or down then counts
+with its height. –: not measured.
 
-{table(["scene", "places of the fill", "compared", "wrong", "walked", "near", "skipped", "islands", "lengths", "median share",
-        "largest", "above 1.02", "by feet: largest", "above"], [make_fill_row(row) for row in parts["reach_compared"]])}
-
+{write("Reach and length", "fill", REACH, make_fill_row)}
 ## Length against Detour
 
 Lengths of paths as a share of Detour's string-pulled line on the mesh that proposes them, where an avatar walks that line
 to its end. *No line*: the mesh has none, as where a connection leads from one of its parts to another. *Not walked*: an
-avatar is stopped on the line. Lines of a metre and more are compared.
+avatar is stopped on the line. Lines of a metre and more are compared. Doors are as they are.
 
-{table(["scene", "pairs", "paths", "no line", "not walked", "compared", "smallest share", "median", "largest", "above 1.02"],
-       [make_length_row(row) for row in parts["detour_pairs"]])}
-
+{write("Length against Detour", "lengths", DETOUR, make_length_row)}
 ## Time
 
 Of a query for a path, with its proof, doors as they are, answered in process on one thread. *On the mesh*: the corridor
-and the corners of its line alone, without a proof.
+and the corners of its line alone, without a proof. *MB*: of memory, with connections.
 
-{table(["scene", "navigable m²", "islands", "build s", "MB", "µs on the mesh, median", "µs a path, median", "99 %", "µs without a path, 99 %"],
-       [make_time_row(row) for row in parts["median_us"]])}
-""")
+{write("Time", "times", TIMES, make_time_row)}""")
 
 
 if __name__ == "__main__":

@@ -197,7 +197,7 @@ class Environments(RoomCase):
         self.need_pictures()
         self.assert_same_steps(2, 12, lambda: [1, 3], goals=[(-4, 0, 0)], discrete=True, max_steps=7,
                                cameras=[enfilade.Camera("a", (16, 12), ahead=0.1),
-                                        enfilade.Camera("b", (8, 8), ("ids",), yaw=1.0)])
+                                        enfilade.Camera("b", (8, 8), ("ids", "flow"), yaw=1.0)])
 
     def test_an_avatar_that_falls_ends_its_episode_in_a_packed_step(self):
         infos = self.assert_same_steps(2, 60, lambda: np.array([[1, 0], [0, 0]], float),
@@ -452,7 +452,9 @@ class Environments(RoomCase):
                             ("distortion", (0.1,))):
             with self.assertRaisesRegex(ValueError, "lens" if name == "distortion" else name):
                 enfilade.Camera(**{"name": "a", name: value})
-        for name, options in (("fov_y", {"lens": "fisheye", "fov_y": 7}),
+        for name, options in (("flow", {"channels": ("flow",), "ahead": 0.1}),
+                              ("flow", {"channels": ("flow",), "lens": "fisheye"}),
+                              ("fov_y", {"lens": "fisheye", "fov_y": 7}),
                               ("lens", {"lens": "equirectangular", "fov_y": 1}),
                               ("depth_noise", {"depth_noise": 1, "channels": ("rgb",)})):
             with self.assertRaisesRegex(ValueError, name):
@@ -482,6 +484,32 @@ class Environments(RoomCase):
         self.assertFalse(np.array_equal(seen["noisy_depth"], seen["plain_depth"]))
         env._rgb = None
         np.testing.assert_array_equal(env.render(), seen["plain_rgb"])
+
+    def test_flow_begins_at_the_last_observation(self):
+        self.need_pictures()
+        env = self.environment(size=None, starts=[(2, 0.01, 0, 30)], ticks_per_step=4, cameras=[
+            enfilade.Camera("", (32, 24), ("ids", "flow"), pitch=0.2, yaw=0.5)])
+        def look(cosine, sine):
+            yaw = math.atan2(sine, cosine) + 0.5
+            return math.cos(0.2) * math.cos(yaw), math.sin(0.2), -math.cos(0.2) * math.sin(yaw)
+        for _ in range(2):
+            before, info = env.reset(seed=1)
+            np.testing.assert_allclose(before["flow"][before["ids"] != 0], 0, atol=1e-4)
+            for action in ((1, 0.5), (0.5, -1), (1, 0)):
+                tick = info["tick"]
+                seen, *_, info = env.step(action)
+                self.assertEqual(info["tick"], tick + 4)
+                flow = env.client.frame("walker", forward=look(*seen["heading"]), width=32, height=24, fov_y=1.2,
+                                        channels=("flow",), flow_from=tick, flow_forward=look(*before["heading"])).flow
+                known = ~np.isnan(flow)
+                self.assertGreater(known.sum(), 100)
+                np.testing.assert_allclose(seen["flow"][known], flow[known], atol=1e-4)
+                self.assertTrue(np.isinf(seen["flow"][~known]).all())
+                self.assertGreater(np.abs(flow[known]).max(), 0.5)
+                self.assertTrue(env.observation_space.contains(seen))
+                before = seen
+        with self.assertRaisesRegex(ValueError, "ticks_per_step: at most 31"):
+            self.environment(size=None, ticks_per_step=32, cameras=[enfilade.Camera("", (8, 8), ("flow",))])
 
     def test_actions_that_are_no_sequence_are_named(self):
         vector = enfilade.VectorWalkEnv(address=self.server.address, num_envs=2, starts=_STARTS, channels=())

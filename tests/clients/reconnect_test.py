@@ -177,7 +177,7 @@ class Arguments(RoomCase):
     def test_arguments_that_are_none_are_refused_by_name(self):
         for name, value in (("goal", (12,)), ("goal", 3.0), ("starts", [(1, 2)]),
                             ("starts", (1.5, 0, 0)), ("channels", "depth"),
-                            ("channels", ("rgb", "flow")), ("ticks_per_step", 0),
+                            ("channels", ("rgb", "haze")), ("ticks_per_step", 0),
                             ("speed", 1e9), ("fov_y", 200), ("render_mode", "human"),
                             ("server_arguments", "--no-cache"), ("scene", "room.obj")):
             with self.assertRaisesRegex(ValueError, name):

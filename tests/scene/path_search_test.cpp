@@ -107,8 +107,7 @@ class PartlyMeshed {
     std::vector<TileMesh> tiles;
     for (int z = 0; z < grid_.tilesZ; ++z)
       for (int x = 0; x < grid_.tilesX; ++x)
-        tiles.push_back(
-            std::move(buildTileMeshes(meshed_.data(), agent_, grid_, x, z, {clearance})[0]));
+        tiles.push_back(buildTileMesh(meshed_.data(), agent_, grid_, x, z, clearance));
     return NavigationMesh(grid_, std::move(tiles));
   }
 

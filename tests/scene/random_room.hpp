@@ -30,8 +30,7 @@ inline NavigationMesh makeMesh(const World& world, const NavigationAgent& agent)
   std::vector<TileMesh> tiles;
   for (int z = 0; z < grid.tilesZ; ++z)
     for (int x = 0; x < grid.tilesX; ++x)
-      tiles.push_back(
-          std::move(buildTileMeshes(world.data(), agent, grid, x, z, {Clearance::ample})[0]));
+      tiles.push_back(buildTileMesh(world.data(), agent, grid, x, z, Clearance::ample));
   return {grid, std::move(tiles)};
 }
 

@@ -8,6 +8,7 @@
 
 #include "server/base/load_scene.hpp"
 #include "server/messages/world_messages.hpp"
+#include "server/navigation/go_order.hpp"
 #include "tests/scene/body_fixture.hpp"
 #include "tests/scene/roofed_rooms.hpp"
 #include "tests/server/program_fixture.hpp"
@@ -115,6 +116,48 @@ TEST(NavigationService, AClosedDoorIsTheReasonAsLongAsAWayLeadsThroughIt) {
   EXPECT_NE(askReason(), "door") << "the gate stands behind it";
   moveGate(0);
   EXPECT_EQ(askReason(), "door");
+}
+
+/// With doors as they are: closed, half open, open.
+TEST(NavigationService, ADoorAsItIsIsAReasonOrALeg) {
+  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, true));
+  NavigationService service(scene);
+  scene::World world(scene);
+  v1::Command go;
+  go.mutable_go();
+  v1::NavigationQuery query;
+  query.mutable_path()->mutable_from()->mutable_point()->set_x(2);
+  query.mutable_path()->add_to()->mutable_point()->set_x(9);
+  v1::NavigationReply reply;
+  const auto askWithDoorAt = [&](double angle) {
+    using Action = scene::BodyCommand::Action;
+    submitBodyCommand(world, {"door", Action::moveTo, angle, 0, std::nullopt});
+    for (int tick = 0; tick < 300; ++tick) tickWorld(world);
+    std::vector<std::uint8_t> attachment;
+    reply = std::get<v1::NavigationReply>(
+        service.answer(query, {world.snapshot(), world.settings()}, attachment));
+    return reply.paths(0);
+  };
+  const v1::NavigationPath closed = askWithDoorAt(0);
+  EXPECT_EQ(closed.reason(), "the door 'door' is closed: open it, or ask with open doors");
+  EXPECT_NEAR(closed.obstacle_at().x(), 5.98 - 0.3, 0.03);
+  EXPECT_EQ(closed.clear_width(), 0);
+  const v1::NavigationPath half = askWithDoorAt(-0.5);
+  EXPECT_EQ(half.obstacle_name(), "door");
+  EXPECT_EQ(half.reason(),
+            "the door 'door' is not open far enough: open it, or ask with open doors");
+  const v1::NavigationPath open = askWithDoorAt(-1.5);
+  ASSERT_EQ(open.legs_size(), 1) << open.reason();
+  EXPECT_EQ(open.legs(0).kind(), v1::NavigationLeg::KIND_DOOR);
+  EXPECT_EQ(open.legs(0).name(), "door");
+  EXPECT_NEAR(open.seconds(), open.length() / scene::Walk().speed, 1e-9) << "it waits for no door";
+  EXPECT_EQ(open.doors_size(), 0);
+  for (const auto doors :
+       {v1::NavigationQuery::DOORS_AS_THEY_ARE, v1::NavigationQuery::DOORS_OPEN}) {
+    go.mutable_go()->set_doors(doors);
+    const auto order = std::get<v1::Command>(makeGoOrder(go, reply));
+    EXPECT_EQ(order.walk().opens_size(), doors == v1::NavigationQuery::DOORS_OPEN ? 1 : 0);
+  }
 }
 
 /// A share that falls begins the next meshes.

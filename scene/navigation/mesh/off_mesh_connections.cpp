@@ -34,6 +34,13 @@ std::span<const OffMeshConnection> ConnectionList::findConnectionsFrom(
   return {first, last};
 }
 
+std::size_t ConnectionList::memoryBytes() const {
+  std::size_t bytes = partOf.size() * sizeof(partOf[0]) + areas.size() * sizeof(areas[0]) +
+                      connections.size() * sizeof(OffMeshConnection);
+  for (const OffMeshConnection& one : connections) bytes += one.points.size() * sizeof(Vec3);
+  return bytes;
+}
+
 ConnectionList listParts(const NavigationMesh& mesh) {
   ConnectionList list{mesh.findIslands(), {}, {}};
   for (std::uint32_t polygon = 0; polygon < mesh.polygonCount(); ++polygon) {

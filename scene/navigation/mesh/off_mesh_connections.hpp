@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstddef>
 #include <cstdint>
 #include <functional>
 #include <limits>
@@ -32,6 +33,7 @@ struct ConnectionList {
   std::vector<double> areas;          ///< by part, square metres; 0: no place to stand was found
   std::vector<OffMeshConnection> connections;  ///< ascending by fromPolygon
 
+  std::size_t memoryBytes() const;
   bool isSmallPart(std::uint32_t polygon) const { return areas[partOf[polygon]] <= kMaxSmallArea; }
   std::span<const OffMeshConnection> findConnectionsFrom(std::uint32_t polygon) const;
 };

@@ -297,9 +297,8 @@ std::vector<float> collectSolidTriangles(const WorldData& world, const Aabb& box
   return triangles;
 }
 
-std::vector<TileMesh> buildTileMeshes(const WorldData& world, const NavigationAgent& agent,
-                                      const TileGrid& grid, int tileX, int tileZ,
-                                      const std::vector<Clearance>& clearances) {
+TileMesh buildTileMesh(const WorldData& world, const NavigationAgent& agent, const TileGrid& grid,
+                       int tileX, int tileZ, Clearance clearance) {
   const int border = makeCellSizes(world.settings, agent, grid, Clearance::ample).erosion + 3;
   TileBuild build{rcContext(false), world.settings, agent, grid, tileX, tileZ, border, {}, {}};
   const double margin = border * grid.cell, size = grid.tileSize();
@@ -307,26 +306,22 @@ std::vector<TileMesh> buildTileMeshes(const WorldData& world, const NavigationAg
   box.min = grid.origin + Vec3(tileX * size - margin, 0, tileZ * size - margin);
   box.max =
       grid.origin + Vec3((tileX + 1) * size + margin, grid.height, (tileZ + 1) * size + margin);
-  std::vector<TileMesh> tiles(clearances.size());
-  for (std::size_t i = 0; i < clearances.size(); ++i) {
-    const std::vector<float> triangles =
-        collectSolidTriangles(world, box, clearances[i] != Clearance::none);
-    if (triangles.empty()) continue;
-    const auto [low, high] = findHeights(triangles);
-    build.min = {static_cast<float>(box.min.x()), low - 1, static_cast<float>(box.min.z())};
-    build.max = {static_cast<float>(box.max.x()), high + static_cast<float>(agent.height) + 1,
-                 static_cast<float>(box.max.z())};
-    const CellSizes sizes = makeCellSizes(world.settings, agent, grid, clearances[i]);
-    const Heightfield field = rasterize(build, triangles);
-    rcFilterLowHangingWalkableObstacles(&build.context, sizes.climb, *field);
-    if (clearances[i] == Clearance::ample)
-      rcFilterLedgeSpans(&build.context, sizes.height, sizes.climb, *field);
-    rcFilterWalkableLowHeightSpans(&build.context, sizes.height, *field);
-    const Polygons polygons = buildPolygons(build, *field, sizes);
-    setFlags(*field, *polygons.flat);
-    tiles[i] = serialize(build, polygons);
-  }
-  return tiles;
+  const std::vector<float> triangles =
+      collectSolidTriangles(world, box, clearance != Clearance::none);
+  if (triangles.empty()) return {};
+  const auto [low, high] = findHeights(triangles);
+  build.min = {static_cast<float>(box.min.x()), low - 1, static_cast<float>(box.min.z())};
+  build.max = {static_cast<float>(box.max.x()), high + static_cast<float>(agent.height) + 1,
+               static_cast<float>(box.max.z())};
+  const CellSizes sizes = makeCellSizes(world.settings, agent, grid, clearance);
+  const Heightfield field = rasterize(build, triangles);
+  rcFilterLowHangingWalkableObstacles(&build.context, sizes.climb, *field);
+  if (clearance == Clearance::ample)
+    rcFilterLedgeSpans(&build.context, sizes.height, sizes.climb, *field);
+  rcFilterWalkableLowHeightSpans(&build.context, sizes.height, *field);
+  const Polygons polygons = buildPolygons(build, *field, sizes);
+  setFlags(*field, *polygons.flat);
+  return serialize(build, polygons);
 }
 
 }  // namespace enfilade::scene

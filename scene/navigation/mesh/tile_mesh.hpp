@@ -40,10 +40,8 @@ inline constexpr std::uint16_t kUnderSkyFlag = 2;  ///< nothing solid is above m
 /// A tile of a Detour navigation mesh, serialized; empty: nothing to walk on.
 using TileMesh = std::vector<std::uint8_t>;
 
-/// Builds a tile at each of some clearances. Throws std::runtime_error if Recast fails, which names
-/// the tile.
-std::vector<TileMesh> buildTileMeshes(const WorldData& world, const NavigationAgent& agent,
-                                      const TileGrid& grid, int tileX, int tileZ,
-                                      const std::vector<Clearance>& clearances);
+/// Throws std::runtime_error if Recast fails, which names the tile.
+TileMesh buildTileMesh(const WorldData& world, const NavigationAgent& agent, const TileGrid& grid,
+                       int tileX, int tileZ, Clearance clearance);
 
 }  // namespace enfilade::scene

@@ -13,11 +13,12 @@ from .arguments import number
 from .kept_request import KeptRequest
 from .questions import frame_request
 
-_CHANNELS = ("rgb", "depth", "ids", "class", "thing", "normals", "range")
+_CHANNELS = ("rgb", "depth", "ids", "class", "thing", "normals", "range", "flow")
+FIRST_TICK = 1  # of the first observation of an episode
 _BOXES = {"rgb": (0, 255, (3,), np.uint8), "depth": (0.0, np.inf, (), np.float32),
           "range": (0.0, np.inf, (), np.float32), "ids": (0, 2**32 - 1, (), np.uint32),
           "class": (0, 2**32 - 1, (), np.uint32), "thing": (0, 2**32 - 1, (), np.uint32),
-          "normals": (-1.0, 1.0, (3,), np.float32)}
+          "normals": (-1.0, 1.0, (3,), np.float32), "flow": (-np.inf, np.inf, (2,), np.float32)}
 
 
 @dataclass(frozen=True)
@@ -25,7 +26,8 @@ class Camera:
     """A camera on an avatar: where it sits and looks, seen from the avatar's heading.
 
     size: (width, height) in pixels. channels: some of "rgb", "depth", "ids", "class", "thing",
-    "normals", "range". yaw, pitch: radians, left and upwards positive. height: metres above the feet;
+    "normals", "range", "flow": since the last observation, in pixels to the right and down, 0 after
+    reset(), inf where it is unknown, and only without a lens, ahead and left. yaw, pitch: radians, left and upwards positive. height: metres above the feet;
     None: the avatar's eyes. ahead, left: metres from its axis. samples: 1, 4 or 16 of the colour in
     each pixel. fov_y: radians, the vertical angle, by default 1.2. lens, distortion and depth_noise are
     those of Client.frame(): with "fisheye" fov_y is the angle of the whole width, by default pi, and
@@ -65,6 +67,8 @@ class Camera:
         number(self.pitch, "pitch", above=-math.pi / 2, below=math.pi / 2)
         for name in ("yaw", "ahead", "left") + (() if self.height is None else ("height",)):
             number(getattr(self, name), name)
+        if "flow" in self.channels and (self.lens or self.ahead or self.left):
+            raise ValueError("channels: \"flow\" needs a camera without lens, ahead and left")
         if self.samples not in (1, 4, 16):
             raise ValueError(f"samples: give 1, 4 or 16, not {self.samples}")
         if self.lens or len(self.distortion) or self.depth_noise is not None:
@@ -110,9 +114,15 @@ class CameraRequest:
         if camera.height is not None:
             eyes.height = camera.height
         self._is_aside = camera.ahead != 0 or camera.left != 0
+        self.has_flow = "flow" in camera.channels
+        self._seen_at: Optional[Tuple[int, Tuple[float, ...]]] = None  # tick and direction; None: never
+        self._aimed: Tuple[float, ...] = ()
         numbers = [(eyes.forward, name) for name in "xyz"]
         if self._is_aside:
             numbers += [(eyes.offset, name) for name in "xz"]
+        if self.has_flow:
+            numbers += [(request.frame.flow_forward, name) for name in "xyz"]
+            numbers.append((request.frame, "flow_from"))
         self.request = KeptRequest(request, *numbers)
         self._across, self._up = math.cos(camera.pitch), math.sin(camera.pitch)
 
@@ -121,14 +131,26 @@ class CameraRequest:
         self.request.set(*self.numbers(heading))
 
     def numbers(self, heading: float) -> Tuple[float, ...]:
-        """The doubles of `request` along a heading."""
+        """The numbers of `request` along a heading."""
         yaw = heading + self.camera.yaw
         forward = self._across * math.cos(yaw), self._up, -self._across * math.sin(yaw)
+        if self.has_flow:
+            self._aimed = forward
+            tick, before = self._seen_at or (FIRST_TICK, forward)
+            return (*forward, *before, tick)
         if not self._is_aside:
             return forward
         c, s = math.cos(heading), math.sin(heading)
         ahead, left = self.camera.ahead, self.camera.left
         return (*forward, ahead * c - left * s, -ahead * s - left * c)
+
+    def keep(self, tick: int) -> None:
+        """The picture of the last aim has come: the next flow begins there."""
+        self._seen_at = tick, self._aimed
+
+    def forget(self) -> None:
+        """The world restarts."""
+        self._seen_at = None
 
     def spaces(self) -> Dict[str, Any]:
         """The spaces of its observations, by name."""

@@ -227,6 +227,8 @@ class WalkEnv(Walker, spaces.EnvBase):
         start, self.goal = self._chosen(seed, options)
         facing = start[3] if len(start) > 3 else float(self.np_random.uniform(0, 360))
         self._face(math.radians(facing))
+        for camera in self.cameras:
+            camera.forget()
         self._steps = 0
         self._tag += 1
         self._start = start

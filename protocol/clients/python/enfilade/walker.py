@@ -16,6 +16,7 @@ from .kept_request import KeptRequest
 
 Observation = Dict[str, np.ndarray]
 
+MAX_FLOW_TICKS = 31  # between two observations: a server keeps the last 32 ticks
 _DISCRETE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 
 
@@ -62,6 +63,8 @@ class Walker:
             if width > widest or height > highest:
                 raise ValueError(f"size: the server draws at most {widest} x {highest} pixels, "
                                  f"not {width} x {height}")
+        if self.ticks_per_step > MAX_FLOW_TICKS and any(one.has_flow for one in self.cameras):
+            raise ValueError(f"ticks_per_step: at most {MAX_FLOW_TICKS} with the channel flow")
         most = client.limits.max_unread_pictures
         if len(self.cameras) > most:
             raise ValueError(f"cameras: the server keeps at most {most} pictures of one step")
@@ -183,6 +186,10 @@ class Walker:
             for name in {"depth", "range"}.intersection(camera.channels):
                 metres = seen[camera.prefix + name]
                 seen[camera.prefix + name] = np.fmin(metres, np.float32(np.inf))  # NaN: background
+            if camera.has_flow:
+                flow = seen[camera.prefix + "flow"]
+                seen[camera.prefix + "flow"] = np.fmin(flow, np.float32(np.inf))  # NaN: unknown
+                camera.keep(frame.tick)
         if self.render_mode is not None and self._picture_key in seen:
             self._rgb = seen[self._picture_key].copy()  # the observation belongs to its reader
         return seen
