@@ -1,12 +1,15 @@
 """Steps per second of Python environments: worlds stepped together (StepMany) against one connection per
-world, in turns in one run. The observations of both must be equal.
+world, in turns in one run. The observations of both must be equal. The processor times are of a step of one world,
+together.
 
     python3 environments.py SCENE [--quick]
 """
 
 import argparse
+import os
 import statistics
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -60,10 +63,17 @@ class Together:
         self.vector.close()
 
 
+def processor_seconds(pid: int) -> float:
+    """User and system time of a process so far."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+
+
 def measure(server: enfilade.Server, count: int, channels: tuple, steps: int, rounds: int) -> str:
     both = [Separate(server, count, channels), Together(server, count, channels)]
     random = np.random.default_rng(1)
     rates: list = [[], []]
+    spent = np.zeros(2)  # processor seconds of the client and the server, together
     for one in both:
         one.reset(1)
     for _ in range(rounds):
@@ -71,17 +81,22 @@ def measure(server: enfilade.Server, count: int, channels: tuple, steps: int, ro
         seen = []
         for one, rate in zip(both, rates):
             start = time.perf_counter()
+            before = np.array([time.process_time(), processor_seconds(server.process.pid)])
             for action in actions:
                 last = one.step(action)
             rate.append(count * steps / (time.perf_counter() - start))
+            if isinstance(one, Together):
+                spent += [time.process_time(), processor_seconds(server.process.pid)] - before
             seen.append(last)
         for name in seen[0]:
             np.testing.assert_array_equal(seen[0][name], seen[1][name])
     for one in both:
         one.close()
     separate, together = (statistics.median(rate) for rate in rates)
+    client, served = 1e6 * spent / (rounds * steps * count)
     return (f"{count:4} worlds, {'+'.join(channels) or 'no pictures':12} separate {separate:8.0f}/s   "
-            f"together {together:8.0f}/s   ratio {together / separate:.2f}")
+            f"together {together:8.0f}/s   ratio {together / separate:.2f}   "
+            f"client {client:4.0f} us, server {served:4.0f} us")
 
 
 def main() -> None:
