@@ -1,9 +1,7 @@
 #include "scene/navigation/connection_search.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <map>
 #include <optional>
@@ -13,6 +11,8 @@
 
 #include "scene/base/parallel_for.hpp"
 #include "scene/navigation/clear_width.hpp"
+#include "scene/navigation/mesh/shortest_corridor.hpp"
+#include "scene/navigation/mesh_paths.hpp"
 #include "scene/navigation/walk/grid_search.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
@@ -20,8 +20,10 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kHeightReach = 0.6;    // metres between both sides of a gap
-constexpr double kMaxGapDetour = 3;     // metres: a longer path around a gap does not pass it
+constexpr double kHeightReach = 0.6;  // metres between both sides of a gap
+// Metres that a path across a gap is longer than the gap. Longer ones lead around it, but the
+// corridor between two islands may bend.
+constexpr double kMaxGapDetour = 3, kMaxCorridorDetour = 6;
 constexpr double kMaxExitDistance = 6;  // metres from a small island
 constexpr double kGridSpacing = 0.12;   // metres
 constexpr double kGapMargin = 1.6;      // metres around the beginning of a path across a gap
@@ -64,10 +66,17 @@ std::vector<Vec3> findPathBack(Walker& walker, const std::vector<Vec3>& path, Gr
 }
 
 /// The path on the meshes, if it is short.
-std::vector<Vec3> findNearPath(const PathFinder& finder, const Vec3& from, const Vec3& to) {
+std::vector<Vec3> findNearPath(const PathFinder& finder, const Vec3& from, const Vec3& to,
+                               double maxDetour) {
   NavigationPath path = findPath(finder, from, to);
-  return path.length <= (to - from).norm() + kMaxGapDetour ? std::move(path.points)
-                                                           : std::vector<Vec3>{};
+  return path.length <= (to - from).norm() + maxDetour ? std::move(path.points)
+                                                       : std::vector<Vec3>{};
+}
+
+/// Metres from the straight line that a path across a gap may come, and what repairs it.
+double computeReach(const BoundaryGap& gap, double maxDetour) {
+  const double aside = 0.5 * std::sqrt(maxDetour * (2 * (gap.to - gap.from).norm() + maxDetour));
+  return aside + kRepairMargin;
 }
 
 /// Inputs and results of a collection.
@@ -105,15 +114,16 @@ bool hasConnectionAt(const ConnectionList& list, const BoundaryGap& gap) {
          leads(gap.to, gap.toPolygon, gap.from, gap.fromPolygon);
 }
 
-/// Whether the scarce mesh leads through the gap, and not around it.
-bool isOnScarceMesh(const Collection& all, const BoundaryGap& gap) {
+/// Whether the scarce mesh leads through the gap, and not around it. Portals that searches closed
+/// count as open: the result does not depend on earlier searches.
+bool isOnScarceMesh(const Collection& all, const BoundaryGap& gap, double maxDetour) {
   const NavigationMesh& scarce = all.finder.scarce;
   const Vec3 extent(all.finder.agent.radius, 0.5, all.finder.agent.radius);
   const auto a = scarce.findNearest(gap.from, extent), b = scarce.findNearest(gap.to, extent);
   if (!a || !b || all.scarceParts[a->polygon] != all.scarceParts[b->polygon]) return false;
-  const auto corridor = scarce.findCorridor(*a, *b);
-  return corridor && computeLength(scarce.straighten(*corridor, a->point, b->point)) <=
-                         (gap.to - gap.from).norm() + kMaxGapDetour;
+  const double maxLength = (gap.to - gap.from).norm() + maxDetour;
+  return a->polygon == b->polygon ||
+         findShortestCorridor(scarce, *a, *b, maxLength, ClosedPortals::open);
 }
 
 /// Where one path was found, the other one leads back along it.
@@ -125,13 +135,14 @@ GapPaths completePaths(Walker& walker, GapPaths paths, const GridSearch& limits)
   return paths;
 }
 
-GapPaths crossOnScarceMesh(const Collection& all, const BoundaryGap& gap) {
+GapPaths crossOnScarceMesh(const Collection& all, const BoundaryGap& gap, double maxDetour) {
   Walker& walker = all.finder.walker;
   const auto start = standNear(walker, gap.from), goal = standNear(walker, gap.to);
   if (!start || !goal) return {};
-  return completePaths(
-      walker, {findNearPath(all.finder, *start, *goal), findNearPath(all.finder, *goal, *start)},
-      {kGridSpacing, kGapMargin, kGapWalks});
+  return completePaths(walker,
+                       {findNearPath(all.finder, *start, *goal, maxDetour),
+                        findNearPath(all.finder, *goal, *start, maxDetour)},
+                       {kGridSpacing, kGapMargin, kGapWalks});
 }
 
 /// Offset i of the sequence 0, +d, -d, +2d, -2d, ... in metres; d is `spacing`.
@@ -146,7 +157,7 @@ GapPaths crossAlong(Walker& walker, const Vec3& start, const Vec3& end) {
   if (!walker.isPathClear(end)) return {};
   const Vec3 to = walker.footPosition();
   if (!walks(walker, to, *from, kHeightError)) return {};
-  return {{*from, to}, {to, *from}};
+  return {.there = {*from, to}, .back = {to, *from}};
 }
 
 /// Walks through the middle of the gap: it may be wider than the agent by a centimetre, and the
@@ -210,7 +221,7 @@ GapPaths crossOnGrid(const Collection& all, Walker& walker, BoundaryGap gap,
   maxWalks = search.maxWalks;
   if (!path) return {};
   std::vector<Vec3> back = findPathBack(walker, *path, limits);
-  return {std::move(*path), std::move(back)};
+  return {.there = std::move(*path), .back = std::move(back)};
 }
 
 /// The result of a gap that was tried off the scarce mesh.
@@ -219,9 +230,10 @@ struct GapTrial {
   std::size_t walks = 0;  ///< on the grid
 };
 
-/// Depends on the gap alone, so several may be tried at once, each with its own walker.
-GapTrial tryGap(const Collection& all, Walker& walker, const BoundaryGap& gap,
-                std::size_t maxWalks) {
+/// Several may be tried at once. Where a walker arrives depends on its caches in the last digits,
+/// so each has a new one.
+GapTrial tryGap(const Collection& all, const BoundaryGap& gap, std::size_t maxWalks) {
+  Walker walker(all.finder.world, all.finder.agent);
   GapTrial trial;
   std::size_t left = maxWalks;
   trial.paths = crossOnGrid(all, walker, gap, left);
@@ -232,7 +244,8 @@ GapTrial tryGap(const Collection& all, Walker& walker, const BoundaryGap& gap,
 
 /// Searches on a grid from a small island, where this comes to an end soon, for a path to another
 /// one and back.
-GapPaths leaveIsland(const Collection& all, Walker& walker, std::uint32_t island) {
+GapPaths leaveIsland(const Collection& all, std::uint32_t island) {
+  Walker walker(all.finder.world, all.finder.agent);
   const Vec3& place = all.islands.islands[island].place;
   const std::size_t share = kMaxExitWalks / all.islands.islands.size();
   const GridSearch limits{kGridSpacing, kMaxExitDistance,
@@ -246,7 +259,7 @@ GapPaths leaveIsland(const Collection& all, Walker& walker, std::uint32_t island
   auto path = findGridPathOut(walker, place, {isOther}, out);
   if (!path) return {};
   std::vector<Vec3> back = findPathBack(walker, *path, limits);
-  return {std::move(*path), std::move(back)};
+  return {.there = std::move(*path), .back = std::move(back)};
 }
 
 void addConnections(Collection& all, const GapPaths& paths) {
@@ -279,61 +292,45 @@ bool isNarrow(const BoundaryGap& gap) {
 }
 
 /// `trial`: with kGapWalks walks; nullopt: not made.
-void crossGap(Collection& all, const BoundaryGap& gap, std::optional<GapTrial> trial) {
+void crossGap(Collection& all, const BoundaryGap& gap, double maxDetour,
+              std::optional<GapTrial> trial) {
   if (!isOpen(all, gap)) return;
   const auto key = makeKey(gap.from, gap.to);
   if (const auto known = all.tried.find(key); known != all.tried.end())
     return addConnections(all, known->second);
-  const bool isOnScarce = isOnScarceMesh(all, gap);
+  const bool isOnScarce = isOnScarceMesh(all, gap, maxDetour);
   if (isOnScarce ? isJoined(all, gap) : !isNarrow(gap)) return;
-  Walker& walker = all.finder.walker;
   GapPaths paths;
   if (isOnScarce) {
-    paths = crossOnScarceMesh(all, gap);
-    if (paths.there.empty()) paths = crossStraight(all.finder.world, walker, gap);
+    paths = crossOnScarceMesh(all, gap, maxDetour);
+    if (paths.there.empty()) paths = crossStraight(all.finder.world, all.finder.walker, gap);
+    paths.reach = computeReach(gap, maxDetour);
   } else if (all.walksLeft > 0) {  // a gap that is given up counts as tried
     if (!trial || trial->walks > all.walksLeft)
-      trial = tryGap(all, walker, gap, std::min(kGapWalks, all.walksLeft));
+      trial = tryGap(all, gap, std::min(kGapWalks, all.walksLeft));
     all.walksLeft -= trial->walks;
     paths = std::move(trial->paths);
+    paths.reach = kGapMargin;
   }
   addConnections(all, all.tried.emplace(key, std::move(paths)).first->second);
 }
 
-/// Walkers of threads that work at once.
-using Walkers = std::deque<Walker>;
-
-Walkers makeWalkers(const PathFinder& finder, int threads) {
-  Walkers walkers;
-  for (int i = 0; i < threads; ++i) walkers.emplace_back(finder.world, finder.agent);
-  return walkers;
-}
-
-/// Calls `work` with each number below `count` and a walker that no other call has meanwhile.
-template <class Work>
-void forEachWithWalker(Walkers& walkers, std::size_t count, const Work& work) {
-  std::atomic<std::size_t> next{0};
-  parallelFor(walkers.size(), static_cast<int>(walkers.size()), {}, [&](std::size_t lane) {
-    for (std::size_t i = next++; i < count; i = next++) work(i, walkers[lane]);
-  });
-}
-
 /// Crosses all gaps in their order. The next ones are tried at once on several threads; connections
 /// and the walks that are left decide afterwards, so that threads change no result.
-void crossGaps(Collection& all, std::span<const BoundaryGap> gaps, Walkers& walkers,
+void crossGaps(Collection& all, std::span<const BoundaryGap> gaps, int threads,
                const std::function<void()>& report) {
   for (std::size_t first = 0; first < gaps.size(); first += kGapsAtOnce) {
     const auto block = gaps.subspan(first, std::min(kGapsAtOnce, gaps.size() - first));
     std::vector<std::optional<GapTrial>> trials(block.size());
-    if (all.walksLeft > 0 && walkers.size() > 1)
-      forEachWithWalker(walkers, block.size(), [&](std::size_t i, Walker& walker) {
+    if (all.walksLeft > 0 && threads > 1)
+      parallelFor(block.size(), threads, {}, [&](std::size_t i) {
         const BoundaryGap& gap = block[i];
         if (isOpen(all, gap) && isNarrow(gap) && !all.tried.contains(makeKey(gap.from, gap.to)) &&
-            !isOnScarceMesh(all, gap))
-          trials[i] = tryGap(all, walker, gap, kGapWalks);
+            !isOnScarceMesh(all, gap, kMaxGapDetour))
+          trials[i] = tryGap(all, gap, kGapWalks);
       });
     for (std::size_t i = 0; i < block.size(); ++i) {
-      crossGap(all, block[i], std::move(trials[i]));
+      crossGap(all, block[i], kMaxGapDetour, std::move(trials[i]));
       report();
     }
   }
@@ -424,23 +421,25 @@ ConnectionList collectConnections(PathFinder finder, const IslandList& islands, 
     if (all.getIsland(polygon) == kNoIsland) all.list.areas[all.list.partOf[polygon]] = 0;
   const std::vector<BoundaryGap> gaps = findBoundaryGaps(
       finder.ample, all.list.partOf, kWallAndDoor + 2 * finder.agent.radius, kHeightReach);
-  Walkers walkers = makeWalkers(finder, threads);
   const std::size_t count = gaps.size() + islands.islands.size();
   std::size_t done = 0;
   const auto report = [&] {
     if (progress) progress(static_cast<double>(++done) / static_cast<double>(count));
   };
   if (progress) progress(0);
-  crossGaps(all, gaps, walkers, report);
-  for (const BoundaryGap& gap : findLongGaps(all)) crossGap(all, gap, std::nullopt);
+  crossGaps(all, gaps, threads, report);
+  for (const BoundaryGap& gap : findLongGaps(all))
+    crossGap(all, gap, kMaxCorridorDetour, std::nullopt);
   const std::vector<std::uint32_t> closed = listClosedIslands(all);
   std::vector<GapPaths> exits(closed.size());
   const auto makeExitKey = [&](std::size_t i) {
     const Vec3& place = islands.islands[closed[i]].place;
     return makeKey(place, place);
   };
-  forEachWithWalker(walkers, closed.size(), [&](std::size_t i, Walker& walker) {
-    if (!tried.contains(makeExitKey(i))) exits[i] = leaveIsland(all, walker, closed[i]);
+  parallelFor(closed.size(), threads, {}, [&](std::size_t i) {
+    if (tried.contains(makeExitKey(i))) return;
+    exits[i] = leaveIsland(all, closed[i]);
+    exits[i].reach = kMaxExitDistance;
   });
   for (std::size_t i = 0; i < closed.size(); ++i)
     addConnections(all, tried.emplace(makeExitKey(i), std::move(exits[i])).first->second);
@@ -449,15 +448,13 @@ ConnectionList collectConnections(PathFinder finder, const IslandList& islands, 
   return std::move(all.list);
 }
 
-void forgetGaps(TriedGaps& tried, const Aabb& box) {
-  constexpr double kAround = 1;  // metres: the agent, and what its walk meets
-  constexpr double kRepairs = 1.5;
+void forgetGaps(TriedGaps& tried, const Aabb& box, const NavigationAgent& agent) {
+  constexpr double kMargin = 0.5;  // metres that a walk looks around
   std::erase_if(tried, [&](const auto& one) {
     const auto& [key, paths] = one;
     const Vec3 from(key[0], key[1], key[2]), to(key[3], key[4], key[5]);
     const Aabb around{from.cwiseMin(to), from.cwiseMax(to)};
-    const double reach = from == to ? kMaxExitDistance : 0.5 * kMaxGapDetour + kRepairs;
-    return overlaps(inflated(around, reach + kAround), box);
+    return overlaps(inflated(around, paths.reach + agent.radius + kMargin), box);
   });
 }
 

@@ -15,7 +15,8 @@ namespace enfilade::scene {
 
 /// The paths across a gap, in both directions; empty: none was found, or the gap was given up.
 struct GapPaths {
-  std::vector<Vec3> there, back;
+  std::vector<Vec3> there = {}, back = {};
+  double reach = 0;  ///< metres from the straight line: what lies there can change the paths
 };
 
 /// Gaps that were tried, by the coordinates of both places: most stay as they are when a body
@@ -30,6 +31,6 @@ ConnectionList collectConnections(PathFinder finder, const IslandList& islands, 
                                   int threads, const std::function<void(double)>& progress);
 
 /// Forgets gaps across which walks may end otherwise, since a body moved within this box.
-void forgetGaps(TriedGaps& tried, const Aabb& box);
+void forgetGaps(TriedGaps& tried, const Aabb& box, const NavigationAgent& agent);
 
 }  // namespace enfilade::scene

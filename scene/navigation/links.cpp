@@ -119,10 +119,10 @@ Links::Links(WorldData& world, const NavigationAgent& agent, const NavigationMes
     : settings_(world.settings), agent_(agent), mesh_(mesh), options_(options) {
   if (options_.maxDrop > settings_.stepHeight) collectEdges();
   if (options_.lifts) collectLifts(world);
-  constexpr std::size_t kMaxPoints = 4;  // of a link
-  for (const auto& [polygon, edges] : edges_) bytes_ += edges.size() * sizeof(Edge);
-  for (const auto& [polygon, links] : links_)
-    bytes_ += links.size() * (sizeof(PathLink) + kMaxPoints * sizeof(Vec3));
+  const std::size_t drop = sizeof(PathLink) + 2 * sizeof(Vec3);
+  const std::size_t ride = sizeof(PathLink) + 4 * sizeof(Vec3);
+  for (const auto& [polygon, edges] : edges_) bytes_ += edges.size() * (sizeof(Edge) + drop);
+  for (const auto& [polygon, links] : links_) bytes_ += links.size() * ride;
 }
 
 std::optional<std::uint32_t> Links::findPolygon(const Vec3& place) const {

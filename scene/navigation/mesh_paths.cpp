@@ -279,7 +279,7 @@ NavigationPath findPathByProposals(const PathFinder& finder, const Vec3& start, 
 }  // namespace
 
 Proof::Proof(std::size_t maxRepairWalks)
-    : coarse{kCoarseSpacing, 1.5, maxRepairWalks},
+    : coarse{kCoarseSpacing, kRepairMargin, maxRepairWalks},
       fine{kFineSpacing, 0.7, maxRepairWalks},
       quickWalks(std::min(kMaxQuickWalks, maxRepairWalks)) {}
 

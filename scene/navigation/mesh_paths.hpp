@@ -15,6 +15,8 @@ inline constexpr double kMaxMeshHeight =
     0.2;                                 ///< metres between a place and its mesh, also over stairs
 inline constexpr double kSameFloor = 1;  ///< metres between the heights of a mesh and its floor
 
+inline constexpr double kRepairMargin = 1.5;  ///< metres around the beginning of a repair
+
 /// The work and the obstacles of a search so far.
 struct Proof {
   explicit Proof(std::size_t maxRepairWalks);

@@ -77,7 +77,7 @@ Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& 
   ampleTiles_ = std::move(meshes.ample);
   scarceTiles_ = std::move(meshes.scarce);
   for (SavedGap& gap : meshes.gaps)
-    triedGaps_[gap.key] = {std::move(gap.there), std::move(gap.back)};
+    triedGaps_[gap.key] = {std::move(gap.there), std::move(gap.back), gap.reach};
   assembleMeshes(threads, progress);
   const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
   report_.seconds = seconds.count();
@@ -90,18 +90,21 @@ std::vector<std::uint8_t> Navigation::save() {
   SavedMeshes meshes{ampleTiles_, scarceTiles_, {}, {}};
   for (const Body& body : world_.data().bodies)
     meshes.bodies.push_back({body.orientation, body.position});
-  for (const auto& [key, paths] : triedGaps_) meshes.gaps.push_back({key, paths.there, paths.back});
+  for (const auto& [key, paths] : triedGaps_)
+    meshes.gaps.push_back({key, paths.there, paths.back, paths.reach});
   return saveMeshes(world_.data(), agent_, meshes);
 }
 
 void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress) {
-  parallelFor(2 * tiles.size(), threads, progress, [&](std::size_t i) {  // two also for one tile
-    const int tile = tiles[i / 2];
-    const bool isAmple = i % 2 == 0;
-    auto& built = (isAmple ? ampleTiles_ : scarceTiles_)[static_cast<std::size_t>(tile)];
-    built = buildTileMesh(world_.data(), agent_, grid_, tile % grid_.tilesX, tile / grid_.tilesX,
-                          isAmple ? Clearance::ample : Clearance::scarce);
-  });
+  parallelFor(
+      2 * tiles.size(), threads, progress,
+      [&](std::size_t i) {  // so that one tile takes both threads
+        const int tile = tiles[i / 2];
+        const bool isAmple = i % 2 == 0;
+        auto& built = (isAmple ? ampleTiles_ : scarceTiles_)[static_cast<std::size_t>(tile)];
+        built = buildTileMesh(world_.data(), agent_, grid_, tile % grid_.tilesX,
+                              tile / grid_.tilesX, isAmple ? Clearance::ample : Clearance::scarce);
+      });
 }
 
 void Navigation::assembleMeshes(int threads, const Progress& progress) {
@@ -144,7 +147,7 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads, const Prog
   std::vector<bool> isChanged(ampleTiles_.size(), false);
   const double margin = agent_.radius + kTileMargin;
   const auto markTiles = [&](const Aabb& box) {
-    forgetGaps(triedGaps_, box);
+    forgetGaps(triedGaps_, box, agent_);
     const auto computeTile = [&](double at, double origin, int count) {
       const double tile = std::floor((at - origin) / grid_.tileSize());
       return static_cast<int>(std::clamp(tile, 0.0, count - 1.0));

@@ -31,7 +31,7 @@ struct PathWriter {
 
   std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& navigation,
                                            const scene::NavigationPath& path) const {
-    if (!scene::hasDoors(answer.scene)) return {};  // without an index
+    if (!scene::hasDoors(answer.scene)) return {};  // saves building the index
     return scene::findDoorsOnPath(answer.index(), answer.settings, answer.snapshot,
                                   navigation.agent(), path.points, path.legs);
   }
@@ -184,8 +184,8 @@ struct PathWriter {
   }
 
   /// The first door on a path through open ones that stops an agent as it is.
-  std::optional<ClosedDoor> findClosedDoor(const Vec3& from, const Vec3& to,
-                                           const scene::PathOptions& options) const {
+  std::optional<BlockingDoor> findBlockingDoor(const Vec3& from, const Vec3& to,
+                                               const scene::PathOptions& options) const {
     scene::Navigation& open = answer.withOpenDoors();
     const scene::NavigationPath through = open.findPath(from, to, options, answer.progress);
     if (!through.found()) return std::nullopt;
@@ -193,7 +193,7 @@ struct PathWriter {
     const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
     if (first == doors.end()) return std::nullopt;
     const Vec3 &start = through.points[first->point], &end = through.points[first->point + 1];
-    return ClosedDoor{first->body, start + first->onLine * (end - start).normalized()};
+    return BlockingDoor{first->body, start + first->onLine * (end - start).normalized()};
   }
 
   /// Gives a door as the reason, if a path leads through it when it is open. Of two islands it is
@@ -206,7 +206,7 @@ struct PathWriter {
     const std::pair islands(first.value_or(0), last.value_or(0));
     const auto known = isOfIslands ? answer.closedDoors.find(islands) : answer.closedDoors.end();
     const auto door = known != answer.closedDoors.end() ? std::optional(known->second)
-                                                        : findClosedDoor(from, to, options);
+                                                        : findBlockingDoor(from, to, options);
     if (!door) return;
     if (isOfIslands) answer.closedDoors.emplace(islands, *door);
     const scene::BodySpec& spec = answer.scene.model().bodies[door->body];
@@ -243,6 +243,8 @@ void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
   std::vector<scene::DoorOnPath> doors;
   if (path.found()) doors = writer.findDoors(answer.navigation, path);
   if (path.found() && answer.doorsOpen) writer.stepAside(to, options, path, doors);
+  // As they are, a path leads through none that is closed, but it may end next to one.
+  if (!answer.doorsOpen) std::erase_if(doors, &scene::DoorOnPath::isInTheWay);
   message.set_found(path.found());
   for (const Vec3& point : path.points) *message.add_points() = toProto(point);
   message.set_length(path.length);

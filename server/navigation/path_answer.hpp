@@ -15,14 +15,14 @@
 
 namespace enfilade::server {
 
-/// A door that stands on a path through open ones.
-struct ClosedDoor {
+/// A door, closed or half open, that stands on a path through open ones.
+struct BlockingDoor {
   std::uint32_t body = 0;                ///< index into Model::bodies
   scene::Vec3 at = scene::Vec3::Zero();  ///< where an agent meets it: feet, scene frame, metres
 };
 
-/// The reasons why no path leads from one island to another one.
-using ClosedDoors = std::map<std::pair<std::uint32_t, std::uint32_t>, ClosedDoor>;
+/// The reasons why no path leads from one island to another one, as the first query found them.
+using ClosedDoors = std::map<std::pair<std::uint32_t, std::uint32_t>, BlockingDoor>;
 
 /// The means to find the paths of a query.
 struct PathAnswer {

@@ -108,7 +108,7 @@ std::shared_ptr<SharedMeshes> findSharedMeshes(const MeshRequest& request, bool 
 
 /// The meshes themselves say for which poses of bodies they are: update() builds the rest.
 std::string makeCacheKey(const MeshRequest& request) {
-  std::string key = "navigation mesh 2 scene " + std::to_string(request.scene->hash());
+  std::string key = "navigation mesh 3 scene " + std::to_string(request.scene->hash());
   for (const double number : {request.agent.radius, request.agent.height,
                               request.settings.stepHeight, request.settings.walkableNormalY})
     key += " " + std::to_string(std::bit_cast<std::uint64_t>(number));

@@ -1,6 +1,6 @@
 """Steps per second of Python environments: worlds stepped together (StepMany) against one connection per
-world, in turns in one run. The observations of both must be equal. The processor times are of a step of one world,
-together.
+world, in turns in one run. The observations of both must be equal. Processor times are per step and world, of the
+worlds stepped together.
 
     python3 environments.py SCENE [--quick]
 """
@@ -80,8 +80,8 @@ def measure(server: enfilade.Server, count: int, channels: tuple, steps: int, ro
         actions = random.uniform(-1, 1, (steps, count, 2))
         seen = []
         for one, rate in zip(both, rates):
-            start = time.perf_counter()
             before = np.array([time.process_time(), processor_seconds(server.process.pid)])
+            start = time.perf_counter()
             for action in actions:
                 last = one.step(action)
             rate.append(count * steps / (time.perf_counter() - start))
@@ -105,7 +105,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true")
     arguments = parser.parse_args()
     with enfilade.serve(arguments.scene) as server:
-        for channels, steps in (((), 200), (("depth",), 40)):
+        for channels, steps in (((), 200), (("depth",), 40), (("rgb",), 40)):
             for count in (1, 16) if arguments.quick else (1, 4, 16, 64):
                 print(measure(server, count, channels, max(8, steps * 16 // max(count, 4) // 4),
                               3 if arguments.quick else 7), flush=True)

@@ -56,7 +56,7 @@ bool isLong(double share) {
 
 struct Effort {
   int pairs = 10'000;
-  int compared = 5000;             ///< pairs per kind that are compared with a flood fill
+  int compared = 1000;             ///< pairs per kind that are compared with a flood fill
   int lengths = 1000;              ///< pairs of which lengths are compared with a flood fill
   std::size_t places = 4'000'000;  ///< limit of a flood fill: 1,600 square metres
   std::string only;                ///< part; "": all

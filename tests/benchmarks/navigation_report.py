@@ -53,9 +53,11 @@ class Section:
 
     def write(self, head, measured, make_row):
         """The table: rows of this run replace those of their scenes."""
-        today = datetime.date.today().isoformat()
-        rows = {**self.rows, **{row["scene"]: [*make_row(row), today] for row in measured}}
-        return self.notes + table([*head, "date"], [row for row in rows.values() if len(row) == len(head) + 1])
+        rows = {**self.rows, **{row["scene"]: [*make_row(row), row["date"]] for row in measured}}
+        for row in rows.values():
+            if len(row) != len(head) + 1:
+                sys.exit(f"{row[0]}: the present report has other columns; measure this part again in all scenes")
+        return self.notes + table([*head, "date"], rows.values())
 
 
 WALKS = ["scene", "pairs", "refused", "paths", "wrong", "silent", "penetration m", "with doors (wrong)", "with lifts", "with drops"]
@@ -72,8 +74,9 @@ def main():
     path = folder / "navigation.md"
     before = path.read_text() if path.exists() else ""
     parts = {}
+    measured_on = datetime.date.fromtimestamp((results / "navigation.jsonl").stat().st_mtime).isoformat()
     for row in read(results, "navigation"):
-        parts.setdefault(row["part"], []).append(row)
+        parts.setdefault(row["part"], []).append({"date": measured_on, **row})
 
     def write(title, part, head, make_row):
         return Section(before, title).write(head, parts.get(part, []), make_row)

@@ -485,6 +485,22 @@ class Environments(RoomCase):
         env._rgb = None
         np.testing.assert_array_equal(env.render(), seen["plain_rgb"])
 
+    def test_kept_requests_have_the_numbers_that_are_set(self):
+        messages = enfilade.messages
+        one = messages.ClientMessage(frame=messages.FrameRequest(width=8))
+        numbers = [(one.frame.flow_forward, "x"), (one.frame, "flow_from"), (one.frame.flow_forward, "z")]
+        kept = enfilade.kept_request.KeptRequest(one, *numbers)
+        for whole in (0, 1, 127, 128, 2**32, 2**63, 2**64 - 1):
+            kept.set(0.5, whole, -1e300)
+            seen = messages.ClientMessage.FromString(bytes(kept.body)).frame
+            self.assertEqual((seen.width, seen.flow_from, seen.flow_forward.x, seen.flow_forward.z),
+                             (8, whole, 0.5, -1e300))
+            world = enfilade.kept_request.KeptRequest.joined(b"", b"\x12", [kept, kept])  # World.requests
+            world.set(1.5, 7, 2.5, 0.5, whole, 3.5)
+            first, second = messages.StepMany.World.FromString(bytes(world.body)).requests
+            self.assertEqual((first.frame.flow_from, second.frame.flow_from), (7, whole))
+            self.assertEqual((first.frame.flow_forward.z, second.frame.flow_forward.z), (2.5, 3.5))
+
     def test_flow_begins_at_the_last_observation(self):
         self.need_pictures()
         env = self.environment(size=None, starts=[(2, 0.01, 0, 30)], ticks_per_step=4, cameras=[

@@ -181,10 +181,42 @@ TEST(OffMeshConnections, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
     }
 }
 
+/// A corridor of two arms of 7 m is longer than the straight line by more than 3 m.
+std::shared_ptr<const Scene> roomsWithBentCorridor(double width) {
+  return boxScene({{"floor", {-4, -0.2, -4}, {11, 0, 11}},
+                   {"wall/inside", {0, 0, 0}, {7 - width, 2.5, 7}},
+                   {"wall/left", {-4, 0, -4}, {0, 2.5, -width}},
+                   {"wall/below", {0, 0, -4}, {7 - width, 2.5, -width}},
+                   {"wall/corner", {7 - width, 0, -4}, {7, 2.5, -width}},
+                   {"wall/right", {7, 0, -4}, {11, 2.5, 7}}});
+}
+
+TEST(OffMeshConnections, ABentCorridorJoinsTheRoomsAtItsEnds) {
+  const Vec3 left(-2, 0, 1.5), right(9, 0, 9);
+  Navigation navigation(roomsWithBentCorridor(0.62), {}, {});
+  EXPECT_TRUE(navigation.findPath(left, right).found());
+  EXPECT_EQ(navigation.findIsland(left), navigation.findIsland(right));
+}
+
+TEST(OffMeshConnections, GapsNearAMovedBodyAreTriedAgain) {
+  TriedGaps tried;
+  tried[{0, 0, 0, 1.2, 0, 0}].reach = 3;
+  tried[{20, 0, 0, 20, 0, 0}].reach = 6;
+  const auto boxAt = [](double x, double z) { return Aabb{{x, 0, z}, {x + 0.1, 2, z + 0.1}}; };
+  const NavigationAgent agent;
+  forgetGaps(tried, boxAt(0.5, 3 + agent.radius + 0.6), agent);
+  forgetGaps(tried, boxAt(1.2 + 3 + agent.radius + 0.6, 0), agent);
+  EXPECT_EQ(tried.size(), 2u) << "these are too far away";
+  forgetGaps(tried, boxAt(0.5, 3 + agent.radius), agent);
+  EXPECT_EQ(tried.size(), 1u);
+  forgetGaps(tried, boxAt(20 - 6 - agent.radius, 0), agent);
+  EXPECT_TRUE(tried.empty());
+}
+
 /// The bytes have the meshes and the paths across all gaps that were tried.
 TEST(OffMeshConnections, ThreadsChangeNoResult) {
   for (const auto& scene : {roomWithTurnedWall(0.35, -0.4, 0.61), boxScene(roomsWithFarGap(0.62)),
-                            roomsWithCorridor(0.62, 3)}) {
+                            roomsWithCorridor(0.62, 3), roomsWithBentCorridor(0.62)}) {
     Navigation built(scene, {}, {}, nullptr, 1);
     const std::vector<std::uint8_t> bytes = built.save();
     EXPECT_EQ(Navigation(scene, {}, {}, nullptr, 3).save(), bytes);

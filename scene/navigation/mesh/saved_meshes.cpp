@@ -15,17 +15,18 @@ namespace enfilade::scene {
 
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, SavedGap>& gap) {
-  auto& [key, there, back] = gap;
-  a(key, there, back);
+  auto& [key, there, back, reach] = gap;
+  a(key, there, back, reach);
 }
 
 namespace {
 
-constexpr std::string_view kMagic = "EnfMesh4";
+constexpr std::string_view kMagic = "EnfMesh5";
 constexpr std::size_t kWordBytes = 8;
 constexpr int kMaxCount = 1 << 22;             // of anything in a tile
 constexpr float kMaxCoordinate = 1e8f;         // metres: Detour's squares do not overflow
 constexpr std::size_t kMaxPathPoints = 5000;   // searches for paths end before
+constexpr double kMaxReach = 1000;             // metres
 constexpr unsigned kBoundaryEdges = 0b010101;  // flags of a triangle of the detail mesh
 
 std::uint64_t computeMeshChecksum(std::span<const std::uint8_t> bytes) {
@@ -195,7 +196,8 @@ SavedMeshes loadMeshes(const WorldData& world, const NavigationAgent& agent, con
         meshes.ample.size() != tiles || meshes.scarce.size() != tiles)
       file.refuse("its lists do not fit the scene");
     for (const SavedGap& gap : meshes.gaps)
-      if (std::max(gap.there.size(), gap.back.size()) > kMaxPathPoints)
+      if (std::max(gap.there.size(), gap.back.size()) > kMaxPathPoints ||
+          !(gap.reach >= 0 && gap.reach <= kMaxReach))
         file.refuse("a path across a gap is too long");
     for (const auto* list : {&meshes.ample, &meshes.scarce})
       for (const TileMesh& tile : *list)

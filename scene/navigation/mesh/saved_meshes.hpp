@@ -20,6 +20,7 @@ struct MeshFileError : std::runtime_error {
 struct SavedGap {
   std::array<double, 6> key{};  ///< coordinates of both places
   std::vector<Vec3> there, back;
+  double reach = 0;  ///< metres
 };
 
 struct SavedMeshes {

@@ -60,13 +60,13 @@ double computeRest(const Interval& interval, Vec3 goal) {
 class CorridorSearch {
  public:
   CorridorSearch(const NavigationMesh& mesh, const MeshPoint& from, const MeshPoint& to,
-                 double bound)
-      : mesh_(mesh), from_(from), to_(to), bound_(bound) {}
+                 double bound, ClosedPortals closed)
+      : mesh_(mesh), from_(from), to_(to), bound_(bound), closed_(closed) {}
 
   std::optional<Corridor> run() {
     shortestToRoot_[key(from_.point)] = 0;
     for (const Portal& portal : mesh_.portals(from_.polygon)) {
-      if (!portal.closed)
+      if (isOpen(portal))
         push({.root = from_.point,
               .low = portal.low,
               .high = portal.high,
@@ -96,6 +96,10 @@ class CorridorSearch {
   using Entry = std::pair<double, std::uint32_t>;  // least length of a whole line, node
 
   static Key key(const Vec3& point) { return {point.x(), point.y(), point.z()}; }
+
+  bool isOpen(const Portal& portal) const {
+    return !portal.closed || closed_ == ClosedPortals::open;
+  }
 
   bool isDetour(const Interval& interval) const {
     const auto found = shortestToRoot_.find(key(interval.root));
@@ -127,7 +131,7 @@ class CorridorSearch {
     const std::uint32_t before =
         interval.parent == kNoNode ? from_.polygon : nodes_[interval.parent].polygon;
     for (const Portal& portal : mesh_.portals(interval.polygon)) {
-      if (portal.closed || portal.to == before) continue;
+      if (!isOpen(portal) || portal.to == before) continue;
       // The portal runs from its low to its high end as seen from inside of the polygon: first the
       // part beyond the ray through the interval's low end, last that beyond its high end.
       const double first = crossing(toLow, portal.low - root, portal.high - root);
@@ -187,6 +191,7 @@ class CorridorSearch {
   const NavigationMesh& mesh_;
   const MeshPoint from_, to_;
   const double bound_;
+  const ClosedPortals closed_;
   std::vector<Interval> nodes_;
   std::priority_queue<Entry, std::vector<Entry>, std::greater<>> open_;
   std::map<Key, double> shortestToRoot_;
@@ -196,9 +201,10 @@ class CorridorSearch {
 }  // namespace
 
 std::optional<Corridor> findShortestCorridor(const NavigationMesh& mesh, const MeshPoint& from,
-                                             const MeshPoint& to, double bound) {
+                                             const MeshPoint& to, double bound,
+                                             ClosedPortals closed) {
   if (from.polygon == to.polygon) return std::nullopt;  // a corridor of one polygon is the shortest
-  return CorridorSearch(mesh, from, to, bound).run();
+  return CorridorSearch(mesh, from, to, bound, closed).run();
 }
 
 }  // namespace enfilade::scene

@@ -40,7 +40,7 @@ inline constexpr std::uint16_t kUnderSkyFlag = 2;  ///< nothing solid is above m
 /// A tile of a Detour navigation mesh, serialized; empty: nothing to walk on.
 using TileMesh = std::vector<std::uint8_t>;
 
-/// Throws std::runtime_error if Recast fails, which names the tile.
+/// Builds a tile. Throws std::runtime_error, which names the tile, if Recast fails.
 TileMesh buildTileMesh(const WorldData& world, const NavigationAgent& agent, const TileGrid& grid,
                        int tileX, int tileZ, Clearance clearance);
 

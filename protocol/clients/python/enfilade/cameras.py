@@ -26,9 +26,10 @@ class Camera:
     """A camera on an avatar: where it sits and looks, seen from the avatar's heading.
 
     size: (width, height) in pixels. channels: some of "rgb", "depth", "ids", "class", "thing",
-    "normals", "range", "flow": since the last observation, in pixels to the right and down, 0 after
-    reset(), inf where it is unknown, and only without a lens, ahead and left. yaw, pitch: radians, left and upwards positive. height: metres above the feet;
-    None: the avatar's eyes. ahead, left: metres from its axis. samples: 1, 4 or 16 of the colour in
+    "normals", "range", "flow". Flow is in pixels to the right and down since the last observation: 0
+    after reset(), inf where it is unknown. It needs a camera without lens, with ahead and left 0. yaw,
+    pitch: radians, left and upwards positive. height: metres above the feet; None: the avatar's eyes.
+    ahead, left: metres from its axis. samples: 1, 4 or 16 of the colour in
     each pixel. fov_y: radians, the vertical angle, by default 1.2. lens, distortion and depth_noise are
     those of Client.frame(): with "fisheye" fov_y is the angle of the whole width, by default pi, and
     "equirectangular" has none. Depths behind a lens are negative, and those that the noise loses are
@@ -145,11 +146,11 @@ class CameraRequest:
         return (*forward, ahead * c - left * s, -ahead * s - left * c)
 
     def keep(self, tick: int) -> None:
-        """The picture of the last aim has come: the next flow begins there."""
+        """Begins the next flow at the picture of the last aim."""
         self._seen_at = tick, self._aimed
 
     def forget(self) -> None:
-        """The world restarts."""
+        """Begins the next flow at its own picture, as after a restart."""
         self._seen_at = None
 
     def spaces(self) -> Dict[str, Any]:

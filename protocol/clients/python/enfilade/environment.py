@@ -355,7 +355,7 @@ class WalkEnv(Walker, spaces.EnvBase):
                                   *self._distance_query()])
 
     def _kept_step(self, member: Member) -> KeptRequest:
-        """The requests of a step in this episode. The doubles are _step_numbers()."""
+        """The requests of a step in this episode. The numbers are _step_numbers()."""
         queries = [KeptRequest(one) for one in self._distance_query()]
         return member.kept_step(self._name, [self._drive, self._run,
                                              *(one.request for one in self.cameras), *queries])

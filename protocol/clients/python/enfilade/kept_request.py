@@ -10,7 +10,7 @@ from . import messages
 _DOUBLE = struct.Struct("<d")
 _ID_KEY = bytes((messages.ClientMessage.DESCRIPTOR.fields_by_name["request_id"].number << 3,))
 _MARK = 1.2345678901234567e-200  # times 1, 2, ...: finds the places of numbers in the bytes
-_WHOLE_MARK = (1 << 63) + 0x5A17_C0DE  # plus 0, 1, ...: the same; its varint has the full length
+_WHOLE_MARK = (1 << 63) + 0x5A17_C0DE  # plus 0, 1, ...: finds those of type uint64; its varint has ten bytes
 
 
 def varint(number: int) -> bytes:
@@ -39,17 +39,16 @@ class KeptRequest:
 
     def __init__(self, request: Any, *numbers: Tuple[Any, str]) -> None:
         self.request_id = 0
-        marks: List[bytes] = []
+        marks: List[Tuple[Callable[..., None], bytes]] = []
         for i, (message, name) in enumerate(numbers):
             is_whole = isinstance(getattr(message, name), int)
             mark = _WHOLE_MARK + i if is_whole else _MARK * (i + 1)
             setattr(message, name, mark)
-            marks.append(varint(mark) if is_whole else _DOUBLE.pack(mark))
+            marks.append((_pack_whole, varint(mark)) if is_whole else (_DOUBLE.pack_into, _DOUBLE.pack(mark)))
         request.ClearField("request_id")
         self.body = bytearray(request.SerializeToString())
         self._places: List[Tuple[Callable[..., None], int]] = [
-            (_DOUBLE.pack_into if len(mark) == _DOUBLE.size else _pack_whole, self.body.index(mark))
-            for mark in marks]
+            (pack, self.body.index(mark)) for pack, mark in marks]
         self.set(*[0] * len(numbers))
 
     @classmethod
