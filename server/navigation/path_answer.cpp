@@ -36,6 +36,11 @@ struct PathWriter {
                                   navigation.agent(), path.points, path.legs);
   }
 
+  bool isClosed(std::uint32_t door) const {
+    return (*answer.snapshot.bodies)[door].jointPosition ==
+           answer.scene.model().bodies[door].closedPosition;
+  }
+
   /// The closed doors that stand on a path through open ones.
   void addDoors(const std::vector<scene::DoorOnPath>& doors, v1::NavigationPath& message) const {
     for (const scene::DoorOnPath& found : doors) {
@@ -210,10 +215,9 @@ struct PathWriter {
     if (!door) return;
     if (isOfIslands) answer.closedDoors.emplace(islands, *door);
     const scene::BodySpec& spec = answer.scene.model().bodies[door->body];
-    const bool isClosed =
-        (*answer.snapshot.bodies)[door->body].jointPosition == spec.closedPosition;
     message.set_reason("the door '" + spec.name + "' " +
-                       (isClosed ? "is closed: " : "is not open far enough: ") + answer.doorRemedy);
+                       (isClosed(door->body) ? "is closed: " : "is not open far enough: ") +
+                       answer.doorRemedy);
     message.set_obstacle(spec.objects.front() + 1);
     message.set_obstacle_name(spec.name);
     *message.mutable_obstacle_at() = toProto(door->at);
@@ -243,8 +247,9 @@ void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
   std::vector<scene::DoorOnPath> doors;
   if (path.found()) doors = writer.findDoors(answer.navigation, path);
   if (path.found() && answer.doorsOpen) writer.stepAside(to, options, path, doors);
-  // As they are, a path leads through none that is closed, but it may end next to one.
-  if (!answer.doorsOpen) std::erase_if(doors, &scene::DoorOnPath::isInTheWay);
+  // As they are, a path leads through none that is closed, but it may touch one.
+  if (!answer.doorsOpen)
+    std::erase_if(doors, [&](const auto& door) { return writer.isClosed(door.body); });
   message.set_found(path.found());
   for (const Vec3& point : path.points) *message.add_points() = toProto(point);
   message.set_length(path.length);

@@ -181,10 +181,12 @@ TEST(OffMeshConnections, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
     }
 }
 
-/// A corridor of two arms of 7 m is longer than the straight line by more than 3 m.
+/// The corridor of two arms of 7 m is the only way. It is longer than the straight line by more
+/// than 3 m.
 std::shared_ptr<const Scene> roomsWithBentCorridor(double width) {
   return boxScene({{"floor", {-4, -0.2, -4}, {11, 0, 11}},
                    {"wall/inside", {0, 0, 0}, {7 - width, 2.5, 7}},
+                   {"wall/end", {-4, 0, 7}, {0, 2.5, 11}},
                    {"wall/left", {-4, 0, -4}, {0, 2.5, -width}},
                    {"wall/below", {0, 0, -4}, {7 - width, 2.5, -width}},
                    {"wall/corner", {7 - width, 0, -4}, {7, 2.5, -width}},

@@ -144,6 +144,8 @@ TEST(NavigationService, ADoorAsItIsIsAReasonOrALeg) {
   EXPECT_EQ(closed.clear_width(), 0);
   const v1::NavigationPath half = askWithDoorAt(-0.5);
   EXPECT_EQ(half.obstacle_name(), "door");
+  EXPECT_GT(half.obstacle_at().x(), 4.5);
+  EXPECT_LT(half.obstacle_at().x(), 5.98);
   EXPECT_EQ(half.reason(),
             "the door 'door' is not open far enough: open it, or ask with open doors");
   const v1::NavigationPath open = askWithDoorAt(-1.5);

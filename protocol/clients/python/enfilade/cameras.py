@@ -13,7 +13,6 @@ from .arguments import number
 from .kept_request import KeptRequest
 from .questions import frame_request
 
-_CHANNELS = ("rgb", "depth", "ids", "class", "thing", "normals", "range", "flow")
 FIRST_TICK = 1  # of the first observation of an episode
 _BOXES = {"rgb": (0, 255, (3,), np.uint8), "depth": (0.0, np.inf, (), np.float32),
           "range": (0.0, np.inf, (), np.float32), "ids": (0, 2**32 - 1, (), np.uint32),
@@ -52,8 +51,8 @@ class Camera:
     def __post_init__(self) -> None:
         if not isinstance(self.name, str):
             raise ValueError(f"name: give text, not {self.name!r}")
-        if not isinstance(self.channels, (list, tuple, set)) or set(self.channels) - set(_CHANNELS):
-            raise ValueError(f"channels: give some of {_CHANNELS}, not {self.channels!r}")
+        if not isinstance(self.channels, (list, tuple, set)) or set(self.channels) - set(_BOXES):
+            raise ValueError(f"channels: give some of {tuple(_BOXES)}, not {self.channels!r}")
         try:
             width, height = self.size
             good = width == int(width) >= 1 and height == int(height) >= 1

@@ -183,12 +183,10 @@ class Walker:
             frame = results.frame(reply.frame, attachment)
             for name in camera.channels:
                 seen[camera.prefix + name] = frame.channel(name)
-            for name in {"depth", "range"}.intersection(camera.channels):
-                metres = seen[camera.prefix + name]
-                seen[camera.prefix + name] = np.fmin(metres, np.float32(np.inf))  # NaN: background
+            for name in {"depth", "range", "flow"}.intersection(camera.channels):
+                values = seen[camera.prefix + name]
+                seen[camera.prefix + name] = np.fmin(values, np.float32(np.inf))  # NaN: unknown, background
             if camera.has_flow:
-                flow = seen[camera.prefix + "flow"]
-                seen[camera.prefix + "flow"] = np.fmin(flow, np.float32(np.inf))  # NaN: unknown
                 camera.keep(frame.tick)
         if self.render_mode is not None and self._picture_key in seen:
             self._rgb = seen[self._picture_key].copy()  # the observation belongs to its reader
