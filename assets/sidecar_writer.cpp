@@ -7,7 +7,7 @@
 #include <stdexcept>
 
 #include "assets/plan.hpp"
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 
 namespace enfilade::assets {
 namespace {

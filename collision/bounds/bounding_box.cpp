@@ -27,6 +27,7 @@
 #include "collision/assert.hpp"
 #include "collision/double2.hpp"
 #include "collision/floating_point.hpp"
+#include "collision/sine_cosine.hpp"
 
 namespace enfilade::collision {
 namespace {
@@ -268,7 +269,8 @@ SupportTable buildSupportTable(const Hull& hull, AabbMethod method) {
   ENFILADE_ASSERT(!hull.vertices.empty());
   SupportTable table;
   table.method = method;
-  table.minTurnTrace = 1 + 2 * std::cos(findMaxClimbTurn(hull));
+  table.minTurnTrace =
+      1 + 2 * computeSineCosineOfDegrees(kDegreesPerRadian * findMaxClimbTurn(hull)).cosine;
   if (method == AabbMethod::hillClimb) appendFans(hull, table);
   return table;
 }

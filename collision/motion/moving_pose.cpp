@@ -17,7 +17,7 @@
 
 #include "collision/assert.hpp"
 #include "collision/floating_point.hpp"
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 
 namespace enfilade::collision {
 namespace {

@@ -1,7 +1,7 @@
 #include "collision/motion/rigid_motion.hpp"
 
 #include "collision/motion/moving_pose.hpp"
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 
 namespace enfilade::collision {
 

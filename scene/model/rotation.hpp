@@ -1,7 +1,7 @@
 // Converts angles to heading vectors, with the same bits on every machine.
 #pragma once
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 
 namespace enfilade::scene {
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 

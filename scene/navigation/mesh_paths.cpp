@@ -8,6 +8,7 @@
 
 #include "scene/navigation/clear_width.hpp"
 #include "scene/navigation/mesh/shortest_corridor.hpp"
+#include "scene/navigation/walk/level_detours.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -244,7 +245,10 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
         pullTight(finder.walker, path.points);
         path.length = computeLength(path.points);
       }
-      if (!finder.walker.takeCrossedSteps() || walksOn(finder.walker, path.points, proof)) {
+      const bool isProved =
+          !finder.walker.takeCrossedSteps() || walksWithoutBumps(finder.walker, path.points, proof);
+      if (isProved) {
+        path.length = computeLength(path.points);
         for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
           mesh.forgetFailures(corridor->polygons[i - 1], corridor->polygons[i]);
         return path;
@@ -301,6 +305,15 @@ bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
     proof.met.push_back({outcome.obstacle, outcome.footPosition, 0});
     return false;
   }
+  return true;
+}
+
+bool walksWithoutBumps(Walker& walker, std::vector<Vec3>& points, Proof& proof) {
+  if (!walksOn(walker, points, proof)) return false;
+  const double rise = std::abs(points.back().y() - points.front().y());
+  if (walker.travel().climb - rise < kMinBump) return true;
+  std::vector<Vec3> level = points;
+  if (goAroundBumps(walker, level) && walksOn(walker, level, proof)) points = std::move(level);
   return true;
 }
 

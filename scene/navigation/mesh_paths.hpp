@@ -38,6 +38,8 @@ bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError);
 
 /// Walks the whole path without a stop: after a step a place may be reached at another height.
 bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof);
+/// As walksOn(). Then leads the path around low objects, where this shortens the way of the feet.
+bool walksWithoutBumps(Walker& walker, std::vector<Vec3>& points, Proof& proof);
 
 /// A path on the ample mesh, or on the scarce one; without a reason if none is found.
 NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,

@@ -81,8 +81,11 @@ NavigationPath provePath(const PathFinder& finder, const std::vector<Vec3>& plac
   NavigationPath path;
   for (const std::vector<Vec3>* points :
        {&std::as_const(tight), &std::as_const(shortened), &places}) {
-    if (!walksOn(finder.walker, *points, proof)) continue;
     path.points = *points;
+    if (!walksWithoutBumps(finder.walker, path.points, proof)) {
+      path.points.clear();
+      continue;
+    }
     path.length = computeLength(path.points);
     break;
   }

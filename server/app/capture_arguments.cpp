@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 #include "server/app/validators.hpp"
 #include "server/base/parse_number.hpp"
 

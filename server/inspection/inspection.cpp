@@ -10,7 +10,7 @@
 #include <nlohmann/json.hpp>
 #include <numeric>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 #include "server/inspection/report_cache.hpp"
 
 namespace enfilade::server {

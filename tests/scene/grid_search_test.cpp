@@ -1,4 +1,5 @@
-// Walks on a grid: around corners, out of somewhere, and out of the swing of a door.
+// Walks on a grid: around corners and low objects, out of somewhere, and out of the swing of a
+// door.
 #include "scene/navigation/walk/grid_search.hpp"
 
 #include <gtest/gtest.h>
@@ -11,6 +12,7 @@
 
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/shape_separation.hpp"
+#include "scene/navigation/walk/level_detours.hpp"
 #include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene::testing {
@@ -74,6 +76,54 @@ TEST(GridSearch, APathOutLeadsTowardsAPointAndOverOpenPlacesAlone) {
   const auto path = findGridPathOut(walker, {0, 0, 0}, {isAside, isOpen, Vec3(0, 0, -4)}, search);
   ASSERT_TRUE(path);
   EXPECT_NEAR(path->back().z(), 1.5, 1e-6) << "the path to the other side is closed";
+}
+
+/// A bed on a floor, low enough to step onto it, between x = 2 and x = 4.
+Model bedModel(double minZ) {
+  return boxModel({{"floor", {-3, -0.2, -5}, {9, 0, 5}}, {"bed", {2, 0, minZ}, {4, 0.25, 5}}});
+}
+
+TEST(LevelDetours, TheEdgeOfALowObjectIsWalkedAround) {
+  const World world(std::make_shared<const Scene>(bedModel(0.2)));
+  Walker walker(world.data(), {});
+  const Vec3 from(0, 0, 0), to(6, 0, 0);
+  const FeetTravel over = measureTravel(walker, from, to);
+  ASSERT_GT(over.climb, 0.45) << "the line leads over the edge of the bed";
+  std::vector<Vec3> places{from, to};
+  ASSERT_TRUE(goAroundBumps(walker, places));
+  EXPECT_EQ(places.front(), from);
+  EXPECT_EQ(places.back(), to);
+  FeetTravel around;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    ASSERT_TRUE(walks(walker, places[i - 1], places[i], 1e-3)) << i;
+    around.length += walker.travel().length;
+    around.climb += walker.travel().climb;
+  }
+  EXPECT_LT(around.climb, 0.01);
+  EXPECT_LT(around.length, 1.01 * (2 * std::hypot(1.9, 0.11) + 2.2));
+}
+
+TEST(LevelDetours, AnObjectWithALongWayAroundItIsWalkedOver) {
+  const World world(std::make_shared<const Scene>(bedModel(-1.5)));
+  Walker walker(world.data(), {});
+  const Vec3 from(0, 0, 0), to(6, 0, 0);
+  std::vector<Vec3> places{from, to};
+  EXPECT_FALSE(goAroundBumps(walker, places));
+  EXPECT_EQ(places, (std::vector<Vec3>{from, to}));
+  const double around = 2 * std::hypot(1.7, 1.8) + 2.6;
+  EXPECT_LT(measureTravel(walker, from, to).length, around);
+}
+
+TEST(GridSearch, AShortcutOverALowObjectIsNotTakenIfTheFeetMoveFarther) {
+  const World world(std::make_shared<const Scene>(bedModel(0.2)));
+  Walker walker(world.data(), {});
+  const std::vector<Vec3> around{{0, 0, 0}, {2, 0, -0.15}, {4, 0, -0.15}, {6, 0, 0}};
+  const std::vector<Vec3> places = shortenPath(walker, around, Shortcuts::all);
+  double climb = 0;
+  for (std::size_t i = 1; i < places.size(); ++i)
+    climb += measureTravel(walker, places[i - 1], places[i]).climb;
+  EXPECT_LT(climb, 0.01);
+  EXPECT_TRUE(walks(walker, around.front(), around.back(), 1e-3)) << "the shortcut can be walked";
 }
 
 TEST(DoorSwing, TouchesWhatTheDoorMeetsAtAnyAngle) {

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 
 namespace enfilade::scene {
 namespace {

@@ -8,7 +8,7 @@
 #include <string_view>
 #include <vector>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 #include "scene/import/file/import_options.hpp"
 
 namespace enfilade::scene {

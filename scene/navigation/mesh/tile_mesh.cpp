@@ -13,7 +13,7 @@
 #include <string>
 #include <utility>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 #include "scene/world/data/body.hpp"
 
 namespace enfilade::scene {

@@ -84,7 +84,8 @@ std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, co
       if (target.x() < end.window.min.x() || target.x() > end.window.max.x() ||
           target.z() < end.window.min.z() || target.z() > end.window.max.z())
         continue;
-      const double next = cost + computeGroundDistance(feet, target);
+      double next = cost + computeGroundDistance(feet, target);
+      if (next + end.estimate(target) > search.maxLength) continue;
       const auto known = places.find({x, z, cell.storey});
       if (known != places.end() && known->second.cost <= next) continue;
       if (search.maxWalks == 0) return std::nullopt;
@@ -92,6 +93,7 @@ std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, co
       walker.returnTo(feet);
       if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
       const Vec3 reached = walker.footPosition();
+      next = std::max(next, cost + walker.travel().length);
       const Cell to2 = grid.computeCell(reached, x, z);
       const auto [at, isNew] = places.try_emplace(to2, Place{reached, next, cell, false});
       if (!isNew) {
@@ -104,12 +106,47 @@ std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, co
   return std::nullopt;
 }
 
+/// The way of the feet along a path. Each leg is walked when it is first asked for.
+class LegLengths {
+ public:
+  LegLengths(Walker& walker, const std::vector<Vec3>& places)
+      : walker_(walker), places_(places), lengths_(places.size() - 1, kUnknown) {}
+
+  /// Metres from place `first` to place `last`.
+  double measure(std::size_t first, std::size_t last) {
+    double sum = 0;
+    for (std::size_t leg = first; leg < last; ++leg) {
+      if (lengths_[leg] == kUnknown)
+        lengths_[leg] = measureTravel(walker_, places_[leg], places_[leg + 1]).length;
+      sum += lengths_[leg];
+    }
+    return sum;
+  }
+
+ private:
+  static constexpr double kUnknown = -1;
+  Walker& walker_;
+  const std::vector<Vec3>& places_;
+  std::vector<double> lengths_;
+};
+
+/// Whether feet that moved by `length` metres left the straight line between two places.
+bool isUneven(double length, const Vec3& from, const Vec3& to) {
+  return length > (to - from).norm() + kSameHeight;
+}
+
 }  // namespace
 
 bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError) {
   walker.returnTo(from);
   return walker.walkTo(to).kind == WalkOutcome::Kind::arrived &&
          std::abs(walker.footPosition().y() - to.y()) <= heightError;
+}
+
+FeetTravel measureTravel(Walker& walker, const Vec3& from, const Vec3& to) {
+  walker.returnTo(from);
+  walker.walkTo(to);
+  return walker.travel();
 }
 
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
@@ -156,7 +193,13 @@ void pullTight(Walker& walker, std::vector<Vec3>& places) {
         walker.returnTo(before);
         if (walker.walkTo(here + part * aside).kind != WalkOutcome::Kind::arrived) continue;
         const Vec3 reached = walker.footPosition();
+        const double first = walker.travel().length;
         if (!walks(walker, reached, after, kSameHeight)) continue;
+        const double second = walker.travel().length;
+        if ((isUneven(first, before, reached) || isUneven(second, reached, after)) &&
+            first + second > measureTravel(walker, before, here).length +
+                                 measureTravel(walker, here, after).length)
+          continue;
         places[i] = reached;
         isMoved = true;
         break;
@@ -166,8 +209,14 @@ void pullTight(Walker& walker, std::vector<Vec3>& places) {
 }
 
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind) {
-  const auto canWalk = [&](const Vec3& from, const Vec3& to) {
-    if (kind == Shortcuts::all) return walks(walker, from, to, kSameHeight);
+  LegLengths legs(walker, places);
+  const auto isShortcut = [&](std::size_t first, std::size_t last) {
+    const Vec3 &from = places[first], &to = places[last];
+    if (kind == Shortcuts::all) {
+      if (!walks(walker, from, to, kSameHeight)) return false;
+      const double length = walker.travel().length;
+      return !isUneven(length, from, to) || length <= legs.measure(first, last);
+    }
     walker.returnTo(from);
     return walker.isPathClear(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
   };
@@ -178,11 +227,11 @@ std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, S
     for (std::size_t step = 2; reached + 1 < failed; step *= 2) {
       const std::size_t next = std::min(at + step, failed - 1);
       if (next <= reached) break;
-      (canWalk(places[at], places[next]) ? reached : failed) = next;
+      (isShortcut(at, next) ? reached : failed) = next;
     }
     while (failed < places.size() && reached + 1 < failed) {
       const std::size_t middle = (reached + failed) / 2;
-      (canWalk(places[at], places[middle]) ? reached : failed) = middle;
+      (isShortcut(at, middle) ? reached : failed) = middle;
     }
     at = reached;
     path.push_back(places[at]);

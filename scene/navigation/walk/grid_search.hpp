@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -16,10 +17,14 @@ namespace enfilade::scene {
 /// below.
 bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError);
 
+/// The way of the feet from one place towards another one, up to where the walk ends.
+FeetTravel measureTravel(Walker& walker, const Vec3& from, const Vec3& to);
+
 struct GridSearch {
   double spacing = 0.1;      ///< metres between places
   double margin = 1.5;       ///< metres: how far the path may leave the box of both ends
   std::size_t maxWalks = 0;  ///< edges to walk
+  double maxLength = std::numeric_limits<double>::infinity();  ///< metres, of the feet
 };
 
 /// The places of a path between two places where the walker stood, with both; nullopt: none was
@@ -47,10 +52,11 @@ std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& fro
 enum class Shortcuts : std::uint8_t { all, free };
 
 /// Moves the places between both ends towards the lines between their neighbours, as long as the
-/// legs can be walked.
+/// legs can be walked and the way of the feet becomes shorter.
 void pullTight(Walker& walker, std::vector<Vec3>& places);
 
-/// Leaves out places of a path as long as the legs between the others can be walked.
+/// Leaves out places of a path as long as the legs between the others can be walked and the way of
+/// the feet becomes shorter.
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind);
 
 }  // namespace enfilade::scene

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdint>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 
 namespace enfilade::scene {
 

@@ -114,27 +114,38 @@ void Walker::prepareStep(const Vec3& velocity) {
 /// Steps if the path is free and level; false, at the same place: it is not. A move of this length
 /// alone would climb and pass what a walk in short steps cannot.
 bool Walker::stepEvenly(const Vec3& displacement, bool isFloorEven) {
-  const Vec3 before = avatar_.footPosition;
+  const Standing before = getStanding();
   prepareStep(displacement / world_.settings.tickDuration);
-  const ShapeCastHit hit = castAvatarShape(*avatar_.shape, before, displacement, avatar_.obstacles,
-                                           makeContactOffset(world_.settings), count_);
+  const ShapeCastHit hit =
+      castAvatarShape(*avatar_.shape, before.footPosition, displacement, avatar_.obstacles,
+                      makeContactOffset(world_.settings), count_);
   if (hit.entity != 0) return false;
   if (isFloorEven) {
     avatar_.footPosition += displacement;
+    addTravel(before.footPosition);
     return true;
   }
   isUneven_ = true;
   moveAvatar(world_, avatar_, count_);
+  addTravel(before.footPosition);
   if (avatar_.blockedBy == 0 && avatar_.grounded &&
-      std::abs(avatar_.footPosition.y() - before.y()) <= kEvenHeight)
+      std::abs(avatar_.footPosition.y() - before.footPosition.y()) <= kEvenHeight)
     return true;
-  returnTo(before);
+  restore(before);
   return false;
 }
 
 void Walker::step(const Vec3& velocity) {
+  const Vec3 before = avatar_.footPosition;
   prepareStep(velocity);
   moveAvatar(world_, avatar_, count_);
+  addTravel(before);
+}
+
+void Walker::addTravel(const Vec3& from) {
+  const Vec3 moved = avatar_.footPosition - from;
+  travel_.length += moved.norm();
+  travel_.climb += std::abs(moved.y());
 }
 
 /// Whether a floor on which one can stand is at most a step below the middle of the feet.
@@ -166,18 +177,24 @@ std::optional<std::string> Walker::place(const Vec3& footPosition, double maxDro
     if (before - avatar_.footPosition.y() < 1e-9 && avatar_.blockedBy != 0)
       return "it would not stand upright on " + world_.findEntityName(avatar_.blockedBy);
   }
+  travel_ = {};
   return std::nullopt;
 }
 
 void Walker::returnTo(const Vec3& footPosition) {
-  avatar_.footPosition = footPosition;
+  restore({footPosition, {}});
+}
+
+void Walker::restore(const Standing& standing) {
+  avatar_.footPosition = standing.footPosition;
   avatar_.grounded = true;
   avatar_.fallSpeed = 0;
+  travel_ = standing.travel;
 }
 
 WalkOutcome Walker::walkTo(const Vec3& goal) {
   const double stepHeight = world_.settings.stepHeight;
-  const Vec3 start = avatar_.footPosition;
+  const Standing start = getStanding();
   hasStepped_ = isUneven_ = false;
   for (double minDistance = std::numeric_limits<double>::infinity();;) {
     avatar_.shape = wideShape_;
@@ -186,7 +203,7 @@ WalkOutcome Walker::walkTo(const Vec3& goal) {
     if (outcome.kind == WalkOutcome::Kind::arrived) {
       if (!hasStepped_) return outcome;
       // Whether a step succeeds, and where it ends, may depend on where the ticks begin.
-      returnTo(start);
+      restore(start);
       return walkByTicks(goal, kAnyLength, false, stepHeight);
     }
     outcome = walkByTicks(goal, kTickedLength, false, stepHeight);
@@ -232,17 +249,17 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
   const double tick = world_.settings.tickDuration;
   double shortDistance = 0, stepLimit = kMaxStep;
   LastFloor floor{avatar_.footPosition.y()};
-  Vec3 stood = avatar_.footPosition;
+  Standing stood = getStanding();
   const auto end = [&](WalkOutcome::Kind kind) {
     const WalkOutcome outcome{kind, avatar_.footPosition, avatar_.blockedBy};
-    if (kind != WalkOutcome::Kind::arrived) returnTo(stood);
+    if (kind != WalkOutcome::Kind::arrived) restore(stood);
     return outcome;
   };
   for (int ticks = 0; ticks < kMaxTicks; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     if (distance <= kArrivalDistance && avatar_.grounded) return end(WalkOutcome::Kind::arrived);
     const Vec3 before = avatar_.footPosition;
-    if (avatar_.grounded) stood = before;
+    if (avatar_.grounded) stood = getStanding();
     if (shortDistance <= 0) {
       const double even = measureEvenFloor(goal, distance);
       const double length = std::min({distance, stepLimit, std::max(kLongStep, even)});
@@ -313,11 +330,11 @@ WalkOutcome Walker::dropTo(const Vec3& goal, double maxDrop) {
 }
 
 WalkOutcome Walker::walkOn(const Vec3& goal) {
-  const Vec3 start = avatar_.footPosition;
+  const Standing start = getStanding();
   hasStepped_ = isUneven_ = false;
   const WalkOutcome outcome = walkWithMargin(goal);  // of the agent's own width
   if (outcome.kind == WalkOutcome::Kind::arrived && !isUneven_) return outcome;
-  returnTo(start);
+  restore(start);
   return walkByTicks(goal, kAnyLength, true, world_.settings.stepHeight);
 }
 

@@ -29,6 +29,12 @@ struct WalkOutcome {
   int ticks = 0;                     ///< of a walk tick by tick
 };
 
+/// The way of the feet. A step counts with its height.
+struct FeetTravel {
+  double length = 0;  ///< metres in space
+  double climb = 0;   ///< metres up, and down
+};
+
 /// Not thread-safe; several walkers may share a world that does not tick.
 class Walker {
  public:
@@ -64,6 +70,8 @@ class Walker {
   /// Whether a walk stepped up or down since the last call. The place where it then stands may
   /// depend on its path.
   bool takeCrossedSteps() { return std::exchange(crossedSteps_, false); }
+  /// Of all walks since the last returnTo() or place().
+  const FeetTravel& travel() const { return travel_; }
 
   const Vec3& footPosition() const { return avatar_.footPosition; }
   EntityId groundEntity() const { return avatar_.groundEntity; }  ///< after place()
@@ -79,6 +87,14 @@ class Walker {
   };
   bool hasFloorBelow();
   bool hasFallen(LastFloor& floor, double maxDrop);
+  /// Where the feet stood, and how they came there.
+  struct Standing {
+    Vec3 footPosition;
+    FeetTravel travel;
+  };
+  Standing getStanding() const { return {avatar_.footPosition, travel_}; }
+  void restore(const Standing& standing);
+  void addTravel(const Vec3& from);
   void prepareStep(const Vec3& velocity);
   void step(const Vec3& velocity);
   void collectNearObstacles();
@@ -92,6 +108,7 @@ class Walker {
   bool hasStepped_ = false;  ///< in the present walk
   bool crossedSteps_ = false;
   bool isUneven_ = false;  ///< the present walk left even floor
+  FeetTravel travel_;
   QueryCount count_;
   /// Obstacles around a cell, with their caches. The avatar has those of `cell_`.
   struct Neighbourhood {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 #include "scene/model/rotation.hpp"
 #include "scene/world/avatars/avatar_state.hpp"
 #include "scene/world/avatars/rigid_step.hpp"

@@ -9,8 +9,8 @@
 #include <numbers>
 #include <string>
 
-#include "collision/motion/sine_cosine.hpp"
 #include "collision/shapes/triangle_tree.hpp"
+#include "collision/sine_cosine.hpp"
 #include "scene/world/queries/scene_trees.hpp"
 
 namespace enfilade::scene {

@@ -5,7 +5,7 @@
 #include <numbers>
 #include <set>
 
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 #include "protocol/json_depth.hpp"
 
 namespace enfilade::server {

@@ -2,7 +2,7 @@
 // and cosine about 0. Their remainders at pi/4 are below 1e-17 (double) and 2^-64 (LongReal).
 // Quarter turns are exact in degrees, as fmod is exact. In radians, pi/2 is a sum of three doubles
 // (W. J. Cody and W. Waite, "Software Manual for the Elementary Functions", 1980).
-#include "collision/motion/sine_cosine.hpp"
+#include "collision/sine_cosine.hpp"
 
 #include <array>
 #include <cmath>

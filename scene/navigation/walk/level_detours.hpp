@@ -1,0 +1,17 @@
+// Detours around low objects, onto which an agent would step for a moment, as onto the corner of a
+// low bed: the shortest line on a navigation mesh ignores heights.
+#pragma once
+
+#include <vector>
+
+#include "scene/navigation/walk/walker.hpp"
+
+namespace enfilade::scene {
+
+inline constexpr double kMinBump = 0.1;  ///< metres up and down together: lower ones stay
+
+/// Replaces parts of a path that lead up and down again by ways around them, if this shortens the
+/// way of the feet. Each leg of `places` can be walked. Returns whether the path changed.
+bool goAroundBumps(Walker& walker, std::vector<Vec3>& places);
+
+}  // namespace enfilade::scene
