@@ -26,7 +26,9 @@ constexpr int kRefutations = 8;
 constexpr int kMaxRepairs = 12;               // of a leg
 constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed rarely need more
 constexpr std::size_t kMaxQuickWalks = 3000;  // of a path
+constexpr double kFarAround = 1.3;            // of the straight line: a way around is long
 constexpr int kQuickProposals = 4;
+constexpr int kMaxImprovements = 3;        // proposals after a path that leads far around
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less is not tried
 constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
@@ -80,6 +82,34 @@ bool passGap(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corn
   return false;
 }
 
+/// A path on the grid to the first target that has one.
+std::optional<std::vector<Vec3>> findWayToFirst(Walker& walker, const Vec3& from,
+                                                const std::vector<Vec3>& targets,
+                                                GridSearch& search) {
+  for (const Vec3& target : targets)
+    if (auto places = findGridPath(walker, from, target, search)) return places;
+  return std::nullopt;
+}
+
+/// As findWayToFirst(), on the coarse grid, or on the fine one: a narrow place may lie between the
+/// lines of the coarse grid.
+std::optional<std::vector<Vec3>> findRepair(Walker& walker, const Vec3& from,
+                                            const std::vector<Vec3>& targets, Proof& proof) {
+  if (proof.isQuick) {
+    const std::size_t maxWalks = std::min(kQuickWalks, proof.quickWalks);
+    GridSearch quick{kCoarseSpacing, proof.coarse.margin, maxWalks};
+    auto places = findWayToFirst(walker, from, targets, quick);
+    proof.quickWalks -= maxWalks - quick.maxWalks;
+    return places;
+  }
+  auto places = findWayToFirst(walker, from, targets, proof.coarse);
+  const double around = places ? computeLength(*places) : std::numeric_limits<double>::infinity();
+  if (places && around <= kFarAround * computeLength({from, places->back()})) return places;
+  proof.fine.maxLength = around;
+  auto finer = findWayToFirst(walker, from, targets, proof.fine);
+  return finer ? finer : places;
+}
+
 /// Goes around the obstacle that stopped the walker on the leg from the last place of `path` to
 /// `corner`. Appends places up to where it joins that leg again, or up to the corner.
 bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corner,
@@ -105,22 +135,11 @@ bool goAround(const PathFinder& finder, const WalkOutcome& stop, const Vec3& cor
       targets.push_back(*place);
   }
   targets.push_back(corner);
-  const auto search = [&](GridSearch& grid) {
-    for (const Vec3& target : targets) {
-      auto places = findGridPath(finder.walker, from, target, grid);
-      if (!places) continue;
-      path.points.insert(path.points.end(), places->begin() + 1, places->end());
-      proof.isRepaired = true;
-      return true;
-    }
-    return false;
-  };
-  if (!proof.isQuick) return search(proof.coarse) || search(proof.fine);
-  const std::size_t maxWalks = std::min(kQuickWalks, proof.quickWalks);
-  GridSearch quick{kCoarseSpacing, proof.coarse.margin, maxWalks};
-  const bool isRepaired = search(quick);
-  proof.quickWalks -= maxWalks - quick.maxWalks;
-  return isRepaired;
+  const auto around = findRepair(finder.walker, from, targets, proof);
+  if (!around) return false;
+  path.points.insert(path.points.end(), around->begin() + 1, around->end());
+  proof.isRepaired = true;
+  return true;
 }
 
 /// Walks from corner to corner, with repairs. Appends the places to `path`, which has the first
@@ -168,7 +187,8 @@ class PortalClosures {
   PortalClosures& operator=(const PortalClosures&) = delete;
 
   /// Closes the portal of a corridor that is closest to a failure; false: the corridor has none.
-  bool closeNearest(const Corridor& corridor, const Vec3& failure) {
+  /// `counts`: the failure may refute the portal.
+  bool closeNearest(const Corridor& corridor, const Vec3& failure, bool counts) {
     const auto& polygons = corridor.polygons;
     if (polygons.size() < 2) return false;
     std::size_t at = 0;
@@ -179,7 +199,7 @@ class PortalClosures {
       if (distance < minDistance) minDistance = distance, at = i;
     }
     mesh_.closePortal(polygons[at], polygons[at + 1]);
-    if (!refutes_ || mesh_.countFailure(polygons[at], polygons[at + 1]) < kRefutations)
+    if (!refutes_ || !counts || mesh_.countFailure(polygons[at], polygons[at + 1]) < kRefutations)
       closed_.emplace_back(polygons[at], polygons[at + 1]);
     return true;
   }
@@ -216,50 +236,63 @@ bool isAt(const MeshPoint& onMesh, const Vec3& place) {
          std::abs(onMesh.point.y() - place.y()) < kMaxMeshHeight;
 }
 
+/// Proves the line `corners`, and shortens what was repaired.
+NavigationPath proveCorridor(const PathFinder& finder, Clearance clearance, const Vec3& from,
+                             std::vector<Vec3> corners, double lineLength, Proof& proof) {
+  NavigationPath path;
+  path.points = {from};
+  finder.walker.takeCrossedSteps();
+  proof.isRepaired = false;
+  if (!proveLegs(finder, std::move(corners), clearance, path, proof)) return {};
+  path.points =
+      shortenPath(finder.walker, path.points, proof.isRepaired ? Shortcuts::all : Shortcuts::free);
+  path.length = computeLength(path.points);
+  if (path.length < kShortPath || (proof.isRepaired && path.length > kTight * lineLength))
+    pullTight(finder.walker, path.points);
+  path.length = computeLength(path.points);
+  if (finder.walker.takeCrossedSteps() && !walksWithoutBumps(finder.walker, path, proof)) return {};
+  return path;
+}
+
+/// A path along a corridor. A repair may lead far around: then other corridors are tried whose
+/// lines are shorter than the path.
 NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Clearance clearance,
                           const Vec3& from, const Vec3& to, Proof& proof) {
   const Vec3 extent = computeMeshReach(finder);
   const auto start = mesh.findNearest(from, extent), goal = mesh.findNearest(to, extent);
-  NavigationPath path;
-  if (!start || !goal) return path;
+  NavigationPath best;
+  if (!start || !goal) return best;
   // Quick repairs refute nothing, nor does the path off furniture.
   PortalClosures closures(mesh, !proof.isQuick && isAt(*start, from) && isAt(*goal, to));
-  const int maxProposals = proof.isQuick ? kQuickProposals : kMaxProposals;
-  for (int proposal = 0; proposal < maxProposals; ++proposal) {
+  int proposals = proof.isQuick ? kQuickProposals : kMaxProposals;
+  while (proposals-- > 0) {
     const auto corridor = findCorridor(mesh, *start, *goal);
-    if (!corridor) return path;
+    if (!corridor) break;
     std::vector<Vec3> corners = mesh.straighten(*corridor, start->point, goal->point);
     const double lineLength = computeLength(corners);
+    if (best.found() && lineLength * kWorthTrying > best.cost()) break;
     proof.shortestLine = std::min(proof.shortestLine, lineLength);
     if (corners.size() > 1) corners.erase(corners.begin(), corners.begin() + 1);
     if (!corners.empty()) corners.pop_back();
     corners.push_back(to);
-    path.points = {from};
-    finder.walker.takeCrossedSteps();
-    proof.isRepaired = false;
-    if (proveLegs(finder, corners, clearance, path, proof)) {
-      path.points = shortenPath(finder.walker, path.points,
-                                proof.isRepaired ? Shortcuts::all : Shortcuts::free);
-      path.length = computeLength(path.points);
-      if (path.length < kShortPath || (proof.isRepaired && path.length > kTight * lineLength)) {
-        pullTight(finder.walker, path.points);
-        path.length = computeLength(path.points);
-      }
-      const bool isProved =
-          !finder.walker.takeCrossedSteps() || walksWithoutBumps(finder.walker, path.points, proof);
-      if (isProved) {
-        path.length = computeLength(path.points);
-        for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
-          mesh.forgetFailures(corridor->polygons[i - 1], corridor->polygons[i]);
-        return path;
-      }
+    NavigationPath path =
+        proveCorridor(finder, clearance, from, std::move(corners), lineLength, proof);
+    const bool isProved = path.found();
+    if (isProved) {
+      for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
+        mesh.forgetFailures(corridor->polygons[i - 1], corridor->polygons[i]);
+      const double cost = path.cost();
+      const bool isShort =
+          cost <= kWorthTrying * lineLength || !(proof.isRepaired || path.bumpClimb > 0);
+      if (!best.found()) proposals = std::min(proposals, kMaxImprovements);
+      if (!best.found() || cost < best.cost()) best = std::move(path);
+      if (isShort) break;
     }
-    path.points.clear();
     if (!proof.isQuick && (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0))
-      return path;  // a search that ended at its limits does not refute the corridor
-    if (!closures.closeNearest(*corridor, proof.failedAt)) return path;
+      break;  // a search that ended at its limits does not refute the corridor
+    if (!closures.closeNearest(*corridor, proof.failedAt, !isProved)) break;
   }
-  return path;
+  return best;
 }
 
 NavigationPath findPathByProposals(const PathFinder& finder, const Vec3& start, const Vec3& goal,
@@ -273,9 +306,9 @@ NavigationPath findPathByProposals(const PathFinder& finder, const Vec3& start, 
   if (shortcut && (!best.found() ||
                    computeLength(finder.scarce.straighten(*shortcut, first->point, last->point)) *
                            kWorthTrying <
-                       best.length)) {
+                       best.cost())) {
     NavigationPath other = findPathOn(finder, finder.scarce, Clearance::scarce, start, goal, proof);
-    if (other.found() && (!best.found() || other.length < best.length)) best = std::move(other);
+    if (other.found() && (!best.found() || other.cost() < best.cost())) best = std::move(other);
   }
   return best;
 }
@@ -298,6 +331,10 @@ bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError) {
 
 bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
   walker.returnTo(points.front());
+  const auto walksEvenlyTo = [&](const Vec3& point) { return walker.walkEvenly(point); };
+  if (std::all_of(points.begin() + 1, points.end(), walksEvenlyTo)) return true;
+  // On bumpy ground a walk that begins a fraction of a millimetre aside may end elsewhere.
+  walker.returnTo(points.front());
   for (std::size_t i = 1; i < points.size(); ++i) {
     const WalkOutcome outcome = walker.walkOn(points[i]);
     if (outcome.kind == WalkOutcome::Kind::arrived) continue;
@@ -308,12 +345,21 @@ bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
   return true;
 }
 
-bool walksWithoutBumps(Walker& walker, std::vector<Vec3>& points, Proof& proof) {
-  if (!walksOn(walker, points, proof)) return false;
-  const double rise = std::abs(points.back().y() - points.front().y());
-  if (walker.travel().climb - rise < kMinBump) return true;
-  std::vector<Vec3> level = points;
-  if (goAroundBumps(walker, level) && walksOn(walker, level, proof)) points = std::move(level);
+bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
+  const auto measureClimb = [&] {
+    const double rise = std::abs(path.points.back().y() - path.points.front().y());
+    return walker.travel().climb - rise;
+  };
+  if (!walksOn(walker, path.points, proof)) return false;
+  path.length = computeLength(path.points);
+  if (measureClimb() < kMinBump) return true;
+  std::vector<Vec3> level = path.points;
+  if (goAroundBumps(walker, level) && walksOn(walker, level, proof)) path.points = std::move(level);
+  path.length = computeLength(path.points);
+  if (const auto bump = findBump(walker, path.points)) {
+    proof.failedAt = *bump;
+    path.bumpClimb = measureClimb();
+  }
   return true;
 }
 
@@ -325,9 +371,9 @@ NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, con
   proof.shortestLine = std::numeric_limits<double>::infinity();
   NavigationPath quick = findPathByProposals(finder, start, goal, proof);
   proof.isQuick = false;
-  if (quick.found() && quick.length <= kTight * proof.shortestLine) return quick;
+  if (quick.found() && quick.cost() <= kTight * proof.shortestLine) return quick;
   NavigationPath best = findPathByProposals(finder, start, goal, proof);
-  return quick.found() && (!best.found() || quick.length < best.length) ? quick : best;
+  return quick.found() && (!best.found() || quick.cost() < best.cost()) ? quick : best;
 }
 
 }  // namespace enfilade::scene

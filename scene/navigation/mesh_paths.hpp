@@ -26,7 +26,7 @@ struct Proof {
   bool isQuick = false;    ///< only short repairs are tried: a failure refutes no portal
   double shortestLine = std::numeric_limits<double>::infinity();  ///< metres, of all proposals
   bool isRepaired = false;                                        ///< the present proposal
-  Vec3 failedAt = Vec3::Zero();                                   ///< where the last proof failed
+  Vec3 failedAt = Vec3::Zero();  ///< where the last proof failed, or leads over a bump
   std::vector<Obstruction> met;
 };
 
@@ -39,7 +39,8 @@ bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError);
 /// Walks the whole path without a stop: after a step a place may be reached at another height.
 bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof);
 /// As walksOn(). Then leads the path around low objects, where this shortens the way of the feet.
-bool walksWithoutBumps(Walker& walker, std::vector<Vec3>& points, Proof& proof);
+/// Sets the length and the climb of what it still leads over, which is at `proof.failedAt`.
+bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof);
 
 /// A path on the ample mesh, or on the scarce one; without a reason if none is found.
 NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,

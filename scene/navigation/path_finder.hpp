@@ -40,12 +40,16 @@ struct NavigationPath {
   /// a slope, a step next to a point with its height. Of falls the distance across, of rides
   /// nothing.
   double length = 0;
+  /// Metres that the feet rise and sink again where they step over a low object, if the search
+  /// measured them.
+  double bumpClimb = 0;
   double seconds = 0;  ///< expected, without waits for doors
   std::vector<PathLeg> legs;
   std::string reason;  ///< without a path: why
   std::optional<Obstruction> obstruction;
 
   bool found() const { return !points.empty(); }
+  double cost() const { return length + bumpClimb; }  ///< metres; the search minimises it
 };
 
 /// The last searches between two islands: they found nothing.

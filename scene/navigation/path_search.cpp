@@ -16,6 +16,8 @@ namespace {
 constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
 constexpr int kMaxConnectionRoutes = 4;
 constexpr double kOnMesh = 0.1;  // metres
+constexpr double kMinAim = 1;    // metres from where a path joins the mesh
+constexpr double kStraight = 1.01;
 constexpr const char* kNotFound = "no path was found within the limits of the search";
 constexpr double kMaxGridDistance = 3;  // metres between places that are connected without a mesh
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
@@ -82,12 +84,8 @@ NavigationPath provePath(const PathFinder& finder, const std::vector<Vec3>& plac
   for (const std::vector<Vec3>* points :
        {&std::as_const(tight), &std::as_const(shortened), &places}) {
     path.points = *points;
-    if (!walksWithoutBumps(finder.walker, path.points, proof)) {
-      path.points.clear();
-      continue;
-    }
-    path.length = computeLength(path.points);
-    break;
+    if (walksWithoutBumps(finder.walker, path, proof)) break;
+    path.points.clear();
   }
   return path;
 }
@@ -211,6 +209,40 @@ Places findPathToMesh(const PathFinder& finder, const Vec3& place, const Vec3& t
   return places ? places : findGridPathOut(finder.walker, place, {isOn, {}, toward}, fine);
 }
 
+/// Places that the paths from both ends to the mesh lead towards.
+struct Aims {
+  Vec3 fromStart, fromGoal;
+};
+
+/// The first place of a path that is some way from its beginning.
+template <class Iterator>
+Vec3 findAim(Iterator first, Iterator end) {
+  const auto isFar = [&](const Vec3& place) {
+    return computeGroundDistance(*first, place) > kMinAim;
+  };
+  const auto far = std::find_if(first, end, isFar);
+  return far == end ? *std::prev(end) : *far;
+}
+
+/// A path from the start to the mesh, on it, and to the goal. Then `aims` are places of its part on
+/// the mesh.
+NavigationPath findPathOverMesh(const PathFinder& finder, const Vec3& start, const Vec3& goal,
+                                Aims& aims, Proof& proof) {
+  Places places = findPathToMesh(finder, start, aims.fromStart);
+  // A walk may lead down where none leads up: the path back from the mesh is walked, too.
+  const Places fromGoal = places ? findPathToMesh(finder, goal, aims.fromGoal) : std::nullopt;
+  const Places last =
+      fromGoal ? findPathOnGrids(finder.walker, fromGoal->back(), goal) : std::nullopt;
+  if (!last) return {};
+  const NavigationPath middle = findPathOnMeshes(finder, places->back(), last->front(), proof);
+  if (!middle.found()) return {};
+  aims = {findAim(middle.points.begin(), middle.points.end()),
+          findAim(middle.points.rbegin(), middle.points.rend())};
+  places->insert(places->end(), middle.points.begin() + 1, middle.points.end());
+  places->insert(places->end(), last->begin() + 1, last->end());
+  return provePath(finder, *places, proof);
+}
+
 /// Places without a mesh, such as narrow ones on furniture, or on a small part of one, are
 /// connected with it by walks on a grid. Places that are near are connected with one another.
 NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal) {
@@ -221,19 +253,19 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
     NavigationPath straight = provePath(finder, {start, goal}, proof);
     if (straight.found()) return straight;
   }
+  NavigationPath best;
   if (computeGroundDistance(start, goal) < kMaxGridDistance)
     if (const Places places = findPathOnGrids(walker, start, goal))
-      return provePath(finder, *places, proof);
-  Places places = findPathToMesh(finder, start, goal);
-  // A walk may lead down where none leads up: the path back from the mesh is walked, too.
-  const Places fromGoal = places ? findPathToMesh(finder, goal, start) : std::nullopt;
-  const Places last = fromGoal ? findPathOnGrids(walker, fromGoal->back(), goal) : std::nullopt;
-  if (!last) return {};
-  const NavigationPath middle = findPathOnMeshes(finder, places->back(), last->front(), proof);
-  if (!middle.found()) return {};
-  places->insert(places->end(), middle.points.begin() + 1, middle.points.end());
-  places->insert(places->end(), last->begin() + 1, last->end());
-  return provePath(finder, *places, proof);
+      best = provePath(finder, *places, proof);
+  // The mesh may lead around walls: its path shows which way the ends lead.
+  Aims aims{goal, start};
+  for (int i = 0; i < 2; ++i) {
+    if (best.found() && best.cost() <= kStraight * (goal - start).norm()) break;
+    NavigationPath path = findPathOverMesh(finder, start, goal, aims, proof);
+    if (!path.found()) break;
+    if (!best.found() || path.cost() < best.cost()) best = std::move(path);
+  }
+  return best;
 }
 
 }  // namespace

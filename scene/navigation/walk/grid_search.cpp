@@ -15,6 +15,7 @@ namespace {
 
 constexpr double kLayerHeight = 1;    // metres: places of a cell closer than this are one place
 constexpr double kSameHeight = 0.05;  // metres: of feet that come to the same place on two paths
+constexpr double kMinPull = 0.01;     // metres
 
 struct Cell {
   int x = 0, z = 0, storey = 0;
@@ -93,7 +94,7 @@ std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, co
       walker.returnTo(feet);
       if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
       const Vec3 reached = walker.footPosition();
-      next = std::max(next, cost + walker.travel().length);
+      if (search.countsHeights) next = std::max(next, cost + walker.travel().length);
       const Cell to2 = grid.computeCell(reached, x, z);
       const auto [at, isNew] = places.try_emplace(to2, Place{reached, next, cell, false});
       if (!isNew) {
@@ -175,34 +176,73 @@ std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& fro
   return searchGrid(walker, from, end, search);
 }
 
+namespace {
+
+/// Moves place `i` towards the line between its neighbours as far as this can be walked.
+bool pullPlace(Walker& walker, std::vector<Vec3>& places, std::size_t i) {
+  const Vec3 &before = places[i - 1], &after = places[i + 1], here = places[i];
+  const Vec3 line = projectToGround(after - before);
+  const double squaredLength = line.squaredNorm();
+  if (!(squaredLength > 0)) return false;
+  const double share = std::clamp(line.dot(here - before) / squaredLength, 0.0, 1.0);
+  const Vec3 aside = projectToGround(before + share * line - here);
+  for (double part = 1; part * aside.norm() > kMinPull; part *= 0.5) {
+    walker.returnTo(before);
+    if (walker.walkTo(here + part * aside).kind != WalkOutcome::Kind::arrived) continue;
+    const Vec3 reached = walker.footPosition();
+    const double first = walker.travel().length;
+    if (!walks(walker, reached, after, kSameHeight)) continue;
+    const double second = walker.travel().length;
+    if ((isUneven(first, before, reached) || isUneven(second, reached, after)) &&
+        first + second >
+            measureTravel(walker, before, here).length + measureTravel(walker, here, after).length)
+      continue;
+    places[i] = reached;
+    return true;
+  }
+  return false;
+}
+
+/// Replaces place `i`, which cannot be pulled, by two on its legs, as near to their other ends as
+/// this can be walked.
+bool cutCorner(Walker& walker, std::vector<Vec3>& places, std::size_t i) {
+  const Vec3 before = places[i - 1], here = places[i], after = places[i + 1];
+  const double first = (before - here).norm(), second = (after - here).norm();
+  for (double along = 0.5 * std::min(first, second); along > kMinPull; along *= 0.5) {
+    const Vec3 from = here + along / first * (before - here);
+    const Vec3 to = here + along / second * (after - here);
+    if (2 * along - (to - from).norm() < kMinPull) return false;
+    walker.returnTo(before);
+    if (walker.walkTo(from).kind != WalkOutcome::Kind::arrived) continue;
+    const Vec3 start = walker.footPosition();
+    if (walker.walkTo(to).kind != WalkOutcome::Kind::arrived) continue;
+    const Vec3 end = walker.footPosition();
+    if (walker.walkTo(after).kind != WalkOutcome::Kind::arrived) continue;
+    if (std::abs(walker.footPosition().y() - after.y()) > kSameHeight) continue;
+    if (walker.travel().length >
+        measureTravel(walker, before, here).length + measureTravel(walker, here, after).length)
+      continue;
+    places[i] = start;
+    places.insert(places.begin() + static_cast<std::ptrdiff_t>(i) + 1, end);
+    return true;
+  }
+  return false;
+}
+
+}  // namespace
+
 void pullTight(Walker& walker, std::vector<Vec3>& places) {
   // A place moves once a pass. More passes make shorter paths, but each walks all legs again.
   constexpr int kMaxPasses = 4;
-  constexpr double kMinGain = 0.01;  // metres
   bool isMoved = true;
   for (int pass = 0; pass < kMaxPasses && isMoved; ++pass) {
     isMoved = false;
     for (std::size_t i = 1; i + 1 < places.size(); ++i) {
-      const Vec3 &before = places[i - 1], &after = places[i + 1], here = places[i];
-      const Vec3 line = projectToGround(after - before);
-      const double squaredLength = line.squaredNorm();
-      if (!(squaredLength > 0)) continue;
-      const double share = std::clamp(line.dot(here - before) / squaredLength, 0.0, 1.0);
-      const Vec3 aside = projectToGround(before + share * line - here);
-      for (double part = 1; part * aside.norm() > kMinGain; part *= 0.5) {
-        walker.returnTo(before);
-        if (walker.walkTo(here + part * aside).kind != WalkOutcome::Kind::arrived) continue;
-        const Vec3 reached = walker.footPosition();
-        const double first = walker.travel().length;
-        if (!walks(walker, reached, after, kSameHeight)) continue;
-        const double second = walker.travel().length;
-        if ((isUneven(first, before, reached) || isUneven(second, reached, after)) &&
-            first + second > measureTravel(walker, before, here).length +
-                                 measureTravel(walker, here, after).length)
-          continue;
-        places[i] = reached;
+      if (pullPlace(walker, places, i)) {
         isMoved = true;
-        break;
+      } else if (cutCorner(walker, places, i)) {
+        isMoved = true;
+        ++i;
       }
     }
   }
@@ -234,6 +274,11 @@ std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, S
       (isShortcut(at, middle) ? reached : failed) = middle;
     }
     at = reached;
+    const bool isLast = at + 1 == places.size();
+    if ((places[at] - path.back()).norm() < kArrivalDistance) {
+      if (!isLast) continue;
+      if (path.size() > 1) path.pop_back();
+    }
     path.push_back(places[at]);
   }
   return path;

@@ -21,10 +21,11 @@ bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError)
 FeetTravel measureTravel(Walker& walker, const Vec3& from, const Vec3& to);
 
 struct GridSearch {
-  double spacing = 0.1;      ///< metres between places
-  double margin = 1.5;       ///< metres: how far the path may leave the box of both ends
-  std::size_t maxWalks = 0;  ///< edges to walk
-  double maxLength = std::numeric_limits<double>::infinity();  ///< metres, of the feet
+  double spacing = 0.1;        ///< metres between places
+  double margin = 1.5;         ///< metres: how far the path may leave the box of both ends
+  std::size_t maxWalks = 0;    ///< edges to walk
+  bool countsHeights = false;  ///< the length of a path is that of the feet, else across
+  double maxLength = std::numeric_limits<double>::infinity();  ///< metres
 };
 
 /// The places of a path between two places where the walker stood, with both; nullopt: none was

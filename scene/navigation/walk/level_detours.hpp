@@ -2,6 +2,7 @@
 // low bed: the shortest line on a navigation mesh ignores heights.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "scene/navigation/walk/walker.hpp"
@@ -13,5 +14,8 @@ inline constexpr double kMinBump = 0.1;  ///< metres up and down together: lower
 /// Replaces parts of a path that lead up and down again by ways around them, if this shortens the
 /// way of the feet. Each leg of `places` can be walked. Returns whether the path changed.
 bool goAroundBumps(Walker& walker, std::vector<Vec3>& places);
+
+/// The middle of the first part that leads up and down again; nullopt: none does.
+std::optional<Vec3> findBump(Walker& walker, const std::vector<Vec3>& places);
 
 }  // namespace enfilade::scene

@@ -305,8 +305,11 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
                    computeGroundDistance(start, goal)};
   for (int ticks = 0;; ++ticks) {
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
-    if (avatar_.grounded && (distance <= kArrivalDistance ||
-                             computeGroundDistance(start, avatar_.footPosition) >= length))
+    const bool isThere =
+        distance <= kArrivalDistance &&
+        (avatar_.grounded || (maySlide && isOnStorey(goal, avatar_, world_.settings)));
+    if (isThere ||
+        (avatar_.grounded && computeGroundDistance(start, avatar_.footPosition) >= length))
       return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0, ticks};
     if (watch.isStalledAt(distance))
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.groundEntity, ticks};
@@ -329,12 +332,12 @@ WalkOutcome Walker::dropTo(const Vec3& goal, double maxDrop) {
   return walkByTicks(goal, kAnyLength, false, maxDrop);
 }
 
-WalkOutcome Walker::walkOn(const Vec3& goal) {
-  const Standing start = getStanding();
+bool Walker::walkEvenly(const Vec3& goal) {
   hasStepped_ = isUneven_ = false;
-  const WalkOutcome outcome = walkWithMargin(goal);  // of the agent's own width
-  if (outcome.kind == WalkOutcome::Kind::arrived && !isUneven_) return outcome;
-  restore(start);
+  return walkWithMargin(goal).kind == WalkOutcome::Kind::arrived && !isUneven_;
+}
+
+WalkOutcome Walker::walkOn(const Vec3& goal) {
   return walkByTicks(goal, kAnyLength, true, world_.settings.stepHeight);
 }
 

@@ -59,8 +59,10 @@ class Walker {
   /// nothing else.
   bool isRideFree(const Vec3& from, const Vec3& to, EntityId body);
 
-  /// As an avatar in a world walks on from where the walker stands; may slide along obstacles. Tick
-  /// by tick off even floor.
+  /// Walks straight to `goal` over even floor, without an obstacle; false: it does not arrive so.
+  bool walkEvenly(const Vec3& goal);
+  /// The walk of an avatar in a world up to rounding, from where the walker stands or falls: tick
+  /// by tick. It may slide along obstacles.
   WalkOutcome walkOn(const Vec3& goal);
   /// Walks tick by tick to `goal`, and may fall by up to `maxDrop` metres on the way.
   WalkOutcome dropTo(const Vec3& goal, double maxDrop);
@@ -107,7 +109,7 @@ class Walker {
   std::shared_ptr<const AvatarShape> shape_, wideShape_, narrowShape_;
   bool hasStepped_ = false;  ///< in the present walk
   bool crossedSteps_ = false;
-  bool isUneven_ = false;  ///< the present walk left even floor
+  bool isUneven_ = false;
   FeetTravel travel_;
   QueryCount count_;
   /// Obstacles around a cell, with their caches. The avatar has those of `cell_`.

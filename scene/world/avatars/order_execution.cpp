@@ -289,12 +289,6 @@ std::string describeBlocking(const OrderContext& context, const Vec3& goal) {
   return "no progress for " + formatShortNumber(context.world.settings.stuckTimeout) + " s";
 }
 
-/// True in a fall that is faster than one from a step: it passes a waypoint above the landing.
-bool isFallingFar(const Avatar& avatar, const WorldSettings& settings) {
-  return !avatar.grounded && !avatar.flying && avatar.fallSpeed > 0 &&
-         avatar.fallSpeed * avatar.fallSpeed > 2 * settings.gravity * settings.stepHeight;
-}
-
 void updateWalk(const Walk& walk, OrderContext& context) {
   Avatar& avatar = *context.findAvatar();
   const Vec3& goal = walk.waypoints[avatar.walk.waypointIndex];
@@ -312,8 +306,7 @@ void updateWalk(const Walk& walk, OrderContext& context) {
            mayPassEarly(context.world, avatar, distance,
                         walk.waypoints[avatar.walk.waypointIndex + 1], context.count);
   };
-  if (!isFallingFar(avatar, context.world.settings) &&
-      std::abs(goal.y() - avatar.footPosition.y()) <= kArrivalHeight &&
+  if (isOnStorey(goal, avatar, context.world.settings) &&
       (distance <= kArrivalDistance || isPassedEarly())) {
     ++avatar.walk.waypointIndex;
     if (!isLast) return startWaypoint(context.world, walk, avatar);

@@ -1,10 +1,12 @@
-// Distance and velocity of a walk to a waypoint.
+// Distance, velocity and end of a walk to a waypoint.
 #pragma once
 
 #include <algorithm>
 #include <cmath>
 
 #include "collision/types.hpp"
+#include "scene/world/data/avatar.hpp"
+#include "scene/world/data/world_settings.hpp"
 
 namespace enfilade::scene {
 
@@ -33,6 +35,18 @@ inline Vec3 computeWalkVelocity(const Vec3& from, const Vec3& goal, bool flying,
   if (!(distance > 0)) return Vec3::Zero();
   const double reached = std::min(speed, distance / tickDuration);
   return (flying ? toGoal : projectToGround(toGoal)) * (reached / distance);
+}
+
+/// True in a fall that is faster than one from a step: it passes a waypoint above the landing.
+inline bool isFallingFar(const Avatar& avatar, const WorldSettings& settings) {
+  return !avatar.grounded && !avatar.flying && avatar.fallSpeed > 0 &&
+         avatar.fallSpeed * avatar.fallSpeed > 2 * settings.gravity * settings.stepHeight;
+}
+
+/// Whether an avatar that is at a waypoint, seen from above, has reached it.
+inline bool isOnStorey(const Vec3& waypoint, const Avatar& avatar, const WorldSettings& settings) {
+  return !isFallingFar(avatar, settings) &&
+         std::abs(waypoint.y() - avatar.footPosition.y()) <= kArrivalHeight;
 }
 
 }  // namespace enfilade::scene
