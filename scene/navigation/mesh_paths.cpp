@@ -32,6 +32,7 @@ constexpr int kMaxImprovements = 3;        // proposals after a path that leads 
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
 constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less is not tried
 constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
+constexpr double kMinClimb = 0.01;         // of the length of a path: less is no reason to search
 constexpr double kMaxMeshOffset = 0.1;     // metres, across
 constexpr double kShortPath = 5;  // metres: mesh lines keep some centimetres more than is needed
 
@@ -352,9 +353,10 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
   };
   if (!walksOn(walker, path.points, proof)) return false;
   path.length = computeLength(path.points);
-  if (measureClimb() < kMinBump) return true;
+  if (measureClimb() < std::max(kMinBump, kMinClimb * path.length)) return true;
   std::vector<Vec3> level = path.points;
-  if (goAroundBumps(walker, level) && walksOn(walker, level, proof)) path.points = std::move(level);
+  if (goAroundBumps(walker, level, proof.bumps) && walksOn(walker, level, proof))
+    path.points = std::move(level);
   path.length = computeLength(path.points);
   if (const auto bump = findBump(walker, path.points)) {
     proof.failedAt = *bump;

@@ -7,6 +7,7 @@
 
 #include "scene/navigation/path_finder.hpp"
 #include "scene/navigation/walk/grid_search.hpp"
+#include "scene/navigation/walk/level_detours.hpp"
 
 namespace enfilade::scene {
 
@@ -28,6 +29,7 @@ struct Proof {
   bool isRepaired = false;                                        ///< the present proposal
   Vec3 failedAt = Vec3::Zero();  ///< where the last proof failed, or leads over a bump
   std::vector<Obstruction> met;
+  BumpList bumps;  ///< without a shorter way around
 };
 
 /// Metres on each axis: how far a place may be off its mesh.

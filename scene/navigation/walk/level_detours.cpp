@@ -19,6 +19,7 @@ constexpr double kMaxBumpLength = 6;  // metres that the feet move
 constexpr double kApproach = 0.7;     // metres before and after a bump that a way around replaces
 constexpr double kGridExcess = 1.08;  // of a shortest path on a grid, before it is pulled tight
 constexpr double kMinSaving = 0.01;   // metres
+constexpr double kSameBump = 0.3;     // metres
 constexpr int kMaxBumps = 4;          // of a path
 constexpr GridSearch kCoarseAround{0.12, 1, 2000, true}, kFineAround{0.03, 0.7, 12'000, true};
 
@@ -86,6 +87,12 @@ double measureLength(Walker& walker, const std::vector<Vec3>& places) {
   return length;
 }
 
+bool isKnown(const BumpList& known, const Vec3& before, const Vec3& after) {
+  return std::ranges::any_of(known, [&](const auto& bump) {
+    return (bump.first - before).norm() < kSameBump && (bump.second - after).norm() < kSameBump;
+  });
+}
+
 /// A part of a path, between two of its places, with a way around a bump; empty: none is shorter.
 std::vector<Vec3> levelPart(Walker& walker, const std::vector<Vec3>& part, const Sample& first,
                             const Sample& last) {
@@ -112,7 +119,7 @@ std::optional<Vec3> findBump(Walker& walker, const std::vector<Vec3>& places) {
   return std::nullopt;
 }
 
-bool goAroundBumps(Walker& walker, std::vector<Vec3>& places) {
+bool goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpList& known) {
   const auto samples = sampleWalk(walker, places);
   if (!samples) return false;
   std::vector<Vec3> level{places.front()};
@@ -124,6 +131,10 @@ bool goAroundBumps(Walker& walker, std::vector<Vec3>& places) {
     if (std::abs((*samples)[i + 1].feet.y() - (*samples)[i].feet.y()) < kMinChange) continue;
     const auto end = findEndOfBump(*samples, i);
     if (!end) continue;
+    if (isKnown(known, (*samples)[i].feet, (*samples)[*end].feet)) {
+      i = *end - 1;
+      continue;
+    }
     ++bumps;
     const Sample& first = (*samples)[std::max(findSampleBefore(*samples, i), begin)];
     const Sample& last = (*samples)[findSampleAfter(*samples, *end)];
@@ -132,6 +143,7 @@ bool goAroundBumps(Walker& walker, std::vector<Vec3>& places) {
     for (std::size_t k = next; k <= last.nextPlace; ++k) part.push_back(places[k]);
     const std::vector<Vec3> around = levelPart(walker, part, first, last);
     if (around.empty()) {
+      known.emplace_back((*samples)[i].feet, (*samples)[*end].feet);
       i = *end - 1;
       continue;
     }
