@@ -20,7 +20,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kHeightReach = 0.9;  // metres between both sides of a gap: three steps
+constexpr double kHeightReach = 0.9;  // metres between both sides of a gap: three steps of 0.3 m
 // Metres that a path across a gap is longer than the gap. Longer ones lead around it, but the
 // corridor between two islands may bend.
 constexpr double kMaxGapDetour = 3, kMaxCorridorDetour = 6;

@@ -27,6 +27,7 @@ constexpr int kMaxRepairs = 12;               // of a leg
 constexpr std::size_t kQuickWalks = 300;      // of a repair; those that succeed rarely need more
 constexpr std::size_t kMaxQuickWalks = 3000;  // of a path
 constexpr double kFarAround = 1.3;            // of the straight line: a way around is long
+constexpr std::size_t kMaxImprovementWalks = 5000;  // of a repair
 constexpr int kQuickProposals = 4;
 constexpr int kMaxImprovements = 3;        // proposals after a path that leads far around
 constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is short enough
@@ -83,17 +84,29 @@ bool passGap(const PathFinder& finder, const WalkOutcome& stop, const Vec3& corn
   return false;
 }
 
-/// A path on the grid to the first target that has one.
-std::optional<std::vector<Vec3>> findWayToFirst(Walker& walker, const Vec3& from,
-                                                const std::vector<Vec3>& targets,
-                                                GridSearch& search) {
-  for (const Vec3& target : targets)
+double computeHorizontalLength(std::vector<Vec3> points) {
+  for (Vec3& point : points) point.y() = 0;
+  return computeLength(points);
+}
+
+/// Metres from the start of a repair over its end to the end of its leg, across.
+double computeRepairLength(const std::vector<Vec3>& places, const Vec3& legEnd) {
+  return computeHorizontalLength(places) + computeGroundDistance(places.back(), legEnd);
+}
+
+/// A path on the grid to the first target that has one; the last target is the end of the leg.
+std::optional<std::vector<Vec3>> findWayToFirst(
+    Walker& walker, const Vec3& from, const std::vector<Vec3>& targets, GridSearch& search,
+    double maxRepairLength = std::numeric_limits<double>::infinity()) {
+  for (const Vec3& target : targets) {
+    search.maxLength = maxRepairLength - computeGroundDistance(target, targets.back());
     if (auto places = findGridPath(walker, from, target, search)) return places;
+  }
   return std::nullopt;
 }
 
-/// As findWayToFirst(), on the coarse grid, or on the fine one: a narrow place may lie between the
-/// lines of the coarse grid.
+/// As findWayToFirst(): a quick search, or a thorough one on the coarse grid and on the fine one. A
+/// narrow place may lie between the lines of the coarse grid, whose way then leads far around.
 std::optional<std::vector<Vec3>> findRepair(Walker& walker, const Vec3& from,
                                             const std::vector<Vec3>& targets, Proof& proof) {
   if (proof.isQuick) {
@@ -104,11 +117,14 @@ std::optional<std::vector<Vec3>> findRepair(Walker& walker, const Vec3& from,
     return places;
   }
   auto places = findWayToFirst(walker, from, targets, proof.coarse);
-  const double around = places ? computeLength(*places) : std::numeric_limits<double>::infinity();
-  if (places && around <= kFarAround * computeLength({from, places->back()})) return places;
-  proof.fine.maxLength = around;
-  auto finer = findWayToFirst(walker, from, targets, proof.fine);
-  return finer ? finer : places;
+  if (!places) return findWayToFirst(walker, from, targets, proof.fine);
+  const double length = computeRepairLength(*places, targets.back());
+  if (length <= kFarAround * computeGroundDistance(from, targets.back())) return places;
+  const std::size_t maxWalks = std::min(kMaxImprovementWalks, proof.improvementWalks);
+  GridSearch finer{kFineSpacing, proof.fine.margin, maxWalks};
+  auto better = findWayToFirst(walker, from, targets, finer, length);
+  proof.improvementWalks -= maxWalks - finer.maxWalks;
+  return better && computeRepairLength(*better, targets.back()) < length ? better : places;
 }
 
 /// Goes around the obstacle that stopped the walker on the leg from the last place of `path` to
@@ -211,11 +227,6 @@ class PortalClosures {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> closed_;
 };
 
-double computeHorizontalLength(std::vector<Vec3> points) {
-  for (Vec3& point : points) point.y() = 0;
-  return computeLength(points);
-}
-
 /// A* through the middles of portals is quick. Where its line bends, another corridor may have a
 /// shorter one.
 std::optional<Corridor> findCorridor(const NavigationMesh& mesh, const MeshPoint& from,
@@ -244,6 +255,7 @@ NavigationPath proveCorridor(const PathFinder& finder, Clearance clearance, cons
   path.points = {from};
   finder.walker.takeCrossedSteps();
   proof.isRepaired = false;
+  proof.bump.reset();
   if (!proveLegs(finder, std::move(corners), clearance, path, proof)) return {};
   path.points =
       shortenPath(finder.walker, path.points, proof.isRepaired ? Shortcuts::all : Shortcuts::free);
@@ -283,15 +295,15 @@ NavigationPath findPathOn(const PathFinder& finder, NavigationMesh& mesh, Cleara
       for (std::size_t i = 1; i < corridor->polygons.size(); ++i)
         mesh.forgetFailures(corridor->polygons[i - 1], corridor->polygons[i]);
       const double cost = path.cost();
-      const bool isShort =
-          cost <= kWorthTrying * lineLength || !(proof.isRepaired || path.bumpClimb > 0);
+      const bool isShort = cost <= kWorthTrying * lineLength || !(proof.isRepaired || proof.bump);
       if (!best.found()) proposals = std::min(proposals, kMaxImprovements);
       if (!best.found() || cost < best.cost()) best = std::move(path);
       if (isShort) break;
     }
     if (!proof.isQuick && (proof.coarse.maxWalks == 0 || proof.fine.maxWalks == 0))
       break;  // a search that ended at its limits does not refute the corridor
-    if (!closures.closeNearest(*corridor, proof.failedAt, !isProved)) break;
+    const Vec3& place = isProved && proof.bump ? *proof.bump : proof.failedAt;
+    if (!closures.closeNearest(*corridor, place, !isProved)) break;
   }
   return best;
 }
@@ -319,7 +331,9 @@ NavigationPath findPathByProposals(const PathFinder& finder, const Vec3& start, 
 Proof::Proof(std::size_t maxRepairWalks)
     : coarse{kCoarseSpacing, kRepairMargin, maxRepairWalks},
       fine{kFineSpacing, 0.7, maxRepairWalks},
-      quickWalks(std::min(kMaxQuickWalks, maxRepairWalks)) {}
+      quickWalks(std::min(kMaxQuickWalks, maxRepairWalks)),
+      improvementWalks(maxRepairWalks),
+      bumps{maxRepairWalks} {}
 
 Vec3 computeMeshReach(const PathFinder& finder) {
   return {3 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight, 3 * finder.agent.radius};
@@ -355,13 +369,22 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
   path.length = computeLength(path.points);
   if (measureClimb() < std::max(kMinBump, kMinClimb * path.length)) return true;
   std::vector<Vec3> level = path.points;
-  if (goAroundBumps(walker, level, proof.bumps) && walksOn(walker, level, proof))
-    path.points = std::move(level);
-  path.length = computeLength(path.points);
-  if (const auto bump = findBump(walker, path.points)) {
-    proof.failedAt = *bump;
-    path.bumpClimb = measureClimb();
+  if (const BumpList replaced = goAroundBumps(walker, level, proof.bumps); !replaced.empty()) {
+    const Vec3 failedAt = proof.failedAt;
+    const std::vector<Obstruction> met = proof.met;
+    if (walksOn(walker, level, proof)) {
+      path.points = std::move(level);
+      path.length = computeLength(path.points);
+    } else {
+      proof.bumps.known.insert(proof.bumps.known.end(), replaced.begin(), replaced.end());
+      proof.failedAt = failedAt;
+      proof.met = met;
+      walksOn(walker, path.points, proof);  // measures its climb
+    }
   }
+  const double climb = measureClimb();
+  proof.bump = findBump(walker, path.points);
+  path.bumpClimb = proof.bump ? climb : 0;
   return true;
 }
 

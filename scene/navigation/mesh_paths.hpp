@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "scene/navigation/path_finder.hpp"
@@ -11,7 +12,6 @@
 
 namespace enfilade::scene {
 
-inline constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  ///< metres, of grids
 inline constexpr double kMaxMeshHeight =
     0.2;                                 ///< metres between a place and its mesh, also over stairs
 inline constexpr double kSameFloor = 1;  ///< metres between the heights of a mesh and its floor
@@ -27,9 +27,11 @@ struct Proof {
   bool isQuick = false;    ///< only short repairs are tried: a failure refutes no portal
   double shortestLine = std::numeric_limits<double>::infinity();  ///< metres, of all proposals
   bool isRepaired = false;                                        ///< the present proposal
-  Vec3 failedAt = Vec3::Zero();  ///< where the last proof failed, or leads over a bump
+  Vec3 failedAt = Vec3::Zero();                                   ///< where the last proof failed
   std::vector<Obstruction> met;
-  BumpList bumps;  ///< without a shorter way around
+  std::size_t improvementWalks;  ///< that are left for repairs on the fine grid after one was found
+  BumpSearch bumps;
+  std::optional<Vec3> bump;  ///< the first one of the path that was proved last
 };
 
 /// Metres on each axis: how far a place may be off its mesh.
@@ -41,7 +43,7 @@ bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError);
 /// Walks the whole path without a stop: after a step a place may be reached at another height.
 bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof);
 /// As walksOn(). Then leads the path around low objects, where this shortens the way of the feet.
-/// Sets the length and the climb of what it still leads over, which is at `proof.failedAt`.
+/// Sets the length, `proof.bump` and its climb.
 bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof);
 
 /// A path on the ample mesh, or on the scarce one; without a reason if none is found.

@@ -40,8 +40,8 @@ struct NavigationPath {
   /// a slope, a step next to a point with its height. Of falls the distance across, of rides
   /// nothing.
   double length = 0;
-  /// Metres that the feet rise and sink again where they step over a low object, if the search
-  /// measured them.
+  /// Metres up and down in excess of the difference in height of both ends, if the path leads over
+  /// a low object; 0: it does not, or the excess is small.
   double bumpClimb = 0;
   double seconds = 0;  ///< expected, without waits for doors
   std::vector<PathLeg> legs;

@@ -15,9 +15,9 @@ namespace {
 
 constexpr int kMaxRefusals = 10;  // searches for the reason; afterwards it is that of the last one
 constexpr int kMaxConnectionRoutes = 4;
-constexpr double kOnMesh = 0.1;  // metres
-constexpr double kMinAim = 1;    // metres from where a path joins the mesh
-constexpr double kStraight = 1.01;
+constexpr double kOnMesh = 0.1;     // metres
+constexpr double kMinAim = 1;       // metres from where a path joins the mesh
+constexpr double kStraight = 1.01;  // of the straight line: a path is short enough
 constexpr const char* kNotFound = "no path was found within the limits of the search";
 constexpr double kMaxGridDistance = 3;  // metres between places that are connected without a mesh
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
@@ -137,7 +137,7 @@ void rejoinMesh(const PathFinder& finder, std::vector<Vec3>& places) {
   if (end - first < 3) return;
   Proof proof(finder.maxRepairWalks);
   const NavigationPath path = findPathOnMeshes(finder, *first, *std::prev(end), proof);
-  if (!path.found() || path.length >= computeLength({first, end})) return;
+  if (!path.found() || path.cost() >= computeLength({first, end})) return;
   std::vector<Vec3> rest(end, places.end());
   places.erase(first, places.end());
   places.insert(places.end(), path.points.begin(), path.points.end());
@@ -209,12 +209,13 @@ Places findPathToMesh(const PathFinder& finder, const Vec3& place, const Vec3& t
   return places ? places : findGridPathOut(finder.walker, place, {isOn, {}, toward}, fine);
 }
 
-/// Places that the paths from both ends to the mesh lead towards.
-struct Aims {
-  Vec3 fromStart, fromGoal;
+/// The parts of a path off the mesh.
+struct Exits {
+  Vec3 aimOfStart, aimOfGoal;            ///< places that they lead towards
+  std::optional<Vec3> start, goal = {};  ///< where they join the mesh
 };
 
-/// The first place of a path that is some way from its beginning.
+/// The first place of a path that is over kMinAim metres from its beginning, across, or its end.
 template <class Iterator>
 Vec3 findAim(Iterator first, Iterator end) {
   const auto isFar = [&](const Vec3& place) {
@@ -224,20 +225,22 @@ Vec3 findAim(Iterator first, Iterator end) {
   return far == end ? *std::prev(end) : *far;
 }
 
-/// A path from the start to the mesh, on it, and to the goal. Then `aims` are places of its part on
-/// the mesh.
+/// A path from the start to the mesh, on it, and to the goal. Sets `exits` to its own, which aim at
+/// its part on the mesh. No path if they are as before.
 NavigationPath findPathOverMesh(const PathFinder& finder, const Vec3& start, const Vec3& goal,
-                                Aims& aims, Proof& proof) {
-  Places places = findPathToMesh(finder, start, aims.fromStart);
+                                Exits& exits, Proof& proof) {
+  Places places = findPathToMesh(finder, start, exits.aimOfStart);
   // A walk may lead down where none leads up: the path back from the mesh is walked, too.
-  const Places fromGoal = places ? findPathToMesh(finder, goal, aims.fromGoal) : std::nullopt;
+  const Places fromGoal = places ? findPathToMesh(finder, goal, exits.aimOfGoal) : std::nullopt;
+  if (!fromGoal) return {};
+  const bool isAsBefore = exits.start == places->back() && exits.goal == fromGoal->back();
   const Places last =
-      fromGoal ? findPathOnGrids(finder.walker, fromGoal->back(), goal) : std::nullopt;
+      isAsBefore ? std::nullopt : findPathOnGrids(finder.walker, fromGoal->back(), goal);
   if (!last) return {};
   const NavigationPath middle = findPathOnMeshes(finder, places->back(), last->front(), proof);
   if (!middle.found()) return {};
-  aims = {findAim(middle.points.begin(), middle.points.end()),
-          findAim(middle.points.rbegin(), middle.points.rend())};
+  exits = {findAim(middle.points.begin(), middle.points.end()),
+           findAim(middle.points.rbegin(), middle.points.rend()), places->back(), fromGoal->back()};
   places->insert(places->end(), middle.points.begin() + 1, middle.points.end());
   places->insert(places->end(), last->begin() + 1, last->end());
   return provePath(finder, *places, proof);
@@ -258,10 +261,10 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
     if (const Places places = findPathOnGrids(walker, start, goal))
       best = provePath(finder, *places, proof);
   // The mesh may lead around walls: its path shows which way the ends lead.
-  Aims aims{goal, start};
+  Exits exits{goal, start, {}, {}};
   for (int i = 0; i < 2; ++i) {
     if (best.found() && best.cost() <= kStraight * (goal - start).norm()) break;
-    NavigationPath path = findPathOverMesh(finder, start, goal, aims, proof);
+    NavigationPath path = findPathOverMesh(finder, start, goal, exits, proof);
     if (!path.found()) break;
     if (!best.found() || path.cost() < best.cost()) best = std::move(path);
   }

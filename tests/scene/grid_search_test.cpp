@@ -78,44 +78,77 @@ TEST(GridSearch, APathOutLeadsTowardsAPointAndOverOpenPlacesAlone) {
   EXPECT_NEAR(path->back().z(), 1.5, 1e-6) << "the path to the other side is closed";
 }
 
-/// A bed on a floor, low enough to step onto it, between x = 2 and x = 4.
+/// The bed is low enough to step onto it, between x = 2 and x = 4.
+constexpr double kBedHeight = 0.25;
+
 Model bedModel(double minZ) {
-  return boxModel({{"floor", {-3, -0.2, -5}, {9, 0, 5}}, {"bed", {2, 0, minZ}, {4, 0.25, 5}}});
+  return boxModel(
+      {{"floor", {-3, -0.2, -5}, {15, 0, 5}}, {"bed", {2, 0, minZ}, {4, kBedHeight, 5}}});
+}
+
+FeetTravel walkAlong(Walker& walker, const std::vector<Vec3>& places) {
+  FeetTravel sum;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    EXPECT_TRUE(walks(walker, places[i - 1], places[i], 1e-3)) << i;
+    sum.length += walker.travel().length;
+    sum.climb += walker.travel().climb;
+  }
+  return sum;
 }
 
 TEST(LevelDetours, TheEdgeOfALowObjectIsWalkedAround) {
   const World world(std::make_shared<const Scene>(bedModel(0.2)));
   Walker walker(world.data(), {});
   const Vec3 from(0, 0, 0), to(6, 0, 0);
-  const FeetTravel over = measureTravel(walker, from, to);
-  ASSERT_GT(over.climb, 0.45) << "the line leads over the edge of the bed";
   std::vector<Vec3> places{from, to};
-  BumpList bumps;
-  ASSERT_TRUE(goAroundBumps(walker, places, bumps));
-  EXPECT_TRUE(bumps.empty());
+  ASSERT_GT(walkAlong(walker, places).climb, 0.45) << "the line leads over the edge of the bed";
+  const auto bump = findBump(walker, places);
+  ASSERT_TRUE(bump);
+  EXPECT_GT(bump->y(), 0.5 * kBedHeight);
+  BumpSearch search{20'000};
+  EXPECT_EQ(goAroundBumps(walker, places, search).size(), 1U);
+  EXPECT_TRUE(search.known.empty());
+  EXPECT_LT(search.maxWalks, 20'000U);
   EXPECT_EQ(places.front(), from);
   EXPECT_EQ(places.back(), to);
-  FeetTravel around;
-  for (std::size_t i = 1; i < places.size(); ++i) {
-    ASSERT_TRUE(walks(walker, places[i - 1], places[i], 1e-3)) << i;
-    around.length += walker.travel().length;
-    around.climb += walker.travel().climb;
-  }
+  const FeetTravel around = walkAlong(walker, places);
   EXPECT_LT(around.climb, 0.01);
   EXPECT_LT(around.length, 1.01 * (2 * std::hypot(1.9, 0.11) + 2.2));
+  EXPECT_FALSE(findBump(walker, places));
 }
 
-TEST(LevelDetours, AnObjectWithALongWayAroundItIsWalkedOver) {
-  const World world(std::make_shared<const Scene>(bedModel(-1.5)));
+TEST(LevelDetours, EachBumpOfALegIsWalkedAround) {
+  Model model = boxModel({{"floor", {-3, -0.2, -5}, {15, 0, 5}},
+                          {"bed", {2, 0, 0.2}, {4, kBedHeight, 5}},
+                          {"other", {7, 0, -5}, {9, kBedHeight, -0.2}}});
+  const World world(std::make_shared<const Scene>(std::move(model)));
   Walker walker(world.data(), {});
+  std::vector<Vec3> places{{0, 0, 0}, {12, 0, 0}};
+  ASSERT_GT(walkAlong(walker, places).climb, 0.9);
+  BumpSearch search{40'000};
+  EXPECT_EQ(goAroundBumps(walker, places, search).size(), 2U);
+  EXPECT_LT(walkAlong(walker, places).climb, 0.01);
+  EXPECT_EQ(places.back(), Vec3(12, 0, 0));
+}
+
+/// Feet that go over the bed move 0.5 m up and down.
+TEST(LevelDetours, AnObjectIsWalkedOverIfTheWayAroundItIsLonger) {
   const Vec3 from(0, 0, 0), to(6, 0, 0);
-  std::vector<Vec3> places{from, to};
-  BumpList bumps;
-  EXPECT_FALSE(goAroundBumps(walker, places, bumps));
-  EXPECT_EQ(bumps.size(), 1U);
-  EXPECT_EQ(places, (std::vector<Vec3>{from, to}));
-  const double around = 2 * std::hypot(1.7, 1.8) + 2.6;
-  EXPECT_LT(measureTravel(walker, from, to).length, around);
+  // The prism is 0.3 m wide to each side, so the way around leads over z = minZ - 0.3.
+  for (const double minZ : {-1.5, -0.95, 0.0}) {
+    const World world(std::make_shared<const Scene>(bedModel(minZ)));
+    Walker walker(world.data(), {});
+    std::vector<Vec3> places{from, to};
+    const double over = walkAlong(walker, places).length;
+    const double around = 2 * std::hypot(1.75, minZ - 0.3) + 2.5;
+    BumpSearch search{40'000};
+    const bool isReplaced = !goAroundBumps(walker, places, search).empty();
+    EXPECT_EQ(isReplaced, around < over) << minZ << ": " << over << " over it, " << around;
+    EXPECT_EQ(search.known.size(), isReplaced ? 0U : 1U);
+    const std::size_t left = search.maxWalks;
+    EXPECT_TRUE(goAroundBumps(walker, places, search).empty());
+    EXPECT_EQ(search.maxWalks, left) << "a known bump is searched again";
+  }
 }
 
 TEST(GridSearch, AShortcutOverALowObjectIsNotTakenIfTheFeetMoveFarther) {
@@ -123,11 +156,28 @@ TEST(GridSearch, AShortcutOverALowObjectIsNotTakenIfTheFeetMoveFarther) {
   Walker walker(world.data(), {});
   const std::vector<Vec3> around{{0, 0, 0}, {2, 0, -0.15}, {4, 0, -0.15}, {6, 0, 0}};
   const std::vector<Vec3> places = shortenPath(walker, around, Shortcuts::all);
-  double climb = 0;
-  for (std::size_t i = 1; i < places.size(); ++i)
-    climb += measureTravel(walker, places[i - 1], places[i]).climb;
-  EXPECT_LT(climb, 0.01);
+  EXPECT_LT(walkAlong(walker, places).climb, 0.01);
   EXPECT_TRUE(walks(walker, around.front(), around.back(), 1e-3)) << "the shortcut can be walked";
+}
+
+TEST(GridSearch, CornersAreCut) {
+  // A pillar with eight sides, around which the shortest path has several corners.
+  std::vector<NamedBox> boxes{{"floor", {-3, -0.2, -5}, {7, 0, 5}}};
+  for (int i = 0; i < 8; ++i) {
+    const double x = 2 + 0.4 * std::cos(0.785398 * i), z = 0.4 * std::sin(0.785398 * i);
+    boxes.push_back({"pillar/" + std::to_string(i), {x - 0.1, 0, z - 0.1}, {x + 0.1, 2, z + 0.1}});
+  }
+  const World world(boxScene(boxes));
+  Walker walker(world.data(), {});
+  std::vector<Vec3> places{{0, 0, 0}, {2, 0, -1}, {4, 0, 0}};
+  pullTight(walker, places);
+  EXPECT_GE(places.size(), 4U) << "one corner cannot be the shortest path around it";
+  // The agent keeps 0.3 m from boxes within 0.55 m of the axis: tangents of 0.7 to 0.85 m.
+  const auto measureAround = [](double radius) {
+    return 2 * std::sqrt(4 - radius * radius) + 2 * radius * std::asin(radius / 2);
+  };
+  EXPECT_GT(measureLength(walker, places), measureAround(0.7));
+  EXPECT_LT(measureLength(walker, places), 1.01 * measureAround(0.85));
 }
 
 TEST(DoorSwing, TouchesWhatTheDoorMeetsAtAnyAngle) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <map>
 #include <queue>
 #include <utility>
@@ -13,9 +14,10 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kLayerHeight = 1;    // metres: places of a cell closer than this are one place
-constexpr double kSameHeight = 0.05;  // metres: of feet that come to the same place on two paths
-constexpr double kMinPull = 0.01;     // metres
+constexpr double kLayerHeight = 1;       // metres: places of a cell closer than this are one place
+constexpr double kSameHeight = 0.05;     // metres: of feet that come to the same place on two paths
+constexpr double kMaxEvenExcess = 0.05;  // metres: of feet over thresholds and rough floor
+constexpr double kMinPull = 0.01;        // metres
 
 struct Cell {
   int x = 0, z = 0, storey = 0;
@@ -95,6 +97,7 @@ std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, co
       if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
       const Vec3 reached = walker.footPosition();
       if (search.countsHeights) next = std::max(next, cost + walker.travel().length);
+      if (next + end.estimate(reached) > search.maxLength) continue;
       const Cell to2 = grid.computeCell(reached, x, z);
       const auto [at, isNew] = places.try_emplace(to2, Place{reached, next, cell, false});
       if (!isNew) {
@@ -118,7 +121,7 @@ class LegLengths {
     double sum = 0;
     for (std::size_t leg = first; leg < last; ++leg) {
       if (lengths_[leg] == kUnknown)
-        lengths_[leg] = measureTravel(walker_, places_[leg], places_[leg + 1]).length;
+        lengths_[leg] = measureLength(walker_, std::span(places_).subspan(leg, 2));
       sum += lengths_[leg];
     }
     return sum;
@@ -131,9 +134,9 @@ class LegLengths {
   std::vector<double> lengths_;
 };
 
-/// Whether feet that moved by `length` metres left the straight line between two places.
+/// Whether feet that moved by `length` metres between two places stepped up or down.
 bool isUneven(double length, const Vec3& from, const Vec3& to) {
-  return length > (to - from).norm() + kSameHeight;
+  return length > (to - from).norm() + kMaxEvenExcess;
 }
 
 }  // namespace
@@ -144,10 +147,15 @@ bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError)
          std::abs(walker.footPosition().y() - to.y()) <= heightError;
 }
 
-FeetTravel measureTravel(Walker& walker, const Vec3& from, const Vec3& to) {
-  walker.returnTo(from);
-  walker.walkTo(to);
-  return walker.travel();
+double measureLength(Walker& walker, std::span<const Vec3> places) {
+  double length = 0;
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    walker.returnTo(places[i - 1]);
+    if (walker.walkTo(places[i]).kind != WalkOutcome::Kind::arrived)
+      return std::numeric_limits<double>::infinity();
+    length += walker.travel().length;
+  }
+  return length;
 }
 
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
@@ -194,8 +202,7 @@ bool pullPlace(Walker& walker, std::vector<Vec3>& places, std::size_t i) {
     if (!walks(walker, reached, after, kSameHeight)) continue;
     const double second = walker.travel().length;
     if ((isUneven(first, before, reached) || isUneven(second, reached, after)) &&
-        first + second >
-            measureTravel(walker, before, here).length + measureTravel(walker, here, after).length)
+        first + second > measureLength(walker, std::array{before, here, after}))
       continue;
     places[i] = reached;
     return true;
@@ -219,9 +226,8 @@ bool cutCorner(Walker& walker, std::vector<Vec3>& places, std::size_t i) {
     const Vec3 end = walker.footPosition();
     if (walker.walkTo(after).kind != WalkOutcome::Kind::arrived) continue;
     if (std::abs(walker.footPosition().y() - after.y()) > kSameHeight) continue;
-    if (walker.travel().length >
-        measureTravel(walker, before, here).length + measureTravel(walker, here, after).length)
-      continue;
+    const double length = walker.travel().length;
+    if (length > measureLength(walker, std::array{before, here, after})) continue;
     places[i] = start;
     places.insert(places.begin() + static_cast<std::ptrdiff_t>(i) + 1, end);
     return true;
@@ -255,7 +261,8 @@ std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, S
     if (kind == Shortcuts::all) {
       if (!walks(walker, from, to, kSameHeight)) return false;
       const double length = walker.travel().length;
-      return !isUneven(length, from, to) || length <= legs.measure(first, last);
+      // A path on a grid will be shorter when it is pulled tight.
+      return !isUneven(length, from, to) || kGridExcess * length <= legs.measure(first, last);
     }
     walker.returnTo(from);
     return walker.isPathClear(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;

@@ -7,6 +7,7 @@
 #include <functional>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "scene/navigation/walk/walker.hpp"
@@ -17,15 +18,20 @@ namespace enfilade::scene {
 /// below.
 bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError);
 
-/// The way of the feet from one place towards another one, up to where the walk ends.
-FeetTravel measureTravel(Walker& walker, const Vec3& from, const Vec3& to);
+/// The way of the feet along places, metres; infinite if a leg cannot be walked.
+double measureLength(Walker& walker, std::span<const Vec3> places);
+
+/// Length of a shortest path on a grid, of the same path pulled tight: at most, on even floor.
+inline constexpr double kGridExcess = 1.08;
+inline constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  ///< metres, of grids
 
 struct GridSearch {
   double spacing = 0.1;        ///< metres between places
   double margin = 1.5;         ///< metres: how far the path may leave the box of both ends
   std::size_t maxWalks = 0;    ///< edges to walk
   bool countsHeights = false;  ///< the length of a path is that of the feet, else across
-  double maxLength = std::numeric_limits<double>::infinity();  ///< metres
+  /// Metres. A lower bound of the length of a path over a place is compared with it.
+  double maxLength = std::numeric_limits<double>::infinity();
 };
 
 /// The places of a path between two places where the walker stood, with both; nullopt: none was
@@ -52,12 +58,12 @@ std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& fro
 /// a shortest line.
 enum class Shortcuts : std::uint8_t { all, free };
 
-/// Moves the places between both ends towards the lines between their neighbours, as long as the
-/// legs can be walked and the way of the feet becomes shorter.
+/// Moves the places between both ends towards the lines between their neighbours, and cuts corners,
+/// as long as the legs can be walked and the way of the feet over steps becomes no longer.
 void pullTight(Walker& walker, std::vector<Vec3>& places);
 
 /// Leaves out places of a path as long as the legs between the others can be walked and the way of
-/// the feet becomes shorter.
+/// the feet over steps becomes no longer.
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind);
 
 }  // namespace enfilade::scene

@@ -17,11 +17,11 @@ constexpr double kMinChange = 0.01;   // metres of height between two of them
 constexpr double kSameLevel = 0.03;   // metres
 constexpr double kMaxBumpLength = 6;  // metres that the feet move
 constexpr double kApproach = 0.7;     // metres before and after a bump that a way around replaces
-constexpr double kGridExcess = 1.08;  // of a shortest path on a grid, before it is pulled tight
 constexpr double kMinSaving = 0.01;   // metres
 constexpr double kSameBump = 0.3;     // metres
 constexpr int kMaxBumps = 4;          // of a path
-constexpr GridSearch kCoarseAround{0.12, 1, 2000, true}, kFineAround{0.03, 0.7, 12'000, true};
+constexpr GridSearch kCoarseAround{kCoarseSpacing, 1, 2000, true};
+constexpr GridSearch kFineAround{kFineSpacing, 0.7, 12'000, true};
 
 /// A place of a walk.
 struct Sample {
@@ -71,20 +71,14 @@ std::size_t findSampleAfter(const std::vector<Sample>& samples, std::size_t i) {
   return i;
 }
 
-std::optional<std::vector<Vec3>> findWayAround(Walker& walker, const Sample& first,
-                                               const Sample& last) {
-  for (GridSearch search : {kCoarseAround, kFineAround}) {
-    search.maxLength = kGridExcess * (last.travel.length - first.travel.length);
-    if (auto way = findGridPath(walker, first.feet, last.feet, search)) return way;
+/// The first and the last sample of the next bump at or after sample `first`.
+std::optional<std::pair<std::size_t, std::size_t>> findNextBump(const std::vector<Sample>& samples,
+                                                                std::size_t first) {
+  for (std::size_t i = first; i + 1 < samples.size(); ++i) {
+    if (std::abs(samples[i + 1].feet.y() - samples[i].feet.y()) < kMinChange) continue;
+    if (const auto end = findEndOfBump(samples, i)) return std::pair(i, *end);
   }
   return std::nullopt;
-}
-
-double measureLength(Walker& walker, const std::vector<Vec3>& places) {
-  double length = 0;
-  for (std::size_t i = 1; i < places.size(); ++i)
-    length += measureTravel(walker, places[i - 1], places[i]).length;
-  return length;
 }
 
 bool isKnown(const BumpList& known, const Vec3& before, const Vec3& after) {
@@ -93,70 +87,66 @@ bool isKnown(const BumpList& known, const Vec3& before, const Vec3& after) {
   });
 }
 
-/// A part of a path, between two of its places, with a way around a bump; empty: none is shorter.
+/// A part of a path with a way around a bump from `first` to `last`; empty: none is shorter.
 std::vector<Vec3> levelPart(Walker& walker, const std::vector<Vec3>& part, const Sample& first,
-                            const Sample& last) {
-  const auto way = findWayAround(walker, first, last);
-  if (!way) return {};
-  std::vector<Vec3> level{part.front()};
-  level.insert(level.end(), way->begin(), way->end());
-  level.push_back(part.back());
-  level = shortenPath(walker, level, Shortcuts::all);
-  pullTight(walker, level);
-  if (measureLength(walker, level) > measureLength(walker, part) - kMinSaving) return {};
-  return level;
+                            const Sample& last, std::size_t& maxWalks) {
+  const double length = measureLength(walker, part);
+  for (GridSearch grid : {kCoarseAround, kFineAround}) {
+    const std::size_t walks = grid.maxWalks = std::min(grid.maxWalks, maxWalks);
+    grid.maxLength = kGridExcess * (last.travel.length - first.travel.length);
+    const auto way = findGridPath(walker, first.feet, last.feet, grid);
+    maxWalks -= walks - grid.maxWalks;
+    if (!way) continue;
+    std::vector<Vec3> level{part.front()};
+    level.insert(level.end(), way->begin(), way->end());
+    level = shortenPath(walker, level, Shortcuts::all);
+    pullTight(walker, level);
+    if (measureLength(walker, level) < length - kMinSaving) return level;
+  }
+  return {};
 }
 
 }  // namespace
 
 std::optional<Vec3> findBump(Walker& walker, const std::vector<Vec3>& places) {
   const auto samples = sampleWalk(walker, places);
-  if (!samples) return std::nullopt;
-  for (std::size_t i = 0; i + 1 < samples->size(); ++i) {
-    if (std::abs((*samples)[i + 1].feet.y() - (*samples)[i].feet.y()) < kMinChange) continue;
-    if (const auto end = findEndOfBump(*samples, i)) return (*samples)[(i + *end) / 2].feet;
-  }
-  return std::nullopt;
+  const auto bump = samples ? findNextBump(*samples, 0) : std::nullopt;
+  if (!bump) return std::nullopt;
+  return (*samples)[(bump->first + bump->second) / 2].feet;
 }
 
-bool goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpList& known) {
+BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search) {
   const auto samples = sampleWalk(walker, places);
-  if (!samples) return false;
+  if (!samples) return {};
+  BumpList replaced;
   std::vector<Vec3> level{places.front()};
   std::size_t next = 1;   // the place of the path that is appended next
   std::size_t begin = 0;  // the sample where the last way around ends
-  int bumps = 0;
-  bool isChanged = false;
-  for (std::size_t i = 0; i + 1 < samples->size() && bumps < kMaxBumps; ++i) {
-    if (std::abs((*samples)[i + 1].feet.y() - (*samples)[i].feet.y()) < kMinChange) continue;
-    const auto end = findEndOfBump(*samples, i);
-    if (!end) continue;
-    if (isKnown(known, (*samples)[i].feet, (*samples)[*end].feet)) {
-      i = *end - 1;
-      continue;
-    }
-    ++bumps;
-    const Sample& first = (*samples)[std::max(findSampleBefore(*samples, i), begin)];
-    const Sample& last = (*samples)[findSampleAfter(*samples, *end)];
+  auto bump = findNextBump(*samples, 0);
+  for (int i = 0; bump && i < kMaxBumps; ++i, bump = findNextBump(*samples, bump->second)) {
+    const std::pair ends((*samples)[bump->first].feet, (*samples)[bump->second].feet);
+    if (isKnown(search.known, ends.first, ends.second)) continue;
+    const Sample& first = (*samples)[std::max(findSampleBefore(*samples, bump->first), begin)];
+    const std::size_t end = findSampleAfter(*samples, bump->second);
+    const Sample& last = (*samples)[end];
     for (; next < first.nextPlace; ++next) level.push_back(places[next]);
     std::vector<Vec3> part{level.back()};
-    for (std::size_t k = next; k <= last.nextPlace; ++k) part.push_back(places[k]);
-    const std::vector<Vec3> around = levelPart(walker, part, first, last);
+    for (std::size_t k = next; k < last.nextPlace; ++k) part.push_back(places[k]);
+    part.push_back(last.feet);
+    const std::vector<Vec3> around = levelPart(walker, part, first, last, search.maxWalks);
     if (around.empty()) {
-      known.emplace_back((*samples)[i].feet, (*samples)[*end].feet);
-      i = *end - 1;
+      search.known.push_back(ends);
       continue;
     }
+    replaced.push_back(ends);
     level.insert(level.end(), around.begin() + 1, around.end());
-    next = last.nextPlace + 1;
-    while (i + 1 < samples->size() && (*samples)[i + 1].nextPlace < next) ++i;
-    begin = i;
-    isChanged = true;
+    next = last.nextPlace;
+    begin = bump->second = end;
   }
-  if (!isChanged) return false;
+  if (replaced.empty()) return replaced;
   level.insert(level.end(), places.begin() + static_cast<std::ptrdiff_t>(next), places.end());
-  places = std::move(level);
-  return true;
+  places = shortenPath(walker, level, Shortcuts::all);
+  return replaced;
 }
 
 }  // namespace enfilade::scene

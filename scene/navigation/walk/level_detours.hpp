@@ -1,7 +1,8 @@
-// Detours around low objects, onto which an agent would step for a moment, as onto the corner of a
-// low bed: the shortest line on a navigation mesh ignores heights.
+// Detours around low objects, such as the corner of a low bed. The shortest line on a navigation
+// mesh ignores heights, and an agent would step onto the object for a moment.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -12,13 +13,19 @@ namespace enfilade::scene {
 
 inline constexpr double kMinBump = 0.1;  ///< metres up and down together: lower ones stay
 
-/// Places before and after bumps that have no shorter way around.
+/// Places before and after bumps.
 using BumpList = std::vector<std::pair<Vec3, Vec3>>;
 
+/// Results and budget of the searches of a query.
+struct BumpSearch {
+  std::size_t maxWalks = 0;  ///< on grids
+  BumpList known = {};       ///< without a shorter way around: they are not searched again
+};
+
 /// Replaces parts of a path that lead up and down again by ways around them, if this shortens the
-/// way of the feet. Each leg of `places` can be walked. Bumps near `known` ones stay; appends those
-/// without a shorter way around. Returns whether the path changed.
-bool goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpList& known);
+/// way of the feet. Each leg of `places` can be walked. Bumps of `search.known` stay. Returns those
+/// that were replaced.
+BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search);
 
 /// The middle of the first part that leads up and down again; nullopt: none does.
 std::optional<Vec3> findBump(Walker& walker, const std::vector<Vec3>& places);

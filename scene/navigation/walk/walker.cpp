@@ -159,9 +159,10 @@ bool Walker::hasFloorBelow() {
 
 /// Call it in each tick in the air. Where drops of a step are allowed, a stair may be descended in
 /// longer falls, onto the tread after the next.
-bool Walker::hasFallen(LastFloor& floor, double maxDrop) {
-  floor.isOnStair = floor.isOnStair && maxDrop <= world_.settings.stepHeight && hasFloorBelow();
-  return avatar_.footPosition.y() < floor.height - maxDrop && !floor.isOnStair;
+bool Walker::hasFallen(double maxDrop) {
+  lastFloor_.isOnStair =
+      lastFloor_.isOnStair && maxDrop <= world_.settings.stepHeight && hasFloorBelow();
+  return avatar_.footPosition.y() < lastFloor_.height - maxDrop && !lastFloor_.isOnStair;
 }
 
 std::optional<std::string> Walker::place(const Vec3& footPosition, double maxDrop) {
@@ -190,6 +191,7 @@ void Walker::restore(const Standing& standing) {
   avatar_.grounded = true;
   avatar_.fallSpeed = 0;
   travel_ = standing.travel;
+  lastFloor_ = {standing.footPosition.y()};
 }
 
 WalkOutcome Walker::walkTo(const Vec3& goal) {
@@ -248,7 +250,7 @@ bool Walker::isRideFree(const Vec3& from, const Vec3& to, EntityId body) {
 WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
   const double tick = world_.settings.tickDuration;
   double shortDistance = 0, stepLimit = kMaxStep;
-  LastFloor floor{avatar_.footPosition.y()};
+  if (avatar_.grounded) lastFloor_ = {avatar_.footPosition.y()};
   Standing stood = getStanding();
   const auto end = [&](WalkOutcome::Kind kind) {
     const WalkOutcome outcome{kind, avatar_.footPosition, avatar_.blockedBy};
@@ -265,7 +267,7 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
       const double length = std::min({distance, stepLimit, std::max(kLongStep, even)});
       const Vec3 displacement = projectToGround(goal - before) * (length / distance);
       if (stepEvenly(displacement, length <= even)) {
-        floor = {avatar_.footPosition.y()};
+        lastFloor_ = {avatar_.footPosition.y()};
         stepLimit = std::min(kMaxStep, 2 * stepLimit);
         continue;
       }
@@ -280,12 +282,12 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
     step(computeWalkVelocity(before, goal, false, agent_.speed, tick));
     if (!avatar_.grounded) {  // falls from tread to tread of a steep stair
       shortDistance = 2 * kLongStep;
-      if (hasFallen(floor, world_.settings.stepHeight)) return end(WalkOutcome::Kind::fell);
+      if (hasFallen(world_.settings.stepHeight)) return end(WalkOutcome::Kind::fell);
       if ((avatar_.footPosition - before).squaredNorm() < kMinGain * kMinGain)
         return end(WalkOutcome::Kind::blocked);
       continue;
     }
-    floor = {avatar_.footPosition.y()};
+    lastFloor_ = {avatar_.footPosition.y()};
     const double across = computeGroundDistance(before, avatar_.footPosition);
     if (isStep(before, avatar_.footPosition)) hasStepped_ = crossedSteps_ = true;
     if (avatar_.blockedBy != 0) return end(WalkOutcome::Kind::blocked);
@@ -298,7 +300,7 @@ WalkOutcome Walker::walkWithMargin(const Vec3& goal) {
 /// or, if it may slide, nothing for long.
 WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, double maxDrop) {
   const Vec3 start = avatar_.footPosition;
-  LastFloor floor{start.y()};
+  if (avatar_.grounded) lastFloor_ = {start.y()};
   const double tick = world_.settings.tickDuration;
   StallWatch watch{std::min(kMinGain, 0.5 * agent_.speed * tick),
                    countTicks(maySlide ? kMaxSlidingStall : kMaxStall, tick),
@@ -307,7 +309,7 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
     const double distance = computeGroundDistance(avatar_.footPosition, goal);
     const bool isThere =
         distance <= kArrivalDistance &&
-        (avatar_.grounded || (maySlide && isOnStorey(goal, avatar_, world_.settings)));
+        (avatar_.grounded || (maySlide && hasReachedHeight(goal, avatar_, world_.settings)));
     if (isThere ||
         (avatar_.grounded && computeGroundDistance(start, avatar_.footPosition) >= length))
       return {WalkOutcome::Kind::arrived, avatar_.footPosition, 0, ticks};
@@ -317,12 +319,11 @@ WalkOutcome Walker::walkByTicks(const Vec3& goal, double length, bool maySlide, 
     step(computeWalkVelocity(before, goal, false, agent_.speed, tick));
     if (isStep(before, avatar_.footPosition)) hasStepped_ = crossedSteps_ = true;
     if (!avatar_.grounded) {
-      if (hasFallen(floor, maxDrop))
-        return {WalkOutcome::Kind::fell, avatar_.footPosition, 0, ticks};
+      if (hasFallen(maxDrop)) return {WalkOutcome::Kind::fell, avatar_.footPosition, 0, ticks};
       if (before.y() - avatar_.footPosition.y() > kMinStepRise) watch.ticks = 0;
       continue;
     }
-    floor = {avatar_.footPosition.y()};
+    lastFloor_ = {avatar_.footPosition.y()};
     if (avatar_.blockedBy != 0 && !maySlide)
       return {WalkOutcome::Kind::blocked, avatar_.footPosition, avatar_.blockedBy, ticks};
   }

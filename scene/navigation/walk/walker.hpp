@@ -61,8 +61,8 @@ class Walker {
 
   /// Walks straight to `goal` over even floor, without an obstacle; false: it does not arrive so.
   bool walkEvenly(const Vec3& goal);
-  /// The walk of an avatar in a world up to rounding, from where the walker stands or falls: tick
-  /// by tick. It may slide along obstacles.
+  /// Walks tick by tick as an avatar in a world does, equal up to rounding: it may slide along
+  /// obstacles, and may end in a fall from a step. Begins standing, or in that fall.
   WalkOutcome walkOn(const Vec3& goal);
   /// Walks tick by tick to `goal`, and may fall by up to `maxDrop` metres on the way.
   WalkOutcome dropTo(const Vec3& goal, double maxDrop);
@@ -88,8 +88,8 @@ class Walker {
     bool isOnStair = true;  ///< since then, a floor was always within a step below
   };
   bool hasFloorBelow();
-  bool hasFallen(LastFloor& floor, double maxDrop);
-  /// Where the feet stood, and how they came there.
+  bool hasFallen(double maxDrop);
+  /// Where the feet stood, and the travel up to there.
   struct Standing {
     Vec3 footPosition;
     FeetTravel travel;
@@ -109,7 +109,8 @@ class Walker {
   std::shared_ptr<const AvatarShape> shape_, wideShape_, narrowShape_;
   bool hasStepped_ = false;  ///< in the present walk
   bool crossedSteps_ = false;
-  bool isUneven_ = false;
+  bool isUneven_ = false;  ///< the present walk left even floor
+  LastFloor lastFloor_;
   FeetTravel travel_;
   QueryCount count_;
   /// Obstacles around a cell, with their caches. The avatar has those of `cell_`.

@@ -306,7 +306,7 @@ void updateWalk(const Walk& walk, OrderContext& context) {
            mayPassEarly(context.world, avatar, distance,
                         walk.waypoints[avatar.walk.waypointIndex + 1], context.count);
   };
-  if (isOnStorey(goal, avatar, context.world.settings) &&
+  if (hasReachedHeight(goal, avatar, context.world.settings) &&
       (distance <= kArrivalDistance || isPassedEarly())) {
     ++avatar.walk.waypointIndex;
     if (!isLast) return startWaypoint(context.world, walk, avatar);

@@ -44,7 +44,8 @@ inline bool isFallingFar(const Avatar& avatar, const WorldSettings& settings) {
 }
 
 /// Whether an avatar that is at a waypoint, seen from above, has reached it.
-inline bool isOnStorey(const Vec3& waypoint, const Avatar& avatar, const WorldSettings& settings) {
+inline bool hasReachedHeight(const Vec3& waypoint, const Avatar& avatar,
+                             const WorldSettings& settings) {
   return !isFallingFar(avatar, settings) &&
          std::abs(waypoint.y() - avatar.footPosition.y()) <= kArrivalHeight;
 }
