@@ -361,28 +361,26 @@ bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
 }
 
 bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
-  const auto measureClimb = [&] {
-    const double rise = std::abs(path.points.back().y() - path.points.front().y());
-    return walker.travel().climb - rise;
-  };
   if (!walksOn(walker, path.points, proof)) return false;
+  // Of the walk over the whole path: searches reset the walker's travel.
+  const double rise = std::abs(path.points.back().y() - path.points.front().y());
+  double climb = walker.travel().climb - rise;
   path.length = computeLength(path.points);
-  if (measureClimb() < std::max(kMinBump, kMinClimb * path.length)) return true;
+  if (climb < std::max(kMinBump, kMinClimb * path.length)) return true;
   std::vector<Vec3> level = path.points;
   if (const BumpList replaced = goAroundBumps(walker, level, proof.bumps); !replaced.empty()) {
     const Vec3 failedAt = proof.failedAt;
     const std::vector<Obstruction> met = proof.met;
     if (walksOn(walker, level, proof)) {
+      climb = walker.travel().climb - rise;
       path.points = std::move(level);
       path.length = computeLength(path.points);
     } else {
       proof.bumps.known.insert(proof.bumps.known.end(), replaced.begin(), replaced.end());
       proof.failedAt = failedAt;
       proof.met = met;
-      walksOn(walker, path.points, proof);  // measures its climb
     }
   }
-  const double climb = measureClimb();
   proof.bump = findBump(walker, path.points);
   path.bumpClimb = proof.bump ? climb : 0;
   return true;

@@ -37,7 +37,7 @@ std::shared_ptr<const Scene> makeBumpyRoom(unsigned seed) {
   return std::make_shared<const Scene>(std::move(model));
 }
 
-/// Where an avatar ends that rests at `start` and walks along `waypoints`; nullopt: it is blocked.
+/// Where the avatar ends that walks along `waypoints`; nullopt: it is blocked.
 std::optional<Vec3> walkInWorld(World& world, const std::vector<Vec3>& waypoints) {
   submitAvatarCommand(world, {"walker", Walk{waypoints}, 0});
   for (int tick = 0; tick < 60 * 60; ++tick)
@@ -84,6 +84,18 @@ TEST(Walker, AProvedWalkIsThatOfAnAvatar) {
   for (unsigned seed = 0; seed < 60; ++seed) compareWalks(seed, walks);
   EXPECT_GE(walks.arrived, 20);
   EXPECT_GE(walks.flights, 5);
+}
+
+/// A waypoint in the air is reached, and the fall continues: as a whole it is at most a step deep.
+TEST(Walker, AFallIsMeasuredFromTheFloorAlsoOverAWaypoint) {
+  const World world(boxScene({floorBox(), {"platform", {-1, 0, -1}, {1, 0.5, 1}}}));
+  Walker walker(world.data(), {});
+  walker.returnTo({0, 0.5 + world.settings().contactOffset, 0});
+  const WalkOutcome first = walker.walkOn({1.55, 0, 0});
+  ASSERT_EQ(first.kind, WalkOutcome::Kind::arrived);
+  EXPECT_GT(first.footPosition.y(), 0.1) << "it should be in the air";
+  EXPECT_LT(first.footPosition.y(), world.settings().stepHeight) << "no deep fall from there";
+  EXPECT_EQ(walker.walkOn({3, 0, 0}).kind, WalkOutcome::Kind::fell);
 }
 
 TEST(Walker, TheWayOfTheFeetCountsHeights) {
