@@ -4,42 +4,12 @@
 #include <cmath>
 
 #include "collision/assert.hpp"
+#include "scene/model/shapes/mesh_to_hull.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 constexpr std::uint32_t kLeafSize = 4;  // hulls; as for triangles, see triangle_tree.cpp
-
-Vec3 placeShapeVertex(const Shape& shape, std::uint32_t vertex, const Eigen::Affine3d& transform) {
-  return transform * shape.vertices[vertex].cast<double>();  // as computeWorldPosition()
-}
-
-collision::Triangle placeTriangle(const Shape& shape, std::size_t t,
-                                  const Eigen::Affine3d& transform) {
-  const auto& corners = shape.triangles[t];
-  return {placeShapeVertex(shape, corners[0], transform),
-          placeShapeVertex(shape, corners[1], transform),
-          placeShapeVertex(shape, corners[2], transform)};
-}
-
-/// 3 V / A of the enclosed volume, metres.
-double computeThickness(const Shape& shape, const Shell& shell, const Eigen::Affine3d& transform) {
-  const Vec3 origin = placeShapeVertex(shape, shape.triangles[shell.first][0], transform);
-  double sixfoldVolume = 0, doubleArea = 0;
-  for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-    const auto [a, b, c] = placeTriangle(shape, t, transform);
-    const Vec3 normal = (b - a).cross(c - a);
-    sixfoldVolume += (a - origin).dot(normal);
-    doubleArea += normal.norm();
-  }
-  return doubleArea > 0 ? std::abs(sixfoldVolume) / doubleArea : 0;
-}
-
-/// True if the shell faces into the solid of another shell of the shape.
-bool isCavity(const Shape& shape, const Shell& shell) {
-  return shell.inward && std::any_of(shape.shells.begin(), shape.shells.end(),
-                                     [](const Shell& other) { return other.hollow; });
-}
 
 /// An integer near the middle of low..high that can be subtracted from every number between them
 /// without rounding. By Sterbenz' lemma this holds for numbers between its half and its double.
@@ -50,10 +20,10 @@ double findExactOrigin(double low, double high) {
   return size <= 2 * minMagnitude && maxMagnitude <= 2 * size ? middle : 0;
 }
 
-Vec3 computeOrigin(const Shape& shape, const Eigen::Affine3d& transform) {
+Vec3 computeOrigin(const PlacedShape& placed) {
   Aabb box;
-  for (std::uint32_t v = 0; v < shape.vertices.size(); ++v)
-    box.include(placeShapeVertex(shape, v, transform));
+  for (std::uint32_t v = 0; v < placed.shape.vertices.size(); ++v)
+    box.include(placed.vertexPosition(v));
   if (box.empty()) return Vec3::Zero();
   return {findExactOrigin(box.min.x(), box.max.x()), findExactOrigin(box.min.y(), box.max.y()),
           findExactOrigin(box.min.z(), box.max.z())};
@@ -62,14 +32,6 @@ Vec3 computeOrigin(const Shape& shape, const Eigen::Affine3d& transform) {
 collision::Triangle makeRelative(collision::Triangle triangle, const Vec3& origin) {
   for (Vec3& corner : triangle) corner -= origin;
   return triangle;
-}
-
-collision::Hull buildShellHull(const Shape& shape, const Shell& shell,
-                               const Eigen::Affine3d& transform, const Vec3& origin) {
-  std::vector<Vec3> points;
-  for (const std::uint32_t v : collectVertices(shape, {&shell, 1}))
-    points.emplace_back(placeShapeVertex(shape, v, transform) - origin);
-  return collision::buildHull(points);
 }
 
 void addHull(collision::Hull hull, CollisionGeometry& geometry) {
@@ -87,25 +49,20 @@ bool hasNumericalArea(const collision::Triangle& t) {
   return !(t[1] - t[0]).cross(t[2] - t[0]).isZero(0.0);
 }
 
-bool isTreatedAsHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& transform) {
-  if (!shell.isConvex() || shell.hollow) return false;
-  if (!shell.inward) return true;
-  return !isCavity(shape, shell) && computeThickness(shape, shell, transform) < kRoomRadius;
-}
-
 CollisionGeometry buildCollisionGeometry(const Shape& shape, const Eigen::Affine3d& transform) {
+  const PlacedShape placed{shape, transform};
   CollisionGeometry geometry;
-  geometry.origin = computeOrigin(shape, transform);
+  geometry.origin = computeOrigin(placed);
   std::vector<collision::Triangle> triangles;
   std::vector<signed char> windingSigns;
   const signed char outside = transform.linear().determinant() < 0 ? -1 : 1;
   for (const Shell& shell : shape.shells) {
-    if (isTreatedAsHull(shape, shell, transform)) {
-      addHull(buildShellHull(shape, shell, transform, geometry.origin), geometry);
+    if (isTreatedAsHull(placed, shell)) {
+      addHull(buildShellHull(placed, {&shell, 1}, geometry.origin), geometry);
       continue;
     }
     for (std::size_t t = shell.first; t < shell.first + shell.count; ++t) {
-      const auto triangle = makeRelative(placeTriangle(shape, t, transform), geometry.origin);
+      const auto triangle = makeRelative(placed.triangle(t), geometry.origin);
       if (!hasNumericalArea(triangle)) continue;
       triangles.push_back(triangle);
       windingSigns.push_back(shell.bounds() ? outside : static_cast<signed char>(0));

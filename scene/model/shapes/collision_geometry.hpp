@@ -83,11 +83,6 @@ void descendParts(const CollisionGeometry& geometry, const Aabb& core, const Ope
               [&](std::uint32_t item) { return geometry.hullCount() + item; });
 }
 
-/// An inward-facing surface is an inside-out solid if no ball of this radius (metres) fits into it.
-/// Otherwise it may be a room seen from within, and stays triangles. A convex solid of volume V and
-/// area A contains no ball with a radius above 3 V / A.
-inline constexpr double kRoomRadius = 0.3;
-
 /// `transform` must keep values finite; it may mirror and flatten.
 CollisionGeometry buildCollisionGeometry(const Shape& shape, const Eigen::Affine3d& transform);
 
@@ -99,9 +94,6 @@ bool hasNumericalArea(const collision::Triangle& t);
 
 /// Triangles of an object that have an area, scene frame, in the order of the model.
 std::vector<collision::Triangle> collectSolidTriangles(const Model& model, std::uint32_t object);
-
-/// True if collision uses the hull of this shell with this transform.
-bool isTreatedAsHull(const Shape& shape, const Shell& shell, const Eigen::Affine3d& transform);
 
 /// Signed crossing of a ray from `point` with a triangle. The sum over a surface is its winding
 /// number: 1 inside a solid whose faces look outwards. Both triangles of an edge give exactly

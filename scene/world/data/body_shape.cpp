@@ -15,6 +15,7 @@
 #include "scene/base/disjoint_sets.hpp"
 #include "scene/model/shapes/collision_geometry.hpp"
 #include "scene/model/shapes/mass_properties.hpp"
+#include "scene/model/shapes/mesh_to_hull.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -23,22 +24,6 @@ using collision::Hull;
 using collision::Triangle;
 
 constexpr double kMinThickness = 1e-3;  // metres: thickness assumed for the mass of sheets
-
-/// One object of the body: its shape and its pose.
-struct PlacedShape {
-  const Shape& shape;
-  Eigen::Affine3d worldFromMesh;
-
-  /// Vertex position as authored, scene frame. Same expression as computeWorldPosition(), so that
-  /// results agree bit for bit.
-  Vec3 vertexPosition(std::uint32_t vertex) const {
-    return worldFromMesh * shape.vertices[vertex].cast<double>();
-  }
-  Triangle triangle(std::size_t t) const {
-    const auto& corners = shape.triangles[t];
-    return {vertexPosition(corners[0]), vertexPosition(corners[1]), vertexPosition(corners[2])};
-  }
-};
 
 const Shape& findOrBuildShape(const Model& model, const std::vector<std::uint32_t>& meshes,
                               MeshShapeCache& cache) {
@@ -96,8 +81,7 @@ class ShapeBuilder {
 
  private:
   void addKinematicShell(const PlacedShape& placed, const Shell& shell) {
-    if (isTreatedAsHull(placed.shape, shell, placed.worldFromMesh))
-      return addHull(placed, {&shell, 1});
+    if (isTreatedAsHull(placed, shell)) return addHull(placed, {&shell, 1});
     for (std::size_t t = shell.first; t < shell.first + shell.count; ++t)
       if (const auto corners = toBodyFrame(placed.triangle(t)); hasNumericalArea(corners))
         shape_.parts.push_back(collision::buildHull(corners));
@@ -118,11 +102,8 @@ class ShapeBuilder {
   }
 
   void addHull(const PlacedShape& placed, std::span<const Shell> shells) {
-    std::vector<Vec3> points;
-    for (const std::uint32_t v : collectVertices(placed.shape, shells))
-      points.emplace_back(placed.vertexPosition(v) - origin_);
     ++shape_.hullCount;
-    shape_.parts.push_back(collision::buildHull(points));
+    shape_.parts.push_back(buildShellHull(placed, shells, origin_));
   }
 
   Triangle toBodyFrame(Triangle triangle) const {

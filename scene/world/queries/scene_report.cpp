@@ -9,6 +9,7 @@
 #include "collision/assert.hpp"
 #include "scene/model/add_diagnostic.hpp"
 #include "scene/model/coplanar_surfaces.hpp"
+#include "scene/model/shapes/mesh_to_hull.hpp"
 
 namespace enfilade::scene {
 namespace {
@@ -34,7 +35,7 @@ void countShapeDefects(const Shape& shape, const std::string& path, bool degener
 
 void countShell(const Shape& shape, const Shell& shell, const Object& object, SceneReport& report) {
   ShellCounts& shells = report.shells;
-  const bool hull = isTreatedAsHull(shape, shell, object.worldFromMesh);
+  const bool hull = isTreatedAsHull({shape, object.worldFromMesh}, shell);
   (hull ? report.hullTriangles : report.partTriangles) += shell.count;
   if (hull && shell.inward) addDiagnostic(report.diagnostics, "inside_out_solid", object.path);
   if (hull) {

@@ -1,0 +1,43 @@
+// Meshes as convex hulls: which surfaces of a placed shape are replaced by their hull, and that
+// hull. All other surfaces stay triangles.
+#pragma once
+
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <span>
+
+#include "collision/shapes/hull.hpp"
+#include "scene/model/shapes/shape.hpp"
+
+namespace enfilade::scene {
+
+/// A shape and its placement, which must keep values finite; it may mirror and flatten. Refers to
+/// `shape`.
+struct PlacedShape {
+  const Shape& shape;
+  Eigen::Affine3d worldFromMesh;
+
+  /// Scene frame, metres. Same expression as computeWorldPosition(), so that results agree bit for
+  /// bit.
+  collision::Vec3 vertexPosition(std::uint32_t vertex) const {
+    return worldFromMesh * shape.vertices[vertex].cast<double>();
+  }
+  collision::Triangle triangle(std::size_t t) const {
+    const auto& corners = shape.triangles[t];
+    return {vertexPosition(corners[0]), vertexPosition(corners[1]), vertexPosition(corners[2])};
+  }
+};
+
+/// An inward-facing surface is an inside-out solid if no ball of this radius (metres) fits into it.
+/// Otherwise it may be a room seen from within, and stays triangles. A convex solid of volume V and
+/// area A contains no ball with a radius above 3 V / A.
+inline constexpr double kRoomRadius = 0.3;
+
+/// True if collision uses the hull of this shell.
+bool isTreatedAsHull(const PlacedShape& placed, const Shell& shell);
+
+/// Convex hull of all vertices of `shells`, relative to `origin` (scene frame, metres).
+collision::Hull buildShellHull(const PlacedShape& placed, std::span<const Shell> shells,
+                               const collision::Vec3& origin);
+
+}  // namespace enfilade::scene
