@@ -65,23 +65,18 @@ function(enfilade_precompile_headers root)
     target_compile_options(enfilade_precompiled_message_tests PRIVATE ${ENFILADE_UNHURRIED})
   endif()
   set(with_messages enfilade_server enfilade_protocol protocol_tests server_tests replay_tests
-                    difference_tests export_tests)
-  set(unhurried "")
-  if(ENFILADE_IMPORT_OPTIONS)
-    set(unhurried enfilade_import)  # compiled with the flags of tests
-  endif()
+                    difference_tests export_tests
+                    enfilade_import)  # it has no messages, but the optimisation of code with them
   foreach(target ${targets})
     get_target_property(type ${target} TYPE)
     if(type STREQUAL "UTILITY" OR target STREQUAL "enfilade_messages")
       continue()  # nothing to compile, or none of these headers
-    elseif(NOT ENFILADE_TESTS AND target IN_LIST unhurried)
-      continue()
     endif()
     set(kind code)
     if(target IN_LIST with_messages)
       set(kind messages)
     endif()
-    if(target MATCHES "_tests$" OR target IN_LIST unhurried)
+    if(target MATCHES "_tests$")
       string(REPLACE code tests kind ${kind})
       string(REPLACE messages message_tests kind ${kind})
     endif()
