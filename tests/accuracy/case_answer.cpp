@@ -147,12 +147,12 @@ std::vector<std::uint32_t> findCandidates(const PlacedConvex& body, const Triang
 }
 
 /// The contact by the tree of the triangles: only candidates are asked.
-MeshContact meshContact(const PlacedConvex& body, const TriangleTree& tree,
-                        const std::vector<Triangle>& mesh, Level level) {
+MeshContact computeMeshContact(const PlacedConvex& body, const TriangleTree& tree,
+                               const std::vector<Triangle>& mesh, Level level) {
   const std::vector<std::uint32_t> candidates = findCandidates(body, tree);
   std::vector<Triangle> triangles;
   for (const std::uint32_t i : candidates) triangles.push_back(mesh[i]);
-  MeshContact contact = bruteForceContact(body, triangles, level == Level::refine);
+  MeshContact contact = findContactByBruteForce(body, triangles, level == Level::refine);
   for (auto* list : {&contact.penetrated, &contact.touched})
     for (std::uint32_t& i : *list) i = candidates[i];
   if (contact.nearest) contact.nearest = candidates[*contact.nearest];
@@ -167,7 +167,7 @@ void answerMesh(const Case& testCase, const Meshes& meshes, Level level, Answer&
   const TriangleTree tree(mesh->second);
   MeshContact contact;
   answer.nanoseconds =
-      measureTime([] {}, [&] { contact = meshContact(body, tree, mesh->second, level); });
+      measureTime([] {}, [&] { contact = computeMeshContact(body, tree, mesh->second, level); });
   answer.verdict = contact.verdict;
   answer.certificate = contact.decidedBy;
   answer.distance = contact.distance;
@@ -269,7 +269,7 @@ Answer answerCase(const Case& testCase, const Meshes& meshes, Level level, WarmS
   return answer;
 }
 
-std::string jsonLine(const Case& testCase, const Answer& answer) {
+std::string formatJsonLine(const Case& testCase, const Answer& answer) {
   if (!answer.error.empty())
     return "{\"id\":" + quote(answer.id) + ",\"verdict\":null,\"error\":" + quote(answer.error) +
            "}";

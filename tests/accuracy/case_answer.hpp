@@ -43,6 +43,6 @@ struct WarmStart {
 Answer answerCase(const Case& testCase, const Meshes& meshes, Level level, WarmStart& warmth);
 
 /// Formats the answer as one JSON object without a line end.
-std::string jsonLine(const Case& testCase, const Answer& answer);
+std::string formatJsonLine(const Case& testCase, const Answer& answer);
 
 }  // namespace enfilade::accuracy

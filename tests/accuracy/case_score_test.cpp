@@ -117,7 +117,7 @@ TEST(Score, ATimeOfImpactMustHoldTheTruthAndBeNarrow) {
 }
 
 TEST(CaseFile, ALineIsReadAndAnsweredInTheRequestedFormat) {
-  const auto file = tests::ownFile("one_case.jsonl");
+  const auto file = tests::makeOwnFile("one_case.jsonl");
   std::ofstream(file) << R"({"id":"x-1","family":"f","a":[[0,0,0],[1,0,0]],"b":[[0,0,2]],)"
                       << R"("pose_a":[1,0,0,0,0,1,0,0,0,0,1,0],"pose_b":[1,0,0,0,0,1,0,0,0,0,1,0],)"
                       << R"("verdict":"separated","distance":"2","penetration":null,"seq":4})"
@@ -128,15 +128,15 @@ TEST(CaseFile, ALineIsReadAndAnsweredInTheRequestedFormat) {
   Answer answer = computeAnswer(cases[0], Level::refine);
   EXPECT_TRUE(passes(cases[0], answer, Level::refine));
   answer.nanoseconds = 5;
-  EXPECT_EQ(
-      jsonLine(cases[0], answer),
-      R"({"id":"x-1","verdict":"separated","distance":2,"penetration":null,"depth_is":null,)"
-      R"("near":null,"point_a":[0,0,0],"point_b":[0,0,2],"error_bound":)" +
-          jsonLine(cases[0], answer).substr(jsonLine(cases[0], answer).find("error_bound") + 13));
+  EXPECT_EQ(formatJsonLine(cases[0], answer),
+            R"({"id":"x-1","verdict":"separated","distance":2,"penetration":null,"depth_is":null,)"
+            R"("near":null,"point_a":[0,0,0],"point_b":[0,0,2],"error_bound":)" +
+                formatJsonLine(cases[0], answer)
+                    .substr(formatJsonLine(cases[0], answer).find("error_bound") + 13));
 }
 
 TEST(CaseFile, ABrokenLineIsNamed) {
-  const auto file = tests::ownFile("broken_case.jsonl");
+  const auto file = tests::makeOwnFile("broken_case.jsonl");
   std::ofstream(file) << "\n{\"id\":\"x\"}\n";
   try {
     readCases(file);

@@ -20,10 +20,10 @@ using collision::Hull;
 using collision::PlacedConvex;
 using collision::SeparationResult;
 using collision::Verdict;
+using collision::testing::drawUniform;
+using collision::testing::makeRandomPoint;
+using collision::testing::makeRandomPoints;
 using collision::testing::Random;
-using collision::testing::randomPoint;
-using collision::testing::randomPoints;
-using collision::testing::uniform;
 
 constexpr double kRounding = 0x1p-53;
 
@@ -39,7 +39,7 @@ struct RotatingBody {
     placed.rotation = Eigen::AngleAxisd(angle, axis).toRotationMatrix() * shape;
     placed.translation = place - placed.rotation * middle;
   }
-  PlacedConvex body(bool withHull) const {
+  PlacedConvex getBody(bool withHull) const {
     return {hull.vertices, placed.translation, &placed.rotation, withHull ? &hull : nullptr};
   }
 };
@@ -58,17 +58,17 @@ std::vector<Vec3> makeNearlyFlat(Random& random, double unevenness) {
   for (int i = 0; i < 8; ++i)
     points.emplace_back((i & 1) != 0 ? 1 : -1, (i & 2) != 0 ? 1 : -1, (i & 4) != 0 ? 1 : -1);
   for (int i = 0; i < 8; ++i) {
-    Vec3 p = randomPoint(random, 1);
+    Vec3 p = makeRandomPoint(random, 1);
     p[i % 3] = i % 2 == 0 ? 1 : -1;
     points.push_back(p);
   }
-  for (Vec3& p : points) p += randomPoint(random, unevenness);
+  for (Vec3& p : points) p += makeRandomPoint(random, unevenness);
   return points;
 }
 
 RotatingBody makeRotatingBody(Random& random, const Kind& kind, std::vector<Vec3> points) {
   RotatingBody result;
-  result.middle = randomPoint(random, kind.offset);
+  result.middle = makeRandomPoint(random, kind.offset);
   for (Vec3& p : points) {
     p.z() *= kind.thickness;
     p += result.middle;
@@ -76,8 +76,9 @@ RotatingBody makeRotatingBody(Random& random, const Kind& kind, std::vector<Vec3
   result.hull = collision::buildHull(points);
   result.placed.points = result.hull.vertices;
   result.shape = Mat3::Identity();
-  for (double& entry : result.shape.reshaped()) entry += uniform(random, -kind.shear, kind.shear);
-  result.axis = randomPoint(random, 1).normalized();
+  for (double& entry : result.shape.reshaped())
+    entry += drawUniform(random, -kind.shear, kind.shear);
+  result.axis = makeRandomPoint(random, 1).normalized();
   return result;
 }
 
@@ -87,7 +88,7 @@ NearestPoint findNearest(const RotatingBody& a, const RotatingBody& b, long& bit
   return findNearestOfDifference(pair.a, pair.b);
 }
 
-Vec3 directionTo(const NearestPoint& nearest) {
+Vec3 computeDirectionTo(const NearestPoint& nearest) {
   const auto coordinate = [&](const mpz_class& of) {
     return mpq_class(of, nearest.denominator).get_d();
   };
@@ -105,7 +106,8 @@ mpf_class computeExactDistance(const RotatingBody& a, const RotatingBody& b) {
 void moveToDistance(const RotatingBody& a, RotatingBody& b, double gap) {
   long bits = 0;
   const NearestPoint nearest = findNearest(a, b, bits);
-  b.placed.translation -= (computeLength(nearest, bits).get_d() - gap) * directionTo(nearest);
+  b.placed.translation -=
+      (computeLength(nearest, bits).get_d() - gap) * computeDirectionTo(nearest);
 }
 
 /// The maximum |coordinate| of both bodies relative to A's translation.
@@ -131,19 +133,20 @@ TEST_P(DistanceBound, HoldsTheExactDistanceWhileBodiesTurn) {
       const bool flat = pair % 3 != 0;
       const double small = std::ldexp(1.0, -static_cast<int>(random() % 48));
       const auto points = [&] {
-        return flat ? makeNearlyFlat(random, small) : randomPoints(random, 9, 1);
+        return flat ? makeNearlyFlat(random, small) : makeRandomPoints(random, 9, 1);
       };
       RotatingBody a = makeRotatingBody(random, GetParam(), points());
       RotatingBody b = makeRotatingBody(random, GetParam(), points());
       const double angle = flat ? std::ldexp(0.02, -static_cast<int>(random() % 48)) : 0.02;
-      const Vec3 place = randomPoint(random, 3);
-      const Vec3 away = flat ? Vec3(a.shape.col(pair % 2)) : randomPoint(random, 1).normalized();
+      const Vec3 place = makeRandomPoint(random, 3);
+      const Vec3 away =
+          flat ? Vec3(a.shape.col(pair % 2)) : makeRandomPoint(random, 1).normalized();
       FeatureCache cache, limited;
       for (int step = 0; step < kSteps; ++step) {
         a.rotateTo(angle * step, place);
         b.rotateTo(-1.5 * angle * step, place + 12 * away);
         moveToDistance(a, b, gap);
-        const PlacedConvex bodyA = a.body(pair % 2 == 0), bodyB = b.body(pair % 2 == 0);
+        const PlacedConvex bodyA = a.getBody(pair % 2 == 0), bodyB = b.getBody(pair % 2 == 0);
         const mpf_class exact = computeExactDistance(a, b);
         const SeparationResult reported = computeSeparation(bodyA, bodyB, cache);
         EXPECT_EQ(reported.verdict == Verdict::separated, exact > 0);

@@ -21,10 +21,10 @@ constexpr int kDescentBound = 100000;
 IntegerPoint operator-(const IntegerPoint& p, const IntegerPoint& q) {
   return {p.x - q.x, p.y - q.y, p.z - q.z};
 }
-mpz_class dot(const IntegerPoint& p, const IntegerPoint& q) {
+mpz_class computeDot(const IntegerPoint& p, const IntegerPoint& q) {
   return p.x * q.x + p.y * q.y + p.z * q.z;
 }
-IntegerPoint cross(const IntegerPoint& p, const IntegerPoint& q) {
+IntegerPoint computeCross(const IntegerPoint& p, const IntegerPoint& q) {
   return {p.y * q.z - p.z * q.y, p.z * q.x - p.x * q.z, p.x * q.y - p.y * q.x};
 }
 bool isZero(const IntegerPoint& p) {
@@ -33,12 +33,12 @@ bool isZero(const IntegerPoint& p) {
 
 using RationalPoint = std::array<mpq_class, 3>;
 
-RationalPoint exactPoint(const Vec3& p) {
+RationalPoint toExactPoint(const Vec3& p) {
   return {mpq_class(p.x()), mpq_class(p.y()), mpq_class(p.z())};
 }
 
-RationalPoint worldPoint(const Placed& body, const Vec3& vertex) {
-  RationalPoint world = exactPoint(body.translation);
+RationalPoint computeWorldPoint(const Placed& body, const Vec3& vertex) {
+  RationalPoint world = toExactPoint(body.translation);
   for (int row = 0; row < 3; ++row)
     for (int k = 0; k < 3; ++k)
       world[row] += mpq_class(body.rotation(row, k)) * mpq_class(vertex[k]);
@@ -46,16 +46,16 @@ RationalPoint worldPoint(const Placed& body, const Vec3& vertex) {
 }
 
 /// The exponent of a denominator, which is a power of two.
-long denominatorBits(const mpq_class& q) {
+long computeDenominatorBits(const mpq_class& q) {
   return static_cast<long>(mpz_sizeinbase(q.get_den_mpz_t(), 2)) - 1;
 }
 
-mpz_class scaled(const mpq_class& q, long bits) {
-  return q.get_num() << (bits - denominatorBits(q));
+mpz_class scaleToInteger(const mpq_class& q, long bits) {
+  return q.get_num() << (bits - computeDenominatorBits(q));
 }
 
-IntegerPoint scaled(const RationalPoint& p, long bits) {
-  return {scaled(p[0], bits), scaled(p[1], bits), scaled(p[2], bits)};
+IntegerPoint scaleToInteger(const RationalPoint& p, long bits) {
+  return {scaleToInteger(p[0], bits), scaleToInteger(p[1], bits), scaleToInteger(p[2], bits)};
 }
 
 struct Descent {
@@ -64,7 +64,7 @@ struct Descent {
 };
 
 /// Solves a symmetric system of size n <= 3 by Cramer's rule: x[i] / determinant.
-mpz_class determinant(const std::array<std::array<mpz_class, 3>, 3>& m, std::size_t n) {
+mpz_class computeDeterminant(const std::array<std::array<mpz_class, 3>, 3>& m, std::size_t n) {
   if (n == 0) return 1;
   if (n == 1) return m[0][0];
   if (n == 2) return m[0][0] * m[1][1] - m[0][1] * m[1][0];
@@ -80,16 +80,17 @@ std::optional<NearestPoint> findNearestInside(const std::vector<IntegerPoint>& p
   std::array<std::array<mpz_class, 3>, 3> gram;
   for (std::size_t i = 0; i < n; ++i) edges[i] = points[i + 1] - points[0];
   for (std::size_t i = 0; i < n; ++i)
-    for (std::size_t j = 0; j < n; ++j) gram[i][j] = dot(edges[i], edges[j]);
+    for (std::size_t j = 0; j < n; ++j) gram[i][j] = computeDot(edges[i], edges[j]);
   NearestPoint result;
-  result.denominator = determinant(gram, n);
+  result.denominator = computeDeterminant(gram, n);
   if (sgn(result.denominator) <= 0) return std::nullopt;
   std::array<mpz_class, 4> weight;
   weight[0] = result.denominator;
   for (std::size_t column = 0; column < n; ++column) {
     auto replaced = gram;
-    for (std::size_t row = 0; row < n; ++row) replaced[row][column] = -dot(edges[row], points[0]);
-    weight[column + 1] = determinant(replaced, n);
+    for (std::size_t row = 0; row < n; ++row)
+      replaced[row][column] = -computeDot(edges[row], points[0]);
+    weight[column + 1] = computeDeterminant(replaced, n);
     if (sgn(weight[column + 1]) <= 0) return std::nullopt;
     weight[0] -= weight[column + 1];
   }
@@ -103,8 +104,8 @@ std::optional<NearestPoint> findNearestInside(const std::vector<IntegerPoint>& p
 }
 
 bool isNearer(const NearestPoint& p, const NearestPoint& q) {
-  return dot(p.numerator, p.numerator) * q.denominator * q.denominator <
-         dot(q.numerator, q.numerator) * p.denominator * p.denominator;
+  return computeDot(p.numerator, p.numerator) * q.denominator * q.denominator <
+         computeDot(q.numerator, q.numerator) * p.denominator * p.denominator;
 }
 
 /// Searches the subsets of `points` with the last point; the others were tried before.
@@ -127,9 +128,9 @@ Descent findNearestOfSimplex(const std::vector<IntegerPoint>& points) {
 const IntegerPoint& findExtreme(const std::vector<IntegerPoint>& points, const IntegerPoint& along,
                                 bool maximize) {
   const IntegerPoint* best = &points.front();
-  mpz_class value = dot(along, *best);
+  mpz_class value = computeDot(along, *best);
   for (const IntegerPoint& p : points) {
-    mpz_class candidate = dot(along, p);
+    mpz_class candidate = computeDot(along, p);
     if (maximize ? candidate > value : candidate < value) value = std::move(candidate), best = &p;
   }
   return *best;
@@ -140,9 +141,9 @@ struct Slab {
 };
 
 Slab computeSlab(const std::vector<IntegerPoint>& points, const IntegerPoint& along) {
-  Slab slab{dot(along, points.front()), dot(along, points.front())};
+  Slab slab{computeDot(along, points.front()), computeDot(along, points.front())};
   for (const IntegerPoint& p : points) {
-    mpz_class value = dot(along, p);
+    mpz_class value = computeDot(along, p);
     if (value < slab.min)
       slab.min = std::move(value);
     else if (value > slab.max)
@@ -167,7 +168,7 @@ struct MinOverlap {
 
 void tryNormal(const ExactPair& pair, const IntegerPoint& normal, MinOverlap& minimum) {
   if (isZero(normal)) return;
-  const mpz_class squared = dot(normal, normal);
+  const mpz_class squared = computeDot(normal, normal);
   const Slab a = computeSlab(pair.a, normal);
   const Slab b = computeSlab(pair.b, normal);
   minimum.include(a.max - b.min, squared);
@@ -185,7 +186,7 @@ void tryFaces(const ExactPair& pair, const std::vector<IntegerPoint>& body, MinO
   for (std::size_t i = 0; i < body.size(); ++i)
     for (std::size_t j = i + 1; j < body.size(); ++j)
       for (std::size_t k = j + 1; k < body.size(); ++k)
-        tryNormal(pair, cross(body[j] - body[i], body[k] - body[i]), minimum);
+        tryNormal(pair, computeCross(body[j] - body[i], body[k] - body[i]), minimum);
 }
 
 /// Whether the Minkowski difference has an interior: its edges span space.
@@ -200,9 +201,9 @@ bool spansSpace(const ExactPair& pair) {
     if (first == nullptr) {
       first = &e;
     } else if (!normal) {
-      IntegerPoint n = cross(*first, e);
+      IntegerPoint n = computeCross(*first, e);
       if (!isZero(n)) normal = std::move(n);
-    } else if (sgn(dot(*normal, e)) != 0) {
+    } else if (sgn(computeDot(*normal, e)) != 0) {
       return true;
     }
   }
@@ -218,16 +219,16 @@ mpf_class toMetres(const mpz_class& integer, long bits) {
 }  // namespace
 
 ExactPair makeExactPair(const Placed& a, const Placed& b, const Vec3& pointA, const Vec3& pointB) {
-  std::vector<RationalPoint> all{exactPoint(pointA), exactPoint(pointB)};
-  for (const Vec3& p : a.points) all.push_back(worldPoint(a, p));
-  for (const Vec3& p : b.points) all.push_back(worldPoint(b, p));
+  std::vector<RationalPoint> all{toExactPoint(pointA), toExactPoint(pointB)};
+  for (const Vec3& p : a.points) all.push_back(computeWorldPoint(a, p));
+  for (const Vec3& p : b.points) all.push_back(computeWorldPoint(b, p));
   ExactPair pair;
   for (const RationalPoint& p : all)
-    for (const mpq_class& q : p) pair.bits = std::max(pair.bits, denominatorBits(q));
-  pair.pointA = scaled(all[0], pair.bits);
-  pair.pointB = scaled(all[1], pair.bits);
+    for (const mpq_class& q : p) pair.bits = std::max(pair.bits, computeDenominatorBits(q));
+  pair.pointA = scaleToInteger(all[0], pair.bits);
+  pair.pointB = scaleToInteger(all[1], pair.bits);
   for (std::size_t i = 2; i < all.size(); ++i)
-    (i < 2 + a.points.size() ? pair.a : pair.b).push_back(scaled(all[i], pair.bits));
+    (i < 2 + a.points.size() ? pair.a : pair.b).push_back(scaleToInteger(all[i], pair.bits));
   return pair;
 }
 
@@ -238,7 +239,7 @@ NearestPoint findNearestOfDifference(const std::vector<IntegerPoint>& a,
     const IntegerPoint& x = at.nearest.numerator;
     if (isZero(x)) return at.nearest;
     IntegerPoint support = findExtreme(b, x, false) - findExtreme(a, x, true);
-    if (dot(x, support) * at.nearest.denominator >= dot(x, x)) return at.nearest;
+    if (computeDot(x, support) * at.nearest.denominator >= computeDot(x, x)) return at.nearest;
     at.simplex.push_back(std::move(support));
     at = findNearestOfSimplex(at.simplex);
   }
@@ -246,7 +247,7 @@ NearestPoint findNearestOfDifference(const std::vector<IntegerPoint>& a,
 }
 
 mpf_class computeLength(const NearestPoint& nearest, long bits) {
-  const mpf_class squared(dot(nearest.numerator, nearest.numerator), kPrecision);
+  const mpf_class squared(computeDot(nearest.numerator, nearest.numerator), kPrecision);
   const mpf_class denominator(nearest.denominator, kPrecision);
   mpf_class length(sqrt(squared) / denominator, kPrecision);
   mpf_div_2exp(length.get_mpf_t(), length.get_mpf_t(), static_cast<mp_bitcnt_t>(bits));
@@ -260,7 +261,7 @@ bool isWithinTolerance(const IntegerPoint& point, const std::vector<IntegerPoint
   mpq_mul_2exp(scaledTolerance.get_mpq_t(), scaledTolerance.get_mpq_t(),
                static_cast<mp_bitcnt_t>(bits));
   const mpq_class reach = scaledTolerance * nearest.denominator;
-  return dot(nearest.numerator, nearest.numerator) <= reach * reach;
+  return computeDot(nearest.numerator, nearest.numerator) <= reach * reach;
 }
 
 ReferenceResult computeReferenceResult(const ExactPair& pair) {
@@ -277,7 +278,7 @@ ReferenceResult computeReferenceResult(const ExactPair& pair) {
   tryFaces(pair, pair.b, minimum);
   const std::vector<IntegerPoint> edgesB = computeEdges(pair.b);
   for (const IntegerPoint& e : computeEdges(pair.a))
-    for (const IntegerPoint& f : edgesB) tryNormal(pair, cross(e, f), minimum);
+    for (const IntegerPoint& f : edgesB) tryNormal(pair, computeCross(e, f), minimum);
   if (!minimum.any || sgn(minimum.overlap) < 0)
     throw std::logic_error("bodies with a common point are separated by a plane");
   if (sgn(minimum.overlap) == 0) return answer;

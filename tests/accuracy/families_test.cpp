@@ -50,7 +50,7 @@ TEST_P(Families, EqualTheExactReferenceAtBothLevels) {
   EXPECT_EQ(refined.noDepth, 0);
 }
 
-Case scaled(Case testCase, double factor) {
+Case scaleCase(Case testCase, double factor) {
   for (Placed* body : {&testCase.a, &testCase.b}) {
     for (Vec3& p : body->points) p *= factor;
     body->translation *= factor;
@@ -63,13 +63,13 @@ TEST_P(Families, ScalingByPowersOfTwoScalesTheAnswer) {
   forEachCase(GetParam(), [&](const Case& testCase) {
     const Answer here = answerCold(testCase, Level::refine);
     for (const double factor : {0x1p40, 0x1p-40}) {
-      const Answer there = answerCold(scaled(testCase, factor), Level::refine);
+      const Answer there = answerCold(scaleCase(testCase, factor), Level::refine);
       EXPECT_EQ(here.verdict, there.verdict) << testCase.id;
       EXPECT_EQ(here.near, there.near) << testCase.id;
       EXPECT_EQ(here.distance * factor, there.distance) << testCase.id;
       EXPECT_EQ(here.penetration.value_or(0) * factor, there.penetration.value_or(0))
           << testCase.id;
-      EXPECT_EQ(answerCold(scaled(testCase, factor), Level::decide).verdict, here.verdict)
+      EXPECT_EQ(answerCold(scaleCase(testCase, factor), Level::decide).verdict, here.verdict)
           << testCase.id;
     }
   });

@@ -74,8 +74,8 @@ void takeNearestRefined(const PlacedConvex& body, std::span<const Triangle> mesh
 
 }  // namespace
 
-MeshContact bruteForceContact(const PlacedConvex& body, std::span<const Triangle> mesh,
-                              bool refined) {
+MeshContact findContactByBruteForce(const PlacedConvex& body, std::span<const Triangle> mesh,
+                                    bool refined) {
   MeshContact contact;
   const std::vector<SeparationResult> separations = decideAll(body, mesh);
   if (separations.empty()) {

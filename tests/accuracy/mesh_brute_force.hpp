@@ -24,7 +24,7 @@ struct MeshContact {
 
 /// Computes the contact. `refined`: the distance by refineSeparation(), otherwise by
 /// computeSeparation().
-MeshContact bruteForceContact(const collision::PlacedConvex& body, std::span<const Triangle> mesh,
-                              bool refined);
+MeshContact findContactByBruteForce(const collision::PlacedConvex& body,
+                                    std::span<const Triangle> mesh, bool refined);
 
 }  // namespace enfilade::accuracy

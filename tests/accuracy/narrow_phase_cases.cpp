@@ -67,7 +67,7 @@ int run(const Options& options) {
       if (options.score)
         addToScore(testCase, answer, options.level, meshes, scores[testCase.family]);
       else
-        std::cout << jsonLine(testCase, answer) << '\n';
+        std::cout << formatJsonLine(testCase, answer) << '\n';
     }
   }
   if (!options.score) return 0;

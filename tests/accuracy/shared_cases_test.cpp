@@ -11,7 +11,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::vector<fs::path> caseFiles(const fs::path& folder) {
+std::vector<fs::path> listCaseFiles(const fs::path& folder) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.path().extension() == ".jsonl" && entry.path().filename() != "meshes.jsonl")
@@ -23,7 +23,7 @@ std::vector<fs::path> caseFiles(const fs::path& folder) {
 int scoreAll(const fs::path& folder, Level level, std::map<std::string, Score>& scores) {
   const Meshes meshes = readMeshes(folder / "meshes.jsonl");
   int count = 0;
-  for (const fs::path& file : caseFiles(folder)) {
+  for (const fs::path& file : listCaseFiles(folder)) {
     std::map<long, WarmStart> sequences;
     for (const Case& testCase : readCases(file)) {
       WarmStart cold;
@@ -62,7 +62,7 @@ TEST(SharedCases, MeshQueriesAnswerAsTheTrianglesOneByOne) {
     const collision::Hull hull = collision::buildHull(testCase.a.points);
     const collision::PlacedConvex body{hull.vertices, testCase.a.translation, &testCase.a.rotation,
                                        &hull};
-    const MeshContact reference = bruteForceContact(body, meshes.at(testCase.mesh), true);
+    const MeshContact reference = findContactByBruteForce(body, meshes.at(testCase.mesh), true);
     EXPECT_EQ(answer.verdict, reference.verdict) << testCase.id;
     EXPECT_EQ(answer.penetrated, reference.penetrated) << testCase.id;
     EXPECT_EQ(answer.touched, reference.touched) << testCase.id;

@@ -166,7 +166,7 @@ bool isGeneratedMessage(const std::string& path) {
   return endsWith(path, ".pb.h");
 }
 
-std::string at(const std::string& path, int line) {
+std::string formatPlace(const std::string& path, int line) {
   return path + ":" + std::to_string(line);
 }
 
@@ -208,7 +208,7 @@ Names findReachedHeaders(const Sources& sources, std::vector<std::string> open, 
 }
 
 /// Headers of a folder that code of another one includes, and all that these include in turn.
-Names publicHeaders(const Sources& sources) {
+Names findPublicHeaders(const Sources& sources) {
   Names reached;
   std::vector<std::string> open;
   for (const auto& [path, text] : sources) {
@@ -222,13 +222,13 @@ Names publicHeaders(const Sources& sources) {
   return reached;
 }
 
-bool allowedInPublicHeader(const std::string& path) {
+bool isAllowedInPublicHeader(const std::string& path) {
   const bool standard = path.find_first_of("/.") == std::string::npos;
   return standard || path.rfind("Eigen/", 0) == 0 || isGeneratedMessage(path);
 }
 
-std::optional<std::string> faultOfInclude(const Sources& sources, const std::string& from,
-                                          const Include& include) {
+std::optional<std::string> findFaultOfInclude(const Sources& sources, const std::string& from,
+                                              const Include& include) {
   const std::string folder = getFolder(from);
   const std::string target = getFolder(include.path);
   if (target.empty()) return "\"" + include.path + "\" is not a path from the root";
@@ -243,7 +243,7 @@ std::optional<std::string> faultOfInclude(const Sources& sources, const std::str
   return std::nullopt;
 }
 
-std::optional<std::string> faultBetweenRooms(const std::string& from, const Include& include) {
+std::optional<std::string> findFaultBetweenRooms(const std::string& from, const Include& include) {
   const std::string room = getRoom(from), wanted = getRoom(include.path);
   if (room == wanted || kWithoutRooms.count(getFolder(from)) != 0 ||
       isGeneratedMessage(include.path))
@@ -255,12 +255,12 @@ std::optional<std::string> faultBetweenRooms(const std::string& from, const Incl
   return std::nullopt;
 }
 
-bool skippedFolder(const std::string& name) {
+bool isSkippedFolder(const std::string& name) {
   return name == ".git" || name == "out" || name == "node_modules" || name == ".cache" ||
          name.rfind("build", 0) == 0;
 }
 
-bool writtenByPeople(const std::filesystem::path& file) {
+bool isWrittenByPeople(const std::filesystem::path& file) {
   static const Names endings{".cpp",  ".hpp",   ".inc", ".proto", ".txt", ".cmake", ".md",
                              ".json", ".jsonl", ".py",  ".js",    ".mjs", ".ts"};
   static const Names names{"dev", "run", ".gitignore", ".clang-format"};
@@ -282,7 +282,7 @@ bool endsSentence(const std::string& word) {
   return last != std::string::npos && std::string(".!?").find(word[last]) != std::string::npos;
 }
 
-bool onlyLinkedTo(const std::filesystem::path& file) {
+bool isOnlyLinkedTo(const std::filesystem::path& file) {
   const std::string extension = file.extension().string();
   return extension == ".png" || extension == ".svg" || file.filename() == "LICENSE";
 }
@@ -293,14 +293,14 @@ Sources readSources(const std::filesystem::path& root) {
   Sources sources;
   for (auto entry = std::filesystem::recursive_directory_iterator(root);
        entry != std::filesystem::recursive_directory_iterator(); ++entry) {
-    if (entry->is_directory() && skippedFolder(entry->path().filename().string())) {
+    if (entry->is_directory() && isSkippedFolder(entry->path().filename().string())) {
       entry.disable_recursion_pending();
       continue;
     }
     if (!entry->is_regular_file()) continue;
     const std::string path = entry->path().lexically_relative(root).generic_string();
-    if (onlyLinkedTo(entry->path())) sources[path] = "";
-    if (!writtenByPeople(entry->path())) continue;
+    if (isOnlyLinkedTo(entry->path())) sources[path] = "";
+    if (!isWrittenByPeople(entry->path())) continue;
     std::ifstream file(entry->path(), std::ios::binary);
     std::ostringstream text;
     text << file.rdbuf();
@@ -310,21 +310,21 @@ Sources readSources(const std::filesystem::path& root) {
   return sources;
 }
 
-Faults includeDirections(const Sources& sources) {
+Faults findWrongIncludes(const Sources& sources) {
   Faults faults;
   for (const auto& [path, text] : sources) {
     if (!isCode(path)) continue;
     for (const Include& include : findIncludes(text)) {
       if (!include.quoted) continue;
-      auto fault = faultOfInclude(sources, path, include);
-      if (!fault) fault = faultBetweenRooms(path, include);
-      if (fault) faults.push_back(at(path, include.line) + ": " + *fault);
+      auto fault = findFaultOfInclude(sources, path, include);
+      if (!fault) fault = findFaultBetweenRooms(path, include);
+      if (fault) faults.push_back(formatPlace(path, include.line) + ": " + *fault);
     }
   }
   return faults;
 }
 
-Faults includeRings(const Sources& sources) {
+Faults findIncludeRings(const Sources& sources) {
   const auto getModule = [](const std::string& path) { return path.substr(0, path.rfind('.')); };
   std::map<std::string, Names> included;  // by module; without modules that include no other one
   for (const auto& [path, text] : sources) {
@@ -352,19 +352,19 @@ Faults includeRings(const Sources& sources) {
   return {fault};
 }
 
-Faults thirdPartiesInPublicHeaders(const Sources& sources) {
+Faults findPublicThirdParties(const Sources& sources) {
   Faults faults;
-  for (const std::string& path : publicHeaders(sources)) {
+  for (const std::string& path : findPublicHeaders(sources)) {
     if (!isHeader(path)) continue;
     for (const Include& include : findIncludes(sources.at(path)))
-      if (!include.quoted && !allowedInPublicHeader(include.path))
-        faults.push_back(at(path, include.line) + ": <" + include.path +
+      if (!include.quoted && !isAllowedInPublicHeader(include.path))
+        faults.push_back(formatPlace(path, include.line) + ": <" + include.path +
                          "> in a header that other folders reach; move it into a .cpp file");
   }
   return faults;
 }
 
-Faults thirdPartiesOutOfPlace(const Sources& sources) {
+Faults findMisplacedThirdParties(const Sources& sources) {
   Faults faults;
   for (const auto& [path, text] : sources) {
     if (!isCode(path) || kMayInclude.count(getFolder(path)) == 0) continue;
@@ -372,15 +372,15 @@ Faults thirdPartiesOutOfPlace(const Sources& sources) {
       for (const ThirdParty& party : kThirdParties) {
         if (include.quoted || party.folders.count(getFolder(path)) != 0) continue;
         if (std::regex_match(include.path, std::regex(party.pattern)))
-          faults.push_back(at(path, include.line) + ": " + party.name + " has no place in " +
-                           getFolder(path) + "/");
+          faults.push_back(formatPlace(path, include.line) + ": " + party.name +
+                           " has no place in " + getFolder(path) + "/");
       }
     }
   }
   return faults;
 }
 
-Faults roomsWithoutDescription(const Sources& sources) {
+Faults findUndescribedRooms(const Sources& sources) {
   const auto page = sources.find("ARCHITECTURE.md");
   const std::string text = page == sources.end() ? "" : page->second;
   const auto headingNames = [&](const std::string& room) {
@@ -402,7 +402,7 @@ Faults roomsWithoutDescription(const Sources& sources) {
   return faults;
 }
 
-Faults headersWithoutPragmaOnce(const Sources& sources) {
+Faults findHeadersWithoutPragmaOnce(const Sources& sources) {
   Faults faults;
   for (const auto& [path, text] : sources)
     if (isHeader(path) && text.find("#pragma once\n") == std::string::npos)
@@ -410,7 +410,7 @@ Faults headersWithoutPragmaOnce(const Sources& sources) {
   return faults;
 }
 
-Faults headersWithoutComment(const Sources& sources) {
+Faults findHeadersWithoutComment(const Sources& sources) {
   Faults faults;
   for (const auto& [path, text] : sources)
     if (endsWith(path, ".hpp") && kMayInclude.count(getFolder(path)) != 0 &&
@@ -419,7 +419,7 @@ Faults headersWithoutComment(const Sources& sources) {
   return faults;
 }
 
-Faults longFiles(const Sources& sources, int maxOfProduct, int maxOfOthers) {
+Faults findLongFiles(const Sources& sources, int maxOfProduct, int maxOfOthers) {
   constexpr int kMaxSchemaLines = 1450;
   Faults faults;
   for (const auto& [path, text] : sources) {
@@ -433,18 +433,18 @@ Faults longFiles(const Sources& sources, int maxOfProduct, int maxOfOthers) {
   return faults;
 }
 
-Faults unfinishedWork(const Sources& sources) {
+Faults findUnfinishedWork(const Sources& sources) {
   // Put together here, so that this file does not accuse itself.
   static const std::regex words(std::string("\\b(TO") + "DO|FIX" + "ME|X" + "XX)\\b");
   Faults faults;
   for (const auto& [path, text] : sources)
     forEachLine(text, [&, &name = path](int number, const std::string& line) {
-      if (std::regex_search(line, words)) faults.push_back(at(name, number) + ": " + line);
+      if (std::regex_search(line, words)) faults.push_back(formatPlace(name, number) + ": " + line);
     });
   return faults;
 }
 
-Faults sourcesWithoutHeader(const Sources& sources) {
+Faults findSourcesWithoutHeader(const Sources& sources) {
   static const std::regex alone(R"(main\.cpp|make_\w+\.cpp|\w+_module\.cpp|\w+_sanitizer\.cpp)");
   Faults faults;
   for (const auto& [path, text] : sources) {
@@ -459,7 +459,7 @@ Faults sourcesWithoutHeader(const Sources& sources) {
   return faults;
 }
 
-Faults unreachedCollisionHeaders(const Sources& sources) {
+Faults findUnreachedHeaders(const Sources& sources) {
   std::vector<std::string> product;
   for (const auto& [path, text] : sources)
     if (isCode(path) && getFolder(path) != "collision" && getFolder(path) != "tests")
@@ -472,7 +472,7 @@ Faults unreachedCollisionHeaders(const Sources& sources) {
   return faults;
 }
 
-Faults crowdedFolders(const Sources& sources, int maxFiles) {
+Faults findCrowdedFolders(const Sources& sources, int maxFiles) {
   std::map<std::string, int> counts;
   for (const auto& [path, text] : sources)
     if (endsWith(path, ".ts") || endsWith(path, ".py") ||
@@ -484,7 +484,7 @@ Faults crowdedFolders(const Sources& sources, int maxFiles) {
   return faults;
 }
 
-Faults oddWords(const Sources& sources) {
+Faults findOddWords(const Sources& sources) {
   static const std::regex words(
       "\\b([Tt]old|[Tt]ells|[Aa]new|[Ll]est|[Bb]esides?|[Ss]omebody|[Nn]obody|[Ww]hoever|[Tt]"
       "hereof|"
@@ -498,17 +498,17 @@ Faults oddWords(const Sources& sources) {
     if (path.rfind("tests/architecture/", 0) == 0) continue;
     forEachLine(text, [&, &name = path](int number, const std::string& line) {
       for (std::sregex_iterator it(line.begin(), line.end(), words), end; it != end; ++it)
-        faults.push_back(at(name, number) + ": " + (*it)[0].str());
+        faults.push_back(formatPlace(name, number) + ": " + (*it)[0].str());
       std::smatch match;
       if (std::regex_search(line, match, subjects))
-        faults.push_back(at(name, number) + ": a comment about \"" + match[1].str() +
+        faults.push_back(formatPlace(name, number) + ": a comment about \"" + match[1].str() +
                          "\"; name the thing");
     });
   }
   return faults;
 }
 
-Faults longSentences(const Sources& sources, int maxWords) {
+Faults findLongSentences(const Sources& sources, int maxWords) {
   static const std::regex code("^\\s*```"), noText("^\\s*([#|].*)?$");
   static const std::regex item(R"(^\s*([-*+]|\d+\.)\s)");
   Faults faults;
@@ -518,7 +518,7 @@ Faults longSentences(const Sources& sources, int maxWords) {
     bool inCode = false;
     const auto endSentence = [&, &name = path] {
       if (words > maxWords)
-        faults.push_back(at(name, firstLine) + ": a sentence of " + std::to_string(words) +
+        faults.push_back(formatPlace(name, firstLine) + ": a sentence of " + std::to_string(words) +
                          " words; split it");
       words = 0;
     };
@@ -538,7 +538,7 @@ Faults longSentences(const Sources& sources, int maxWords) {
   return faults;
 }
 
-Faults nounFunctions(const Sources& sources) {
+Faults findNounFunctions(const Sources& sources) {
   // JavaScript itself names two methods of strings and arrays so.
   static const std::regex noun(R"(\b(?!(?:i|lastI)ndexOf\b)([a-z]\w*Of)(?:<[^<>()]*>)?\()");
   Faults faults;
@@ -547,14 +547,14 @@ Faults nounFunctions(const Sources& sources) {
     if (!isScript(path) && !(isCode(path) && isProduct)) continue;
     forEachLine(text, [&, &name = path](int number, const std::string& line) {
       for (std::sregex_iterator it(line.begin(), line.end(), noun), end; it != end; ++it)
-        faults.push_back(at(name, number) + ": " + (*it)[1].str() +
+        faults.push_back(formatPlace(name, number) + ": " + (*it)[1].str() +
                          "(); name it by a verb, as get.., find.., compute.. or make..");
     });
   }
   return faults;
 }
 
-Faults diagnosticsWithoutMeaning(const Sources& sources) {
+Faults findUnexplainedDiagnostics(const Sources& sources) {
   static const std::string table = "scene/model/diagnostic_catalog.cpp";
   static const std::regex reported(
       R"re((?:addDiagnostic\(|problems\.push_back\()[^";]*"([a-z_]+)")re");
@@ -567,13 +567,14 @@ Faults diagnosticsWithoutMeaning(const Sources& sources) {
       const std::string word = '"' + (*it)[1].str() + '"';
       if (meanings->second.find(word) != std::string::npos) continue;
       const auto line = 1 + std::count(text.begin(), text.begin() + it->position(), '\n');
-      faults.push_back(at(path, static_cast<int>(line)) + ": " + word + " is not in " + table);
+      faults.push_back(formatPlace(path, static_cast<int>(line)) + ": " + word + " is not in " +
+                       table);
     }
   }
   return faults;
 }
 
-Faults sharedTemporaryFiles(const Sources& sources) {
+Faults findSharedTemporaryFiles(const Sources& sources) {
   static const std::string keeper = "tests/support/temporary_folder.hpp";
   static const std::regex shared(R"(\b(temp_directory_path|TempDir)\()");
   Faults faults;
@@ -582,13 +583,14 @@ Faults sharedTemporaryFiles(const Sources& sources) {
       continue;
     for (std::sregex_iterator it(text.begin(), text.end(), shared), end; it != end; ++it) {
       const auto line = 1 + std::count(text.begin(), text.begin() + it->position(), '\n');
-      faults.push_back(at(path, static_cast<int>(line)) + ": files of a test come from " + keeper);
+      faults.push_back(formatPlace(path, static_cast<int>(line)) + ": files of a test come from " +
+                       keeper);
     }
   }
   return faults;
 }
 
-Faults brokenLinks(const Sources& sources) {
+Faults findBrokenLinks(const Sources& sources) {
   static const std::regex link(R"(\]\(([A-Za-z0-9_./-]+)(#[^)]*)?\))");
   Faults faults;
   for (const auto& [path, text] : sources) {
@@ -599,7 +601,8 @@ Faults brokenLinks(const Sources& sources) {
         const std::string target = (*it)[1];
         const auto file = (folder / target).lexically_normal().generic_string();
         if (sources.count(file) == 0)
-          faults.push_back(at(name, number) + ": links to " + target + ", which is not there");
+          faults.push_back(formatPlace(name, number) + ": links to " + target +
+                           ", which is not there");
       }
     });
   }

@@ -21,63 +21,63 @@ Sources readSources(const std::filesystem::path& root);
 
 /// Quoted includes go by path from the root, exist, and follow
 /// collision <- scene <- render <- server, protocol <- server, scene <- assets.
-Faults includeDirections(const Sources& sources);
+Faults findWrongIncludes(const Sources& sources);
 
 /// Modules, each a .hpp file and the .cpp file of the same name, that include one another in a
 /// ring. At most one ring is reported. Tests do not count.
-Faults includeRings(const Sources& sources);
+Faults findIncludeRings(const Sources& sources);
 
 /// A header that another folder can reach includes nothing but the standard library, Eigen,
 /// generated messages and our own.
-Faults thirdPartiesInPublicHeaders(const Sources& sources);
+Faults findPublicThirdParties(const Sources& sources);
 
 /// A third party is used only in the folders it was chosen for.
-Faults thirdPartiesOutOfPlace(const Sources& sources);
+Faults findMisplacedThirdParties(const Sources& sources);
 
 /// Rooms that ARCHITECTURE.md names neither in a heading nor as `room/`.
-Faults roomsWithoutDescription(const Sources& sources);
+Faults findUndescribedRooms(const Sources& sources);
 
-Faults headersWithoutPragmaOnce(const Sources& sources);
+Faults findHeadersWithoutPragmaOnce(const Sources& sources);
 /// A header of the product begins with a comment.
-Faults headersWithoutComment(const Sources& sources);
+Faults findHeadersWithoutComment(const Sources& sources);
 /// Code of the product has at most `maxOfProduct` lines; tests and documents have `maxOfOthers`. A
 /// schema (.proto) may be twice as long as these: it is read as one document.
-Faults longFiles(const Sources& sources, int maxOfProduct, int maxOfOthers);
-Faults unfinishedWork(const Sources& sources);
+Faults findLongFiles(const Sources& sources, int maxOfProduct, int maxOfOthers);
+Faults findUnfinishedWork(const Sources& sources);
 
 /// A .cpp file in a room has a .hpp file of the same name. Mains, modules and the options of
 /// sanitizers have none.
-Faults sourcesWithoutHeader(const Sources& sources);
+Faults findSourcesWithoutHeader(const Sources& sources);
 
 /// A header of collision/ that no program of the product reaches: neither another folder includes
 /// it, nor a header that one reaches, nor the source of such a header. Tests do not count.
-Faults unreachedCollisionHeaders(const Sources& sources);
+Faults findUnreachedHeaders(const Sources& sources);
 
 /// A folder of the product holds at most `maxFiles` sources directly.
-Faults crowdedFolders(const Sources& sources, int maxFiles);
+Faults findCrowdedFolders(const Sources& sources, int maxFiles);
 
 /// Archaic, colloquial and roundabout words, which do not belong in technical English, one fault a
 /// place. Comments, messages and pages count; identifiers that merely contain such a word do not.
 /// Constants are named kMax.. and kMin.., not kMost.., kLeast.. and kLargest...
-Faults oddWords(const Sources& sources);
+Faults findOddWords(const Sources& sources);
 
 /// Sentences of the Markdown pages with more than `maxWords` words. A list item ends a sentence,
 /// too. Headings, tables and code do not count.
-Faults longSentences(const Sources& sources, int maxWords);
+Faults findLongSentences(const Sources& sources, int maxWords);
 
 /// Functions of the product, and of all scripts for browsers and Node.js, that are named by a noun,
 /// as `areaOf()`. The convention is verb + noun: `getArea()`, `findArea()`, `computeArea()`.
 /// Comments count.
-Faults nounFunctions(const Sources& sources);
+Faults findNounFunctions(const Sources& sources);
 
 /// Each kind of diagnostic that scene/ reports is in scene/model/diagnostic_catalog.cpp.
-Faults diagnosticsWithoutMeaning(const Sources& sources);
+Faults findUnexplainedDiagnostics(const Sources& sources);
 
 /// Tests run side by side: a file in the system's temporary folder under a name of its author's
 /// choice is overwritten by the next test that chose it.
-Faults sharedTemporaryFiles(const Sources& sources);
+Faults findSharedTemporaryFiles(const Sources& sources);
 
 /// Links of the Markdown pages to files of the repository that are not there.
-Faults brokenLinks(const Sources& sources);
+Faults findBrokenLinks(const Sources& sources);
 
 }  // namespace enfilade::architecture

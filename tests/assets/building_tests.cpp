@@ -16,7 +16,7 @@ using scene::Model;
 using scene::Object;
 using scene::Vec3;
 
-const Model& building() {
+const Model& getBuilding() {
   static const Model model = makeBuilding();
   return model;
 }
@@ -30,14 +30,14 @@ Aabb computeBox(const Model& model, const Object& object) {
 }
 
 Aabb computeBox(const std::string& path) {
-  for (const Object& object : building().objects)
-    if (object.path == path) return computeBox(building(), object);
+  for (const Object& object : getBuilding().objects)
+    if (object.path == path) return computeBox(getBuilding(), object);
   ADD_FAILURE() << "no object " << path;
   return {};
 }
 
 template <typename Visit>
-void eachTriangle(const Model& model, const Object& object, Visit visit) {
+void forEachTriangle(const Model& model, const Object& object, Visit visit) {
   for (std::uint32_t m : object.meshes) {
     const scene::Mesh& mesh = model.meshes[m];
     for (std::size_t i = 0; i + 2 < mesh.indices.size(); i += 3)
@@ -49,7 +49,7 @@ void eachTriangle(const Model& model, const Object& object, Visit visit) {
 
 /// Counts edges (by position, over all meshes of the object) without an equal number of opposite
 /// ones.
-std::size_t unmatchedEdges(const Model& model, const Object& object) {
+std::size_t countUnmatchedEdges(const Model& model, const Object& object) {
   using Corner = std::array<float, 3>;
   std::map<std::pair<Corner, Corner>, int> balance;
   const auto corner = [](const Eigen::Vector3f& p) {
@@ -72,38 +72,38 @@ std::size_t unmatchedEdges(const Model& model, const Object& object) {
 double computeVolume(const Model& model, const Object& object) {
   double volume = 0;
   const Vec3 origin = object.worldFromMesh.translation();
-  eachTriangle(model, object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
+  forEachTriangle(model, object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
     volume += (a - origin).dot((b - origin).cross(c - origin)) / 6;
   });
   return volume;
 }
 
 TEST(Building, HasTheRequestedNumberOfObjects) {
-  EXPECT_GE(building().objects.size(), 2000u);
-  EXPECT_LE(building().objects.size(), 5000u);
-  EXPECT_LT(building().meshes.size(), building().objects.size() * 2 / 3);
+  EXPECT_GE(getBuilding().objects.size(), 2000u);
+  EXPECT_LE(getBuilding().objects.size(), 5000u);
+  EXPECT_LT(getBuilding().meshes.size(), getBuilding().objects.size() * 2 / 3);
 }
 
 TEST(Building, NamesEveryObjectOnce) {
   std::set<std::string> paths;
-  for (const Object& object : building().objects)
+  for (const Object& object : getBuilding().objects)
     EXPECT_TRUE(paths.insert(object.path).second) << object.path;
   EXPECT_TRUE(paths.contains("building/ground/enfilade/room1/bench1/leg2"));
 }
 
 TEST(Building, MakesClosedSolidsThatFaceOutwards) {
   std::size_t solids = 0;
-  for (const Object& object : building().objects) {
+  for (const Object& object : getBuilding().objects) {
     if (object.path.ends_with("/canvas")) continue;  // paint is a set of flat patches
     ++solids;
-    EXPECT_EQ(unmatchedEdges(building(), object), 0u) << object.path;
-    EXPECT_GT(computeVolume(building(), object), 0) << object.path;
+    EXPECT_EQ(countUnmatchedEdges(getBuilding(), object), 0u) << object.path;
+    EXPECT_GT(computeVolume(getBuilding(), object), 0) << object.path;
   }
   EXPECT_GT(solids, 2000u);
 }
 
 TEST(Building, HasUnitNormalsThatAgreeWithTheWinding) {
-  for (const scene::Mesh& mesh : building().meshes) {
+  for (const scene::Mesh& mesh : getBuilding().meshes) {
     ASSERT_EQ(mesh.normals.size(), mesh.positions.size()) << mesh.name;
     for (std::size_t i = 0; i < mesh.indices.size(); i += 3) {
       const auto corner = [&](std::size_t k) -> const Eigen::Vector3f& {
@@ -123,9 +123,9 @@ TEST(Building, HasUnitNormalsThatAgreeWithTheWinding) {
 TEST(Building, LeavesTheAxisOfTheEnfiladeFree) {
   const Aabb corridor{{-0.3, 0.02, -0.35}, {49, 2.0, 0.35}};
   std::size_t seen = 0;
-  for (const Object& object : building().objects) {
-    if (!overlaps(computeBox(building(), object), corridor)) continue;
-    eachTriangle(building(), object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
+  for (const Object& object : getBuilding().objects) {
+    if (!overlaps(computeBox(getBuilding(), object), corridor)) continue;
+    forEachTriangle(getBuilding(), object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
       Aabb box;
       for (const Vec3& p : {a, b, c}) box.include(p);
       EXPECT_FALSE(overlaps(box, corridor)) << object.path;
@@ -137,12 +137,12 @@ TEST(Building, LeavesTheAxisOfTheEnfiladeFree) {
 
 /// Height of the highest surface at most 0.02 above `y`, straight below a point; -1e9 if none was
 /// found.
-double floorBelow(double x, double z, double y) {
+double findFloorBelow(double x, double z, double y) {
   double floor = -1e9;
-  for (const Object& object : building().objects) {
-    const Aabb box = computeBox(building(), object);
+  for (const Object& object : getBuilding().objects) {
+    const Aabb box = computeBox(getBuilding(), object);
     if (box.min.x() > x || box.max.x() < x || box.min.z() > z || box.max.z() < z) continue;
-    eachTriangle(building(), object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
+    forEachTriangle(getBuilding(), object, [&](const Vec3& a, const Vec3& b, const Vec3& c) {
       const double area = (b.x() - a.x()) * (c.z() - a.z()) - (c.x() - a.x()) * (b.z() - a.z());
       if (area == 0) return;
       const double u = ((b.x() - x) * (c.z() - z) - (c.x() - x) * (b.z() - z)) / area;
@@ -159,12 +159,13 @@ double floorBelow(double x, double z, double y) {
 TEST(Building, HasAFloorUnderEveryDoorAndRoomOfTheEnfilade) {
   for (std::size_t i = 0; i < landmarks::kDoors.size(); ++i)
     for (const double dx : {-0.2, -0.149, 0.0, 0.151, 0.2})
-      EXPECT_NEAR(floorBelow(landmarks::kDoors[i].x() + dx, 0.0123, 0), 0, 0.02) << "door " << i;
+      EXPECT_NEAR(findFloorBelow(landmarks::kDoors[i].x() + dx, 0.0123, 0), 0, 0.02)
+          << "door " << i;
   for (const Vec3& room : landmarks::kRooms)
-    EXPECT_NEAR(floorBelow(room.x() + 0.0123, room.z() + 0.0321, 0), 0, 0.02);
+    EXPECT_NEAR(findFloorBelow(room.x() + 0.0123, room.z() + 0.0321, 0), 0, 0.02);
   const Vec3 head = landmarks::kStairHead, view = landmarks::kGalleryView;
-  EXPECT_NEAR(floorBelow(head.x(), head.z() + 0.01, head.y()), 4.2, 0.02);
-  EXPECT_NEAR(floorBelow(view.x(), view.z() + 0.01, view.y()), 4.2, 0.02);
+  EXPECT_NEAR(findFloorBelow(head.x(), head.z() + 0.01, head.y()), 4.2, 0.02);
+  EXPECT_NEAR(findFloorBelow(view.x(), view.z() + 0.01, view.y()), 4.2, 0.02);
 }
 
 TEST(Building, HasAStairThatCanBeWalked) {
@@ -190,9 +191,9 @@ TEST(Building, HasAStairThatCanBeWalked) {
     Aabb heads{step.min, step.max};
     heads.min += Vec3{0.02, step.size().y() + 0.3, 0.3};
     heads.max += Vec3{-0.05, 2.1, -0.3};
-    for (const Object& object : building().objects) {
+    for (const Object& object : getBuilding().objects) {
       if (object.path.find("/stair/") != std::string::npos) continue;
-      EXPECT_FALSE(overlaps(computeBox(building(), object), heads)) << object.path;
+      EXPECT_FALSE(overlaps(computeBox(getBuilding(), object), heads)) << object.path;
     }
   }
 }

@@ -12,7 +12,7 @@
 namespace enfilade::assets {
 namespace {
 
-const std::string& buildingBytes() {
+const std::string& getBuildingBytes() {
   static const std::string bytes = [] {
     std::vector<MovingPart> parts;
     const scene::Model model = makeBuilding({}, &parts);
@@ -21,7 +21,7 @@ const std::string& buildingBytes() {
   return bytes;
 }
 
-std::uint32_t wordAt(const std::string& bytes, std::size_t offset) {
+std::uint32_t readWordAt(const std::string& bytes, std::size_t offset) {
   std::uint32_t word = 0;
   std::memcpy(&word, bytes.data() + offset, 4);
   return word;
@@ -36,7 +36,7 @@ int runMakerWith(std::vector<const char*> arguments, std::vector<MakerArguments>
                   });
 }
 
-std::uint64_t fnv1a(const std::string& bytes) {
+std::uint64_t computeFnv1a(const std::string& bytes) {
   std::uint64_t hash = 0xcbf29ce484222325u;
   for (const char c : bytes) hash = (hash ^ static_cast<unsigned char>(c)) * 0x100000001b3u;
   return hash;
@@ -64,9 +64,10 @@ TEST(Maker, ParsesFileNumberAndSeed) {
 TEST(Glb, IsTheSameFromRunToRunAndFromCompilerToCompiler) {
   std::vector<MovingPart> parts;
   const scene::Model again = makeBuilding({}, &parts);
-  EXPECT_EQ(encodeGlb(again, parts), buildingBytes());
+  EXPECT_EQ(encodeGlb(again, parts), getBuildingBytes());
   // Pinned hash: a deliberate change of the building changes it.
-  EXPECT_EQ(fnv1a(buildingBytes()), 0xfafad81e048108c7u) << std::hex << fnv1a(buildingBytes());
+  EXPECT_EQ(computeFnv1a(getBuildingBytes()), 0xfafad81e048108c7u)
+      << std::hex << computeFnv1a(getBuildingBytes());
 }
 
 TEST(Glb, DiffersWithTheSeed) {
@@ -74,16 +75,16 @@ TEST(Glb, DiffersWithTheSeed) {
 }
 
 TEST(Glb, HasAWellFormedHeaderAndStaysSmall) {
-  const std::string& glb = buildingBytes();
+  const std::string& glb = getBuildingBytes();
   EXPECT_LT(glb.size(), 20u << 20);
   EXPECT_EQ(glb.substr(0, 4), "glTF");
-  EXPECT_EQ(wordAt(glb, 4), 2u);
-  EXPECT_EQ(wordAt(glb, 8), glb.size());
-  const std::uint32_t json = wordAt(glb, 12);
+  EXPECT_EQ(readWordAt(glb, 4), 2u);
+  EXPECT_EQ(readWordAt(glb, 8), glb.size());
+  const std::uint32_t json = readWordAt(glb, 12);
   EXPECT_EQ(glb.substr(16, 4), "JSON");
   EXPECT_EQ(json % 4, 0u);
   EXPECT_EQ(glb.substr(20 + json + 4, 4), std::string("BIN\0", 4));
-  EXPECT_EQ(20 + json + 8 + wordAt(glb, 20 + json), glb.size());
+  EXPECT_EQ(20 + json + 8 + readWordAt(glb, 20 + json), glb.size());
   EXPECT_NE(glb.find("\"walk_kind\":\"hinged\""), std::string::npos);
   EXPECT_NE(glb.find("\"walk_kind\":\"sliding\""), std::string::npos);
   EXPECT_NE(glb.find("\"walk_kind\":\"lift\""), std::string::npos);
@@ -109,7 +110,7 @@ Count countObjects(const aiScene& scene, const aiNode& node) {
 TEST(Glb, IsReadBackByAssimpWithAllItsObjectsAndTriangles) {
   Assimp::Importer importer;
   const aiScene* scene =
-      importer.ReadFileFromMemory(buildingBytes().data(), buildingBytes().size(), 0, "glb");
+      importer.ReadFileFromMemory(getBuildingBytes().data(), getBuildingBytes().size(), 0, "glb");
   ASSERT_NE(scene, nullptr) << importer.GetErrorString();
   const scene::Model model = makeBuilding();
   Count expected{model.objects.size(), 0};

@@ -36,16 +36,16 @@ struct Errors {
       return;
     }
     if (!truth.collides && !std::isnan(answer.distance)) {
-      distance.push_back(relative(answer.distance, truth.distance));
+      distance.push_back(computeRelativeError(answer.distance, truth.distance));
     }
     if (truth.depth > 0 && !std::isnan(answer.depth)) {
-      depth.push_back(relative(answer.depth, truth.depth));
+      depth.push_back(computeRelativeError(answer.depth, truth.depth));
       if (answer.depthProved) provedDepth.push_back(depth.back());
       if (!answer.depthProved) ++upperBounds;
     }
   }
 
-  nlohmann::json json() const {
+  nlohmann::json toJson() const {
     return {{"count", count},
             {"wrong", wrong},
             {"wrong_beyond", wrongBeyond},
@@ -53,21 +53,21 @@ struct Errors {
             {"filter", filter},
             {"expansion", expansion},
             {"rational", rational},
-            {"distance_error", quantiles(distance)},
-            {"depth_error", quantiles(depth)},
+            {"distance_error", computeQuantiles(distance)},
+            {"depth_error", computeQuantiles(depth)},
             {"upper_bounds", upperBounds},
-            {"proved_depth_error", quantiles(provedDepth)}};
+            {"proved_depth_error", computeQuantiles(provedDepth)}};
   }
 
  private:
-  static double relative(double measured, long double truth) {
+  static double computeRelativeError(double measured, long double truth) {
     return static_cast<double>(std::abs(measured - truth) / truth);
   }
   /// Median, 99th percentile, maximum; null without values.
-  static nlohmann::json quantiles(const std::vector<double>& values) {
+  static nlohmann::json computeQuantiles(const std::vector<double>& values) {
     if (values.empty()) return nullptr;
-    return {number(quantile(values, 0.5)), number(quantile(values, 0.99)),
-            number(quantile(values, 1))};
+    return {toJsonNumber(computeQuantile(values, 0.5)), toJsonNumber(computeQuantile(values, 0.99)),
+            toJsonNumber(computeQuantile(values, 1))};
   }
 };
 

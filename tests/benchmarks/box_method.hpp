@@ -28,7 +28,7 @@ class BoxUpdate {
   virtual ~BoxUpdate() = default;
   virtual void update(const std::vector<TurnedPose>& poses, std::vector<Aabb>& boxes) = 0;
   /// Vertices that all updates so far looked at; 0 if unknown.
-  virtual std::uint64_t looked() const { return 0; }
+  virtual std::uint64_t countLooked() const { return 0; }
 };
 
 struct BoxMethod {
@@ -37,7 +37,7 @@ struct BoxMethod {
 };
 
 // Factories of the peers, one per source file.
-BoxMethod bulletBoxes();
-BoxMethod fclBoxes();
+BoxMethod makeBulletBoxes();
+BoxMethod makeFclBoxes();
 
 }  // namespace enfilade::benchmarks

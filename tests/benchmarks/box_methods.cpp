@@ -20,7 +20,7 @@ class OurBoxUpdate : public BoxUpdate {
       boxes[k] = collision::computeAabb(hull_, table_, poses[k].rotation, poses[k].translation,
                                         last_[k], looked_);
   }
-  std::uint64_t looked() const override { return looked_; }
+  std::uint64_t countLooked() const override { return looked_; }
 
  private:
   const Hull& hull_;
@@ -44,7 +44,7 @@ class RecomputeUpdate : public BoxUpdate {
     }
     looked_ += poses.size() * hull_.vertices.size();
   }
-  std::uint64_t looked() const override { return looked_; }
+  std::uint64_t countLooked() const override { return looked_; }
 
  private:
   const Hull& hull_;
@@ -53,7 +53,7 @@ class RecomputeUpdate : public BoxUpdate {
 
 }  // namespace
 
-std::vector<BoxMethod> boxMethods() {
+std::vector<BoxMethod> makeBoxMethods() {
   std::vector<BoxMethod> all;
   for (const auto method : {AabbMethod::sphereCube, AabbMethod::vertexScan, AabbMethod::hillClimb})
     all.push_back({getName(method), [method](const Hull& hull, std::size_t bodies) {
@@ -69,10 +69,10 @@ std::vector<BoxMethod> boxMethods() {
                    return std::make_unique<RecomputeUpdate>(hull);
                  }});
 #ifdef BENCH_BULLET
-  all.push_back(bulletBoxes());
+  all.push_back(makeBulletBoxes());
 #endif
 #ifdef BENCH_FCL
-  all.push_back(fclBoxes());
+  all.push_back(makeFclBoxes());
 #endif
   return all;
 }

@@ -23,6 +23,6 @@ inline constexpr const char* kClimbAlways = "hill climb";
 
 /// Our three methods, "hill climb" (after each turn), "recompute" (every vertex by a matrix
 /// product, as before them), the peers.
-std::vector<BoxMethod> boxMethods();
+std::vector<BoxMethod> makeBoxMethods();
 
 }  // namespace enfilade::benchmarks

@@ -31,18 +31,18 @@ struct PairTally {
   void addDynamicPair(std::uint32_t a, std::uint32_t b) {
     add({std::min(a, b), std::max(a, b), true});
   }
-  bool sameAs(const PairTally& other) const { return count == other.count && sum == other.sum; }
+  bool isSameAs(const PairTally& other) const { return count == other.count && sum == other.sum; }
 
  private:
   /// Finalizer of splitmix64 (Steele, Lea and Flood 2014).
-  static std::uint64_t mixed(std::uint64_t x) {
+  static std::uint64_t mixBits(std::uint64_t x) {
     x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ULL;
     x = (x ^ (x >> 27)) * 0x94d049bb133111ebULL;
     return x ^ (x >> 31);
   }
   void add(const ProxyPair& pair) {
     const std::uint64_t other = 2 * std::uint64_t{pair.other} + (pair.otherIsDynamic ? 1 : 0);
-    sum += mixed((std::uint64_t{pair.proxy} << 33) + other + 1);
+    sum += mixBits((std::uint64_t{pair.proxy} << 33) + other + 1);
     ++count;
     if (kept != nullptr) kept->push_back(pair);
   }
@@ -54,9 +54,9 @@ class BroadPhase {
   virtual ~BroadPhase() = default;
   /// Moves every proxy to its new box (the first call inserts them) and reports exactly all
   /// overlapping pairs of closed boxes: a dynamic and a static one, or two dynamic ones.
-  virtual void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) = 0;
+  virtual void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) = 0;
   /// Bytes allocated without malloc.
-  virtual std::size_t hiddenBytes() const { return 0; }
+  virtual std::size_t countHiddenBytes() const { return 0; }
   /// Whether the method reads the given static boxes after construction, so that it needs no copy.
   virtual bool readsGivenBoxes() const { return true; }
 };
@@ -73,28 +73,28 @@ struct BroadPhaseMethod {
 };
 
 template <typename Method, typename... Arguments>
-auto maker(Arguments... arguments) {
+auto bindMaker(Arguments... arguments) {
   return [arguments...](std::span<const Aabb> staticBoxes) -> std::unique_ptr<BroadPhase> {
     return std::make_unique<Method>(staticBoxes, arguments...);
   };
 }
 
 /// All methods found at configure time: ours first, then other approaches, then peers.
-std::vector<BroadPhaseMethod> broadPhaseMethods();
+std::vector<BroadPhaseMethod> makeBroadPhaseMethods();
 
 // Factories, one per source file.
-BroadPhaseMethod ourSortAndSweep();
-BroadPhaseMethod bruteForce();
-BroadPhaseMethod hashGrid();
-BroadPhaseMethod looseOctree();
-BroadPhaseMethod bspTree();
-BroadPhaseMethod intervalTree();
-BroadPhaseMethod boostRtree();
-BroadPhaseMethod cgalBoxes();
-BroadPhaseMethod embreeBvh();
-std::vector<BroadPhaseMethod> bulletBroadPhases();
-std::vector<BroadPhaseMethod> bulletFloatBroadPhases();
-std::vector<BroadPhaseMethod> fclBroadPhases();
-std::vector<BroadPhaseMethod> odeSpaces();
+BroadPhaseMethod makeOurSortAndSweep();
+BroadPhaseMethod makeBruteForce();
+BroadPhaseMethod makeHashGrid();
+BroadPhaseMethod makeLooseOctree();
+BroadPhaseMethod makeBspTree();
+BroadPhaseMethod makeIntervalTree();
+BroadPhaseMethod makeBoostRtree();
+BroadPhaseMethod makeCgalBoxes();
+BroadPhaseMethod makeEmbreeBvh();
+std::vector<BroadPhaseMethod> makeBulletBroadPhases();
+std::vector<BroadPhaseMethod> makeFloatBulletBroadPhases();
+std::vector<BroadPhaseMethod> makeFclBroadPhases();
+std::vector<BroadPhaseMethod> makeOdeSpaces();
 
 }  // namespace enfilade::benchmarks

@@ -7,7 +7,7 @@ class OurSortAndSweep : public BroadPhase {
  public:
   explicit OurSortAndSweep(std::span<const Aabb> staticBoxes) : sweep_(staticBoxes) {}
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
       if (inserted_) {
         sweep_.move(id, dynamicBoxes[id]);
@@ -38,34 +38,34 @@ class OurSortAndSweep : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod ourSortAndSweep() {
+BroadPhaseMethod makeOurSortAndSweep() {
   return {"ours: sort and sweep", BroadPhaseMethod::Kind::ours, SIZE_MAX, "",
-          maker<OurSortAndSweep>()};
+          bindMaker<OurSortAndSweep>()};
 }
 
-std::vector<BroadPhaseMethod> broadPhaseMethods() {
-  std::vector<BroadPhaseMethod> all{ourSortAndSweep(), hashGrid(),     looseOctree(),
-                                    bspTree(),         intervalTree(), bruteForce()};
+std::vector<BroadPhaseMethod> makeBroadPhaseMethods() {
+  std::vector<BroadPhaseMethod> all{makeOurSortAndSweep(), makeHashGrid(),     makeLooseOctree(),
+                                    makeBspTree(),         makeIntervalTree(), makeBruteForce()};
 #ifdef BENCH_BOOST
-  all.push_back(boostRtree());
+  all.push_back(makeBoostRtree());
 #endif
 #ifdef BENCH_BULLET
-  append(all, bulletBroadPhases());
+  append(all, makeBulletBroadPhases());
 #endif
 #ifdef BENCH_BULLETFLOAT
-  append(all, bulletFloatBroadPhases());
+  append(all, makeFloatBulletBroadPhases());
 #endif
 #ifdef BENCH_EMBREE
-  all.push_back(embreeBvh());
+  all.push_back(makeEmbreeBvh());
 #endif
 #ifdef BENCH_FCL
-  append(all, fclBroadPhases());
+  append(all, makeFclBroadPhases());
 #endif
 #ifdef BENCH_ODE
-  append(all, odeSpaces());
+  append(all, makeOdeSpaces());
 #endif
 #ifdef BENCH_CGAL
-  all.push_back(cgalBoxes());
+  all.push_back(makeCgalBoxes());
 #endif
   return all;
 }

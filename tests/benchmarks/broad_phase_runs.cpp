@@ -12,7 +12,7 @@ constexpr int kRuns = 3;
 constexpr std::size_t kMinTicks = 4;
 constexpr double kLongToBuild = 0.5;  // seconds
 
-double heapBytes() {
+double readHeapBytes() {
   const auto info = mallinfo2();
   return static_cast<double>(info.uordblks) + static_cast<double>(info.hblkhd);
 }
@@ -20,11 +20,12 @@ double heapBytes() {
 BroadPhaseRun build(const BroadPhaseMethod& method, std::span<const Aabb> staticBoxes) {
   BroadPhaseRun run;
   run.method = &method;
-  const double before = heapBytes();
+  const double before = readHeapBytes();
   const auto start = Clock::now();
   run.phase = method.make(staticBoxes);
-  run.buildSeconds = secondsSince(start);
-  const double bytes = heapBytes() - before + static_cast<double>(run.phase->hiddenBytes());
+  run.buildSeconds = measureSecondsSince(start);
+  const double bytes =
+      readHeapBytes() - before + static_cast<double>(run.phase->countHiddenBytes());
   run.bytesAnObject = bytes / static_cast<double>(staticBoxes.size());
   if (!run.phase->readsGivenBoxes()) run.bytesAnObject -= sizeof(Aabb);
   return run;
@@ -40,12 +41,12 @@ void turn(BroadPhaseRun& run, const RecordedBoxes& recorded, double secondsAMeth
     if (run.tick > kMinTicks && run.spent > secondsAMethod) return;
     PairTally tally;
     const auto start = Clock::now();
-    run.phase->tick(recorded.boxes[run.tick], tally);
-    const double seconds = secondsSince(start);
+    run.phase->runTick(recorded.boxes[run.tick], tally);
+    const double seconds = measureSecondsSince(start);
     run.spent += seconds;
     if (run.tick == 0) run.firstTick = seconds;
     run.microseconds.push_back(run.tick > first ? 1e6 * seconds : 0);
-    if (!tally.sameAs(recorded.pairs[run.tick])) ++run.wrong;
+    if (!tally.isSameAs(recorded.pairs[run.tick])) ++run.wrong;
   }
 }
 
@@ -91,7 +92,7 @@ std::vector<BroadPhaseRun> runMethods(std::span<const BroadPhaseMethod* const> m
   return best;
 }
 
-const char* kindName(BroadPhaseMethod::Kind kind) {
+const char* getKindName(BroadPhaseMethod::Kind kind) {
   if (kind == BroadPhaseMethod::Kind::ours) return "ours";
   return kind == BroadPhaseMethod::Kind::approach ? "approach" : "peer";
 }

@@ -40,6 +40,6 @@ std::vector<BroadPhaseRun> runMethods(std::span<const BroadPhaseMethod* const> m
                                       std::span<const Aabb> staticBoxes,
                                       const RecordedBoxes& recorded, double secondsAMethod);
 
-const char* kindName(BroadPhaseMethod::Kind kind);
+const char* getKindName(BroadPhaseMethod::Kind kind);
 
 }  // namespace enfilade::benchmarks

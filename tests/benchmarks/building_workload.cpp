@@ -21,12 +21,12 @@ void furnishRoom(Random& random, const Vec3& at, std::vector<Aabb>& staticBoxes)
   staticBoxes.push_back(makeBox(at.x(), at.y(), at.z() + 3, 0.15, kStorey - 0.2, 2));
   for (int k = 4; k < kObjectsPerRoom; ++k) {
     const bool large = k % 8 == 0;
-    const double sx = uniform(random, 0.05, large ? 2.0 : 0.5);
-    const double sy = uniform(random, 0.05, large ? 1.8 : 0.5);
-    const double sz = uniform(random, 0.05, large ? 1.0 : 0.5);
-    const double x = uniform(random, 0.2, kRoomX - sx);
-    const double y = uniform(random, 0, k % 3 == 0 ? 2.0 : 0.9);
-    const double z = uniform(random, 0.2, kRoomZ - sz);
+    const double sx = drawUniform(random, 0.05, large ? 2.0 : 0.5);
+    const double sy = drawUniform(random, 0.05, large ? 1.8 : 0.5);
+    const double sz = drawUniform(random, 0.05, large ? 1.0 : 0.5);
+    const double x = drawUniform(random, 0.2, kRoomX - sx);
+    const double y = drawUniform(random, 0, k % 3 == 0 ? 2.0 : 0.9);
+    const double z = drawUniform(random, 0.2, kRoomZ - sz);
     staticBoxes.push_back(makeBox(at.x() + x, at.y() + y, at.z() + z, sx, sy, sz));
   }
 }
@@ -55,12 +55,13 @@ std::vector<Body> makeBodies(Random& random, std::size_t count, const Building& 
   std::vector<Body> bodies;
   for (std::size_t k = 0; k < count; ++k) {
     const bool turns = k % 5 == 4;
-    const double heading = uniform(random, 0, 6.28);
+    const double heading = drawUniform(random, 0, 6.28);
     const double speed = turns ? 0.3 : 1.5;
-    const double storey = std::floor(uniform(random, 0, building.extent.y() / kStorey)) * kStorey;
-    const double x = uniform(random, 0, building.extent.x());
-    const double z = uniform(random, 0, building.extent.z());
-    const double phase = uniform(random, 0, 6.28);
+    const double storey =
+        std::floor(drawUniform(random, 0, building.extent.y() / kStorey)) * kStorey;
+    const double x = drawUniform(random, 0, building.extent.x());
+    const double z = drawUniform(random, 0, building.extent.z());
+    const double phase = drawUniform(random, 0, 6.28);
     bodies.push_back({Vec3(x, storey + 0.9, z),
                       Vec3(std::cos(heading), 0, std::sin(heading)) * speed * kSecondsPerTick,
                       Vec3(0.3, 0.875, 0.3), Vec3(phase, phase / 2, phase / 3), turns});

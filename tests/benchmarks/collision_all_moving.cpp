@@ -40,7 +40,7 @@ RecordedBoxes record(int ticks, Source... sources) {
 }
 
 /// Two distant boxes, which some peers need to know the extent of the world.
-std::vector<Aabb> distantBoxes() {
+std::vector<Aabb> makeDistantBoxes() {
   return {{Vec3(-1e3, -1001, -1e3), Vec3(1e3, -1000, 1e3)},
           {Vec3(-1e3, 1000, -1e3), Vec3(1e3, 1001, 1e3)}};
 }
@@ -54,7 +54,7 @@ std::vector<double> selectTimed(const BroadPhaseRun& run) {
 std::size_t measure(CubeMotion motion, const Size& size, const Arguments& arguments,
                     const std::vector<BroadPhaseMethod>& methods, Results& results) {
   const RecordedBoxes recorded = record(size.ticks, MovingCubes(motion, size.cubes));
-  const std::vector<Aabb> distant = distantBoxes();
+  const std::vector<Aabb> distant = makeDistantBoxes();
   std::vector<const BroadPhaseMethod*> chosen;
   for (const BroadPhaseMethod& method : methods) {
     if (method.kind != BroadPhaseMethod::Kind::approach && arguments.wants(method.name) &&
@@ -64,7 +64,8 @@ std::size_t measure(CubeMotion motion, const Size& size, const Arguments& argume
   std::size_t wrong = 0;
   for (const BroadPhaseRun& run : runMethods(chosen, distant, recorded, size.secondsAMethod)) {
     const std::vector<double> timed = selectTimed(run);
-    const double median = quantile(timed, 0.5) / 1e3, p99 = quantile(timed, 0.99) / 1e3;
+    const double median = computeQuantile(timed, 0.5) / 1e3,
+                 p99 = computeQuantile(timed, 0.99) / 1e3;
     const double pairs = static_cast<double>(recorded.pairs.back().count);
     std::printf("%-22s %-9s %6zu cubes | %9.3f ms (99 %% %9.3f, first %9.2f) | %zu of %zu wrong\n",
                 run.method->name.c_str(), getName(motion), size.cubes, median, p99,
@@ -72,7 +73,7 @@ std::size_t measure(CubeMotion motion, const Size& size, const Arguments& argume
     std::fflush(stdout);
     results.add({{"bench", "moving"},
                  {"method", run.method->name},
-                 {"kind", kindName(run.method->kind)},
+                 {"kind", getKindName(run.method->kind)},
                  {"motion", getName(motion)},
                  {"cubes", size.cubes},
                  {"median_ms", median},
@@ -93,13 +94,13 @@ std::size_t measureHeapBesideWalkers(const Size& size, const BroadPhaseMethod& o
   constexpr std::size_t kWalkers = 1000;
   const MovingCubes heap(CubeMotion::turbulent, size.cubes);
   const WalkingBoxes walkers(kWalkers, Vec3(500, 0, 0));
-  const std::vector<Aabb> distant = distantBoxes();
+  const std::vector<Aabb> distant = makeDistantBoxes();
   const BroadPhaseMethod* const methods[] = {&ours};
   std::size_t wrong = 0;
   const auto measureMedian = [&](const RecordedBoxes& recorded) {
     const auto runs = runMethods(methods, distant, recorded, size.secondsAMethod);
     wrong += runs[0].wrong;
-    return quantile(selectTimed(runs[0]), 0.5) / 1e3;
+    return computeQuantile(selectTimed(runs[0]), 0.5) / 1e3;
   };
   const double ofHeap = measureMedian(record(size.ticks, heap));
   const double ofWalkers = measureMedian(record(size.ticks, walkers));
@@ -121,7 +122,7 @@ std::size_t measureHeapBesideWalkers(const Size& size, const BroadPhaseMethod& o
 int main(int argc, char** argv) {
   const Arguments arguments(argc, argv);
   Results results(arguments);
-  const auto methods = broadPhaseMethods();
+  const auto methods = makeBroadPhaseMethods();
   const std::span<const Size> sizes =
       arguments.quick ? std::span<const Size>(kQuickSizes) : std::span<const Size>(kSizes);
   std::size_t wrong = 0;

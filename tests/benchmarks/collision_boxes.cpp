@@ -30,7 +30,7 @@ constexpr double kRadiansPerDegree = std::numbers::pi / 180;
 Hull makeEllipsoid(Random& random, std::size_t vertices) {
   std::vector<Vec3> points;
   for (std::size_t k = 0; k < vertices; ++k)
-    points.push_back(direction(random).cwiseProduct(Vec3(0.2, 0.15, 0.1)));
+    points.push_back(drawDirection(random).cwiseProduct(Vec3(0.2, 0.15, 0.1)));
   return collision::buildHull(points);
 }
 
@@ -39,9 +39,9 @@ class Turning {
  public:
   Turning(Random& random, std::size_t bodies, double degrees) {
     for (std::size_t k = 0; k < bodies; ++k) {
-      const Vec3 axis = direction(random);
-      const double x = uniform(random, -50, 50), y = uniform(random, 0, 3),
-                   z = uniform(random, -50, 50);
+      const Vec3 axis = drawDirection(random);
+      const double x = drawUniform(random, -50, 50), y = drawUniform(random, 0, 3),
+                   z = drawUniform(random, -50, 50);
       poses_.push_back({Quat::Identity(), Mat3::Identity(), Vec3(x, y, z)});
       steps_.emplace_back(Eigen::AngleAxisd(degrees * kRadiansPerDegree, axis));
     }
@@ -130,7 +130,7 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
   const std::size_t bodies = chooseBodyCount(vertices);
   Turning turning(random, bodies, degrees);
   std::vector<Contestant> all;
-  for (const BoxMethod& method : boxMethods()) {
+  for (const BoxMethod& method : makeBoxMethods()) {
     if (!arguments.wants(method.name)) continue;
     all.push_back({method.name, method.make(hull, bodies), std::vector<Aabb>(bodies), {}});
   }
@@ -144,7 +144,7 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
       Contestant& one = all[turn];
       const auto start = Clock::now();
       one.update->update(poses, one.boxes);
-      one.nanoseconds.push_back(1e9 * secondsSince(start) / static_cast<double>(bodies));
+      one.nanoseconds.push_back(1e9 * measureSecondsSince(start) / static_cast<double>(bodies));
       for (const Aabb& box : one.boxes) one.volume += box.size().prod();
       if (tick % 20 == 19) checkBoxes(one, hull, poses, 1 + vertices / 8);
     }
@@ -153,8 +153,8 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
   std::size_t wrong = 0;
   for (const Contestant& one : all) {
     const double boxes = static_cast<double>(ticks * bodies);
-    const double looked = static_cast<double>(one.update->looked()) / boxes;
-    const double time = quantile(one.nanoseconds, 0.5);
+    const double looked = static_cast<double>(one.update->countLooked()) / boxes;
+    const double time = computeQuantile(one.nanoseconds, 0.5);
     if (isOurs(one.name)) wrong += one.notConservative;
     std::printf(
         "%4zu vertices %3g degrees | %-12s %8.1f ns %8.1f vertices a box | mean volume "
@@ -164,7 +164,7 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
     results.add({{"vertices", hull.vertices.size()},
                  {"degrees", degrees},
                  {"method", one.name},
-                 {"ns", number(time)},
+                 {"ns", toJsonNumber(time)},
                  {"looked", looked},
                  {"volume", one.volume / boxes},
                  {"checked", one.checked},

@@ -40,7 +40,7 @@ class PairTruth {
     std::sort(byX_.begin(), byX_.end());
   }
 
-  PairTally tick(std::span<const Aabb> dynamicBoxes) {
+  PairTally runTick(std::span<const Aabb> dynamicBoxes) {
     reach_.resize(dynamicBoxes.size());
     candidates_.resize(dynamicBoxes.size());
     PairTally tally;
@@ -77,7 +77,7 @@ class PairTruth {
 };
 
 /// The reference itself is compared with the library's brute force, once a size.
-bool truthHolds(const Building& building, std::span<const Aabb> dynamicBoxes,
+bool checkTruth(const Building& building, std::span<const Aabb> dynamicBoxes,
                 const PairTally& reported) {
   std::vector<std::pair<collision::ProxyId, Aabb>> live;
   for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id)
@@ -87,7 +87,7 @@ bool truthHolds(const Building& building, std::span<const Aabb> dynamicBoxes,
     if (pair.otherIsDynamic) expected.addDynamicPair(pair.proxy, pair.other);
     if (!pair.otherIsDynamic) expected.addStaticPair(pair.proxy, pair.other);
   }
-  return expected.sameAs(reported);
+  return expected.isSameAs(reported);
 }
 
 RecordedBoxes record(const Building& building, std::size_t dynamicBoxes, int ticks) {
@@ -97,10 +97,10 @@ RecordedBoxes record(const Building& building, std::size_t dynamicBoxes, int tic
   for (int tick = 0; tick < ticks; ++tick) {
     const auto boxes = bodies.next();
     motion.boxes.emplace_back(boxes.begin(), boxes.end());
-    motion.pairs.push_back(truth.tick(boxes));
+    motion.pairs.push_back(truth.runTick(boxes));
   }
   const std::size_t work = dynamicBoxes * building.staticBoxes.size();
-  if (work <= 10000000 && !truthHolds(building, motion.boxes[0], motion.pairs[0])) {
+  if (work <= 10000000 && !checkTruth(building, motion.boxes[0], motion.pairs[0])) {
     std::fprintf(stderr, "the reference differs from brute force\n");
     std::exit(1);
   }
@@ -111,7 +111,7 @@ nlohmann::json makeHead(const BroadPhaseMethod& method, std::size_t objects,
                         std::size_t dynamicBoxes) {
   return {{"bench", "broad"},
           {"method", method.name},
-          {"kind", kindName(method.kind)},
+          {"kind", getKindName(method.kind)},
           {"objects", objects},
           {"dynamic_boxes", dynamicBoxes}};
 }
@@ -120,8 +120,8 @@ void print(const BroadPhaseRun& run, std::size_t objects, std::size_t dynamicBox
            Results& results) {
   std::vector<double> timed = run.microseconds;
   std::erase(timed, 0.0);
-  const double median = quantile(timed, 0.5);
-  const double p99 = quantile(timed, 0.99);
+  const double median = computeQuantile(timed, 0.5);
+  const double p99 = computeQuantile(timed, 0.99);
   std::printf(
       "%-22s %8zu %6zu | %10.2f %10.2f %8.3f us a dynamic box | build %7.3f s %6.1f B an object"
       " | %5zu of %4zu ticks wrong\n",
@@ -174,7 +174,7 @@ std::size_t measure(const Building& building, std::size_t objects, std::size_t d
 
 // ---- ours alone --------------------------------------------------------------------------------
 
-[[gnu::noinline]] std::size_t oursTick(collision::SortAndSweep& sweep,
+[[gnu::noinline]] std::size_t tickOurs(collision::SortAndSweep& sweep,
                                        std::span<const Aabb> boxes) {
   for (collision::ProxyId id = 0; id < boxes.size(); ++id) sweep.move(id, boxes[id]);
   sweep.update();
@@ -183,7 +183,7 @@ std::size_t measure(const Building& building, std::size_t objects, std::size_t d
   return ends;
 }
 
-void oursAlone(std::size_t objects, std::size_t dynamicBoxes, std::size_t ticks) {
+void runOursAlone(std::size_t objects, std::size_t dynamicBoxes, std::size_t ticks) {
   const Building building = makeBuilding(objects);
   collision::SortAndSweep sweep(building.staticBoxes);
   BuildingMotion motion(building, dynamicBoxes);
@@ -194,16 +194,16 @@ void oursAlone(std::size_t objects, std::size_t dynamicBoxes, std::size_t ticks)
   for (std::size_t tick = 0; tick < ticks; ++tick) {
     const auto boxes = motion.next();
     const auto start = Clock::now();
-    ends += oursTick(sweep, boxes);
-    microseconds.push_back(1e6 * secondsSince(start));
+    ends += tickOurs(sweep, boxes);
+    microseconds.push_back(1e6 * measureSecondsSince(start));
     exchanges += sweep.counters().swaps;
     aabbTests += sweep.counters().aabbTests;
     laid += sweep.counters().windowsBuilt;
   }
   const double share = 1 / static_cast<double>(dynamicBoxes * ticks);
   std::printf("%zu objects, %zu dynamic boxes, %zu ticks: median %.2f us, p99 %.2f us\n",
-              building.staticBoxes.size(), dynamicBoxes, ticks, quantile(microseconds, 0.5),
-              quantile(microseconds, 0.99));
+              building.staticBoxes.size(), dynamicBoxes, ticks, computeQuantile(microseconds, 0.5),
+              computeQuantile(microseconds, 0.99));
   std::printf(
       "a dynamic box and tick: %.2f pairs, %.3f swaps, %.3f box tests, %.4f windows built\n",
       static_cast<double>(ends) * share, static_cast<double>(exchanges) * share,
@@ -215,14 +215,14 @@ void oursAlone(std::size_t objects, std::size_t dynamicBoxes, std::size_t ticks)
 int main(int argc, char** argv) {
   if (argc > 3 && std::strcmp(argv[1], "--ours") == 0) {
     const auto number = [&](int at) { return std::strtoul(argv[at], nullptr, 10); };
-    oursAlone(number(2), number(3), argc > 4 ? number(4) : 600);
+    runOursAlone(number(2), number(3), argc > 4 ? number(4) : 600);
     return 0;
   }
   const Arguments arguments(argc, argv);
   const Effort effort =
       arguments.quick ? Effort{100000, 121, 0.1, 10} : Effort{1000000, 601, 1.5, 1};
   Results results(arguments);
-  const auto methods = broadPhaseMethods();
+  const auto methods = makeBroadPhaseMethods();
   std::size_t wrong = 0;
   for (std::size_t objects = 1000; objects <= effort.maxObjects; objects *= 10) {
     const Building building = makeBuilding(objects);

@@ -46,9 +46,9 @@ double computeVolume(const Hull& hull) {
 }
 
 /// Random vertices on the unit sphere: triangles, 2 V - 4 of them.
-Hull polytope(Random& random, std::size_t faces) {
+Hull makePolytope(Random& random, std::size_t faces) {
   Points points;
-  for (std::size_t k = 0; k < faces / 2 + 2; ++k) points.push_back(direction(random));
+  for (std::size_t k = 0; k < faces / 2 + 2; ++k) points.push_back(drawDirection(random));
   return collision::buildHull(points);
 }
 
@@ -61,10 +61,10 @@ struct Flyer {
 
 class Swarm {
  public:
-  explicit Swarm(const Setting& setting) : hull(polytope(random_, setting.faces)) {
+  explicit Swarm(const Setting& setting) : hull(makePolytope(random_, setting.faces)) {
     const double volume = computeVolume(hull) * static_cast<double>(setting.number);
     edge_ = std::cbrt(volume / setting.density);
-    for (std::size_t k = 0; k < setting.number; ++k) flyers.push_back(fresh(setting));
+    for (std::size_t k = 0; k < setting.number; ++k) flyers.push_back(makeFlyer(setting));
   }
 
   void step() {
@@ -79,7 +79,7 @@ class Swarm {
       f.rotation = f.pose.rotation.toRotationMatrix();
     }
   }
-  PlacedConvex body(std::size_t k) const {
+  PlacedConvex makeBody(std::size_t k) const {
     return {hull.vertices, flyers[k].pose.translation, &flyers[k].rotation, &hull};
   }
 
@@ -91,14 +91,14 @@ class Swarm {
   std::vector<Flyer> flyers;
 
  private:
-  Flyer fresh(const Setting& setting) {
+  Flyer makeFlyer(const Setting& setting) {
     Flyer f;
-    const double x = uniform(random_, 0, edge_);
-    const double y = uniform(random_, 0, edge_);
-    const double z = uniform(random_, 0, edge_);
+    const double x = drawUniform(random_, 0, edge_);
+    const double y = drawUniform(random_, 0, edge_);
+    const double z = drawUniform(random_, 0, edge_);
     f.pose.translation = Vec3(x, y, z);
-    const Vec3 axis = direction(random_);
-    f.velocity = setting.radii * direction(random_);
+    const Vec3 axis = drawDirection(random_);
+    f.velocity = setting.radii * drawDirection(random_);
     f.turn = Eigen::AngleAxisd(setting.degrees * 0.017453292519943295, axis);
     f.rotation = Mat3::Identity();
     return f;
@@ -115,7 +115,8 @@ Contacts findTruth(const Swarm& swarm) {
     for (std::uint32_t b = a + 1; b < boxes.size(); ++b) {
       if (!collision::overlaps(boxes[a], boxes[b])) continue;
       collision::FeatureCache cold;
-      const auto reported = collision::computeSeparation(swarm.body(a), swarm.body(b), cold);
+      const auto reported =
+          collision::computeSeparation(swarm.makeBody(a), swarm.makeBody(b), cold);
       if (reported.verdict != collision::Verdict::separated) contacts.emplace_back(a, b);
     }
   }
@@ -128,13 +129,13 @@ Contacts findTruth(const Swarm& swarm) {
 struct Frame {
   std::size_t pairs = 0;  ///< pairs given to the narrow phase
   double boxes = 0, broad = 0, narrow = 0;
-  double whole() const { return boxes + broad + narrow; }
+  double sumParts() const { return boxes + broad + narrow; }
 };
 
 class Stopwatch {
  public:
   /// Milliseconds since the last lap.
-  double lap() {
+  double takeLap() {
     const auto now = Clock::now();
     const double passed = std::chrono::duration<double, std::milli>(now - last_).count();
     last_ = now;
@@ -149,7 +150,7 @@ class Detector {
  public:
   virtual ~Detector() = default;
   /// Reports the contacts of this frame in any order.
-  virtual Frame frame(const Swarm& swarm, Contacts& contacts) = 0;
+  virtual Frame runFrame(const Swarm& swarm, Contacts& contacts) = 0;
 };
 
 enum class Boxes { fixedCubes, tight };
@@ -161,7 +162,7 @@ class BoxMaker {
         support_(kind == Boxes::fixedCubes
                      ? collision::buildSupportTable(hull, AabbMethod::sphereCube)
                      : collision::buildSupportTable(hull)) {}
-  std::span<const Aabb> boxes(const Swarm& swarm) {
+  std::span<const Aabb> makeBoxes(const Swarm& swarm) {
     boxes_.resize(swarm.flyers.size());
     extremal_.resize(swarm.flyers.size());
     for (std::size_t k = 0; k < boxes_.size(); ++k) {
@@ -185,11 +186,11 @@ class OurDetector : public Detector {
  public:
   OurDetector(Boxes kind, const Hull& hull) : boxes_(kind, hull), sweep_({}) {}
 
-  Frame frame(const Swarm& swarm, Contacts& contacts) override {
+  Frame runFrame(const Swarm& swarm, Contacts& contacts) override {
     Frame frame;
     Stopwatch watch;
-    const auto boxes = boxes_.boxes(swarm);
-    frame.boxes = watch.lap();
+    const auto boxes = boxes_.makeBoxes(swarm);
+    frame.boxes = watch.takeLap();
     for (std::uint32_t k = 0; k < boxes.size(); ++k) {
       if (inserted_) sweep_.move(k, boxes[k]);
       if (!inserted_) sweep_.insert(boxes[k]);
@@ -198,17 +199,17 @@ class OurDetector : public Detector {
     sweep_.update();
     for (const ProxyPair& pair : sweep_.removedPairs())
       features_.erase(makeKey(pair.proxy, pair.other));
-    frame.broad = watch.lap();
+    frame.broad = watch.takeLap();
     for (std::uint32_t a = 0; a < boxes.size(); ++a) {
       for (const auto& partner : sweep_.getOverlaps(a)) {
         if (partner.id <= a) continue;
         ++frame.pairs;
-        const auto reported = collision::computeSeparation(swarm.body(a), swarm.body(partner.id),
-                                                           features_[makeKey(a, partner.id)]);
+        const auto reported = collision::computeSeparation(
+            swarm.makeBody(a), swarm.makeBody(partner.id), features_[makeKey(a, partner.id)]);
         if (reported.verdict != collision::Verdict::separated) contacts.emplace_back(a, partner.id);
       }
     }
-    frame.narrow = watch.lap();
+    frame.narrow = watch.takeLap();
     return frame;
   }
 
@@ -230,16 +231,16 @@ class PeerDetector : public Detector {
         broad_(broad.make({})),
         pair_(narrow.make(swarm.hull.vertices, swarm.hull.vertices)) {}
 
-  Frame frame(const Swarm& swarm, Contacts& contacts) override {
+  Frame runFrame(const Swarm& swarm, Contacts& contacts) override {
     Frame frame;
     Stopwatch watch;
-    const auto boxes = boxes_.boxes(swarm);
-    frame.boxes = watch.lap();
+    const auto boxes = boxes_.makeBoxes(swarm);
+    frame.boxes = watch.takeLap();
     pairs_.clear();
     PairTally tally;
     tally.kept = &pairs_;
-    broad_->tick(boxes, tally);
-    frame.broad = watch.lap();
+    broad_->runTick(boxes, tally);
+    frame.broad = watch.takeLap();
     for (const ProxyPair& pair : pairs_) {
       pair_->forget();  // one pair object is used for all pairs
       const Answer reported =
@@ -248,7 +249,7 @@ class PeerDetector : public Detector {
         contacts.emplace_back(pair.proxy, pair.other);
     }
     frame.pairs = pairs_.size();
-    frame.narrow = watch.lap();
+    frame.narrow = watch.takeLap();
     return frame;
   }
 
@@ -269,14 +270,14 @@ struct Contestant {
   std::size_t pairs = 0, missed = 0, wrong = 0;
 
   void add(const Frame& frame) {
-    whole.push_back(frame.whole());
+    whole.push_back(frame.sumParts());
     boxes.push_back(frame.boxes);
     broad.push_back(frame.broad);
     narrow.push_back(frame.narrow);
   }
 };
 
-std::vector<Contestant> contestants(const Swarm& swarm, const Arguments& arguments) {
+std::vector<Contestant> makeContestants(const Swarm& swarm, const Arguments& arguments) {
   std::vector<Contestant> all;
   const auto add = [&](const std::string& name, std::unique_ptr<Detector> detector) {
     if (!arguments.wants(name)) return;
@@ -288,8 +289,8 @@ std::vector<Contestant> contestants(const Swarm& swarm, const Arguments& argumen
   add("ours, tight boxes", std::make_unique<OurDetector>(Boxes::tight, swarm.hull));
   const std::pair<const char*, const char*> stacks[] = {{"FCL dynamic tree", "FCL libccd"},
                                                         {"Bullet Dbvt", "Bullet GjkEpa2"}};
-  for (const BroadPhaseMethod& broad : broadPhaseMethods()) {
-    for (const NarrowPhaseMethod& narrow : narrowPhaseMethods()) {
+  for (const BroadPhaseMethod& broad : makeBroadPhaseMethods()) {
+    for (const NarrowPhaseMethod& narrow : makeNarrowPhaseMethods()) {
       for (const auto& [b, n] : stacks) {
         if (broad.name != b || narrow.name != n) continue;
         add(broad.name + " + " + narrow.name, std::make_unique<PeerDetector>(broad, narrow, swarm));
@@ -302,7 +303,7 @@ std::vector<Contestant> contestants(const Swarm& swarm, const Arguments& argumen
 // ---- the sweeps --------------------------------------------------------------------------------
 
 /// Counts the contacts of `a` that are not in `b`.
-std::size_t notIn(const Contacts& a, const Contacts& b) {
+std::size_t countMissing(const Contacts& a, const Contacts& b) {
   Contacts rest;
   std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(rest));
   return rest.size();
@@ -311,39 +312,40 @@ std::size_t notIn(const Contacts& a, const Contacts& b) {
 void measure(const char* sweep, double value, const Setting& setting, std::size_t frames,
              const Arguments& arguments, Results& results) {
   Swarm swarm(setting);
-  auto all = contestants(swarm, arguments);
+  auto all = makeContestants(swarm, arguments);
   std::size_t trueContacts = 0;
   for (std::size_t frame = 0; frame < frames; ++frame) {
     swarm.step();
     const Contacts truth = findTruth(swarm);
     for (Contestant& one : all) {
       Contacts reported;
-      const Frame cost = one.detector->frame(swarm, reported);
+      const Frame cost = one.detector->runFrame(swarm, reported);
       if (frame > 0) one.add(cost);  // the first one inserts
       std::sort(reported.begin(), reported.end());
       one.pairs += cost.pairs;
-      one.missed += notIn(truth, reported);
-      one.wrong += notIn(reported, truth);
+      one.missed += countMissing(truth, reported);
+      one.wrong += countMissing(reported, truth);
     }
     trueContacts += truth.size();
   }
   for (const Contestant& one : all) {
-    const double median = quantile(one.whole, 0.5);
+    const double median = computeQuantile(one.whole, 0.5);
     std::printf(
         "%-12s %8g | %-30s %8.3f ms a frame (%.3f boxes, %.3f broad, %.3f narrow) | "
         "%6.0f pairs %6.1f contacts a frame | missed %zu false %zu\n",
-        sweep, value, one.name.c_str(), median, quantile(one.boxes, 0.5), quantile(one.broad, 0.5),
-        quantile(one.narrow, 0.5), static_cast<double>(one.pairs) / static_cast<double>(frames),
+        sweep, value, one.name.c_str(), median, computeQuantile(one.boxes, 0.5),
+        computeQuantile(one.broad, 0.5), computeQuantile(one.narrow, 0.5),
+        static_cast<double>(one.pairs) / static_cast<double>(frames),
         static_cast<double>(trueContacts) / static_cast<double>(frames), one.missed, one.wrong);
     results.add({{"bench", "icollide"},
                  {"sweep", sweep},
                  {"value", value},
                  {"method", one.name},
-                 {"ms", number(median)},
-                 {"ms_99", number(quantile(one.whole, 0.99))},
-                 {"boxes_ms", number(quantile(one.boxes, 0.5))},
-                 {"broad_ms", number(quantile(one.broad, 0.5))},
-                 {"narrow_ms", number(quantile(one.narrow, 0.5))},
+                 {"ms", toJsonNumber(median)},
+                 {"ms_99", toJsonNumber(computeQuantile(one.whole, 0.99))},
+                 {"boxes_ms", toJsonNumber(computeQuantile(one.boxes, 0.5))},
+                 {"broad_ms", toJsonNumber(computeQuantile(one.broad, 0.5))},
+                 {"narrow_ms", toJsonNumber(computeQuantile(one.narrow, 0.5))},
                  {"pairs", static_cast<double>(one.pairs) / static_cast<double>(frames)},
                  {"contacts", trueContacts},
                  {"missed", one.missed},

@@ -26,40 +26,42 @@ constexpr double kStep = 0.25;  // metres
 constexpr double kRadius = 0.5;
 constexpr int kMaxTruths = 40;
 
-double heightAt(double x, double z) {
+double computeHeightAt(double x, double z) {
   return 0.6 * std::sin(0.5 * x) * std::cos(0.4 * z) + 0.15 * std::sin(2.1 * x + 1.3 * z) +
          0.05 * std::sin(7 * x) * std::sin(6 * z);
 }
 
-Vec3 groundAt(int x, int z) {
-  return {kStep * x, heightAt(kStep * x, kStep * z), kStep * z};
+Vec3 computeGroundAt(int x, int z) {
+  return {kStep * x, computeHeightAt(kStep * x, kStep * z), kStep * z};
 }
 
-Triangles terrain() {
+Triangles makeTerrain() {
   Triangles triangles;
   for (int x = 0; x < kAlongX; ++x) {
     for (int z = 0; z < kAlongZ; ++z) {
-      triangles.push_back({groundAt(x, z), groundAt(x, z + 1), groundAt(x + 1, z + 1)});
-      triangles.push_back({groundAt(x, z), groundAt(x + 1, z + 1), groundAt(x + 1, z)});
+      triangles.push_back(
+          {computeGroundAt(x, z), computeGroundAt(x, z + 1), computeGroundAt(x + 1, z + 1)});
+      triangles.push_back(
+          {computeGroundAt(x, z), computeGroundAt(x + 1, z + 1), computeGroundAt(x + 1, z)});
     }
   }
   return triangles;
 }
 
-Points bodyPoints() {
+Points makeBodyPoints() {
   Random random(5);
   Points points;
   while (points.size() < 20) {
-    const double x = uniform(random, -1, 1);
-    const double y = uniform(random, -1, 1);
-    const double z = uniform(random, -1, 1);
+    const double x = drawUniform(random, -1, 1);
+    const double y = drawUniform(random, -1, 1);
+    const double z = drawUniform(random, -1, 1);
     const Vec3 v(x, y, z);
     if (v.squaredNorm() > 0.01 && v.squaredNorm() < 1) points.push_back(kRadius * v.normalized());
   }
   return points;
 }
 
-std::vector<RigidTransform> flight(bool dipping, std::size_t steps) {
+std::vector<RigidTransform> makeFlight(bool dipping, std::size_t steps) {
   const Vec3 axis = Vec3(0.3, 1, 0.2).normalized();
   const double side = 0.25 * kStep * kAlongX;  // circles about the centre
   std::vector<RigidTransform> places;
@@ -70,8 +72,8 @@ std::vector<RigidTransform> flight(bool dipping, std::size_t steps) {
     const double above =
         dipping ? kRadius - 0.1 + 0.1 * std::sin(0.05 * static_cast<double>(k)) : kRadius + 0.35;
     const double angle = std::numbers::pi / 180 * static_cast<double>(k);
-    places.push_back(
-        {Eigen::AngleAxisd(angle, axis).toRotationMatrix(), Vec3(x, heightAt(x, z) + above, z)});
+    places.push_back({Eigen::AngleAxisd(angle, axis).toRotationMatrix(),
+                      Vec3(x, computeHeightAt(x, z) + above, z)});
   }
   return places;
 }
@@ -110,7 +112,7 @@ template <typename Ask>
 double measureMicroseconds(const Ask& ask) {
   const auto start = Clock::now();
   ask();
-  return 1e6 * secondsSince(start);
+  return 1e6 * measureSecondsSince(start);
 }
 
 /// Two passes, so that neither query warms the other's cache: a tick of the library makes only one
@@ -120,7 +122,8 @@ void fly(Row& row, std::span<const RigidTransform> places, std::span<const Truth
   row.query->forget();
   for (std::size_t k = 0; k < places.size(); ++k) {
     double reported = 0;
-    const double time = measureMicroseconds([&] { reported = row.query->distance(places[k]); });
+    const double time =
+        measureMicroseconds([&] { reported = row.query->computeDistance(places[k]); });
     if (k > 0) row.distance.push_back(time);
     if (k % every == 0) {
       const double error = std::abs(reported - truths[k / every].distance);
@@ -130,7 +133,7 @@ void fly(Row& row, std::span<const RigidTransform> places, std::span<const Truth
   row.query->forget();
   for (std::size_t k = 0; k < places.size(); ++k) {
     std::vector<std::uint32_t> reported;
-    const double time = measureMicroseconds([&] { row.query->contacts(places[k], reported); });
+    const double time = measureMicroseconds([&] { row.query->findContacts(places[k], reported); });
     if (k > 0) row.contacts.push_back(time);
     if (k % every != 0) continue;
     std::sort(reported.begin(), reported.end());
@@ -149,16 +152,16 @@ void fly(Row& row, std::span<const RigidTransform> places, std::span<const Truth
 void askCold(Row& row, std::span<const RigidTransform> places, std::size_t every) {
   for (std::size_t k = 0; k < places.size(); k += every) {
     row.query->forget();
-    row.coldDistance.push_back(measureMicroseconds([&] { row.query->distance(places[k]); }));
+    row.coldDistance.push_back(measureMicroseconds([&] { row.query->computeDistance(places[k]); }));
     row.query->forget();
     std::vector<std::uint32_t> reported;
     row.coldContacts.push_back(
-        measureMicroseconds([&] { row.query->contacts(places[k], reported); }));
+        measureMicroseconds([&] { row.query->findContacts(places[k], reported); }));
   }
 }
 
 void print(const Row& row, const char* motion, Results& results) {
-  const auto median = [](const std::vector<double>& v) { return quantile(v, 0.5); };
+  const auto median = [](const std::vector<double>& v) { return computeQuantile(v, 0.5); };
   std::printf(
       "%-14s %-8s | distance %8.2f (cold %8.2f) us, error <= %8.1e m | contacts %8.2f "
       "(cold %8.2f) us, %zu missed %zu false | build %.3f s\n",
@@ -169,12 +172,12 @@ void print(const Row& row, const char* motion, Results& results) {
                {"method", row.method->name},
                {"ours", row.method->ours},
                {"motion", motion},
-               {"distance_us", number(median(row.distance))},
-               {"distance_cold_us", number(median(row.coldDistance))},
-               {"distance_99_us", number(quantile(row.distance, 0.99))},
-               {"contacts_us", number(median(row.contacts))},
-               {"contacts_cold_us", number(median(row.coldContacts))},
-               {"contacts_99_us", number(quantile(row.contacts, 0.99))},
+               {"distance_us", toJsonNumber(median(row.distance))},
+               {"distance_cold_us", toJsonNumber(median(row.coldDistance))},
+               {"distance_99_us", toJsonNumber(computeQuantile(row.distance, 0.99))},
+               {"contacts_us", toJsonNumber(median(row.contacts))},
+               {"contacts_cold_us", toJsonNumber(median(row.coldContacts))},
+               {"contacts_99_us", toJsonNumber(computeQuantile(row.contacts, 0.99))},
                {"error_m", row.worstError},
                {"missed", row.missed},
                {"false", row.wrong},
@@ -189,12 +192,12 @@ int main(int argc, char** argv) {
   const std::size_t steps = arguments.quick ? 200 : 1000;
   const std::size_t every = steps / kMaxTruths;
   const int turns = arguments.quick ? 1 : 3;
-  const Triangles mesh = terrain();
-  const Points points = bodyPoints();
+  const Triangles mesh = makeTerrain();
+  const Points points = makeBodyPoints();
   const collision::Hull hull = collision::buildHull(points);
-  const auto methods = meshMethods();
+  const auto methods = makeMeshMethods();
   for (const bool dipping : {false, true}) {
-    const auto places = flight(dipping, steps);
+    const auto places = makeFlight(dipping, steps);
     std::vector<Truth> truths;
     for (std::size_t k = 0; k < steps; k += every)
       truths.push_back(findTruth(hull, places[k], mesh));
@@ -205,7 +208,7 @@ int main(int argc, char** argv) {
       rows.back().method = &method;
       const auto start = Clock::now();
       rows.back().query = method.make(points, mesh);
-      rows.back().buildSeconds = secondsSince(start);
+      rows.back().buildSeconds = measureSecondsSince(start);
     }
     for (int turn = 0; turn < turns; ++turn) {
       for (Row& row : rows) fly(row, places, truths, every);

@@ -55,7 +55,7 @@ double measureNanoseconds(PairOfBodies& pair, const ConvexMotion& motion, std::s
     if (!warm) pair.forget();
     pair.ask(motion.placesA[k], motion.placesB[k]);
   }
-  return 1e9 * secondsSince(start) / static_cast<double>(steps);
+  return 1e9 * measureSecondsSince(start) / static_cast<double>(steps);
 }
 
 Turn measureTurn(const NarrowPhaseMethod& method, const std::vector<ConvexMotion>& motions,
@@ -63,7 +63,8 @@ Turn measureTurn(const NarrowPhaseMethod& method, const std::vector<ConvexMotion
   Turn turn;
   const auto start = Clock::now();
   const double secondsAPair = seconds / static_cast<double>(motions.size());
-  for (std::size_t k = 0; k < motions.size() && (k == 0 || secondsSince(start) < seconds); ++k) {
+  for (std::size_t k = 0; k < motions.size() && (k == 0 || measureSecondsSince(start) < seconds);
+       ++k) {
     const auto pair = method.make(motions[k].a, motions[k].b);
     // Warms the machine's caches, and measures how many steps the time allows.
     const double one = 1e-9 * measureNanoseconds(*pair, motions[k], 1, true);
@@ -93,13 +94,13 @@ std::vector<GuardedAnswer> collectAnswers(const NarrowPhaseMethod& method,
   const double secondsAPair = seconds / static_cast<double>(motions.size());
   std::unique_ptr<PairOfBodies> pair;
   auto start = Clock::now();
-  return guarded<GuardedAnswer>(steps * motions.size(), kMaxSeconds, [&](std::size_t k) {
+  return computeGuarded<GuardedAnswer>(steps * motions.size(), kMaxSeconds, [&](std::size_t k) {
     const ConvexMotion& motion = motions[k / steps];
     if (!pair || k % steps == 0) {
       pair = method.make(motion.a, motion.b);
       start = Clock::now();
     }
-    if (secondsSince(start) > secondsAPair) return GuardedAnswer{{}, false};
+    if (measureSecondsSince(start) > secondsAPair) return GuardedAnswer{{}, false};
     return GuardedAnswer{pair->ask(motion.placesA[k % steps], motion.placesB[k % steps]), true};
   });
 }
@@ -127,31 +128,33 @@ std::vector<std::optional<TrueAnswer>> findTruth(const Methods& methods,
 
 void report(const NarrowPhaseMethod& method, std::size_t vertices, Gap gap, const Errors& errors,
             const std::vector<double>& cold, const std::vector<double>& warm, Results& results) {
-  const double coldMedian = quantile(cold, 0.5);
-  const double warmMedian = quantile(warm, 0.5);
+  const double coldMedian = computeQuantile(cold, 0.5);
+  const double warmMedian = computeQuantile(warm, 0.5);
   std::printf(
       "%-26s %4zu %-11s | cold %10.0f  warm %10.0f ns | wrong %4zu none %4zu of %5zu |"
       " error of distance %8.1e of depth %8.1e\n",
       method.name.c_str(), vertices, getName(gap), coldMedian, warmMedian, errors.wrong,
-      errors.none, errors.count, quantile(errors.distance, 1), quantile(errors.depth, 1));
+      errors.none, errors.count, computeQuantile(errors.distance, 1),
+      computeQuantile(errors.depth, 1));
   std::fflush(stdout);
   auto line = makeHead(method, "narrow");
-  line.update(errors.json());
+  line.update(errors.toJson());
   line.update({{"vertices", vertices},
                {"gap", getName(gap)},
                {"warms", method.warm},
-               {"cold_ns", number(coldMedian)},
-               {"warm_ns", number(warmMedian)}});
+               {"cold_ns", toJsonNumber(coldMedian)},
+               {"warm_ns", toJsonNumber(warmMedian)}});
   results.add(line);
 }
 
 void measureMotion(const Methods& methods, std::size_t vertices, Gap gap, const Effort& effort,
                    Results& results) {
-  const auto motions = convexMotions(vertices, gap, effort.pairs, effort.steps);
+  const auto motions = makeConvexMotions(vertices, gap, effort.pairs, effort.steps);
   const auto truth = findTruth(methods, motions, effort.secondsAnswers);
-  const auto turns = guarded<Turn>(effort.turns * methods.size(), kMaxSeconds, [&](std::size_t k) {
-    return measureTurn(methods[k % methods.size()], motions, effort.secondsATurn);
-  });
+  const auto turns =
+      computeGuarded<Turn>(effort.turns * methods.size(), kMaxSeconds, [&](std::size_t k) {
+        return measureTurn(methods[k % methods.size()], motions, effort.secondsATurn);
+      });
   for (std::size_t m = 0; m < methods.size(); ++m) {
     Errors errors;
     const auto answers = collectAnswers(methods[m], motions, effort.secondsAnswers);
@@ -180,7 +183,7 @@ RigidTransform getPlacement(const accuracy::Placed& body) {
   return {body.rotation, body.translation};
 }
 
-double diagonal(const Points& points) {
+double computeDiagonal(const Points& points) {
   enfilade::collision::Aabb box;
   for (const Vec3& p : points) box.include(p);
   return box.size().norm();
@@ -192,8 +195,8 @@ TrueAnswer findTruth(const accuracy::Case& asked) {
   };
   TrueAnswer truth{asked.truth.verdict != "separated", parsed(asked.truth.distance),
                    parsed(asked.truth.penetration), 0};
-  truth.scale = std::max(
-      {diagonal(asked.a.points), diagonal(asked.b.points), static_cast<double>(truth.distance)});
+  truth.scale = std::max({computeDiagonal(asked.a.points), computeDiagonal(asked.b.points),
+                          static_cast<double>(truth.distance)});
   return truth;
 }
 
@@ -220,7 +223,7 @@ class CaseAnswerer {
     const RigidTransform b = getPlacement(asked.b);
     const auto start = Clock::now();
     const Answer answer = pair_->ask(a, b);
-    return {answer, 1e9 * secondsSince(start)};
+    return {answer, 1e9 * measureSecondsSince(start)};
   }
   TimedAnswer askCold(const accuracy::Case& asked) {
     std::vector<double> times;
@@ -230,7 +233,7 @@ class CaseAnswerer {
       timed = ask(asked);
       times.push_back(timed.nanoseconds);
     }
-    timed.nanoseconds = quantile(times, 0.5);
+    timed.nanoseconds = computeQuantile(times, 0.5);
     return timed;
   }
 
@@ -241,7 +244,7 @@ class CaseAnswerer {
   Points pointsA_, pointsB_;
 };
 
-std::vector<accuracy::Case> pairCases(const std::filesystem::path& folder) {
+std::vector<accuracy::Case> readPairCases(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     const std::string name = entry.path().filename();
@@ -260,7 +263,7 @@ std::vector<accuracy::Case> pairCases(const std::filesystem::path& folder) {
 void measureCases(const NarrowPhaseMethod& method, const std::vector<accuracy::Case>& cases,
                   const Effort& effort, Results& results) {
   CaseAnswerer answerer(method, effort.repeats);
-  const auto answers = guarded<TimedAnswer>(
+  const auto answers = computeGuarded<TimedAnswer>(
       cases.size(), kMaxSecondsPerCase, [&](std::size_t k) { return answerer.answer(cases[k]); });
   std::map<std::string, Errors> errors;
   std::map<std::string, std::vector<double>> times;
@@ -272,19 +275,19 @@ void measureCases(const NarrowPhaseMethod& method, const std::vector<accuracy::C
   }
   for (const auto& [family, e] : errors) {
     auto line = makeHead(method, "family");
-    line.update(e.json());
+    line.update(e.toJson());
     line.update({{"family", family},
-                 {"ns", number(quantile(times[family], 0.5))},
-                 {"ns_99", number(quantile(times[family], 0.99))}});
+                 {"ns", toJsonNumber(computeQuantile(times[family], 0.5))},
+                 {"ns_99", toJsonNumber(computeQuantile(times[family], 0.99))}});
     results.add(line);
     if (family != "all") continue;
     std::printf(
         "%-26s all cases | %8.0f ns | wrong %4zu (%zu beyond 1e-9) none %4zu of %5zu |"
         " error of distance 99 %% %8.1e most %8.1e, of depth most %8.1e |"
         " filter %zu expansion %zu rational %zu\n",
-        method.name.c_str(), quantile(times[family], 0.5), e.wrong, e.wrongBeyond, e.none, e.count,
-        quantile(e.distance, 0.99), quantile(e.distance, 1), quantile(e.depth, 1), e.filter,
-        e.expansion, e.rational);
+        method.name.c_str(), computeQuantile(times[family], 0.5), e.wrong, e.wrongBeyond, e.none,
+        e.count, computeQuantile(e.distance, 0.99), computeQuantile(e.distance, 1),
+        computeQuantile(e.depth, 1), e.filter, e.expansion, e.rational);
     std::fflush(stdout);
   }
 }
@@ -296,16 +299,16 @@ int main(int argc, char** argv) {
   const Effort effort =
       arguments.quick ? Effort{4, 100, 3, 0.02, 0.1, 1} : Effort{16, 200, 5, 0.15, 1, 3};
   Results results(arguments);
-  Methods methods = narrowPhaseMethods();
+  Methods methods = makeNarrowPhaseMethods();
   std::erase_if(methods, [&](const auto& m) { return !arguments.wants(m.name); });
   for (const std::size_t vertices : {8u, 20u, 50u, 200u}) {
     for (const Gap gap : kGaps) measureMotion(methods, vertices, gap, effort, results);
   }
-  const auto shared = enfilade::tests::sharedFolder();
+  const auto shared = enfilade::tests::findSharedFolder();
   if (!shared || !std::filesystem::is_directory(*shared / "cases")) {
     std::printf("no shared cases: set ENFILADE_SHARED or put the folder next to the sources\n");
     return 0;
   }
-  const auto cases = pairCases(*shared / "cases");
+  const auto cases = readPairCases(*shared / "cases");
   for (const auto& method : methods) measureCases(method, cases, effort, results);
 }

@@ -34,17 +34,17 @@ struct MovingPair {
   Motion motionA, motionB;
   Vec3 between;  ///< from A's reference point to B's
 
-  MovingBody a() const { return {{hullA.vertices, Vec3::Zero(), nullptr, &hullA}, motionA}; }
-  MovingBody b() const { return {{hullB.vertices, between, nullptr, &hullB}, motionB}; }
+  MovingBody getBodyA() const { return {{hullA.vertices, Vec3::Zero(), nullptr, &hullA}, motionA}; }
+  MovingBody getBodyB() const { return {{hullB.vertices, between, nullptr, &hullB}, motionB}; }
 };
 
-Vec3 vector(Random& random, double size) {
-  const double x = uniform(random, -size, size), y = uniform(random, -size, size);
-  const double z = uniform(random, -size, size);
+Vec3 drawVector(Random& random, double size) {
+  const double x = drawUniform(random, -size, size), y = drawUniform(random, -size, size);
+  const double z = drawUniform(random, -size, size);
   return {x, y, z};
 }
 
-Hull boxHull(const Vec3& half) {
+Hull makeBoxHull(const Vec3& half) {
   std::vector<Vec3> corners;
   for (int k = 0; k < 8; ++k)
     corners.emplace_back(k & 1 ? half.x() : -half.x(), k & 2 ? half.y() : -half.y(),
@@ -52,28 +52,28 @@ Hull boxHull(const Vec3& half) {
   return buildHull(corners);
 }
 
-Hull stone(Random& random) {
+Hull makeStone(Random& random) {
   std::vector<Vec3> points;
-  for (int k = 0; k < 20; ++k) points.push_back(vector(random, 0.5));
+  for (int k = 0; k < 20; ++k) points.push_back(drawVector(random, 0.5));
   return buildHull(points);
 }
 
-MovingPair rod(Random& random) {
-  const double halfLength = uniform(random, 0.5, 2);
-  const double gap = std::pow(10.0, uniform(random, -5, -2));
-  MovingPair e{boxHull({halfLength, 0.02, 0.02}), boxHull({5, 0.1, 5}), {}, {}, {0, 0, 0}};
+MovingPair makeRod(Random& random) {
+  const double halfLength = drawUniform(random, 0.5, 2);
+  const double gap = std::pow(10.0, drawUniform(random, -5, -2));
+  MovingPair e{makeBoxHull({halfLength, 0.02, 0.02}), makeBoxHull({5, 0.1, 5}), {}, {}, {0, 0, 0}};
   e.between.y() = -(0.02 + gap + 0.1);
-  e.motionA.angularVelocity = Vec3(0, 0, uniform(random, 0.5, 3));
+  e.motionA.angularVelocity = Vec3(0, 0, drawUniform(random, 0.5, 3));
   return e;
 }
 
-MovingPair flight(Random& random, bool turning) {
-  MovingPair e{stone(random), stone(random), {}, {}, {uniform(random, 2, 4), 0, 0}};
-  e.motionA.velocity = Vec3(uniform(random, 0.5, 3), 0, 0) + vector(random, 0.2);
-  e.motionB.acceleration = vector(random, 0.5);
+MovingPair makeFlight(Random& random, bool turning) {
+  MovingPair e{makeStone(random), makeStone(random), {}, {}, {drawUniform(random, 2, 4), 0, 0}};
+  e.motionA.velocity = Vec3(drawUniform(random, 0.5, 3), 0, 0) + drawVector(random, 0.2);
+  e.motionB.acceleration = drawVector(random, 0.5);
   if (!turning) return e;
-  e.motionA.angularVelocity = vector(random, 3);
-  e.motionB.angularVelocity = vector(random, 3);
+  e.motionA.angularVelocity = drawVector(random, 3);
+  e.motionB.angularVelocity = drawVector(random, 3);
   return e;
 }
 
@@ -84,13 +84,13 @@ MotionBounds computeMotionBounds(const MovingBody& moving) {
 }
 
 /// Gap, normal and closest points are the input of both bounds.
-double ourTime(const MovingPair& e, const SeparationResult& gap) {
+double computeOurTime(const MovingPair& e, const SeparationResult& gap) {
   const ClosingBounds closing = computeClosingBounds(
-      computeMotionBounds(e.a()), computeMotionBounds(e.b()), gap.normal, kHorizon);
+      computeMotionBounds(e.getBodyA()), computeMotionBounds(e.getBodyB()), gap.normal, kHorizon);
   return computeTimeToContact(gap.distance - gap.errorBound, closing);
 }
 
-double seedTime(const MovingPair& e, const SeparationResult& gap) {
+double computeSeedTime(const MovingPair& e, const SeparationResult& gap) {
   const auto velocityAt = [](const MovingBody& moving, const Vec3& point) {
     return Vec3(moving.motion.velocity +
                 moving.motion.angularVelocity.cross(point - moving.body.translation));
@@ -100,8 +100,9 @@ double seedTime(const MovingPair& e, const SeparationResult& gap) {
     return m.acceleration.norm() +
            m.angularVelocity.squaredNorm() * computeRadius(moving.body, false);
   };
-  const double v = (velocityAt(e.a(), gap.pointA) - velocityAt(e.b(), gap.pointB)).dot(gap.normal);
-  const double a = computeAcceleration(e.a()) + computeAcceleration(e.b());
+  const double v =
+      (velocityAt(e.getBodyA(), gap.pointA) - velocityAt(e.getBodyB(), gap.pointB)).dot(gap.normal);
+  const double a = computeAcceleration(e.getBodyA()) + computeAcceleration(e.getBodyB());
   if (a == 0) return v > 0 ? gap.distance / v : kHorizon;
   return (std::sqrt(v * v + 2 * a * gap.distance) - v) / a;
 }
@@ -117,26 +118,26 @@ void measure(const char* motion, const std::vector<MovingPair>& pairs, Results& 
   std::size_t met = 0, unproved = 0;
   for (const MovingPair& e : pairs) {
     FeatureCache cache;
-    const SeparationResult gap = computeSeparation(e.a().body, e.b().body, cache);
+    const SeparationResult gap = computeSeparation(e.getBodyA().body, e.getBodyB().body, cache);
     auto start = Clock::now();
-    const MotionResult impact = computeTimeOfImpact(e.a(), e.b(), kHorizon, cache);
-    impacts.seconds += secondsSince(start);
+    const MotionResult impact = computeTimeOfImpact(e.getBodyA(), e.getBodyB(), kHorizon, cache);
+    impacts.seconds += measureSecondsSince(start);
     unproved += impact.outcome == MotionOutcome::unproved;
     if (impact.outcome != MotionOutcome::contact) continue;
     ++met;
     const auto compare = [&](Tally& tally, auto&& bound) {
       start = Clock::now();
       const double time = bound(e, gap);
-      tally.seconds += secondsSince(start);
+      tally.seconds += measureSecondsSince(start);
       tally.broken += time > impact.hi;
       tally.share.push_back(time / impact.hi);
     };
-    compare(ours, ourTime);
-    compare(seeds, seedTime);
+    compare(ours, computeOurTime);
+    compare(seeds, computeSeedTime);
   }
   const auto printRow = [&](const char* name, const Tally& tally, std::size_t asked) {
     const double ns = 1e9 * tally.seconds / static_cast<double>(asked);
-    const double median = quantile(tally.share, 0.5);
+    const double median = computeQuantile(tally.share, 0.5);
     std::printf("%-12s %-22s | %5zu of %5zu broken | %8.3g of the true time | %9.0f ns\n", motion,
                 name, tally.broken, met, median, ns);
     results.add({{"bench", "time"},
@@ -145,7 +146,7 @@ void measure(const char* motion, const std::vector<MovingPair>& pairs, Results& 
                  {"met", met},
                  {"unproved", unproved},
                  {"broken", tally.broken},
-                 {"share", number(median)},
+                 {"share", toJsonNumber(median)},
                  {"ns", ns}});
   };
   printRow("ours: bound", ours, met);
@@ -171,7 +172,7 @@ void measureCrossings(const ThinKind& kind, std::size_t count, Results& results)
     FeatureCache cache;
     const auto start = Clock::now();
     const MotionResult impact = computeTimeOfImpact(a, b, 3, cache);
-    const double ns = 1e9 * secondsSince(start);
+    const double ns = 1e9 * measureSecondsSince(start);
     const bool isContact = impact.outcome == MotionOutcome::contact;
     if (!exact || *exact > 3) {
       misses.push_back(ns);
@@ -184,7 +185,7 @@ void measureCrossings(const ThinKind& kind, std::size_t count, Results& results)
   }
   std::printf(
       "crossing     %-22s | %5zu of %5zu hits proved, %zu late | %zu of %zu false | %9.0f ns\n",
-      kind.name, proved, hits.size(), late, falseHits, misses.size(), quantile(hits, 0.5));
+      kind.name, proved, hits.size(), late, falseHits, misses.size(), computeQuantile(hits, 0.5));
   results.add({{"bench", "crossing"},
                {"kind", kind.name},
                {"hits", hits.size()},
@@ -192,9 +193,9 @@ void measureCrossings(const ThinKind& kind, std::size_t count, Results& results)
                {"late", late},
                {"misses", misses.size()},
                {"false", falseHits},
-               {"hit_ns", number(quantile(hits, 0.5))},
-               {"hit_p99_ns", number(quantile(hits, 0.99))},
-               {"miss_ns", number(quantile(misses, 0.5))}});
+               {"hit_ns", toJsonNumber(computeQuantile(hits, 0.5))},
+               {"hit_p99_ns", toJsonNumber(computeQuantile(hits, 0.99))},
+               {"miss_ns", toJsonNumber(computeQuantile(misses, 0.5))}});
 }
 
 }  // namespace
@@ -209,9 +210,9 @@ int main(int argc, char** argv) {
     for (std::size_t k = 0; k < count; ++k) pairs.push_back(one());
     return pairs;
   };
-  measure("translation", some([&] { return flight(random, false); }), results);
-  measure("turning", some([&] { return flight(random, true); }), results);
-  measure("rod", some([&] { return rod(random); }), results);
+  measure("translation", some([&] { return makeFlight(random, false); }), results);
+  measure("turning", some([&] { return makeFlight(random, true); }), results);
+  measure("rod", some([&] { return makeRod(random); }), results);
   for (const ThinKind& kind :
        {ThinKind{"point, triangle", 1, 3}, ThinKind{"edge, edge", 2, 2},
         ThinKind{"edge, triangle", 2, 3}, ThinKind{"triangle, triangle", 3, 3}})

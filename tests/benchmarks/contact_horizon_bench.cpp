@@ -33,19 +33,19 @@ struct Method {
   std::vector<double> seconds = {};
 
   void update(const scene::World& world) {
-    const double start = processorTime();
+    const double start = readProcessorTime();
     horizons.update(world.snapshot());
-    seconds.push_back(processorTime() - start);
+    seconds.push_back(readProcessorTime() - start);
   }
 };
 
-double mean(const std::vector<double>& values) {
+double computeMean(const std::vector<double>& values) {
   double sum = 0;
   for (const double value : values) sum += value;
   return values.empty() ? 0 : sum / static_cast<double>(values.size());
 }
 
-double worst(const std::vector<double>& values) {
+double findWorst(const std::vector<double>& values) {
   return values.empty() ? 0 : *std::max_element(values.begin(), values.end());
 }
 
@@ -55,7 +55,7 @@ double examineAllPairs(const scene::World& world, scene::EntityIndex& index,
   const scene::SceneAt at{index, *world.snapshot()};
   const auto& avatars = world.snapshot()->avatars;
   pairCount = 0;
-  const double start = processorTime();
+  const double start = readProcessorTime();
   const auto examine = [&](scene::EntityId avatar, scene::EntityId other) {
     std::size_t work = scene::kMaxWorkPerEntity;
     computePairProximity(at, other, avatar, false, work);
@@ -68,14 +68,14 @@ double examineAllPairs(const scene::World& world, scene::EntityIndex& index,
       examine(avatars[i].id, body.id);
     for (std::size_t k = 0; k < i; ++k) examine(avatars[i].id, avatars[k].id);
   }
-  return processorTime() - start;
+  return readProcessorTime() - start;
 }
 
-void row(const Method& method, double unit, int ticks) {
+void printRow(const Method& method, double unit, int ticks) {
   const ContactHorizons::Statistics& counts = method.horizons.statistics();
   std::printf("| %-20s | %10.1f | %10.1f | %9.2f | %11.1f | %9.1f | %8.1f | %9llu |\n", method.name,
-              1e6 * mean(method.seconds), 1e6 * worst(method.seconds), mean(method.seconds) / unit,
-              static_cast<double>(counts.examinations) / ticks,
+              1e6 * computeMean(method.seconds), 1e6 * findWorst(method.seconds),
+              computeMean(method.seconds) / unit, static_cast<double>(counts.examinations) / ticks,
               static_cast<double>(counts.boxChecks) / ticks,
               static_cast<double>(counts.searches) / ticks,
               static_cast<unsigned long long>(counts.postponed));
@@ -118,11 +118,11 @@ void bench(std::size_t avatars, int ticks, std::size_t objects) {
   std::printf(
       "| method               | mean us    | worst us   | ratio     | examined    | by boxes  | "
       "searches | postponed |\n|---|---|---|---|---|---|---|---|\n");
-  const double unit = mean(methods[0].seconds);
-  for (const Method& method : methods) row(method, unit, ticks);
+  const double unit = computeMean(methods[0].seconds);
+  for (const Method& method : methods) printRow(method, unit, ticks);
   std::printf("| %-20s | %10.1f | %10.1f | %9.2f | %11.1f |           |          |           |\n",
-              "all pairs", 1e6 * mean(allPairs), 1e6 * worst(allPairs), mean(allPairs) / unit,
-              static_cast<double>(pairCount));
+              "all pairs", 1e6 * computeMean(allPairs), 1e6 * findWorst(allPairs),
+              computeMean(allPairs) / unit, static_cast<double>(pairCount));
   std::printf("horizons lie %.1f ms ahead on average\n",
               1e3 * ahead / static_cast<double>(std::max<std::size_t>(horizonCount, 1)));
 }

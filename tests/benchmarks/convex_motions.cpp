@@ -10,9 +10,9 @@ namespace {
 constexpr double kRadiansPerDegree = 0.017453292519943295;
 constexpr double kFarApart = 10;  // metres: separated for certain, for unit spheres
 
-Points sphericalPoints(Random& random, std::size_t count) {
+Points makeSphericalPoints(Random& random, std::size_t count) {
   Points points;
-  for (std::size_t k = 0; k < count; ++k) points.push_back(direction(random));
+  for (std::size_t k = 0; k < count; ++k) points.push_back(drawDirection(random));
   return points;
 }
 
@@ -21,11 +21,11 @@ struct Turning {
   Vec3 axis;
   double start, step;  ///< radians
 
-  explicit Turning(Random& random) : axis(direction(random)) {
-    start = uniform(random, 0, 6.28);
-    step = uniform(random, 0.6, 1.8) * kRadiansPerDegree;
+  explicit Turning(Random& random) : axis(drawDirection(random)) {
+    start = drawUniform(random, 0, 6.28);
+    step = drawUniform(random, 0.6, 1.8) * kRadiansPerDegree;
   }
-  Mat3 at(std::size_t k) const {
+  Mat3 computeRotationAt(std::size_t k) const {
     return Eigen::AngleAxisd(start + step * static_cast<double>(k), axis).toRotationMatrix();
   }
 };
@@ -36,14 +36,16 @@ double getGapLength(Gap gap) {
 }
 
 ConvexMotion makeMotion(Random& random, std::size_t vertices, Gap gap, std::size_t steps) {
-  ConvexMotion motion{sphericalPoints(random, vertices), sphericalPoints(random, vertices), {}, {}};
+  ConvexMotion motion{
+      makeSphericalPoints(random, vertices), makeSphericalPoints(random, vertices), {}, {}};
   const collision::Hull hullA = collision::buildHull(motion.a);
   const collision::Hull hullB = collision::buildHull(motion.b);
   const Turning turnA(random), turnB(random), orbit(random);
   const Vec3 away = orbit.axis.unitOrthogonal();
   for (std::size_t k = 0; k < steps; ++k) {
-    RigidTransform a{turnA.at(k), Vec3(0.25, 0.5, 0.125)};
-    RigidTransform b{turnB.at(k), a.translation + kFarApart * (orbit.at(k) * away)};
+    RigidTransform a{turnA.computeRotationAt(k), Vec3(0.25, 0.5, 0.125)};
+    RigidTransform b{turnB.computeRotationAt(k),
+                     a.translation + kFarApart * (orbit.computeRotationAt(k) * away)};
     collision::FeatureCache none;
     const auto separation =
         collision::computeSeparation({hullA.vertices, a.translation, &a.rotation, &hullA},
@@ -62,8 +64,8 @@ const char* getName(Gap gap) {
   return gap == Gap::near ? "near" : "penetrating";
 }
 
-std::vector<ConvexMotion> convexMotions(std::size_t vertices, Gap gap, std::size_t pairs,
-                                        std::size_t steps) {
+std::vector<ConvexMotion> makeConvexMotions(std::size_t vertices, Gap gap, std::size_t pairs,
+                                            std::size_t steps) {
   Random random(vertices);
   std::vector<ConvexMotion> motions;
   for (std::size_t k = 0; k < pairs; ++k) {

@@ -22,7 +22,7 @@ struct ConvexMotion {
 
 /// Polytopes with vertices on unit spheres. Both rotate by 0.6 to 1.8 degrees a step about their
 /// own axes while B orbits A. Each step moves B along the closest points to restore the gap.
-std::vector<ConvexMotion> convexMotions(std::size_t vertices, Gap gap, std::size_t pairs,
-                                        std::size_t steps);
+std::vector<ConvexMotion> makeConvexMotions(std::size_t vertices, Gap gap, std::size_t pairs,
+                                            std::size_t steps);
 
 }  // namespace enfilade::benchmarks

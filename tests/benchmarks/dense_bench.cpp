@@ -43,7 +43,7 @@ struct Run {
   double maxPenetration = 0;
 };
 
-double quantile(std::vector<double> values, double q) {
+double computeQuantile(std::vector<double> values, double q) {
   std::sort(values.begin(), values.end());
   return values.at(static_cast<std::size_t>(q * double(values.size() - 1)));
 }
@@ -61,9 +61,9 @@ Run walk(scene::World& world, int ticks) {
   spawnAvatars(world, kAvatars, random);
   for (int i = 0; i < ticks; ++i) {
     if (i % kTurnTicks == 0) turnAll(world, kSpeed, random);
-    const double start = processorTime();
+    const double start = readProcessorTime();
     const scene::TickReport report = tickWorld(world);
-    run.tickSeconds.push_back(processorTime() - start);
+    run.tickSeconds.push_back(readProcessorTime() - start);
     run.queries += report.narrowQueries;
     run.parts += report.partsLookedAt;
     run.maxPenetration = std::max(run.maxPenetration, report.maxPenetration);
@@ -92,9 +92,9 @@ nlohmann::json measure(const std::string& name, const std::string& description, 
           {"triangles", made},
           {"avatars", avatars},
           {"ticks", ticks},
-          {"avatar_us", share * quantile(run.tickSeconds, 0.5)},
-          {"tick_p99_us", 1e6 * quantile(run.tickSeconds, 0.99)},
-          {"tick_max_us", 1e6 * quantile(run.tickSeconds, 1)},
+          {"avatar_us", share * computeQuantile(run.tickSeconds, 0.5)},
+          {"tick_p99_us", 1e6 * computeQuantile(run.tickSeconds, 0.99)},
+          {"tick_max_us", 1e6 * computeQuantile(run.tickSeconds, 1)},
           {"queries", double(run.queries) / ticks / double(avatars)},
           {"parts", double(run.parts) / ticks / double(avatars)},
           {"checked", run.checked},
@@ -131,7 +131,7 @@ int main(int argc, char** argv) {
     if (out.is_open()) out << row.dump() << std::endl;
     wrong += row["wrong"].get<std::size_t>();
   };
-  for (const DenseScene& dense : tests::denseScenes())
+  for (const DenseScene& dense : tests::listDenseScenes())
     for (const std::size_t triangles : sizes)
       write(measure(dense.name, dense.description, dense.make(triangles), ticks));
   for (const std::string& name : files) {

@@ -20,7 +20,7 @@ void main() { gl_Position = clipFromRelative * vec4(position, 1.0); }
 )";
 constexpr const char* kFragmentSource = "#version 450 core\nvoid main() {}\n";
 
-Eigen::Matrix4f clipFromRelative(const Camera& camera, bool reversed) {
+Eigen::Matrix4f computeClipFromRelative(const Camera& camera, bool reversed) {
   const render::CameraBasis view = render::computeCameraBasis(camera);
   const double near = camera.near, far = camera.far, range = far - near;
   Eigen::Matrix4d clip = Eigen::Matrix4d::Zero();
@@ -33,7 +33,7 @@ Eigen::Matrix4f clipFromRelative(const Camera& camera, bool reversed) {
 }
 
 /// Converts a stored depth to metres; NaN for the background.
-float metres(float stored, const Camera& camera, bool reversed) {
+float toMetres(float stored, const Camera& camera, bool reversed) {
   const double near = camera.near, far = camera.far, range = far - near;
   const double d = stored;
   if (reversed ? d <= 0 : d >= 1) return std::numeric_limits<float>::quiet_NaN();
@@ -119,7 +119,7 @@ render::Frame DepthVariant::draw(const Camera& camera) {
   glClearDepth(s.buffer.reversed ? 0 : 1);
   glClear(GL_DEPTH_BUFFER_BIT);
   glUseProgram(s.program.name());
-  const Eigen::Matrix4f clip = clipFromRelative(camera, s.buffer.reversed);
+  const Eigen::Matrix4f clip = computeClipFromRelative(camera, s.buffer.reversed);
   glUniformMatrix4fv(0, 1, GL_FALSE, clip.data());
   glBindVertexArray(s.array.name());
   glVertexArrayVertexBuffer(s.array.name(), 0, s.vertices.name(), 0, sizeof(Eigen::Vector3f));
@@ -130,7 +130,7 @@ render::Frame DepthVariant::draw(const Camera& camera) {
   frame.depth.resize(static_cast<std::size_t>(s.width) * static_cast<std::size_t>(s.height));
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   glReadPixels(0, 0, s.width, s.height, GL_DEPTH_COMPONENT, GL_FLOAT, frame.depth.data());
-  for (float& d : frame.depth) d = metres(d, camera, s.buffer.reversed);
+  for (float& d : frame.depth) d = toMetres(d, camera, s.buffer.reversed);
   render::checkGl("drawing a depth variant");
   return frame;
 }

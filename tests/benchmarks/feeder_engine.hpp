@@ -11,9 +11,9 @@ class FeederEngine {
  public:
   virtual ~FeederEngine() = default;
   /// Runs one tick of 1/60 s in FeederPlan::substeps.
-  virtual void tick(bool driven) = 0;
-  virtual std::vector<testing::PlacedPart> parts() const = 0;
-  virtual testing::Vec3 tray() const = 0;
+  virtual void runTick(bool driven) = 0;
+  virtual std::vector<testing::PlacedPart> getParts() const = 0;
+  virtual testing::Vec3 getTray() const = 0;
 };
 
 std::unique_ptr<FeederEngine> makeBulletFeeder(const testing::FeederPlan& plan);

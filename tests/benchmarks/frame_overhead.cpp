@@ -35,24 +35,24 @@ using namespace enfilade;
 constexpr int kBlock = 25;  // images of one kind before the next kind's turn
 
 template <typename Work>
-double microseconds(const Work& work) {
+double measureMicroseconds(const Work& work) {
   const auto start = std::chrono::steady_clock::now();
   work();
   return std::chrono::duration<double, std::micro>(std::chrono::steady_clock::now() - start)
       .count();
 }
 
-double quantile(std::vector<double> values, double q) {
+double computeQuantile(std::vector<double> values, double q) {
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(q * double(values.size() - 1))];
 }
 
-void row(const char* name, const std::vector<double>& times) {
-  std::printf("| %-24s | %8.1f | %8.1f | %8.1f |\n", name, quantile(times, 0.1),
-              quantile(times, 0.5), quantile(times, 0.9));
+void printRow(const char* name, const std::vector<double>& times) {
+  std::printf("| %-24s | %8.1f | %8.1f | %8.1f |\n", name, computeQuantile(times, 0.1),
+              computeQuantile(times, 0.5), computeQuantile(times, 0.9));
 }
 
-v1::FrameRequest smallPicture() {
+v1::FrameRequest makeSmallPicture() {
   v1::FrameRequest request;
   request.mutable_free()->mutable_eye()->set_x(1.5);
   request.mutable_free()->mutable_eye()->set_y(1.6);
@@ -78,7 +78,7 @@ struct Waited {
 class ByPython {
  public:
   explicit ByPython(std::uint16_t port) {
-    const std::string fifo = tests::ownFile("orders");
+    const std::string fifo = tests::makeOwnFile("orders");
     if (::mkfifo(fifo.c_str(), 0600) != 0) return;
     const std::string command =
         "PYTHONPATH=protocol/clients/python /usr/bin/python3 "
@@ -127,7 +127,7 @@ int main(int argc, char** argv) {
   protocol::Client client("127.0.0.1", server.port());
   render::RenderThread renderer(scene);
   const scene::World world(scene);
-  const v1::FrameRequest request = smallPicture();
+  const v1::FrameRequest request = makeSmallPicture();
   const auto view =
       std::get<render::ViewRequest>(server::viewFromProto(request, *world.snapshot()));
   constexpr double kMicro = 1e6;
@@ -135,7 +135,7 @@ int main(int argc, char** argv) {
   ByPython script(server.port());
   const auto draw = [&] {
     double drawn = 0;
-    const double waited = microseconds([&] {
+    const double waited = measureMicroseconds([&] {
       drawn = renderer.render(world.snapshot(), view.camera, view.options, view.renderer)
                   .get()
                   .statistics.seconds;
@@ -145,7 +145,7 @@ int main(int argc, char** argv) {
   const auto fetch = [&] {
     double drawn = 0;
     const double waited =
-        microseconds([&] { drawn = client.frame(request).description.drawing_seconds(); });
+        measureMicroseconds([&] { drawn = client.frame(request).description.drawing_seconds(); });
     overSocket.push(waited, kMicro * drawn);
   };
   const auto repeat = [&](const auto& once) {
@@ -164,22 +164,23 @@ int main(int argc, char** argv) {
       "%s, %d pictures\n| microseconds             |      p10 |   median |      p90 |\n"
       "|---|---|---|---|\n",
       server.rendererName().c_str(), pictures);
-  row("in process", inProcess.whole);
-  row("over the socket, C++", overSocket.whole);
-  row("  without drawing it", overSocket.added);
+  printRow("in process", inProcess.whole);
+  printRow("over the socket, C++", overSocket.whole);
+  printRow("  without drawing it", overSocket.added);
   if (!python.whole.empty()) {
-    row("over the socket, Python", python.whole);
-    row("  without drawing it", python.added);
-    row("a step, Python", steps.whole);
-    row("both, Python", stepsAndPictures.whole);
-    row("  without drawing it", stepsAndPictures.added);
+    printRow("over the socket, Python", python.whole);
+    printRow("  without drawing it", python.added);
+    printRow("a step, Python", steps.whole);
+    printRow("both, Python", stepsAndPictures.whole);
+    printRow("  without drawing it", stepsAndPictures.added);
   }
-  const double step = python.whole.empty() ? 0 : quantile(steps.whole, 0.5);
+  const double step = python.whole.empty() ? 0 : computeQuantile(steps.whole, 0.5);
   const auto printRow = [&](const char* who, const Waited& waited, double others) {
     if (waited.whole.empty()) return;
-    std::printf("%s: %.1f us more than drawing the same image, %.1f us more than in process\n", who,
-                quantile(waited.added, 0.5) - others,
-                quantile(waited.whole, 0.5) - quantile(inProcess.whole, 0.5) - others);
+    std::printf(
+        "%s: %.1f us more than drawing the same image, %.1f us more than in process\n", who,
+        computeQuantile(waited.added, 0.5) - others,
+        computeQuantile(waited.whole, 0.5) - computeQuantile(inProcess.whole, 0.5) - others);
   };
   std::printf("Overhead of the socket (medians)\n");
   printRow("C++", overSocket, 0);

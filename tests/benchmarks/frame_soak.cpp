@@ -29,7 +29,7 @@ using namespace enfilade;
 
 constexpr double kAllocatedAllowed = 0.1, kResidentAllowed = 4;  // megabytes
 
-double residentMegabytes() {
+double readResidentMegabytes() {
   std::ifstream statm("/proc/self/statm");
   double all = 0, resident = 0;
   statm >> all >> resident;
@@ -37,12 +37,12 @@ double residentMegabytes() {
 }
 
 /// Memory in use, without the allocators' free lists.
-double allocatedMegabytes() {
+double readAllocatedMegabytes() {
   const struct mallinfo2 info = ::mallinfo2();
   return static_cast<double>(info.uordblks + info.hblkhd) / 1e6;
 }
 
-double median(std::vector<double> values) {
+double findMedian(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
   std::nth_element(values.begin(), middle, values.end());
   return *middle;
@@ -75,8 +75,8 @@ int main(int argc, char** argv) {
   std::vector<double> resident, allocated;
   for (int i = 0; i < reloads; ++i) {
     takePictures(*kind, model, each, i * each);
-    resident.push_back(residentMegabytes());
-    allocated.push_back(allocatedMegabytes());
+    resident.push_back(readResidentMegabytes());
+    allocated.push_back(readAllocatedMegabytes());
     if ((i + 1) % (reloads / 10) == 0)
       std::printf("%-4s %4d scenes %6d pictures  %7.1f MB, allocated %8.3f MB\n",
                   render::toString(*kind), i + 1, (i + 1) * each, resident.back(),
@@ -84,7 +84,7 @@ int main(int argc, char** argv) {
     std::fflush(stdout);
   }
   const auto begin = resident.begin(), middle = begin + reloads / 2;
-  const double grown = median({middle, resident.end()}) - median({begin, middle});
+  const double grown = findMedian({middle, resident.end()}) - findMedian({begin, middle});
   const double kept = allocated.back() - allocated[static_cast<std::size_t>(reloads / 10)];
   std::printf("%-4s from half to half %+.1f MB, allocated after the first tenth %+.3f MB\n",
               render::toString(*kind), grown, kept);

@@ -17,8 +17,8 @@ std::vector<bool> runGuarded(std::size_t count, unsigned seconds, std::span<std:
 
 /// The same with a record type; records of unfinished calls are T{}.
 template <typename T>
-std::vector<T> guarded(std::size_t count, unsigned seconds,
-                       const std::function<T(std::size_t)>& one) {
+std::vector<T> computeGuarded(std::size_t count, unsigned seconds,
+                              const std::function<T(std::size_t)>& one) {
   static_assert(std::is_trivially_copyable_v<T>);
   std::vector<T> results(count);
   const auto bytes = std::as_writable_bytes(std::span(results));

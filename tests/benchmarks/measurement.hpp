@@ -16,19 +16,19 @@ namespace enfilade::benchmarks {
 
 using Clock = std::chrono::steady_clock;
 
-inline double secondsSince(Clock::time_point start) {
+inline double measureSecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 /// The `q` quantile (0..1) of the values; NaN without values.
-inline double quantile(std::vector<double> values, double q) {
+inline double computeQuantile(std::vector<double> values, double q) {
   if (values.empty()) return std::numeric_limits<double>::quiet_NaN();
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1))];
 }
 
 /// JSON has no NaN and infinity; they become null.
-inline nlohmann::json number(double x) {
+inline nlohmann::json toJsonNumber(double x) {
   return std::isfinite(x) ? nlohmann::json(x) : nlohmann::json(nullptr);
 }
 

@@ -19,10 +19,10 @@ class MeshQuery {
  public:
   virtual ~MeshQuery() = default;
   /// Metres; 0 if they touch or penetrate.
-  virtual double distance(const RigidTransform& body) = 0;
+  virtual double computeDistance(const RigidTransform& body) = 0;
   /// Appends the indices (into the mesh's triangle list) of all triangles that the body touches or
   /// penetrates, in any order.
-  virtual void contacts(const RigidTransform& body, std::vector<std::uint32_t>& triangles) = 0;
+  virtual void findContacts(const RigidTransform& body, std::vector<std::uint32_t>& triangles) = 0;
   virtual void forget() {}
 };
 
@@ -32,11 +32,11 @@ struct MeshMethod {
   std::function<std::unique_ptr<MeshQuery>(const Points& body, const Triangles& mesh)> make;
 };
 
-std::vector<MeshMethod> meshMethods();
+std::vector<MeshMethod> makeMeshMethods();
 
 // Factories, one per source file.
-std::vector<MeshMethod> ourMeshQueries();
-std::vector<MeshMethod> bulletMesh();
-std::vector<MeshMethod> fclMesh();
+std::vector<MeshMethod> makeOurMeshQueries();
+std::vector<MeshMethod> makeBulletMeshMethods();
+std::vector<MeshMethod> makeFclMeshMethods();
 
 }  // namespace enfilade::benchmarks

@@ -2,16 +2,16 @@
 
 namespace enfilade::benchmarks {
 
-std::vector<MeshMethod> meshMethods() {
-  std::vector<MeshMethod> all = ourMeshQueries();
+std::vector<MeshMethod> makeMeshMethods() {
+  std::vector<MeshMethod> all = makeOurMeshQueries();
   [[maybe_unused]] const auto append = [&all](std::vector<MeshMethod> some) {
     for (MeshMethod& method : some) all.push_back(std::move(method));
   };
 #ifdef BENCH_FCL
-  append(fclMesh());
+  append(makeFclMeshMethods());
 #endif
 #ifdef BENCH_BULLET
-  append(bulletMesh());
+  append(makeBulletMeshMethods());
 #endif
   return all;
 }

@@ -13,10 +13,10 @@ constexpr double kTowerHeight = 3;   // widths
 constexpr double kRebound = 0.4;     // of the speed
 constexpr double kHeapSpeed = 6;     // metres per second at the heap's surface
 
-Vec3 uniform3(Random& random, const Vec3& low, const Vec3& high) {
-  const double x = uniform(random, low.x(), high.x());
-  const double y = uniform(random, low.y(), high.y());
-  const double z = uniform(random, low.z(), high.z());
+Vec3 drawUniform3(Random& random, const Vec3& low, const Vec3& high) {
+  const double x = drawUniform(random, low.x(), high.x());
+  const double y = drawUniform(random, low.y(), high.y());
+  const double z = drawUniform(random, low.z(), high.z());
   return {x, y, z};
 }
 
@@ -43,10 +43,10 @@ MovingCubes::MovingCubes(CubeMotion motion, std::size_t count)
   const double height = motion == CubeMotion::falling ? kTowerHeight * width_ : width_;
   for (std::size_t k = 0; k < count; ++k) {
     if (motion == CubeMotion::turbulent) {
-      centres_.push_back(width_ * std::cbrt(uniform(random_, 0, 1)) * direction(random_));
-      velocities_[k] = kHeapSpeed * uniform(random_, 0, 1) * direction(random_);
+      centres_.push_back(width_ * std::cbrt(drawUniform(random_, 0, 1)) * drawDirection(random_));
+      velocities_[k] = kHeapSpeed * drawUniform(random_, 0, 1) * drawDirection(random_);
     } else {
-      centres_.push_back(uniform3(random_, Vec3::Zero(), Vec3(width_, height, width_)));
+      centres_.push_back(drawUniform3(random_, Vec3::Zero(), Vec3(width_, height, width_)));
     }
   }
 }
@@ -64,8 +64,9 @@ std::span<const Aabb> MovingCubes::next() {
 void MovingCubes::moveRandomly() {
   const Vec3 low = Vec3::Zero(), high = Vec3::Constant(width_);
   for (Vec3& centre : centres_)
-    centre =
-        (centre + uniform(random_, 0, kMaxStep) * direction(random_)).cwiseMax(low).cwiseMin(high);
+    centre = (centre + drawUniform(random_, 0, kMaxStep) * drawDirection(random_))
+                 .cwiseMax(low)
+                 .cwiseMin(high);
 }
 
 void MovingCubes::fall() {
@@ -74,8 +75,8 @@ void MovingCubes::fall() {
     centres_[k] += kFrame * velocities_[k];
     if (centres_[k].y() > 0.5) continue;
     centres_[k].y() = 0.5;
-    velocities_[k] =
-        Vec3(uniform(random_, -1, 1), -kRebound * velocities_[k].y(), uniform(random_, -1, 1));
+    velocities_[k] = Vec3(drawUniform(random_, -1, 1), -kRebound * velocities_[k].y(),
+                          drawUniform(random_, -1, 1));
   }
 }
 
@@ -84,7 +85,7 @@ void MovingCubes::swirl() {
   const double rate = kHeapSpeed / width_;
   for (std::size_t k = 0; k < centres_.size(); ++k) {
     velocities_[k] -= rate * rate * kFrame * centres_[k];
-    velocities_[k] += 0.2 * velocities_[k].norm() * direction(random_);
+    velocities_[k] += 0.2 * velocities_[k].norm() * drawDirection(random_);
     if (velocities_[k].norm() > kHeapSpeed) velocities_[k] *= kHeapSpeed / velocities_[k].norm();
     centres_[k] += kFrame * velocities_[k];
   }
@@ -93,8 +94,8 @@ void MovingCubes::swirl() {
 WalkingBoxes::WalkingBoxes(std::size_t count, const Vec3& corner)
     : corner_(corner), width_(4 * std::sqrt(static_cast<double>(count))), boxes_(count) {
   for (std::size_t k = 0; k < count; ++k) {
-    feet_.push_back(uniform3(random_, Vec3::Zero(), Vec3(width_, 0, width_)));
-    const Vec3 towards = direction(random_);
+    feet_.push_back(drawUniform3(random_, Vec3::Zero(), Vec3(width_, 0, width_)));
+    const Vec3 towards = drawDirection(random_);
     velocities_.push_back(1.4 * Vec3(towards.x(), 0, towards.z()));
   }
 }

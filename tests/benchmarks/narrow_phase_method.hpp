@@ -32,7 +32,7 @@ struct Answer {
   bool depthProved = true;  ///< ours: false for an upper bound
 };
 
-inline Answer apart(double distance) {
+inline Answer makeApart(double distance) {
   Answer answer;
   if (!std::isfinite(distance)) return answer;
   answer.verdict = Answer::Verdict::apart;
@@ -65,14 +65,14 @@ struct NarrowPhaseMethod {
 };
 
 /// All methods, ours first.
-std::vector<NarrowPhaseMethod> narrowPhaseMethods();
+std::vector<NarrowPhaseMethod> makeNarrowPhaseMethods();
 
 // Factories, one per source file.
-std::vector<NarrowPhaseMethod> ourNarrowPhases();
-std::vector<NarrowPhaseMethod> bulletConvex();
-std::vector<NarrowPhaseMethod> ccdConvex();
-std::vector<NarrowPhaseMethod> cgalConvex();
-std::vector<NarrowPhaseMethod> fclConvex();
-std::vector<NarrowPhaseMethod> odeConvex();
+std::vector<NarrowPhaseMethod> makeOurNarrowPhases();
+std::vector<NarrowPhaseMethod> makeBulletConvexMethods();
+std::vector<NarrowPhaseMethod> makeCcdConvexMethods();
+std::vector<NarrowPhaseMethod> makeCgalConvexMethods();
+std::vector<NarrowPhaseMethod> makeFclConvexMethods();
+std::vector<NarrowPhaseMethod> makeOdeConvexMethods();
 
 }  // namespace enfilade::benchmarks

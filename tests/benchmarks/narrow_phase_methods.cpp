@@ -2,25 +2,25 @@
 
 namespace enfilade::benchmarks {
 
-std::vector<NarrowPhaseMethod> narrowPhaseMethods() {
-  std::vector<NarrowPhaseMethod> all = ourNarrowPhases();
+std::vector<NarrowPhaseMethod> makeNarrowPhaseMethods() {
+  std::vector<NarrowPhaseMethod> all = makeOurNarrowPhases();
   [[maybe_unused]] const auto append = [&all](std::vector<NarrowPhaseMethod> some) {
     for (NarrowPhaseMethod& method : some) all.push_back(std::move(method));
   };
 #ifdef BENCH_FCL
-  append(fclConvex());
+  append(makeFclConvexMethods());
 #endif
 #ifdef BENCH_BULLET
-  append(bulletConvex());
+  append(makeBulletConvexMethods());
 #endif
 #ifdef BENCH_CCD
-  append(ccdConvex());
+  append(makeCcdConvexMethods());
 #endif
 #ifdef BENCH_ODE
-  append(odeConvex());
+  append(makeOdeConvexMethods());
 #endif
 #ifdef BENCH_CGAL
-  append(cgalConvex());
+  append(makeCgalConvexMethods());
 #endif
   return all;
 }

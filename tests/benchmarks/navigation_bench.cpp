@@ -251,7 +251,7 @@ std::vector<double> timeMeshQueries(const scene::NavigationMesh& mesh,
   for (std::size_t i = 0; i < std::min(starts.size(), goals.size()); ++i) {
     const auto start = Clock::now();
     const bool isLine = findLine(mesh, starts[i], goals[i]).has_value();
-    const double seconds = secondsSince(start);
+    const double seconds = measureSecondsSince(start);
     if (isLine) times.push_back(1e6 * seconds);
   }
   return times;
@@ -265,12 +265,13 @@ void measureTimes(Bench& bench, const Effort& effort, nlohmann::json& row) {
   for (std::size_t i = 0; i < std::min(starts.size(), goals.size()); ++i) {
     const auto start = Clock::now();
     const bool isFound = bench.findPath(starts[i], goals[i], doors).found();
-    (isFound ? found : notFound).push_back(1e6 * secondsSince(start));
+    (isFound ? found : notFound).push_back(1e6 * measureSecondsSince(start));
   }
-  row["mesh_us"] = number(quantile(timeMeshQueries(buildMesh(bench.atRest), starts, goals), 0.5));
-  row["median_us"] = number(quantile(found, 0.5));
-  row["p99_us"] = number(quantile(found, 0.99));
-  row["not_found_p99_us"] = number(quantile(notFound, 0.99));
+  row["mesh_us"] =
+      toJsonNumber(computeQuantile(timeMeshQueries(buildMesh(bench.atRest), starts, goals), 0.5));
+  row["median_us"] = toJsonNumber(computeQuantile(found, 0.5));
+  row["p99_us"] = toJsonNumber(computeQuantile(found, 0.99));
+  row["not_found_p99_us"] = toJsonNumber(computeQuantile(notFound, 0.99));
 }
 
 /// Places on islands that are drawn from, and some on each of the 20 largest islands.
@@ -462,7 +463,7 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   const std::vector<Vec3> places = drawAnywhere(bench, effort.compared);
   const auto start = Clock::now();
   const FloodFill fill(bench.atRest.data(), {}, places, effort.places);
-  std::printf("  %zu places filled in %.0f s\n", fill.size(), secondsSince(start));
+  std::printf("  %zu places filled in %.0f s\n", fill.size(), measureSecondsSince(start));
   std::fflush(stdout);
   std::mt19937_64 random(7);
   const auto drawIndex = [&](std::size_t count) {
@@ -493,10 +494,10 @@ void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {
   row["islands_wrong"] = result.islandsWrong;
   row["lengths"] = lengths.shares.size();
   row["lengths_unwalkable"] = lengths.unwalkable;
-  row["length_median"] = number(quantile(lengths.shares, 0.5));
-  row["length_max"] = number(quantile(lengths.shares, 1));
+  row["length_median"] = toJsonNumber(computeQuantile(lengths.shares, 0.5));
+  row["length_max"] = toJsonNumber(computeQuantile(lengths.shares, 1));
   row["length_above"] = std::ranges::count_if(lengths.shares, isLong);
-  row["feet_max"] = number(quantile(lengths.feetShares, 1));
+  row["feet_max"] = toJsonNumber(computeQuantile(lengths.feetShares, 1));
   row["feet_above"] = std::ranges::count_if(lengths.feetShares, isLong);
 }
 
@@ -547,9 +548,9 @@ void compareWithDetour(Bench& bench, const Effort& effort, nlohmann::json& row) 
   row["detour_no_line"] = noLine;
   row["detour_unwalkable"] = lengths.unwalkable;
   row["detour_compared"] = lengths.shares.size();
-  row["detour_median"] = number(quantile(lengths.shares, 0.5));
-  row["detour_min"] = number(quantile(lengths.shares, 0));
-  row["detour_max"] = number(quantile(lengths.shares, 1));
+  row["detour_median"] = toJsonNumber(computeQuantile(lengths.shares, 0.5));
+  row["detour_min"] = toJsonNumber(computeQuantile(lengths.shares, 0));
+  row["detour_max"] = toJsonNumber(computeQuantile(lengths.shares, 1));
   row["detour_above"] = std::ranges::count_if(lengths.shares, isLong);
 }
 
@@ -575,7 +576,7 @@ void measure(const std::string& file, const Effort& effort, std::ofstream& out) 
     const auto start = Clock::now();
     nlohmann::json row = {{"scene", options.file.filename().string()}, {"part", part}};
     measurePart(bench, effort, row);
-    std::printf("%s, %.1f s\n", row.dump().c_str(), secondsSince(start));
+    std::printf("%s, %.1f s\n", row.dump().c_str(), measureSecondsSince(start));
     std::fflush(stdout);
     out << row.dump() << "\n" << std::flush;
   };

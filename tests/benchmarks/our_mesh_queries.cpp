@@ -12,41 +12,43 @@ using namespace collision;
 class OurMeshQuery : public MeshQuery {
  public:
   OurMeshQuery(const Points& body, const Triangles& mesh)
-      : hull_(buildHull(body)), tree_(buildBoxTree(std::span(&localBox(), 1), 1)), mesh_(mesh) {}
+      : hull_(buildHull(body)),
+        tree_(buildBoxTree(std::span(&computeLocalBox(), 1), 1)),
+        mesh_(mesh) {}
 
-  double distance(const RigidTransform& at) override {
+  double computeDistance(const RigidTransform& at) override {
     const CompoundView body{&tree_, at.rotation, at.translation,
-                            [&](std::uint32_t) { return bodyAt(at); }};
+                            [&](std::uint32_t) { return placeBodyAt(at); }};
     const CompoundView mesh{&mesh_.boxes(), Mat3::Identity(), Vec3::Zero(),
-                            [this](std::uint32_t i) { return triangle(i); },
+                            [this](std::uint32_t i) { return getTriangle(i); },
                             [this](std::uint32_t i) { return computeAabb(mesh_.triangles()[i]); }};
     std::size_t budget = std::numeric_limits<std::size_t>::max();
     return findNearestParts({&body, 1}, {&mesh, 1}, std::numeric_limits<double>::infinity(), budget)
         .separation.distance;
   }
-  void contacts(const RigidTransform& at, std::vector<std::uint32_t>& triangles) override {
-    const PlacedConvex body = bodyAt(at);
+  void findContacts(const RigidTransform& at, std::vector<std::uint32_t>& triangles) override {
+    const PlacedConvex body = placeBodyAt(at);
     Aabb box;
     for (const Vec3& vertex : body.vertices) box.include(at.rotation * vertex + at.translation);
     near_.clear();
     mesh_.query(inflated(box, 1e-9), near_);  // more than the rounding of the box
     for (const std::uint32_t i : near_) {
       FeatureCache cold;
-      const auto separation = computeSeparationWithin(body, triangle(i), 0, cold);
+      const auto separation = computeSeparationWithin(body, getTriangle(i), 0, cold);
       if (separation && separation->verdict != Verdict::separated)
         triangles.push_back(mesh_.inputIndex(i));
     }
   }
 
  private:
-  const Aabb& localBox() {
+  const Aabb& computeLocalBox() {
     for (const Vec3& vertex : hull_.vertices) box_.include(vertex);
     return box_;
   }
-  PlacedConvex bodyAt(const RigidTransform& at) const {
+  PlacedConvex placeBodyAt(const RigidTransform& at) const {
     return {hull_.vertices, at.translation, &at.rotation, &hull_};
   }
-  PlacedConvex triangle(std::uint32_t i) const { return {mesh_.triangles()[i]}; }
+  PlacedConvex getTriangle(std::uint32_t i) const { return {mesh_.triangles()[i]}; }
 
   Hull hull_;
   Aabb box_;  ///< of the hull, in its frame
@@ -57,7 +59,7 @@ class OurMeshQuery : public MeshQuery {
 
 }  // namespace
 
-std::vector<MeshMethod> ourMeshQueries() {
+std::vector<MeshMethod> makeOurMeshQueries() {
   return {{"ours: decide", true, false, [](const Points& body, const Triangles& mesh) {
              return std::make_unique<OurMeshQuery>(body, mesh);
            }}};

@@ -32,7 +32,7 @@ class Decides : public OurPair {
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     const auto result =
         collision::computeSeparation(makeBody(hullA_, a), makeBody(hullB_, b), features_);
-    Answer answer = result.verdict == Verdict::separated ? apart(result.distance) : collides();
+    Answer answer = result.verdict == Verdict::separated ? makeApart(result.distance) : collides();
     answer.decidedBy = static_cast<std::int8_t>(result.certificate);
     return answer;
   }
@@ -45,7 +45,7 @@ class DecidesWithDepth : public OurPair {
     const PlacedConvex bodyA = makeBody(hullA_, a);
     const PlacedConvex bodyB = makeBody(hullB_, b);
     const auto result = collision::computeSeparation(bodyA, bodyB, features_);
-    Answer answer = result.verdict == Verdict::separated ? apart(result.distance) : collides(0);
+    Answer answer = result.verdict == Verdict::separated ? makeApart(result.distance) : collides(0);
     answer.decidedBy = static_cast<std::int8_t>(result.certificate);
     if (result.verdict == Verdict::penetrating) {
       const auto depth = collision::computePenetrationDepth(bodyA, bodyB, features_, depth_);
@@ -69,7 +69,7 @@ class Refines : public OurPair {
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     const auto result =
         collision::refineSeparation(makeBody(hullA_, a), makeBody(hullB_, b), features_);
-    Answer answer = result.verdict == Verdict::separated ? apart(result.distance)
+    Answer answer = result.verdict == Verdict::separated ? makeApart(result.distance)
                                                          : collides(result.penetration);
     answer.decidedBy = static_cast<std::int8_t>(result.certificate);
     return answer;
@@ -83,7 +83,7 @@ std::unique_ptr<PairOfBodies> make(const Points& a, const Points& b) {
 
 }  // namespace
 
-std::vector<NarrowPhaseMethod> ourNarrowPhases() {
+std::vector<NarrowPhaseMethod> makeOurNarrowPhases() {
   return {{"ours: decide", true, "decide", true, true, false, make<Decides>},
           {"ours: decide with depth", true, "decide", true, true, true, make<DecidesWithDepth>},
           {"ours: refine", true, "refine", true, true, true, make<Refines>}};

@@ -35,12 +35,12 @@ constexpr int kMaxTicksOneThread = 240;  // ticks of ours with one thread, and o
 class OurFeeder : public FeederEngine {
  public:
   OurFeeder(const FeederPlan& plan, int threads) : feeder_(plan, threads) {}
-  void tick(bool driven) override { feeder_.tick(driven); }
-  std::vector<testing::PlacedPart> parts() const override { return feeder_.parts(); }
-  testing::Vec3 tray() const override { return feeder_.tray(); }
-  double energy() const { return feeder_.energy(); }
-  const scene::StepReport& report() const { return feeder_.report(); }
-  double epsilon() { return feeder_.settings().solver.contactOffset; }
+  void runTick(bool driven) override { feeder_.tick(driven); }
+  std::vector<testing::PlacedPart> getParts() const override { return feeder_.getParts(); }
+  testing::Vec3 getTray() const override { return feeder_.getTrayPosition(); }
+  double getEnergy() const { return feeder_.computeEnergy(); }
+  const scene::StepReport& getReport() const { return feeder_.getReport(); }
+  double getEpsilon() { return feeder_.getSettings().solver.contactOffset; }
 
  private:
   testing::Feeder feeder_;
@@ -52,12 +52,12 @@ struct Row {
   FeederFindings worst;
 };
 
-FeederFindings worse(const FeederFindings& a, const FeederFindings& b) {
+FeederFindings chooseWorse(const FeederFindings& a, const FeederFindings& b) {
   return {std::max(a.deepest, b.deepest), std::max(a.penetrating, b.penetrating),
           std::max(a.outside, b.outside)};
 }
 
-double cpuSeconds() {
+double readCpuSeconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
@@ -68,20 +68,21 @@ Row run(FeederEngine& engine, const FeederCheck& feederCheck, int ticks, bool dr
   Row row;
   for (int i = 1; i <= ticks; ++i) {
     const auto start = std::chrono::steady_clock::now();
-    const double cpu = cpuSeconds();
-    engine.tick(driven);
-    row.cpu += cpuSeconds() - cpu;
+    const double cpu = readCpuSeconds();
+    engine.runTick(driven);
+    row.cpu += readCpuSeconds() - cpu;
     row.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (afterTick) afterTick();
     if (i % kJudgeEvery != 0) continue;
-    row.worst = worse(row.worst, feederCheck.evaluate(engine.parts(), engine.tray()));
+    row.worst = chooseWorse(row.worst, feederCheck.evaluate(engine.getParts(), engine.getTray()));
   }
   return row;
 }
 
 /// Concatenates two measured intervals.
-Row both(const Row& first, const Row& second) {
-  return {first.seconds + second.seconds, first.cpu + second.cpu, worse(first.worst, second.worst)};
+Row joinRows(const Row& first, const Row& second) {
+  return {first.seconds + second.seconds, first.cpu + second.cpu,
+          chooseWorse(first.worst, second.worst)};
 }
 
 void print(const char* name, const Row& row, int ticks) {
@@ -97,24 +98,25 @@ bool check(bool holds, const char* what) {
 
 bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks) {
   OurFeeder still(plan, kThreads);
-  const double start = still.energy();
+  const double start = still.getEnergy();
   double maxEnergy = start;
-  const auto watchEnergy = [&] { maxEnergy = std::max(maxEnergy, still.energy()); };
+  const auto watchEnergy = [&] { maxEnergy = std::max(maxEnergy, still.getEnergy()); };
   Row off = run(still, feederCheck, ticks, false, watchEnergy);
   int asleepAfter = ticks;  // the run continues untimed until the whole heap sleeps
-  for (; asleepAfter < kMaxTicksToSleep && still.report().awake > 0; asleepAfter += kJudgeEvery)
-    off.worst = worse(off.worst, run(still, feederCheck, kJudgeEvery, false, watchEnergy).worst);
+  for (; asleepAfter < kMaxTicksToSleep && still.getReport().awake > 0; asleepAfter += kJudgeEvery)
+    off.worst =
+        chooseWorse(off.worst, run(still, feederCheck, kJudgeEvery, false, watchEnergy).worst);
   OurFeeder driven(plan, kThreads), alone(plan, 1);
   std::uint64_t shortened = 0, crushed = 0, solids = 0;
   const auto count = [&] {
-    shortened += driven.report().reducedMotions;
-    crushed += driven.report().crushed;
+    shortened += driven.getReport().reducedMotions;
+    crushed += driven.getReport().crushed;
     solids += plan.parts.size() * static_cast<std::uint64_t>(plan.looks);
   };
   const int last = std::max(kJudgeEvery, ticks / 10);
   const Row begun = run(driven, feederCheck, ticks - last, true, count);
   const Row ended = run(driven, feederCheck, last, true, count);
-  const Row on = both(begun, ended);
+  const Row on = joinRows(begun, ended);
   const Row one = run(alone, feederCheck, std::min(ticks, kMaxTicksOneThread), true);
   print("ours, drive off", off, ticks);
   print("ours", on, ticks);
@@ -126,10 +128,10 @@ bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks
       maxEnergy / start, 100.0 * static_cast<double>(shortened) / static_cast<double>(solids),
       static_cast<unsigned long long>(crushed));
   std::printf("  with the drive off the heap sleeps after %.1f s at most\n", asleepAfter / 60.0);
-  bool all = check(still.report().awake == 0, "drive off: the whole heap sleeps within 10 s");
+  bool all = check(still.getReport().awake == 0, "drive off: the whole heap sleeps within 10 s");
   all &= check(maxEnergy <= 1.001 * start, "drive off: energy never above its start + 0.1 %");
   all &= check(off.worst.outside + on.worst.outside == 0, "all parts inside");
-  all &= check(std::max(off.worst.deepest, on.worst.deepest) <= driven.epsilon(),
+  all &= check(std::max(off.worst.deepest, on.worst.deepest) <= driven.getEpsilon(),
                "penetration <= epsilon");
   return all;
 }
@@ -147,20 +149,20 @@ bool checkScene(const FeederPlan& plan, int ticks) {
   const auto go = [&](int tickCount) {
     Row row;
     for (int i = 0; i < tickCount; ++i) {
-      const double cpu = cpuSeconds();
+      const double cpu = readCpuSeconds();
       const auto start = std::chrono::steady_clock::now();
       const scene::TickReport report = tickWorld(world);
       const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-      row.seconds += took.count(), row.cpu += cpuSeconds() - cpu;
+      row.seconds += took.count(), row.cpu += readCpuSeconds() - cpu;
       FeederFindings now{report.maxPenetration, report.crushedBodies, 0};
       for (const scene::BodySnapshot& body : *report.snapshot->bodies)
         if (!isInside(body)) ++now.outside;
-      row.worst = worse(row.worst, now);
+      row.worst = chooseWorse(row.worst, now);
     }
     return row;
   };
   const int last = std::max(kJudgeEvery, ticks / 10);
-  const Row begun = go(ticks - last), ended = go(last), all = both(begun, ended);
+  const Row begun = go(ticks - last), ended = go(last), all = joinRows(begun, ended);
   print("scene", all, ticks);
   print("  last tenth", ended, last);
   const bool inside = check(all.worst.outside == 0, "all parts of the scene inside");

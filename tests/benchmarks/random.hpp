@@ -10,16 +10,16 @@ namespace enfilade::benchmarks {
 using collision::Vec3;
 using Random = std::mt19937_64;
 
-inline double uniform(Random& random, double low, double high) {
+inline double drawUniform(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
 
 /// A uniformly distributed unit vector.
-inline Vec3 direction(Random& random) {
+inline Vec3 drawDirection(Random& random) {
   while (true) {
-    const double x = uniform(random, -1, 1);
-    const double y = uniform(random, -1, 1);
-    const double z = uniform(random, -1, 1);
+    const double x = drawUniform(random, -1, 1);
+    const double y = drawUniform(random, -1, 1);
+    const double z = drawUniform(random, -1, 1);
     const Vec3 v(x, y, z);
     if (v.squaredNorm() > 0.01 && v.squaredNorm() < 1) return v.normalized();
   }

@@ -71,12 +71,12 @@ std::vector<tests::WalkStop> walkIn(const std::shared_ptr<const scene::Scene>& s
   return begun ? walk.walk(frames) : std::vector<tests::WalkStop>{};
 }
 
-bool same(const render::Frame& a, const render::Frame& b) {
+bool areSame(const render::Frame& a, const render::Frame& b) {
   return a.rgb == b.rgb && a.ids == b.ids && a.depth.size() == b.depth.size() &&
          std::memcmp(a.depth.data(), b.depth.data(), a.depth.size() * sizeof(float)) == 0;
 }
 
-double processorSeconds() {
+double readProcessorSeconds() {
   std::timespec now{};
   ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
@@ -93,12 +93,12 @@ render::Frame draw(render::GlRenderer& renderer, const tests::WalkStop& stop, Si
   render::Camera camera = stop.camera;
   camera.width = size.width;
   camera.height = size.height;
-  const double busy = processorSeconds();
+  const double busy = readProcessorSeconds();
   const auto begin = Clock::now();
   render::Frame frame =
       renderer.render(*stop.snapshot, camera, {.hiddenEntity = stop.walker, .culling = culling});
   result.seconds += std::chrono::duration<double>(Clock::now() - begin).count();
-  result.processor += processorSeconds() - busy;
+  result.processor += readProcessorSeconds() - busy;
   ++result.frames;
   result.statistics.drawn += frame.statistics.drawn;
   result.statistics.occluded += frame.statistics.occluded;
@@ -127,7 +127,7 @@ void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string
   for (std::size_t i = 0; i < stops.size(); i += every, ++compared) {
     const render::Frame all = draw(renderer, stops[i], size, render::Culling::none, single);
     const render::Frame seen = draw(renderer, stops[i], size, render::Culling::occlusion, ignored);
-    different += same(all, seen) ? 0 : 1;
+    different += areSame(all, seen) ? 0 : 1;
   }
   const double n = static_cast<double>(culled.frames), m = static_cast<double>(single.frames);
   const double fast = n / culled.seconds, slow = m / single.seconds;
@@ -226,7 +226,7 @@ int main(int argc, char** argv) {
     return 0;
   }
   benchmark("district:100000", frames);
-  if (const auto shared = tests::sharedFolder()) {
+  if (const auto shared = tests::findSharedFolder()) {
     benchmark((*shared / "scenes/schependomlaan/schependomlaan_estate.glb").string(), frames);
     benchmark((*shared / "scenes/aws-small-house/small_house.gltf").string(), frames);
   }

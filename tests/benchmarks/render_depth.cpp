@@ -33,7 +33,7 @@ using render::Camera;
 using render::Frame;
 using scene::Vec3;
 
-double processorSeconds() {
+double readProcessorSeconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
@@ -44,10 +44,10 @@ struct NamedScene {
   std::function<scene::Model()> make;
 };
 
-std::vector<NamedScene> scenes() {
+std::vector<NamedScene> listScenes() {
   std::vector<NamedScene> all{{"building", [] { return assets::makeBuilding(); }},
                               {"district", [] { return assets::makeDistrict(100'000, 1); }}};
-  if (const auto shared = tests::sharedFolder()) {
+  if (const auto shared = tests::findSharedFolder()) {
     const auto file = [&](const char* path) {
       return [path = *shared / "scenes" / path] { return scene::importModel(path); };
     };
@@ -60,7 +60,7 @@ std::vector<NamedScene> scenes() {
 }
 
 /// Reduces the scene to what all methods draw alike.
-std::shared_ptr<const scene::Scene> plainScene(scene::Model model) {
+std::shared_ptr<const scene::Scene> makePlainScene(scene::Model model) {
   for (scene::Material& material : model.materials) {
     material.alpha = scene::Material::Alpha::opaque;
     material.baseColourTexture = -1;
@@ -70,7 +70,7 @@ std::shared_ptr<const scene::Scene> plainScene(scene::Model model) {
 }
 
 /// Cameras at eye height with a floor below and an object ahead.
-std::vector<Camera> camerasIn(const std::shared_ptr<const scene::Scene>& scene, int count) {
+std::vector<Camera> placeCamerasIn(const std::shared_ptr<const scene::Scene>& scene, int count) {
   const scene::RayCaster caster(scene);
   const scene::Aabb& bounds = scene->bounds();
   std::mt19937_64 random(2026);
@@ -108,7 +108,7 @@ struct Method {
 
 const render::FrameOptions kMeasured{0, {false, true, true, false}};
 
-std::vector<Method> methodsFor(const std::shared_ptr<const scene::Scene>& scene) {
+std::vector<Method> makeMethodsFor(const std::shared_ptr<const scene::Scene>& scene) {
   const auto ignore = [](const Camera&) {};
   std::vector<Method> methods;
   for (const DepthBuffer& buffer :
@@ -132,10 +132,10 @@ void take(Method& method, const Camera& camera, const render::ReferenceFrame& tr
   render::mergeReports(method.report, render::compareWithReference(method.draw(camera), truth));
   for (int i = 0; i < times; ++i) {
     const auto start = Clock::now();
-    const double begun = processorSeconds();
+    const double begun = readProcessorSeconds();
     method.draw(camera);
-    method.processor.push_back(1e3 * (processorSeconds() - begun));
-    method.milliseconds.push_back(1e3 * secondsSince(start));
+    method.processor.push_back(1e3 * (readProcessorSeconds() - begun));
+    method.milliseconds.push_back(1e3 * measureSecondsSince(start));
   }
 }
 
@@ -148,8 +148,8 @@ nlohmann::json makeLine(const std::string& scene, const scene::Model& model, std
   line["triangles"] = triangles;
   line["size"] = std::to_string(size.width) + "x" + std::to_string(size.height);
   line["method"] = method.name;
-  line["ms"] = number(quantile(method.milliseconds, 0.5));
-  line["cpu_ms"] = number(quantile(method.processor, 0.5));
+  line["ms"] = toJsonNumber(computeQuantile(method.milliseconds, 0.5));
+  line["cpu_ms"] = toJsonNumber(computeQuantile(method.processor, 0.5));
   return line;
 }
 
@@ -162,15 +162,15 @@ std::size_t countTriangles(const scene::Model& model) {
 }
 
 void measure(const NamedScene& named, const Arguments& arguments, Results& results) {
-  const auto scene = plainScene(named.make());
-  const std::vector<Camera> cameras = camerasIn(scene, arguments.quick ? 3 : 5);
+  const auto scene = makePlainScene(named.make());
+  const std::vector<Camera> cameras = placeCamerasIn(scene, arguments.quick ? 3 : 5);
   std::printf("%s: %zu objects, %zu cameras\n", named.name.c_str(), scene->model().objects.size(),
               cameras.size());
   render::ReferenceTracer rays(scene);
   const std::size_t triangles = countTriangles(scene->model());
   for (const auto& [width, height] : {std::pair(256, 256), std::pair(640, 480)}) {
     if (arguments.quick && width > 256) break;
-    std::vector<Method> methods = methodsFor(scene);
+    std::vector<Method> methods = makeMethodsFor(scene);
     Camera size;
     for (Camera camera : cameras) {
       camera.width = width;
@@ -183,8 +183,8 @@ void measure(const NamedScene& named, const Arguments& arguments, Results& resul
       results.add(makeLine(named.name, scene->model(), triangles, size, method));
       const render::DepthErrors& away = method.report.awayFromEdges;
       std::printf("  %4dx%-4d %-24s %8.2f ms %8.2f ms CPU   mean %.5f mm  max %.4f mm\n", width,
-                  height, method.name.c_str(), quantile(method.milliseconds, 0.5),
-                  quantile(method.processor, 0.5), 1e3 * away.mean(), 1e3 * away.max);
+                  height, method.name.c_str(), computeQuantile(method.milliseconds, 0.5),
+                  computeQuantile(method.processor, 0.5), 1e3 * away.mean(), 1e3 * away.max);
     }
     std::fflush(stdout);
   }
@@ -198,6 +198,6 @@ int main(int argc, char** argv) {
   if (const auto code = scene::runImportWorker(argc, argv)) return *code;
   const benchmarks::Arguments arguments(argc, argv);
   benchmarks::Results results(arguments);
-  for (const auto& scene : benchmarks::scenes())
+  for (const auto& scene : benchmarks::listScenes())
     if (arguments.wants(scene.name)) benchmarks::measure(scene, arguments, results);
 }

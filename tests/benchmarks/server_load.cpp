@@ -29,11 +29,11 @@ namespace {
 
 using namespace enfilade;
 
-std::uint64_t quantile(const std::vector<std::uint64_t>& sorted, double q) {
+std::uint64_t computeQuantile(const std::vector<std::uint64_t>& sorted, double q) {
   return sorted.empty() ? 0 : sorted[static_cast<std::size_t>(q * double(sorted.size() - 1))];
 }
 
-double processorSeconds() {
+double readProcessorSeconds() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
   const auto seconds = [](const timeval& time) {
@@ -74,14 +74,14 @@ void printRow(const tests::LoadResult& result, double processor) {
   for (const auto& [name, ticks] :
        {std::pair{"taken", &result.acceptedToShown}, std::pair{"sent", &result.sentToShown}}) {
     std::printf("ticks from %s to shown: p50 %llu, p99 %llu, maximum %llu, of %zu commands\n", name,
-                static_cast<unsigned long long>(quantile(*ticks, 0.5)),
-                static_cast<unsigned long long>(quantile(*ticks, 0.99)),
-                static_cast<unsigned long long>(quantile(*ticks, 1)), ticks->size());
+                static_cast<unsigned long long>(computeQuantile(*ticks, 0.5)),
+                static_cast<unsigned long long>(computeQuantile(*ticks, 0.99)),
+                static_cast<unsigned long long>(computeQuantile(*ticks, 1)), ticks->size());
   }
   for (const std::string& fault : result.faults) std::printf("FAULT %s\n", fault.c_str());
 }
 
-server::ServerOptions roomForMany() {
+server::ServerOptions makeRoomForMany() {
   server::ServerOptions options;
   options.world.limits.connections = 4096;
   return options;
@@ -89,18 +89,18 @@ server::ServerOptions roomForMany() {
 
 bool load(const std::shared_ptr<const scene::Scene>& scene, int clients, double seconds,
           double stateRate, std::size_t watchEvery) {
-  server::Server server(scene, {"127.0.0.1", 0}, roomForMany());
+  server::Server server(scene, {"127.0.0.1", 0}, makeRoomForMany());
   tests::LoadOptions options;
   options.port = server.port();
-  options.places = tests::standingPlaces(scene, clients, 1);
+  options.places = tests::findStandingPlaces(scene, clients, 1);
   options.seconds = seconds;
   options.stateRate = stateRate;
   options.watchEvery = watchEvery;
-  const double before = processorSeconds();
+  const double before = readProcessorSeconds();
   double used = 0;
   v1::Metrics metrics;
   const auto atEnd = [&] {
-    used = processorSeconds() - before;
+    used = readProcessorSeconds() - before;
     metrics = protocol::Client("127.0.0.1", server.port()).metrics();
   };
   const tests::LoadResult result = tests::runLoad(options, atEnd, [&] { server.stop(); });
@@ -117,7 +117,7 @@ void printRow(const char* when, const tests::Footprint& now) {
 }
 
 /// Returns when the server has dropped all clients except the calling one.
-bool settled(protocol::Client& client) {
+bool waitUntilSettled(protocol::Client& client) {
   constexpr int kTries = 1000;
   const auto alone = [&] {
     const v1::Metrics metrics = client.metrics();
@@ -133,17 +133,17 @@ bool settled(protocol::Client& client) {
 
 bool visit(const std::shared_ptr<const scene::Scene>& scene, int visits) {
   constexpr double kGrowth = 2e6;  // bytes; 2,000 sessions hold over 100 MB
-  server::Server server(scene, {"127.0.0.1", 0}, roomForMany());
+  server::Server server(scene, {"127.0.0.1", 0}, makeRoomForMany());
   protocol::Client stays("127.0.0.1", server.port());
   v1::SetClock freely;  // so that avatars spawn, and leave with their clients
   freely.mutable_free_run()->set_speed(10);
   stays.setClock(freely);
   tests::visitRudely(server.port(), visits / 10, 1);
-  if (!settled(stays)) return false;
-  const tests::Footprint before = tests::footprint();
+  if (!waitUntilSettled(stays)) return false;
+  const tests::Footprint before = tests::measureFootprint();
   tests::visitRudely(server.port(), visits, 2);
-  const bool alone = settled(stays);
-  const tests::Footprint after = tests::footprint();
+  const bool alone = waitUntilSettled(stays);
+  const tests::Footprint after = tests::measureFootprint();
   std::printf("%d visits:\n", visits);
   printRow("before", before);
   printRow("after", after);

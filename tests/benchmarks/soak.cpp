@@ -38,7 +38,7 @@ constexpr double kGrowthAllowed = 4e6;  // bytes, after a tenth of the ticks: th
 class Soak {
  public:
   explicit Soak(std::shared_ptr<const scene::Scene> scene)
-      : places_(tests::standingPlaces(scene, 8 * kAvatars, 1)), world_(std::move(scene)) {
+      : places_(tests::findStandingPlaces(scene, 8 * kAvatars, 1)), world_(std::move(scene)) {
     // Parts are built lazily when an avatar first comes near. All are built now, so that a first
     // visit does not look like growth.
     for (const std::uint32_t object : world_.scene().solidObjects())
@@ -57,7 +57,7 @@ class Soak {
     notices_ += report.notices.size();
   }
 
-  bool right() const { return audit_.isClean() && worst_ == 0; }
+  bool isRight() const { return audit_.isClean() && worst_ == 0; }
   void printRow() const {
     std::printf(
         "%llu ticks audited, %llu pairs, %llu missed, %llu extra; worst penetration %g m; "
@@ -142,7 +142,7 @@ int main(int argc, char** argv) {
     if (tick % sampleEvery != 0 && tick + 1 != ticks) continue;
     const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
     ::malloc_trim(0);  // memory cached by the allocator is not growth
-    const double resident = static_cast<double>(tests::footprint().residentBytes);
+    const double resident = static_cast<double>(tests::measureFootprint().residentBytes);
     if (tick < warm) afterWarmUp = resident;
     maxResident = std::max(maxResident, tick >= warm ? resident : 0);
     if (tick >= warm && afterWarmUp == 0) afterWarmUp = resident;
@@ -154,5 +154,5 @@ int main(int argc, char** argv) {
   soak.printRow();
   const bool flat = maxResident <= afterWarmUp + kGrowthAllowed;
   std::printf("memory after the warm-up: %+.1f MB\n", 1e-6 * (maxResident - afterWarmUp));
-  return soak.right() && flat ? 0 : 3;
+  return soak.isRight() && flat ? 0 : 3;
 }

@@ -25,7 +25,7 @@ void run(const char* name, std::uint64_t seed, int moves, Totals& all,
   const std::vector<Cell> cells = build(b, random);
   CellFixture fixture(b.model, cells);
   fixture.spawn();
-  fixture.randomMoves(random, moves / static_cast<int>(cells.size()));
+  fixture.moveRandomly(random, moves / static_cast<int>(cells.size()));
   std::printf("| %-18s | %7d | %6.1f %% | %7d | %11d |\n", name, fixture.moves,
               100.0 * fixture.blocked / fixture.moves, fixture.outside, fixture.penetrating);
   all.moves += fixture.moves;
@@ -33,12 +33,12 @@ void run(const char* name, std::uint64_t seed, int moves, Totals& all,
   all.penetrating += fixture.penetrating;
 }
 
-std::vector<Cell> stairs(Builder& b, Seeded& random) {
+std::vector<Cell> makeStairs(Builder& b, Seeded& random) {
   std::vector<Cell> cells;
   for (int i = 0; i < 16; ++i)
-    cells.push_back(stairCell(b, "stair" + std::to_string(i),
-                              0.02 * std::pow(35, random.uniform(0, 1)),
-                              0.02 * std::pow(35, random.uniform(0, 1)), 9, 2.5 * i));
+    cells.push_back(addStairCell(b, "stair" + std::to_string(i),
+                                 0.02 * std::pow(35, random.drawUniform(0, 1)),
+                                 0.02 * std::pow(35, random.drawUniform(0, 1)), 9, 2.5 * i));
   return cells;
 }
 
@@ -52,7 +52,7 @@ int main(int argc, char** argv) {
       "|---|---|---|---|---|\n");
   Totals all;
   const auto grid = [](double size, bool sliced) {
-    return [=](Builder& b, Seeded&) { return gridOfCells(b, 4, size, 3, sliced); };
+    return [=](Builder& b, Seeded&) { return addGridOfCells(b, 4, size, 3, sliced); };
   };
   const int each = moves / 7;
   run("sheets, 1.4 m", seed, each, all, grid(1.4, false));
@@ -60,10 +60,10 @@ int main(int argc, char** argv) {
   run("slivers, 1.4 m", seed + 2, each, all, grid(1.4, true));
   run("slivers, 4 m", seed + 3, each, all, grid(4, true));
   run("panes of 1 mm", seed + 4, each, all,
-      [](Builder& b, Seeded& random) { return paneRooms(b, 8, random); });
+      [](Builder& b, Seeded& random) { return addPaneRooms(b, 8, random); });
   run("gaps of 1 mm more", seed + 5, each, all,
-      [](Builder& b, Seeded&) { return gapRooms(b, 8, 0.601); });
-  run("stairs", seed + 6, each, all, stairs);
+      [](Builder& b, Seeded&) { return addGapRooms(b, 8, 0.601); });
+  run("stairs", seed + 6, each, all, makeStairs);
   std::printf("%d moves, %d outside their cell, %d penetrating\n", all.moves, all.outside,
               all.penetrating);
   return all.outside + all.penetrating == 0 ? 0 : 3;

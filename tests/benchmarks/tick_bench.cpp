@@ -34,17 +34,17 @@ using namespace enfilade::benchmarks;
 using scene::Notice;
 using scene::Vec3;
 
-double quantile(std::vector<double> values, double q) {
+double computeQuantile(std::vector<double> values, double q) {
   std::sort(values.begin(), values.end());
   return values.empty() ? 0 : values[static_cast<std::size_t>(q * double(values.size() - 1))];
 }
 
-void row(const char* name, const std::vector<double>& seconds) {
-  std::printf("| %-8s | %9.1f | %9.1f | %9.1f |\n", name, 1e6 * quantile(seconds, 0.5),
-              1e6 * quantile(seconds, 0.99), 1e6 * quantile(seconds, 1));
+void printRow(const char* name, const std::vector<double>& seconds) {
+  std::printf("| %-8s | %9.1f | %9.1f | %9.1f |\n", name, 1e6 * computeQuantile(seconds, 0.5),
+              1e6 * computeQuantile(seconds, 0.99), 1e6 * computeQuantile(seconds, 1));
 }
 
-double peakMegabytes() {
+double readPeakMegabytes() {
   rusage usage{};
   getrusage(RUSAGE_SELF, &usage);
   return static_cast<double>(usage.ru_maxrss) / 1024;
@@ -68,7 +68,7 @@ std::shared_ptr<const scene::Scene> load(const std::filesystem::path& file) {
   auto staticScene = std::make_shared<const scene::Scene>(loadNamedModel(file));
   const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
   std::printf("%s: %zu objects loaded in %.2f s, %.0f MB at most\n", file.c_str(),
-              staticScene->model().objects.size(), took.count(), peakMegabytes());
+              staticScene->model().objects.size(), took.count(), readPeakMegabytes());
   return staticScene;
 }
 
@@ -81,10 +81,10 @@ void measure(const std::string& title, scene::World& world, int ticks,
   std::uint64_t queries = 0, rationals = 0, pairs = 0, bounded = 0;
   for (int i = 0; i < ticks; ++i) {
     before(i);
-    const double start = processorTime(), startOfAll = processorTimeOfAllThreads();
+    const double start = readProcessorTime(), startOfAll = readTimeOfAllThreads();
     const scene::TickReport report = tickWorld(world);
-    processor.push_back(processorTime() - start);
-    allProcessors.push_back(processorTimeOfAllThreads() - startOfAll);
+    processor.push_back(readProcessorTime() - start);
+    allProcessors.push_back(readTimeOfAllThreads() - startOfAll);
     double sum = 0;
     for (std::size_t s = 0; s < scene::kStageCount; ++s) {
       stages[s].push_back(report.stageSeconds[s]);
@@ -100,10 +100,10 @@ void measure(const std::string& title, scene::World& world, int ticks,
   std::printf("%s: %zu objects, %zu avatars, %d ticks\n", title.c_str(),
               world.scene().model().objects.size(), world.snapshot()->avatars.size(), ticks);
   std::printf("| stage    | median us |    p99 us |    max us |\n|---|---|---|---|\n");
-  for (std::size_t s = 0; s < scene::kStageCount; ++s) row(scene::kStageNames[s], stages[s]);
-  row("tick", whole);
-  row("main CPU", processor);
-  row("all CPUs", allProcessors);
+  for (std::size_t s = 0; s < scene::kStageCount; ++s) printRow(scene::kStageNames[s], stages[s]);
+  printRow("tick", whole);
+  printRow("main CPU", processor);
+  printRow("all CPUs", allProcessors);
   std::printf(
       "a tick: %.1f pairs, %.1f narrow queries, %.3f of them rational; "
       "%llu sweeps bounded; worst penetration %g m; state hash %016llx\n",
@@ -129,7 +129,7 @@ void bench(const std::filesystem::path& file, int avatars, int ticks, int thread
 void benchCrowd(int ticks) {
   constexpr int kCrowd = 200;
   scene::testing::Builder builder;
-  scene::testing::sheetCell(builder, "corridor", {-30, 0, -2}, {30, 3, 2}, false);
+  scene::testing::addSheetCell(builder, "corridor", {-30, 0, -2}, {30, 3, 2}, false);
   scene::World world(std::make_shared<const scene::Scene>(builder.model));
   const auto name = [](int i) { return "walker" + std::to_string(i); };
   for (int i = 0; i < kCrowd; ++i)
@@ -145,10 +145,10 @@ void benchCrowd(int ticks) {
 }
 
 /// The bundled building, and the shared estate of 16,395 objects if present.
-std::vector<std::filesystem::path> defaultScenes(const char* program) {
+std::vector<std::filesystem::path> listDefaultScenes(const char* program) {
   const auto built = std::filesystem::absolute(program).parent_path().parent_path();
   std::vector<std::filesystem::path> scenes{built / "assets/building.glb"};
-  if (const auto shared = tests::sharedFolder())
+  if (const auto shared = tests::findSharedFolder())
     scenes.push_back(*shared / "scenes/schependomlaan/schependomlaan_estate.glb");
   return scenes;
 }
@@ -163,7 +163,7 @@ int main(int argc, char** argv) {
   if (argc > 1) {
     bench(argv[1], avatars, ticks, threads);
   } else {
-    for (const auto& scene : defaultScenes(argv[0])) bench(scene, avatars, ticks, threads);
+    for (const auto& scene : listDefaultScenes(argv[0])) bench(scene, avatars, ticks, threads);
     benchCrowd(600);
   }
 }

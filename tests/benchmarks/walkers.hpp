@@ -12,14 +12,14 @@
 namespace enfilade::benchmarks {
 
 /// Equal on all standard libraries, unlike std::uniform_real_distribution.
-inline double uniform(std::mt19937_64& random, double low, double high) {
+inline double drawUniform(std::mt19937_64& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
 }
 
-inline scene::Vec3 somewhere(std::mt19937_64& random, const scene::Aabb& b) {
-  const double x = uniform(random, b.min.x(), b.max.x());
-  const double y = uniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
-  const double z = uniform(random, b.min.z(), b.max.z());
+inline scene::Vec3 drawPlace(std::mt19937_64& random, const scene::Aabb& b) {
+  const double x = drawUniform(random, b.min.x(), b.max.x());
+  const double y = drawUniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
+  const double z = drawUniform(random, b.min.z(), b.max.z());
   return {x, y, z};
 }
 
@@ -28,7 +28,7 @@ inline void spawnAvatars(scene::World& world, std::size_t count, std::mt19937_64
   for (std::size_t tries = 0; tries < 200 * count; ++tries) {
     if (world.snapshot()->avatars.size() >= count) return;
     const std::string name = "walker" + std::to_string(world.snapshot()->tick);
-    submitAvatarCommand(world, {name, scene::Spawn{somewhere(random, world.scene().bounds())}, 0});
+    submitAvatarCommand(world, {name, scene::Spawn{drawPlace(random, world.scene().bounds())}, 0});
     tickWorld(world);
   }
 }
@@ -36,7 +36,7 @@ inline void spawnAvatars(scene::World& world, std::size_t count, std::mt19937_64
 /// Drives all avatars towards new places at `speed` (m/s).
 inline void turnAll(scene::World& world, double speed, std::mt19937_64& random) {
   for (const scene::AvatarSnapshot& avatar : world.snapshot()->avatars) {
-    scene::Vec3 way = somewhere(random, world.scene().bounds()) - avatar.footPosition;
+    scene::Vec3 way = drawPlace(random, world.scene().bounds()) - avatar.footPosition;
     way.y() = 0;
     submitAvatarCommand(world, {avatar.name, scene::Drive{speed * way.normalized()}, 0});
   }
@@ -48,11 +48,11 @@ inline double readClock(clockid_t clock) {
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
 }
 /// CPU time of this thread, seconds; other load does not count.
-inline double processorTime() {
+inline double readProcessorTime() {
   return readClock(CLOCK_THREAD_CPUTIME_ID);
 }
 /// The same of all threads of the process.
-inline double processorTimeOfAllThreads() {
+inline double readTimeOfAllThreads() {
   return readClock(CLOCK_PROCESS_CPUTIME_ID);
 }
 

@@ -10,14 +10,14 @@
 namespace enfilade::collision {
 namespace {
 
-Vec3 randomUnit(std::mt19937& random) {
+Vec3 makeRandomUnit(std::mt19937& random) {
   std::normal_distribution<double> number;
   return Vec3(number(random), number(random), number(random)).normalized();
 }
 
-Hull randomHull(std::mt19937& random, int points) {
+Hull makeSmallHull(std::mt19937& random, int points) {
   std::vector<Vec3> corners;
-  for (int i = 0; i < points; ++i) corners.push_back(0.1 * randomUnit(random));
+  for (int i = 0; i < points; ++i) corners.push_back(0.1 * makeRandomUnit(random));
   return buildHull(corners);
 }
 
@@ -26,15 +26,16 @@ TEST(AxisSeparation, IsNeverMoreThanTheDistanceAndAllOfItAlongTheClosestPoints) 
   int apart = 0;
   for (int i = 0; i < 2000; ++i) {
     const int corners = i % 4 == 0 ? 60 : 6 + i % 11;  // many: by climbing
-    const Hull a = randomHull(random, corners), b = randomHull(random, 8);
-    const Mat3 turned = Eigen::AngleAxisd(1.0 + i, randomUnit(random)).toRotationMatrix();
-    const PlacedConvex bodyA{a.vertices, 5 * randomUnit(random), &turned, &a};
-    const PlacedConvex bodyB{b.vertices, bodyA.translation + 0.25 * randomUnit(random), nullptr,
+    const Hull a = makeSmallHull(random, corners), b = makeSmallHull(random, 8);
+    const Mat3 turned = Eigen::AngleAxisd(1.0 + i, makeRandomUnit(random)).toRotationMatrix();
+    const PlacedConvex bodyA{a.vertices, 5 * makeRandomUnit(random), &turned, &a};
+    const PlacedConvex bodyB{b.vertices, bodyA.translation + 0.25 * makeRandomUnit(random), nullptr,
                              &b};
     FeatureCache cache;
     const SeparationResult separation = computeSeparation(bodyA, bodyB, cache);
     const double distance = separation.distance + separation.errorBound;
-    EXPECT_LE(computeAxisSeparation(bodyA, bodyB, randomUnit(random)).lowerBound, distance) << i;
+    EXPECT_LE(computeAxisSeparation(bodyA, bodyB, makeRandomUnit(random)).lowerBound, distance)
+        << i;
     if (separation.verdict != Verdict::separated) continue;
     ++apart;
     const AxisSeparation along = computeAxisSeparation(bodyA, bodyB, separation.normal);
@@ -48,10 +49,10 @@ TEST(AxisSeparation, IsNeverMoreThanTheDistanceAndAllOfItAlongTheClosestPoints) 
 TEST(AxisSeparation, SwappingTheBodiesAndTheDirectionChangesNothing) {
   std::mt19937 random(6);
   for (int i = 0; i < 200; ++i) {
-    const Hull a = randomHull(random, 8), b = randomHull(random, 8);
-    const PlacedConvex bodyA{a.vertices, randomUnit(random), nullptr, &a};
-    const PlacedConvex bodyB{b.vertices, randomUnit(random), nullptr, &b};
-    const Vec3 direction = randomUnit(random);
+    const Hull a = makeSmallHull(random, 8), b = makeSmallHull(random, 8);
+    const PlacedConvex bodyA{a.vertices, makeRandomUnit(random), nullptr, &a};
+    const PlacedConvex bodyB{b.vertices, makeRandomUnit(random), nullptr, &b};
+    const Vec3 direction = makeRandomUnit(random);
     const AxisSeparation one = computeAxisSeparation(bodyA, bodyB, direction),
                          other = computeAxisSeparation(bodyB, bodyA, -direction);
     EXPECT_NEAR(one.value, other.value, 1e-15);
@@ -62,7 +63,7 @@ TEST(AxisSeparation, SwappingTheBodiesAndTheDirectionChangesNothing) {
 
 TEST(AxisSeparation, NonFiniteInputCertifiesNothing) {
   std::mt19937 random(7);
-  const Hull a = randomHull(random, 8);
+  const Hull a = makeSmallHull(random, 8);
   const PlacedConvex here{a.vertices, Vec3::Zero(), nullptr, &a};
   const PlacedConvex nowhere{a.vertices, {std::nan(""), 0, 0}, nullptr, &a};
   EXPECT_EQ(computeAxisSeparation(here, nowhere, Vec3::UnitX()).lowerBound,

@@ -11,7 +11,7 @@
 namespace enfilade::collision {
 namespace {
 
-Hull randomHull(std::mt19937& random, std::size_t points) {
+Hull makeRandomHull(std::mt19937& random, std::size_t points) {
   std::uniform_real_distribution<double> coordinate(-1, 1);
   std::vector<Vec3> cloud;
   for (std::size_t k = 0; k < points; ++k) {
@@ -21,7 +21,7 @@ Hull randomHull(std::mt19937& random, std::size_t points) {
   return buildHull(cloud);
 }
 
-Pose randomPose(std::mt19937& random, double reach) {
+Pose makeRandomPose(std::mt19937& random, double reach) {
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> coordinate(-reach, reach);
   const double w = normal(random), i = normal(random), j = normal(random), k = normal(random);
@@ -87,13 +87,13 @@ struct Turning {
   Turning(const Hull& h, AabbMethod method) : hull(h), support(buildSupportTable(h, method)) {
     support.minTurnTrace = -std::numeric_limits<double>::infinity();
   }
-  Aabb box(const Pose& pose, double clearance = 0) {
+  Aabb computeBox(const Pose& pose, double clearance = 0) {
     return computeAabb(hull, support, pose.rotation.toRotationMatrix(), pose.translation, last,
                        looked, clearance);
   }
 };
 
-Aabb scannedBox(const Hull& hull, const Pose& pose, double clearance = 0) {
+Aabb computeScannedBox(const Hull& hull, const Pose& pose, double clearance = 0) {
   return computeTightAabb(hull, pose.rotation.toRotationMatrix(), pose.translation, clearance);
 }
 
@@ -109,26 +109,26 @@ Quat rotateBy(const Quat& rotation, const Vec3& half) {
 TEST(HillClimb, GivesTheBoxOfTheScanToTheLastBitAndContainsTheExactOne) {
   std::mt19937 random(11);
   for (int body = 0; body < 40; ++body) {
-    const Hull hull = randomHull(random, 8 + 3 * static_cast<std::size_t>(body));
-    Pose pose = randomPose(random, body % 2 == 0 ? 10.0 : 1e6);
+    const Hull hull = makeRandomHull(random, 8 + 3 * static_cast<std::size_t>(body));
+    Pose pose = makeRandomPose(random, body % 2 == 0 ? 10.0 : 1e6);
     Turning climbing(hull, AabbMethod::hillClimb);
     for (int tick = 0; tick < 20; ++tick) {
       pose.rotation = rotateBy(pose.rotation, Vec3(0.02, 0.03, -0.01));
-      const Aabb box = climbing.box(pose);
+      const Aabb box = climbing.computeBox(pose);
       expectContains(box, hull, pose);
-      expectSame(box, scannedBox(hull, pose));
+      expectSame(box, computeScannedBox(hull, pose));
     }
   }
 }
 
 TEST(HillClimb, GivesTheSameBoxFromAnyStartAndFromIndicesOfAnotherHull) {
   std::mt19937 random(12);
-  const Hull hull = randomHull(random, 200);
-  const Pose pose = randomPose(random, 5.0);
+  const Hull hull = makeRandomHull(random, 200);
+  const Pose pose = makeRandomPose(random, 5.0);
   for (std::uint32_t start = 0; start < hull.vertices.size() + 3; ++start) {
     Turning climbing(hull, AabbMethod::hillClimb);
     climbing.last.vertex.fill(start);
-    expectSame(climbing.box(pose), scannedBox(hull, pose));
+    expectSame(climbing.computeBox(pose), computeScannedBox(hull, pose));
   }
 }
 
@@ -144,12 +144,12 @@ TEST(HillClimb, IsNotFooledByATopThatRisesLessThanRoundingShows) {
   const Hull hull = buildHull(corners);
   for (const double tilt : {0.0, 1e-19, 1e-17, 1e-16, 3e-16, 1e-15, 1e-14}) {
     const Pose pose{Quat(1, tilt, -tilt, 0), Vec3::Zero()};
-    const Aabb scanned = scannedBox(hull, pose);
+    const Aabb scanned = computeScannedBox(hull, pose);
     expectContains(scanned, hull, pose);
     for (std::uint32_t start = 0; start < hull.vertices.size(); start += 7) {
       Turning climbing(hull, AabbMethod::hillClimb);
       climbing.last.vertex.fill(start);
-      expectSame(climbing.box(pose), scanned);
+      expectSame(climbing.computeBox(pose), scanned);
     }
   }
 }
@@ -171,14 +171,14 @@ TEST(HillClimb, HoldsForVerticesThatWereMovedByRoundingSinceTheHullWasBuilt) {
       vertex -= Vec3(0.1 / 3, 0.4, -0.7 / 9);
       hull.radius = std::max(hull.radius, vertex.norm());
     }
-    const Quat random1 = randomPose(random, 1).rotation;
+    const Quat random1 = makeRandomPose(random, 1).rotation;
     for (const Quat& rotation : {Quat::Identity(), Quat(1, 1, 0, 0).normalized(),
                                  Quat(1, 0, 1, 0).normalized(), random1}) {
       const Pose pose{rotation, Vec3(1, 2, 3)};
       for (std::uint32_t start = 0; start < hull.vertices.size(); start += 5) {
         Turning climbing(hull, AabbMethod::hillClimb);
         climbing.last.vertex.fill(start);
-        expectSame(climbing.box(pose), scannedBox(hull, pose));
+        expectSame(climbing.computeBox(pose), computeScannedBox(hull, pose));
       }
     }
   }
@@ -194,16 +194,16 @@ TEST(HillClimb, LooksAtFewVerticesOfABodyThatTurnsSlowly) {
   }
   const Hull hull = buildHull(points);
   Turning climbing(hull, AabbMethod::hillClimb);
-  Pose pose = randomPose(random, 5.0);
-  climbing.box(pose);
+  Pose pose = makeRandomPose(random, 5.0);
+  climbing.computeBox(pose);
   climbing.looked = 0;
   const ExtremalVertices before = climbing.last;
   pose.translation += Vec3(1, 2, 3);
-  climbing.box(pose);
+  climbing.computeBox(pose);
   EXPECT_EQ(before.vertex, climbing.last.vertex);
   for (int tick = 0; tick < 50; ++tick) {
     pose.rotation = rotateBy(pose.rotation, Vec3(0.01, 0.01, -0.01));
-    climbing.box(pose);
+    climbing.computeBox(pose);
   }
   EXPECT_LT(climbing.looked / 51, 100u);
 }
@@ -216,22 +216,22 @@ TEST(TightBox, OfFlatHullsIsRight) {
     const Hull hull = buildHull(points);
     Turning climbing(hull, AabbMethod::hillClimb);
     for (int k = 0; k < 50; ++k) {
-      const Pose pose = randomPose(random, 3.0);
-      const Aabb box = climbing.box(pose);
+      const Pose pose = makeRandomPose(random, 3.0);
+      const Aabb box = climbing.computeBox(pose);
       expectContains(box, hull, pose);
-      expectSame(box, scannedBox(hull, pose));
+      expectSame(box, computeScannedBox(hull, pose));
     }
   }
 }
 
 TEST(SphereCube, ContainsTheBodyInEveryAttitude) {
   std::mt19937 random(15);
-  const Hull hull = randomHull(random, 30);
+  const Hull hull = makeRandomHull(random, 30);
   Turning cube(hull, AabbMethod::sphereCube);
   for (int k = 0; k < 100; ++k) {
-    const Pose pose = randomPose(random, 100.0);
-    expectContains(cube.box(pose), hull, pose);
-    EXPECT_NEAR(cube.box(pose).size().x(), 2 * hull.radius, 1e-12);
+    const Pose pose = makeRandomPose(random, 100.0);
+    expectContains(cube.computeBox(pose), hull, pose);
+    EXPECT_NEAR(cube.computeBox(pose).size().x(), 2 * hull.radius, 1e-12);
   }
   EXPECT_EQ(cube.looked, 0u);
 }
@@ -240,13 +240,14 @@ TEST(BoxesWithClearance, HoldTheExactBoxGrownByItWhateverTheSizes) {
   std::mt19937 random(16);
   int rounded = 0;
   for (int body = 0; body < 60; ++body) {
-    const Hull hull = randomHull(random, 12);
-    const Pose pose = randomPose(random, std::ldexp(1.0, 5 * (body % 8)));
+    const Hull hull = makeRandomHull(random, 12);
+    const Pose pose = makeRandomPose(random, std::ldexp(1.0, 5 * (body % 8)));
     const double clearance = std::ldexp(0.7, body % 50 - 40);
     for (const AabbMethod method :
          {AabbMethod::sphereCube, AabbMethod::vertexScan, AabbMethod::hillClimb})
-      expectContains(Turning(hull, method).box(pose, clearance), hull, pose, clearance);
-    const Aabb box = scannedBox(hull, pose, clearance), tight = scannedBox(hull, pose);
+      expectContains(Turning(hull, method).computeBox(pose, clearance), hull, pose, clearance);
+    const Aabb box = computeScannedBox(hull, pose, clearance),
+               tight = computeScannedBox(hull, pose);
     const double slack = 0x1p-44 * (hull.radius + pose.translation.norm() + clearance);
     EXPECT_LE((box.max - tight.max).maxCoeff(), clearance + slack);
     // Adding the clearance to the tight box with rounding to nearest is not sufficient.
@@ -255,7 +256,7 @@ TEST(BoxesWithClearance, HoldTheExactBoxGrownByItWhateverTheSizes) {
   EXPECT_GT(rounded, 10);
 }
 
-Hull ellipsoid(std::mt19937& random, int vertices, const Vec3& halfAxes) {
+Hull makeEllipsoid(std::mt19937& random, int vertices, const Vec3& halfAxes) {
   std::normal_distribution<double> normal;
   std::vector<Vec3> points;
   for (int k = 0; k < vertices; ++k) {
@@ -267,16 +268,16 @@ Hull ellipsoid(std::mt19937& random, int vertices, const Vec3& halfAxes) {
 
 TEST(HillClimb, ScansAfterALargeTurnAlone) {
   std::mt19937 random(19);
-  const Hull hull = ellipsoid(random, 60, Vec3(0.2, 0.15, 0.1));
+  const Hull hull = makeEllipsoid(random, 60, Vec3(0.2, 0.15, 0.1));
   const SupportTable support = buildSupportTable(hull, AabbMethod::hillClimb);
   ExtremalVertices last;
-  Pose pose = randomPose(random, 5.0);
+  Pose pose = makeRandomPose(random, 5.0);
   const auto countLooked = [&](double turn) {
     pose.rotation = rotateBy(pose.rotation, Vec3(0, turn / 2, 0));
     std::uint64_t looked = 0;
     expectSame(computeAabb(hull, support, pose.rotation.toRotationMatrix(), pose.translation, last,
                            looked),
-               scannedBox(hull, pose));
+               computeScannedBox(hull, pose));
     return looked;
   };
   countLooked(0);  // climbs from any vertex
@@ -288,11 +289,11 @@ TEST(HillClimb, ScansAfterALargeTurnAlone) {
 
 TEST(AabbMethod, IsTheCubeForTheRoundTheScanForTheSmallTheClimbForTheLarge) {
   std::mt19937 random(18);
-  EXPECT_EQ(chooseAabbMethod(ellipsoid(random, 1000, Vec3(0.25, 0.25, 0.25))),
+  EXPECT_EQ(chooseAabbMethod(makeEllipsoid(random, 1000, Vec3(0.25, 0.25, 0.25))),
             AabbMethod::sphereCube);
-  EXPECT_EQ(chooseAabbMethod(ellipsoid(random, 8, Vec3(1, 0.1, 0.1))), AabbMethod::vertexScan);
-  EXPECT_EQ(chooseAabbMethod(ellipsoid(random, 200, Vec3(1, 0.1, 0.1))), AabbMethod::hillClimb);
-  std::vector<Vec3> moved = ellipsoid(random, 1000, Vec3(0.2, 0.2, 0.2)).vertices;
+  EXPECT_EQ(chooseAabbMethod(makeEllipsoid(random, 8, Vec3(1, 0.1, 0.1))), AabbMethod::vertexScan);
+  EXPECT_EQ(chooseAabbMethod(makeEllipsoid(random, 200, Vec3(1, 0.1, 0.1))), AabbMethod::hillClimb);
+  std::vector<Vec3> moved = makeEllipsoid(random, 1000, Vec3(0.2, 0.2, 0.2)).vertices;
   for (Vec3& vertex : moved) vertex += Vec3(1, 0, 0);  // far from its own origin
   EXPECT_EQ(chooseAabbMethod(buildHull(moved)), AabbMethod::hillClimb);
 }

@@ -17,7 +17,7 @@ namespace {
 using Id = BoxTable::Id;
 using IdPairs = std::vector<BoxTable::IdPair>;
 
-IdPairs sorted(IdPairs pairs) {
+IdPairs sortPairs(IdPairs pairs) {
   for (auto& [a, b] : pairs)
     if (a > b) std::swap(a, b);
   std::sort(pairs.begin(), pairs.end());
@@ -58,8 +58,8 @@ std::size_t BoxTables::checkPairs(const std::vector<Aabb>& boxes, const Aabb& qu
   IdPairs found, foundByQuery;
   table.findPairs(found);
   table.findOverlaps(toMaxEndpoints(query), kQuery, foundByQuery);
-  EXPECT_EQ(sorted(found), expected);
-  EXPECT_EQ(sorted(foundByQuery), expectedByQuery);
+  EXPECT_EQ(sortPairs(found), expected);
+  EXPECT_EQ(sortPairs(foundByQuery), expectedByQuery);
   return expected.size();
 }
 
@@ -69,8 +69,8 @@ TEST_P(BoxTables, FindsThePairsOfEqualBoxesInAnyDensity) {
     std::vector<Aabb> boxes;
     for (int k = 0; k < 300; ++k)
       boxes.push_back(
-          boxAt(uniform3(random, Vec3::Zero(), Vec3::Constant(width)), Vec3::Constant(1)));
-    checkPairs(boxes, boxAt(Vec3::Constant(width / 3), Vec3(1, 2, 3)));
+          makeBoxAt(drawVector(random, Vec3::Zero(), Vec3::Constant(width)), Vec3::Constant(1)));
+    checkPairs(boxes, makeBoxAt(Vec3::Constant(width / 3), Vec3(1, 2, 3)));
   }
 }
 
@@ -80,10 +80,10 @@ TEST_P(BoxTables, FindsThePairsOfBoxesOfAllSizesAndPlaces) {
   for (int round = 0; round < 40; ++round) {
     std::vector<Aabb> boxes;
     const auto randomBox = [&] {
-      const double reach = std::exp2(randomInt(random, -2, 8));
-      const Vec3 size =
-          std::exp2(randomInt(random, -12, 8)) * uniform3(random, Vec3::Zero(), Vec3::Constant(1));
-      return boxAt(uniform3(random, Vec3::Constant(-reach), Vec3::Constant(reach)), size);
+      const double reach = std::exp2(drawInteger(random, -2, 8));
+      const Vec3 size = std::exp2(drawInteger(random, -12, 8)) *
+                        drawVector(random, Vec3::Zero(), Vec3::Constant(1));
+      return makeBoxAt(drawVector(random, Vec3::Constant(-reach), Vec3::Constant(reach)), size);
     };
     for (int k = 0; k < 200; ++k) boxes.push_back(randomBox());
     pairs += checkPairs(boxes, randomBox());
@@ -95,10 +95,11 @@ TEST_P(BoxTables, FindsThePairsOfFewLargeBoxesAmongManySmallOnes) {
   Random random(3);
   std::vector<Aabb> boxes;
   for (int k = 0; k < 600; ++k)
-    boxes.push_back(boxAt(uniform3(random, Vec3::Zero(), Vec3::Constant(60)), Vec3::Constant(0.3)));
+    boxes.push_back(
+        makeBoxAt(drawVector(random, Vec3::Zero(), Vec3::Constant(60)), Vec3::Constant(0.3)));
   for (const double size : {20.0, 50.0, 1000.0})
-    boxes.push_back(boxAt(Vec3::Constant(-3), Vec3(size, 0.5 * size, size)));
-  EXPECT_GT(checkPairs(boxes, boxAt(Vec3::Constant(-1e9), Vec3::Constant(2e9))), 600u);
+    boxes.push_back(makeBoxAt(Vec3::Constant(-3), Vec3(size, 0.5 * size, size)));
+  EXPECT_GT(checkPairs(boxes, makeBoxAt(Vec3::Constant(-1e9), Vec3::Constant(2e9))), 600u);
 }
 
 TEST_P(BoxTables, BoxesThatTouchOverlapAndThoseApartByOneRoundingDoNot) {
@@ -111,7 +112,7 @@ TEST_P(BoxTables, BoxesThatTouchOverlapAndThoseApartByOneRoundingDoNot) {
           const Vec3 corner = Vec3::Constant(centre) + Vec3(x, y, z) * 0.7;
           Aabb box{corner, corner + Vec3::Constant(0.7)};
           for (int axis = 0; axis < 3; ++axis) {  // touch the next one exactly, or almost
-            const int chance = randomInt(random, 0, 2);
+            const int chance = drawInteger(random, 0, 2);
             const double next = centre + (Vec3(x, y, z)[axis] + 1) * 0.7;
             box.max[axis] = chance == 0 ? next : std::nextafter(next, chance == 1 ? -1e300 : 1e300);
           }
@@ -127,9 +128,9 @@ TEST_P(BoxTables, RoundingNeverPutsBoxesThatTouchTwoCellsApart) {
   // other.
   Random random(6);
   for (int round = 0; round < 3000; ++round) {
-    const double size = uniform(random, 0.01, 3);
+    const double size = drawBetween(random, 0.01, 3);
     const double far = round % 2 == 0 ? 0 : 0x1p38;  // cells away: corners are rounded, too
-    const double border = size * (far + randomInt(random, -40, 40));
+    const double border = size * (far + drawInteger(random, -40, 40));
     std::vector<Aabb> boxes;
     for (const double below : {border, std::nextafter(border, -1e300)}) {
       for (const double above : {below + size, std::nextafter(below + size, 1e300)}) {
@@ -148,29 +149,32 @@ TEST_P(BoxTables, AcceptsPointsHugeCoordinatesAndDistantClusters) {
   for (const double centre : {-1e300, -1e15, 0.0, 5e-324, 1e9, 1.7e308})
     for (int k = 0; k < 20; ++k) {
       const Vec3 corner =
-          Vec3::Constant(centre) + uniform3(random, Vec3::Zero(), Vec3::Constant(2));
-      boxes.push_back(boxAt(corner, Vec3::Constant(k % 3 == 0 ? 0.0 : 1.0)));
+          Vec3::Constant(centre) + drawVector(random, Vec3::Zero(), Vec3::Constant(2));
+      boxes.push_back(makeBoxAt(corner, Vec3::Constant(k % 3 == 0 ? 0.0 : 1.0)));
     }
   boxes.push_back({Vec3::Constant(-1.7e308), Vec3::Constant(1.7e308)});
   boxes.push_back({Vec3::Zero(), Vec3(5e-324, 0, 0)});
-  EXPECT_GT(checkPairs(boxes, boxAt(Vec3::Constant(1e9), Vec3::Zero())), 100u);
+  EXPECT_GT(checkPairs(boxes, makeBoxAt(Vec3::Constant(1e9), Vec3::Zero())), 100u);
 }
 
 TEST_P(BoxTables, FindsThePairsOfBoxesOfHundredsOfSizes) {
   std::vector<Aabb> boxes;  // no two have sizes of one level
   for (int k = -150; k < 150; ++k)
-    boxes.push_back(boxAt(Vec3::Zero(), Vec3::Constant(std::ldexp(1.0, 2 * k))));
+    boxes.push_back(makeBoxAt(Vec3::Zero(), Vec3::Constant(std::ldexp(1.0, 2 * k))));
   const double size = std::ldexp(1.0, 299);  // many of the largest level, which all overlap
   Random random(7);
   for (int k = 0; k < 20; ++k)
-    boxes.push_back(boxAt(uniform3(random, Vec3::Constant(-0.5 * size), Vec3::Constant(0.5 * size)),
-                          Vec3::Constant(size)));
+    boxes.push_back(
+        makeBoxAt(drawVector(random, Vec3::Constant(-0.5 * size), Vec3::Constant(0.5 * size)),
+                  Vec3::Constant(size)));
   EXPECT_GT(checkPairs(boxes, boxes[299]), 40000u);
 }
 
 TEST_P(BoxTables, FindsNothingInAnEmptyTable) {
-  EXPECT_EQ(checkPairs({}, boxAt(Vec3::Zero(), Vec3::Ones())), 0u);
-  EXPECT_EQ(checkPairs({boxAt(Vec3::Zero(), Vec3::Ones())}, boxAt(Vec3::Ones(), Vec3::Ones())), 0u);
+  EXPECT_EQ(checkPairs({}, makeBoxAt(Vec3::Zero(), Vec3::Ones())), 0u);
+  EXPECT_EQ(
+      checkPairs({makeBoxAt(Vec3::Zero(), Vec3::Ones())}, makeBoxAt(Vec3::Ones(), Vec3::Ones())),
+      0u);
 }
 
 }  // namespace

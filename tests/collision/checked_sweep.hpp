@@ -16,19 +16,19 @@ namespace enfilade::collision {
 using Random = std::mt19937_64;
 using Pairs = std::vector<ProxyPair>;
 
-inline double uniform(Random& random, double low, double high) {
+inline double drawBetween(Random& random, double low, double high) {
   return std::uniform_real_distribution<double>(low, high)(random);
 }
-inline int randomInt(Random& random, int low, int high) {
+inline int drawInteger(Random& random, int low, int high) {
   return std::uniform_int_distribution<int>(low, high)(random);
 }
-inline Vec3 uniform3(Random& random, const Vec3& low, const Vec3& high) {
-  const double x = uniform(random, low.x(), high.x());
-  const double y = uniform(random, low.y(), high.y());
-  const double z = uniform(random, low.z(), high.z());
+inline Vec3 drawVector(Random& random, const Vec3& low, const Vec3& high) {
+  const double x = drawBetween(random, low.x(), high.x());
+  const double y = drawBetween(random, low.y(), high.y());
+  const double z = drawBetween(random, low.z(), high.z());
   return {x, y, z};
 }
-inline Aabb boxAt(const Vec3& corner, const Vec3& size) {
+inline Aabb makeBoxAt(const Vec3& corner, const Vec3& size) {
   return {corner, corner + size};
 }
 
@@ -65,9 +65,9 @@ class CheckedSweep {
   }
   void updateAndCheck();
 
-  std::map<ProxyId, Aabb>& dynamicBoxes() { return dynamicBoxes_; }
-  SortAndSweep& sweep() { return sweep_; }
-  const std::vector<Aabb>& staticBoxes() const {
+  std::map<ProxyId, Aabb>& getDynamicBoxes() { return dynamicBoxes_; }
+  SortAndSweep& getSweep() { return sweep_; }
+  const std::vector<Aabb>& getStaticBoxes() const {
     return staticBoxes_;
   }  ///< an empty box for a removed id
   std::size_t pairsAdded = 0, pairsRemoved = 0, dynamicPairsAdded = 0;
@@ -81,7 +81,7 @@ class CheckedSweep {
   Pairs lastPairs_;
 };
 
-inline Pairs difference(const Pairs& a, const Pairs& b) {
+inline Pairs subtractPairs(const Pairs& a, const Pairs& b) {
   Pairs result;
   std::set_difference(a.begin(), a.end(), b.begin(), b.end(), std::back_inserter(result));
   return result;
@@ -93,8 +93,8 @@ inline void CheckedSweep::updateAndCheck() {
   Pairs expected = findPairsBruteForce(staticBoxes_, active);
   const Pairs added(sweep_.addedPairs().begin(), sweep_.addedPairs().end());
   const Pairs removed(sweep_.removedPairs().begin(), sweep_.removedPairs().end());
-  ASSERT_EQ(added, difference(expected, lastPairs_));
-  ASSERT_EQ(removed, difference(lastPairs_, expected));
+  ASSERT_EQ(added, subtractPairs(expected, lastPairs_));
+  ASSERT_EQ(removed, subtractPairs(lastPairs_, expected));
   ASSERT_EQ(sweep_.pairCount(), expected.size());
   ASSERT_EQ(sweep_.staticCount(),
             static_cast<std::size_t>(std::count_if(staticBoxes_.begin(), staticBoxes_.end(),
@@ -125,9 +125,9 @@ inline void CheckedSweep::checkOverlaps(const Pairs& expected) {
 inline std::vector<Aabb> makeFurnishedHall(Random& random, std::size_t count, const Vec3& extent) {
   std::vector<Aabb> boxes;
   for (std::size_t k = 0; k < count; ++k) {
-    const Vec3 corner = uniform3(random, Vec3::Zero(), extent);
-    const Vec3 size = uniform3(random, Vec3::Constant(0.05), Vec3(1.5, 1.0, 1.5));
-    boxes.push_back(boxAt(corner, k % 40 == 0 ? Vec3(12 * size) : size));
+    const Vec3 corner = drawVector(random, Vec3::Zero(), extent);
+    const Vec3 size = drawVector(random, Vec3::Constant(0.05), Vec3(1.5, 1.0, 1.5));
+    boxes.push_back(makeBoxAt(corner, k % 40 == 0 ? Vec3(12 * size) : size));
   }
   return boxes;
 }

@@ -118,7 +118,7 @@ TEST(ContactManifold, FlatBodiesHaveTheirCorners) {
 
 TEST(ContactManifold, ALeaningBoxStandsOnTwoPointsAndOnFourWithinTheLimit) {
   const Hull box = makeBoxHull({0.5, 0.5, 0.5});
-  const Mat3 rotation = rotationAt(1e-3, Vec3(0, 0, 1));  // the far edge is 1 mm up
+  const Mat3 rotation = computeRotationAt(1e-3, Vec3(0, 0, 1));  // the far edge is 1 mm up
   const Vec3 at(0, 0.5005, 0);
   const PlacedConvex floor = makeConvex(kFloor, kFloorAt), leaning = makeConvex(box, at, &rotation);
   EXPECT_EQ(computeManifold(floor, leaning, 1e-4).size, 2u);
@@ -134,12 +134,13 @@ TEST(ContactManifold, DistantBodiesHaveNoPoints) {
 TEST(ContactManifold, OnlyAsManyPointsAsWantedAndTheDeepestAmongThem) {
   std::vector<Vec3> drum;
   for (int i = 0; i < 16; ++i) {
-    const Vec3 at = rotationAt(1, Vec3(0, 1, 0)) * Vec3(wave(0.25 * i), 0, wave(0.25 * i + 1));
+    const Vec3 at = computeRotationAt(1, Vec3(0, 1, 0)) *
+                    Vec3(computeWave(0.25 * i), 0, computeWave(0.25 * i + 1));
     drum.push_back(at);
     drum.push_back(at + Vec3(0, 1, 0));
   }
   const Hull hull = buildHull(drum);
-  const Mat3 rotation = rotationAt(1e-5, Vec3(1, 0, 2));
+  const Mat3 rotation = computeRotationAt(1e-5, Vec3(1, 0, 2));
   const PlacedConvex floor = makeConvex(kFloor, kFloorAt),
                      b = makeConvex(hull, {0, 1e-4, 0}, &rotation);
   for (const std::size_t maxPoints : {1u, 3u, 8u}) {
@@ -154,8 +155,9 @@ TEST(ContactManifold, SwappingFlipsTheNormalAndKeepsThePoints) {
   Random random(41);
   int points = 0;
   for (int i = 0; i < 60; ++i) {
-    const Hull first = makeBoxHull({1, 0.5, 1}), second = buildHull(randomPoints(random, 12, 0.7));
-    const Mat3 turned = rotationAt(uniform(random, -2, 2), randomPoint(random, 1));
+    const Hull first = makeBoxHull({1, 0.5, 1}),
+               second = buildHull(makeRandomPoints(random, 12, 0.7));
+    const Mat3 turned = computeRotationAt(drawUniform(random, -2, 2), makeRandomPoint(random, 1));
     PlacedConvex a = makeConvex(first, Vec3::Zero()),
                  b = makeConvex(second, {0.1, 3, 0.2}, &turned);
     FeatureCache cold;

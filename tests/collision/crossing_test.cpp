@@ -107,10 +107,10 @@ TEST(Crossing, NearAnEdgeNoMissIsAContact) {
   Random random(32);
   int proved = 0, hits = 0, misses = 0;
   for (int i = 0; i < 3000; ++i) {
-    const std::vector<Vec3> triangle = randomPoints(random, 3, 1);
-    const double share = uniform(random, 0, 1);
+    const std::vector<Vec3> triangle = makeRandomPoints(random, 3, 1);
+    const double share = drawUniform(random, 0, 1);
     const Vec3 onEdge = share * triangle[0] + (1 - share) * triangle[1];
-    const Vec3 velocity = randomPoint(random, 1);
+    const Vec3 velocity = makeRandomPoint(random, 1);
     const MovingBody a{{kPoint, onEdge - 1.1 * velocity}, translate(velocity)};
     const MovingBody b{{triangle}, {}};
     const bool hit = findFirstTime(a, b).has_value();
@@ -138,9 +138,9 @@ TEST(Crossing, ThinBodiesOnALatticeMeetAtTheExactTime) {
   Random random(34);
   int contacts = 0, aligned = 0;
   for (int i = 0; i < 3000; ++i) {
-    const std::vector<Vec3> pointsA = latticePoints(random, 1 + i % 3, 2);
-    const std::vector<Vec3> pointsB = latticePoints(random, 3, 2);
-    const Vec3 direction = latticePoints(random, 1, 2)[0];
+    const std::vector<Vec3> pointsA = makeLatticePoints(random, 1 + i % 3, 2);
+    const std::vector<Vec3> pointsB = makeLatticePoints(random, 3, 2);
+    const Vec3 direction = makeLatticePoints(random, 1, 2)[0];
     const MovingBody a{{pointsA, -6 * direction}, translate(0.3 * direction)};
     const MovingBody b{{pointsB}, {}};
     FeatureCache cache;
@@ -203,9 +203,9 @@ TEST(Crossing, TumblingTrianglesMeetWhereTheirDistanceVanishes) {
   for (int i = 0; i < 400; ++i) {
     MovingBody a, b;
     makeThinPair(random, 3, 3, points, a, b);
-    a.motion.angularVelocity = randomPoint(random, 3);
-    b.motion.angularVelocity = randomPoint(random, 3);
-    a.motion.acceleration = randomPoint(random, 0.3);
+    a.motion.angularVelocity = makeRandomPoint(random, 3);
+    b.motion.angularVelocity = makeRandomPoint(random, 3);
+    a.motion.acceleration = makeRandomPoint(random, 0.3);
     const MotionResult impact = findImpact(a, b, 3);
     unproved += impact.outcome == MotionOutcome::unproved;
     if (impact.outcome != MotionOutcome::contact) continue;

@@ -10,14 +10,14 @@
 namespace enfilade::collision {
 namespace {
 
-int rationalTurn(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
+int computeRationalTurn(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
   const int i = (dropped + 1) % 3, j = (dropped + 2) % 3;
   const mpq_class ux = mpq_class(b[i]) - a[i], uy = mpq_class(b[j]) - a[j];
   const mpq_class vx = mpq_class(c[i]) - a[i], vy = mpq_class(c[j]) - a[j];
   return sgn(ux * vy - uy * vx);
 }
 
-int rationalOrientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+int computeRationalOrientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   const auto minus = [](const Vec3& p, const Vec3& q) {
     return std::array<mpq_class, 3>{mpq_class(p.x()) - q.x(), mpq_class(p.y()) - q.y(),
                                     mpq_class(p.z()) - q.z()};
@@ -30,7 +30,7 @@ int rationalOrientation(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3&
 /// Realistic and unrealistic coordinates: integers, floats, doubles, of mixed size.
 struct CoordinateGenerator {
   std::mt19937_64 random{11};
-  double next(int kind) {
+  double drawCoordinate(int kind) {
     const auto whole = static_cast<double>(static_cast<int>(random() % 7) - 3);
     const double unit = static_cast<double>(random() >> 11) * 0x1p-53;
     switch (kind) {
@@ -46,8 +46,8 @@ struct CoordinateGenerator {
         return random() % 2 == 0 ? whole * 1e80 : whole * 1e-300;
     }
   }
-  Vec3 point(int kind) {
-    const double x = next(kind), y = next(kind), z = next(kind);
+  Vec3 drawPoint(int kind) {
+    const double x = drawCoordinate(kind), y = drawCoordinate(kind), z = drawCoordinate(kind);
     return {x, y, z};
   }
 };
@@ -57,18 +57,18 @@ TEST(ExactOrientation, SignsAreThoseOfRationals) {
   std::array<int, 3> turns{}, orientations{};
   for (int i = 0; i < 20000; ++i) {
     const int kind = i % 5;
-    const Vec3 a = coordinates.point(kind), b = coordinates.point(kind);
+    const Vec3 a = coordinates.drawPoint(kind), b = coordinates.drawPoint(kind);
     // Half of the points lie on the line through the first two, up to rounding.
-    const Vec3 c = i % 2 ? coordinates.point(kind) : Vec3(a + 2 * (b - a));
-    const Vec3 d = coordinates.point(kind);
+    const Vec3 c = i % 2 ? coordinates.drawPoint(kind) : Vec3(a + 2 * (b - a));
+    const Vec3 d = coordinates.drawPoint(kind);
     for (int dropped = 0; dropped < 3; ++dropped) {
       const int sign = orient2d(a, b, c, dropped);
-      ASSERT_EQ(sign, rationalTurn(a, b, c, dropped))
+      ASSERT_EQ(sign, computeRationalTurn(a, b, c, dropped))
           << a.transpose() << " | " << b.transpose() << " | " << c.transpose();
       ++turns.at(static_cast<std::size_t>(sign + 1));
     }
     const int sign = orient3d(a, b, c, d);
-    ASSERT_EQ(sign, rationalOrientation(a, b, c, d))
+    ASSERT_EQ(sign, computeRationalOrientation(a, b, c, d))
         << a.transpose() << " | " << b.transpose() << " | " << c.transpose();
     ++orientations.at(static_cast<std::size_t>(sign + 1));
   }
@@ -81,18 +81,20 @@ TEST(ExactOrientation, CornersOfATurnedFlatFaceLieWhereRationalsHaveThem) {
   std::array<int, 3> orientations{};
   for (int i = 0; i < 5000; ++i) {
     const Mat3 rotation =
-        Eigen::AngleAxisd(coordinates.next(2), Vec3(1, 2, 3).normalized()).toRotationMatrix();
-    const Vec3 middle = coordinates.point(2);
+        Eigen::AngleAxisd(coordinates.drawCoordinate(2), Vec3(1, 2, 3).normalized())
+            .toRotationMatrix();
+    const Vec3 middle = coordinates.drawPoint(2);
     const auto corner = [&]() -> Vec3 {
-      return rotation * Vec3(coordinates.next(2), coordinates.next(2), 0) + middle;
+      return rotation * Vec3(coordinates.drawCoordinate(2), coordinates.drawCoordinate(2), 0) +
+             middle;
     };
     const Vec3 a = corner(), b = corner(), c = corner(), d = corner();
     const int sign = orient3d(a, b, c, d);
-    ASSERT_EQ(sign, rationalOrientation(a, b, c, d)) << i;
+    ASSERT_EQ(sign, computeRationalOrientation(a, b, c, d)) << i;
     ++orientations.at(static_cast<std::size_t>(sign + 1));
     for (int dropped = 0; dropped < 3; ++dropped) {
-      const Vec3 along = a + coordinates.next(0) * (b - a);
-      ASSERT_EQ(orient2d(a, b, along, dropped), rationalTurn(a, b, along, dropped)) << i;
+      const Vec3 along = a + coordinates.drawCoordinate(0) * (b - a);
+      ASSERT_EQ(orient2d(a, b, along, dropped), computeRationalTurn(a, b, along, dropped)) << i;
     }
   }
   EXPECT_GT(orientations[0], 1000);

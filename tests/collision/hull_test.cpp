@@ -29,7 +29,7 @@ void expectInside(const Hull& hull, const Points& points) {
   }
 }
 
-Points boxCorners(const Vec3& low, const Vec3& high) {
+Points makeBoxCorners(const Vec3& low, const Vec3& high) {
   Points corners;
   for (int k = 0; k < 8; ++k) {
     corners.emplace_back((k & 1) != 0 ? high.x() : low.x(), (k & 2) != 0 ? high.y() : low.y(),
@@ -38,7 +38,7 @@ Points boxCorners(const Vec3& low, const Vec3& high) {
   return corners;
 }
 
-Points latticePoints(std::mt19937& random, std::size_t count, int size) {
+Points makeIntegerPoints(std::mt19937& random, std::size_t count, int size) {
   std::uniform_int_distribution<int> coordinate(0, size);
   Points points;
   for (std::size_t k = 0; k < count; ++k) {
@@ -48,7 +48,7 @@ Points latticePoints(std::mt19937& random, std::size_t count, int size) {
   return points;
 }
 
-Points realPoints(std::mt19937& random, std::size_t count, double scale) {
+Points makeRealPoints(std::mt19937& random, std::size_t count, double scale) {
   std::uniform_real_distribution<double> coordinate(-scale, scale);
   Points points;
   for (std::size_t k = 0; k < count; ++k) {
@@ -122,7 +122,7 @@ TEST(Hull, OfOnePointOrASegmentOrAPolygonIsFlat) {
 }
 
 TEST(Hull, FacesRunAnticlockwiseSeenFromOutside) {
-  const Hull hull = buildHull(boxCorners({-1, -2, -3}, {1, 2, 3}));
+  const Hull hull = buildHull(makeBoxCorners({-1, -2, -3}, {1, 2, 3}));
   for (const auto& face : hull.faces) {
     const Vec3& a = hull.vertices[face[0]];
     const Vec3 normal = (hull.vertices[face[1]] - a).cross(hull.vertices[face[2]] - a);
@@ -135,7 +135,7 @@ TEST(Hull, OfLatticePointsIsRightWithManyTies) {
   int solids = 0, flats = 0;
   for (int scene = 0; scene < 400; ++scene) {
     const Points points =
-        latticePoints(random, 3 + static_cast<std::size_t>(scene) % 40, 1 + scene % 4);
+        makeIntegerPoints(random, 3 + static_cast<std::size_t>(scene) % 40, 1 + scene % 4);
     const Hull hull = buildHull(points);
     ASSERT_NO_THROW(validateHull(hull)) << "scene " << scene;
     expectInside(hull, points);
@@ -148,7 +148,7 @@ TEST(Hull, OfLatticePointsIsRightWithManyTies) {
 TEST(Hull, OfPointsNearlyOnAPlaneIsRight) {
   std::mt19937 random(3);
   for (int scene = 0; scene < 60; ++scene) {
-    Points points = realPoints(random, 60, 1.0);
+    Points points = makeRealPoints(random, 60, 1.0);
     // z = x + y rounded: coplanar up to an ulp, so a solid a few 1e-17 thick
     for (Vec3& p : points) p.z() = p.x() + p.y();
     const Hull hull = buildHull(points);
@@ -159,7 +159,7 @@ TEST(Hull, OfPointsNearlyOnAPlaneIsRight) {
 
 TEST(Hull, OfPointsOnASphereKeepsThemAll) {
   std::mt19937 random(4);
-  Points points = realPoints(random, 300, 1.0);
+  Points points = makeRealPoints(random, 300, 1.0);
   for (Vec3& p : points) p.normalize();
   const Hull hull = buildHull(points);
   ASSERT_NO_THROW(validateHull(hull));
@@ -171,7 +171,8 @@ TEST(Hull, OfPointsOnASphereKeepsThemAll) {
 TEST(Hull, DoesNotDependOnTheOrderOfThePoints) {
   std::mt19937 random(5);
   for (int scene = 0; scene < 100; ++scene) {
-    Points points = scene % 2 == 0 ? latticePoints(random, 30, 3) : realPoints(random, 30, 10.0);
+    Points points =
+        scene % 2 == 0 ? makeIntegerPoints(random, 30, 3) : makeRealPoints(random, 30, 10.0);
     const Hull hull = buildHull(points);
     std::shuffle(points.begin(), points.end(), random);
     points.push_back(points.front());
@@ -182,14 +183,14 @@ TEST(Hull, DoesNotDependOnTheOrderOfThePoints) {
 TEST(Hull, OfItsOwnVerticesIsItself) {
   std::mt19937 random(6);
   for (int scene = 0; scene < 50; ++scene) {
-    const Hull hull = buildHull(latticePoints(random, 50, 5));
+    const Hull hull = buildHull(makeIntegerPoints(random, 50, 5));
     expectSame(hull, buildHull(hull.vertices));
   }
 }
 
 TEST(Hull, AcceptsHugeAndTinyCoordinates) {
   for (const double scale : {1e-300, 1e-160, 1e100, 1e300}) {
-    Points points = boxCorners({-1, -1, -1}, {1, 1, 1});
+    Points points = makeBoxCorners({-1, -1, -1}, {1, 1, 1});
     points.emplace_back(0, 0, 0);
     points.emplace_back(1, 0.5, 0.25);
     for (Vec3& p : points) p *= scale;
@@ -206,7 +207,7 @@ TEST(Hull, RefusesNoPointsAndPointsThatAreNotFinite) {
 }
 
 TEST(Hull, ValidateFindsEachDefect) {
-  const Hull sound = buildHull(boxCorners({0, 0, 0}, {1, 1, 1}));
+  const Hull sound = buildHull(makeBoxCorners({0, 0, 0}, {1, 1, 1}));
   Hull hull = sound;
   hull.faces.pop_back();
   EXPECT_THROW(validateHull(hull), std::logic_error);

@@ -95,7 +95,7 @@ RefinedSeparation refineSeparationCold(const PlacedConvex& a, const PlacedConvex
   return refineSeparation(a, b, cache);
 }
 
-std::vector<Vec3> scaled(std::vector<Vec3> points, double unit) {
+std::vector<Vec3> scalePoints(std::vector<Vec3> points, double unit) {
   for (Vec3& p : points) p *= unit;
   return points;
 }
@@ -105,12 +105,13 @@ TEST(NarrowPhaseExtremes, RefinedDepthsScaleExactlyUpToTheLargestNumbers) {
   testing::Random random(11);
   int penetrating = 0;
   for (int i = 0; i < 200; ++i) {
-    const std::vector<Vec3> a = testing::latticePoints(random, 6, 3);
-    const std::vector<Vec3> b = testing::latticePoints(random, 6, 3);
+    const std::vector<Vec3> a = testing::makeLatticePoints(random, 6, 3);
+    const std::vector<Vec3> b = testing::makeLatticePoints(random, 6, 3);
     const RefinedSeparation here = refineSeparationCold({a}, {b});
     for (const int exponent : {-300, 260, 465}) {
       const double unit = std::ldexp(1.0, exponent);
-      const RefinedSeparation there = refineSeparationCold({scaled(a, unit)}, {scaled(b, unit)});
+      const RefinedSeparation there =
+          refineSeparationCold({scalePoints(a, unit)}, {scalePoints(b, unit)});
       ASSERT_EQ(there.verdict, here.verdict) << i << " at 2^" << exponent;
       EXPECT_EQ(there.penetration, here.penetration * unit) << i << " at 2^" << exponent;
     }
@@ -125,11 +126,12 @@ TEST(NarrowPhaseExtremes, AmongTheLeastNumbersDistancesAndDepthsAreRounded) {
   testing::Random random(12);
   std::array<int, 3> seen{};
   for (int i = 0; i < 300; ++i) {
-    const Vec3 at = testing::latticePoints(random, 1, 4)[0];
-    const std::vector<Vec3> a = testing::latticePoints(random, 5, 3);
-    const std::vector<Vec3> b = testing::latticePoints(random, 5, 3);
+    const Vec3 at = testing::makeLatticePoints(random, 1, 4)[0];
+    const std::vector<Vec3> a = testing::makeLatticePoints(random, 5, 3);
+    const std::vector<Vec3> b = testing::makeLatticePoints(random, 5, 3);
     const RefinedSeparation large = refineSeparationCold({a, at}, {b});
-    const std::vector<Vec3> smallA = scaled(a, kMinPositive), smallB = scaled(b, kMinPositive);
+    const std::vector<Vec3> smallA = scalePoints(a, kMinPositive),
+                            smallB = scalePoints(b, kMinPositive);
     const RefinedSeparation small = refineSeparationCold({smallA, kMinPositive * at}, {smallB});
     ASSERT_EQ(small.verdict, large.verdict) << i;
     EXPECT_EQ(small.distance, std::nearbyint(large.distance) * kMinPositive) << i;
@@ -153,9 +155,9 @@ TEST(NarrowPhaseExtremes, AMirroredBodyIsAsDeepAsItsMirrorImage) {
   testing::Random random(13);
   int penetrating = 0;
   for (int i = 0; i < 200; ++i) {
-    const Hull a = buildHull(testing::latticePoints(random, 3 + i % 5, 2));
-    const Hull b = buildHull(testing::latticePoints(random, 7, 2));
-    const Vec3 at = testing::latticePoints(random, 1, 2)[0];
+    const Hull a = buildHull(testing::makeLatticePoints(random, 3 + i % 5, 2));
+    const Hull b = buildHull(testing::makeLatticePoints(random, 7, 2));
+    const Vec3 at = testing::makeLatticePoints(random, 1, 2)[0];
     std::vector<Vec3> image = b.vertices;
     for (Vec3& p : image) p = mirror * p;
     const PlacedConvex first{a.vertices, at, nullptr, &a};

@@ -11,13 +11,13 @@ namespace {
 
 using namespace testing;
 
-Vec3 randomDirection(Random& random) {
-  return randomPoint(random, 1).normalized();
+Vec3 makeRandomDirection(Random& random) {
+  return makeRandomPoint(random, 1).normalized();
 }
 
-Hull roundHull(Random& random, int count) {
+Hull makeRoundHull(Random& random, int count) {
   std::vector<Vec3> points;
-  for (int i = 0; i < count; ++i) points.push_back(randomDirection(random));
+  for (int i = 0; i < count; ++i) points.push_back(makeRandomDirection(random));
   return buildHull(points);
 }
 
@@ -30,11 +30,11 @@ struct Motion {
   Vec3 translationB;
 
   Motion(Random& random, int vertices, double initialDistance)
-      : hullA(roundHull(random, vertices)),
-        hullB(roundHull(random, vertices)),
-        axisA(randomDirection(random)),
-        axisB(randomDirection(random)),
-        away(randomDirection(random)),
+      : hullA(makeRoundHull(random, vertices)),
+        hullB(makeRoundHull(random, vertices)),
+        axisA(makeRandomDirection(random)),
+        axisB(makeRandomDirection(random)),
+        away(makeRandomDirection(random)),
         distance(initialDistance) {}
   void step(int k) {
     rotationA = Eigen::AngleAxisd(0.02 * k, axisA).toRotationMatrix();
@@ -49,7 +49,7 @@ struct Motion {
     return {hullB.vertices, Vec3(0.25, 0.5, 0.125) + translationB, &rotationB, &hullB};
   }
   /// The largest |coordinate| of both bodies from A's translation.
-  double maxCoordinate() const {
+  double findMaxCoordinate() const {
     double result = 0;
     for (const Vec3& p : hullA.vertices)
       result = std::max(result, (rotationA * p).cwiseAbs().maxCoeff());
@@ -73,9 +73,10 @@ TEST(NarrowPhaseMotion, ExactDistancesLieWithinBoundsOfAFewUnitsOfRounding) {
         const RefinedSeparation exact = refineSeparation(motion.a(), motion.b(), exactCache);
         ASSERT_EQ(d.verdict, Verdict::separated);
         EXPECT_LE(std::abs(d.distance - exact.distance), d.errorBound + 2e-16 * exact.distance);
-        EXPECT_LE(d.errorBound, 16 * 0x1p-53 * motion.maxCoordinate());
-        EXPECT_NEAR((d.pointB - d.pointA).norm(), d.distance, 1e-15 * motion.maxCoordinate());
-        EXPECT_NEAR(d.normal.dot(d.pointB - d.pointA), d.distance, 1e-15 * motion.maxCoordinate());
+        EXPECT_LE(d.errorBound, 16 * 0x1p-53 * motion.findMaxCoordinate());
+        EXPECT_NEAR((d.pointB - d.pointA).norm(), d.distance, 1e-15 * motion.findMaxCoordinate());
+        EXPECT_NEAR(d.normal.dot(d.pointB - d.pointA), d.distance,
+                    1e-15 * motion.findMaxCoordinate());
         EXPECT_NEAR(cache.axis.norm(), 1, 1e-15);
         changes += cache.pairs != last.pairs || cache.size != last.size;
         byFilter += d.certificate == Certificate::filter;
@@ -100,11 +101,12 @@ TEST(NarrowPhaseMotion, PenetratingBodiesHaveACommonPointAndADepthWithinItsBound
         const SeparationResult d = computeSeparation(motion.a(), motion.b(), cache);
         if (d.verdict != Verdict::penetrating) continue;  // two corners slipped past each other
         ++count;
-        EXPECT_LE((d.pointB - d.pointA).norm(), 4 * 0x1p-53 * motion.maxCoordinate());
+        EXPECT_LE((d.pointB - d.pointA).norm(), 4 * 0x1p-53 * motion.findMaxCoordinate());
         const PenetrationResult reported =
             computePenetrationDepth(motion.a(), motion.b(), cache, depthCache);
         EXPECT_TRUE(reported.global);
-        EXPECT_LE(reported.errorBound, 1e-12 * reported.depth + 0x1p-53 * motion.maxCoordinate());
+        EXPECT_LE(reported.errorBound,
+                  1e-12 * reported.depth + 0x1p-53 * motion.findMaxCoordinate());
         if (k % 8 != 0 || vertices > 8) continue;  // an exact depth is expensive
         FeatureCache exactCache;
         const RefinedSeparation exact = refineSeparation(motion.a(), motion.b(), exactCache);

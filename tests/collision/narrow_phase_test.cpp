@@ -26,14 +26,15 @@ SeparationResult computeSeparationCold(const PlacedConvex& a, const PlacedConvex
 
 // ---- reference implementations -----------------------------------------------------------------
 
-double distancePointSegment(const Vec3& p, const Vec3& a, const Vec3& b) {
+double computePointSegmentDistance(const Vec3& p, const Vec3& a, const Vec3& b) {
   const double t = std::clamp((p - a).dot(b - a) / (b - a).squaredNorm(), 0.0, 1.0);
   return (p - (a + t * (b - a))).norm();
 }
 
-double distanceSegmentSegment(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
-  double best = std::min(std::min(distancePointSegment(a, c, d), distancePointSegment(b, c, d)),
-                         std::min(distancePointSegment(c, a, b), distancePointSegment(d, a, b)));
+double computeSegmentDistance(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
+  double best = std::min(
+      std::min(computePointSegmentDistance(a, c, d), computePointSegmentDistance(b, c, d)),
+      std::min(computePointSegmentDistance(c, a, b), computePointSegmentDistance(d, a, b)));
   const Vec3 n = (b - a).cross(d - c);
   if (n.squaredNorm() < 1e-24) return best;
   const double s = (c - a).cross(d - c).dot(n) / n.squaredNorm();
@@ -43,10 +44,10 @@ double distanceSegmentSegment(const Vec3& a, const Vec3& b, const Vec3& c, const
   return best;
 }
 
-double distancePointTriangle(const Vec3& p, const Triangle& t) {
-  double best =
-      std::min(distancePointSegment(p, t[0], t[1]),
-               std::min(distancePointSegment(p, t[1], t[2]), distancePointSegment(p, t[2], t[0])));
+double computePointTriangleDistance(const Vec3& p, const Triangle& t) {
+  double best = std::min(computePointSegmentDistance(p, t[0], t[1]),
+                         std::min(computePointSegmentDistance(p, t[1], t[2]),
+                                  computePointSegmentDistance(p, t[2], t[0])));
   const Vec3 n = (t[1] - t[0]).cross(t[2] - t[0]);
   for (int i = 0; i < 3; ++i)
     if ((t[(i + 1) % 3] - t[i]).cross(p - t[i]).dot(n) < 0) return best;
@@ -54,20 +55,21 @@ double distancePointTriangle(const Vec3& p, const Triangle& t) {
 }
 
 /// Distance of two disjoint triangles: a vertex and a face, or two edges.
-double distanceTriangleTriangle(const Triangle& a, const Triangle& b) {
+double computeTriangleDistance(const Triangle& a, const Triangle& b) {
   double best = std::numeric_limits<double>::infinity();
   for (int i = 0; i < 3; ++i) {
-    best = std::min({best, distancePointTriangle(a[i], b), distancePointTriangle(b[i], a)});
+    best = std::min(
+        {best, computePointTriangleDistance(a[i], b), computePointTriangleDistance(b[i], a)});
     for (int j = 0; j < 3; ++j)
-      best = std::min(best, distanceSegmentSegment(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]));
+      best = std::min(best, computeSegmentDistance(a[i], a[(i + 1) % 3], b[j], b[(j + 1) % 3]));
   }
   return best;
 }
 
-double bruteForceDistance(const std::vector<Triangle>& a, const std::vector<Triangle>& b) {
+double computeBruteForceDistance(const std::vector<Triangle>& a, const std::vector<Triangle>& b) {
   double best = std::numeric_limits<double>::infinity();
   for (const Triangle& s : a)
-    for (const Triangle& t : b) best = std::min(best, distanceTriangleTriangle(s, t));
+    for (const Triangle& t : b) best = std::min(best, computeTriangleDistance(s, t));
   return best;
 }
 
@@ -157,16 +159,19 @@ TEST(NarrowPhase, AProvedSeparationIsThatOfTheLowerBound) {
   int proved = 0, refused = 0;
   for (int i = 0; i < 400; ++i) {
     const bool flat = i % 3 == 0;
-    const Hull a = buildHull(flat ? latticePoints(random, 30, 2) : randomPoints(random, 20, 1));
-    const Hull b = buildHull(flat ? latticePoints(random, 30, 2) : randomPoints(random, 90, 1));
+    const Hull a =
+        buildHull(flat ? makeLatticePoints(random, 30, 2) : makeRandomPoints(random, 20, 1));
+    const Hull b =
+        buildHull(flat ? makeLatticePoints(random, 30, 2) : makeRandomPoints(random, 90, 1));
     const Mat3 turned =
-        Eigen::AngleAxisd(uniform(random, 0, 3), randomPoint(random, 1).normalized()).matrix();
+        Eigen::AngleAxisd(drawUniform(random, 0, 3), makeRandomPoint(random, 1).normalized())
+            .matrix();
     const PlacedConvex atA{a.vertices, Vec3::Zero(), nullptr, &a};
-    const PlacedConvex atB{b.vertices, Vec3(flat ? 5 : uniform(random, 0, 4), 0, 0),
+    const PlacedConvex atB{b.vertices, Vec3(flat ? 5 : drawUniform(random, 0, 4), 0, 0),
                            flat ? nullptr : &turned, &b};
     FeatureCache cache;
     computeSeparation(atA, atB, cache);
-    cache.axis *= i % 7 == 0 ? 1e-120 : uniform(random, 0.1, 10);
+    cache.axis *= i % 7 == 0 ? 1e-120 : drawUniform(random, 0.1, 10);
     const double bound = computeSeparationLowerBound(atA, atB, cache);
     for (const double distance :
          {0.0, 0.5 * bound, bound, std::nextafter(bound, -10.0), std::nextafter(bound, 10.0),
@@ -186,14 +191,14 @@ TEST(NarrowPhase, HullsAndTrianglesAgreeWithBruteForceOverFeatures) {
   Random random(1);
   int separated = 0;
   for (int i = 0; i < 600; ++i) {
-    const Hull hull = buildHull(randomPoints(random, 14, 1));
-    const std::vector<Vec3> triangle = randomPoints(random, 3, 1.5);
-    const Vec3 at = randomPoint(random, 1.6);
+    const Hull hull = buildHull(makeRandomPoints(random, 14, 1));
+    const std::vector<Vec3> triangle = makeRandomPoints(random, 3, 1.5);
+    const Vec3 at = makeRandomPoint(random, 1.6);
     const SeparationResult d = computeSeparationCold({hull.vertices, at}, {triangle, Vec3::Zero()});
     if (d.verdict != Verdict::separated) continue;
     ++separated;
-    const double reference =
-        bruteForceDistance(boundary(hull, at), {{triangle[0], triangle[1], triangle[2]}});
+    const double reference = computeBruteForceDistance(makeBoundary(hull, at),
+                                                       {{triangle[0], triangle[1], triangle[2]}});
     EXPECT_NEAR(d.distance, reference, 1e-13) << "case " << i;
     EXPECT_LE(std::abs(d.distance - reference), d.errorBound + 1e-14) << "case " << i;
     EXPECT_LT(d.errorBound, 1e-12) << "case " << i;
@@ -207,9 +212,9 @@ TEST(NarrowPhase, VerdictsOnALatticeEqualExactArithmeticWhicheverWayTheyWereDeci
   Random random(2);
   std::array<int, 3> seen{};
   for (int i = 0; i < 1500; ++i) {
-    const std::vector<Vec3> a = latticePoints(random, 1 + static_cast<int>(random() % 6), 2);
-    const std::vector<Vec3> b = latticePoints(random, 1 + static_cast<int>(random() % 6), 2);
-    const Vec3 at = latticePoints(random, 1, 2)[0];
+    const std::vector<Vec3> a = makeLatticePoints(random, 1 + static_cast<int>(random() % 6), 2);
+    const std::vector<Vec3> b = makeLatticePoints(random, 1 + static_cast<int>(random() % 6), 2);
+    const Vec3 at = makeLatticePoints(random, 1, 2)[0];
     const Verdict exact = computeRationalVerdict({a, at}, {b, Vec3::Zero()});
     EXPECT_EQ(computeSeparationCold({a, at}, {b, Vec3::Zero()}).verdict, exact) << "case " << i;
     EXPECT_EQ(computeRationalVerdict({b, Vec3::Zero()}, {a, at}), exact) << "case " << i;
@@ -223,8 +228,8 @@ TEST(NarrowPhase, TinyAndHugeBodiesAreDecidedExactlyThoughDoublesUnderAndOverflo
   std::array<int, 3> seen{};
   for (int i = 0; i < 600; ++i) {
     const double scale = std::array{0x1p-530, 0x1p-356, 0x1p520}[static_cast<std::size_t>(i % 3)];
-    std::vector<Vec3> a = latticePoints(random, 5, 2), b = latticePoints(random, 5, 2);
-    const Vec3 at = latticePoints(random, 1, 2)[0];
+    std::vector<Vec3> a = makeLatticePoints(random, 5, 2), b = makeLatticePoints(random, 5, 2);
+    const Vec3 at = makeLatticePoints(random, 1, 2)[0];
     for (Vec3& p : a) p *= scale;
     for (Vec3& p : b) p *= i % 2 == 0 ? scale : scale / 3;
     const PlacedConvex bodyA{a, scale * at}, bodyB{b};
@@ -238,9 +243,9 @@ TEST(NarrowPhase, TinyAndHugeBodiesAreDecidedExactlyThoughDoublesUnderAndOverflo
 TEST(NarrowPhase, SwappingTheBodiesSwapsTheAnswer) {
   Random random(3);
   for (int i = 0; i < 300; ++i) {
-    const std::vector<Vec3> a = randomPoints(random, 10, 1);
-    const std::vector<Vec3> b = randomPoints(random, 3, 2);
-    const Vec3 at = randomPoint(random, 3);
+    const std::vector<Vec3> a = makeRandomPoints(random, 10, 1);
+    const std::vector<Vec3> b = makeRandomPoints(random, 3, 2);
+    const Vec3 at = makeRandomPoint(random, 3);
     const SeparationResult ab = computeSeparationCold({a, at}, {b, Vec3::Zero()});
     const SeparationResult ba = computeSeparationCold({b, Vec3::Zero()}, {a, at});
     ASSERT_EQ(ab.verdict, ba.verdict);
@@ -271,10 +276,11 @@ TEST(NarrowPhase, NamesTheClosestFeatures) {
   Random random(14);
   std::map<std::pair<Feature, Feature>, int> seen;
   for (int i = 0; i < 400; ++i) {
-    const Hull a = buildHull(randomPoints(random, 8, 1)), b = buildHull(randomPoints(random, 8, 1));
+    const Hull a = buildHull(makeRandomPoints(random, 8, 1)),
+               b = buildHull(makeRandomPoints(random, 8, 1));
     const PlacedConvex bodyA{.vertices = a.vertices, .hull = &a};
     const PlacedConvex bodyB{
-        .vertices = b.vertices, .translation = randomPoint(random, 3), .hull = &b};
+        .vertices = b.vertices, .translation = makeRandomPoint(random, 3), .hull = &b};
     const SeparationResult d = computeSeparationCold(bodyA, bodyB);
     if (d.verdict == Verdict::penetrating) {
       EXPECT_EQ(d.featureA, Feature::none);
@@ -338,7 +344,8 @@ TEST(NarrowPhase, PointsLieWithinTheReportedFeatures) {
     const Vec3 axis = i % 2 == 0 ? Vec3::UnitX() : Vec3::UnitY();
     const double turn = i % 4 < 2 ? 1e-13 : 0.5 * std::numbers::pi;
     const Mat3 rotation = Eigen::AngleAxisd(turn, axis).toRotationMatrix();
-    const Vec3 at(uniform(random, -0.2, 0.2), uniform(random, 0.4, 2), uniform(random, -0.2, 0.2));
+    const Vec3 at(drawUniform(random, -0.2, 0.2), drawUniform(random, 0.4, 2),
+                  drawUniform(random, -0.2, 0.2));
     const PlacedConvex above{
         .vertices = cube.vertices, .translation = at, .rotation = &rotation, .hull = &cube};
     const auto expectFeatures = [&](const auto& reported) {
@@ -361,9 +368,9 @@ TEST(NarrowPhase, MovingByTheDistanceMakesContactAndNotEarlier) {
   Random random(4);
   int tried = 0;
   for (int i = 0; i < 300; ++i) {
-    const std::vector<Vec3> a = randomPoints(random, 12, 1);
-    const std::vector<Vec3> b = randomPoints(random, 12, 1);
-    const Vec3 at = randomPoint(random, 4);
+    const std::vector<Vec3> a = makeRandomPoints(random, 12, 1);
+    const std::vector<Vec3> b = makeRandomPoints(random, 12, 1);
+    const Vec3 at = makeRandomPoint(random, 4);
     const SeparationResult d = computeSeparationCold({a, at}, {b, Vec3::Zero()});
     if (d.verdict != Verdict::separated) continue;
     ++tried;
@@ -379,8 +386,8 @@ TEST(NarrowPhase, MovingByTheDistanceMakesContactAndNotEarlier) {
 
 TEST(NarrowPhase, AWarmStartChangesTheWorkAndNotTheAnswer) {
   Random random(5);
-  const std::vector<Vec3> a = randomPoints(random, 20, 1);
-  const std::vector<Vec3> b = randomPoints(random, 20, 1);
+  const std::vector<Vec3> a = makeRandomPoints(random, 20, 1);
+  const std::vector<Vec3> b = makeRandomPoints(random, 20, 1);
   FeatureCache cache;
   for (int step = 0; step < 400; ++step) {
     const Vec3 at{4.0 - 0.02 * step, 0.3, 0.2};

@@ -25,11 +25,12 @@ struct Cloud {
   Vec3 translation;
 
   Cloud(Random& random, const Vec3& at, std::uint32_t leafSize)
-      : rotation(integrateRotation(Mat3::Identity(), randomPoint(random, 2), 1)), translation(at) {
+      : rotation(integrateRotation(Mat3::Identity(), makeRandomPoint(random, 2), 1)),
+        translation(at) {
     std::vector<Aabb> boxes;
     for (int i = 0; i < 40; ++i) {
-      const Vec3 middle = randomPoint(random, 1);
-      std::vector<Vec3> points = randomPoints(random, 9, 0.1);
+      const Vec3 middle = makeRandomPoint(random, 1);
+      std::vector<Vec3> points = makeRandomPoints(random, 9, 0.1);
       for (Vec3& point : points) point += middle;
       parts.push_back(buildHull(points));
       for (Aabb& box = boxes.emplace_back(); const Vec3& v : parts.back().vertices) box.include(v);
@@ -45,14 +46,14 @@ struct Cloud {
     for (const Vec3& v : parts[part].vertices) box.include(rotation * v + translation);
     return box;
   }
-  CompoundView view(std::size_t& placed) const {
+  CompoundView makeView(std::size_t& placed) const {
     return {&tree, rotation, translation, [this, &placed](std::uint32_t item) {
               ++placed;
               return place(tree.order[item]);
             }};
   }
-  CompoundView viewWithBoxes(std::size_t& placed) const {
-    CompoundView with = view(placed);
+  CompoundView makeViewWithBoxes(std::size_t& placed) const {
+    CompoundView with = makeView(placed);
     with.box = [this](std::uint32_t item) { return computeBox(tree.order[item]); };
     return with;
   }
@@ -78,13 +79,13 @@ TEST(NearestParts, AreThoseByBruteForceAndWithBoxesOfPartsFewerArePlaced) {
   std::size_t placed = 0, placedWithBoxes = 0;
   for (const std::uint32_t leafSize : {1u, 4u}) {
     for (int i = 0; i < 50; ++i) {
-      const Cloud a(random, randomPoint(random, 1), leafSize),
-          b(random, Vec3(2.8, 0, 0) + randomPoint(random, 1), leafSize);
+      const Cloud a(random, makeRandomPoint(random, 1), leafSize),
+          b(random, Vec3(2.8, 0, 0) + makeRandomPoint(random, 1), leafSize);
       const double distance = findDistanceByBruteForce(a, b);
-      const NearestParts nearest = findNearest(a.view(placed), b.view(placed));
+      const NearestParts nearest = findNearest(a.makeView(placed), b.makeView(placed));
       EXPECT_EQ(nearest.separation.distance, distance) << "pair " << i;
       const NearestParts withBoxes =
-          findNearest(a.viewWithBoxes(placedWithBoxes), b.viewWithBoxes(placedWithBoxes));
+          findNearest(a.makeViewWithBoxes(placedWithBoxes), b.makeViewWithBoxes(placedWithBoxes));
       EXPECT_EQ(withBoxes.separation.distance, distance) << "pair " << i;
       EXPECT_EQ(withBoxes.a.hull, nearest.a.hull);
       EXPECT_EQ(withBoxes.b.hull, nearest.b.hull);

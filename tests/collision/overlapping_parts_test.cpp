@@ -40,7 +40,7 @@ struct Placed {
       boxes.push_back(inflated(box, margin));
     }
   }
-  PartBounds bounds() const { return {view, boxes, margin}; }
+  PartBounds getBounds() const { return {view, boxes, margin}; }
 };
 
 std::vector<PartPair> findPairsByBruteForce(const Placed& a, const Placed& b) {
@@ -53,7 +53,7 @@ std::vector<PartPair> findPairsByBruteForce(const Placed& a, const Placed& b) {
 
 std::vector<PartPair> findPairs(const Placed& a, const Placed& b, PartFront& front) {
   std::vector<PartPair> pairs{{7, 7}};  // replaced
-  findOverlappingParts(a.bounds(), b.bounds(), front, pairs);
+  findOverlappingParts(a.getBounds(), b.getBounds(), front, pairs);
   return pairs;
 }
 
@@ -62,8 +62,8 @@ Compound makeRing(Random& random, int count, double radius, std::uint32_t leafSi
   std::vector<std::vector<Vec3>> parts;
   for (int i = 0; i < count; ++i) {
     const double t = 4.0 * i / count;
-    parts.push_back(randomPoints(random, 8, 0.1));
-    for (Vec3& p : parts.back()) p += Vec3(radius * wave(t), 0, radius * wave(t + 1));
+    parts.push_back(makeRandomPoints(random, 8, 0.1));
+    for (Vec3& p : parts.back()) p += Vec3(radius * computeWave(t), 0, radius * computeWave(t + 1));
   }
   return {parts, leafSize};
 }
@@ -73,7 +73,7 @@ Compound makeCrumpledSheet(Random& random, int n, std::uint32_t leafSize = 1) {
   const double side = 2.0 / n;
   for (int i = 0; i < n; ++i)
     for (int j = 0; j < n; ++j) {
-      const Vec3 at(side * i - 1, uniform(random, -0.05, 0.05), side * j - 1);
+      const Vec3 at(side * i - 1, drawUniform(random, -0.05, 0.05), side * j - 1);
       triangles.push_back({at, at + Vec3(side, 0, 0), at + Vec3(0, 0, side)});
     }
   return {triangles, leafSize};
@@ -88,8 +88,9 @@ TEST(OverlappingParts, EqualThoseOfTheDoubleLoopAlongAMotion) {
     std::size_t pairs = 0, without = 0;
     for (int tick = 0; tick < 250; ++tick) {
       const double t = 0.02 * tick;
-      const Placed a(ring, rotationAt(t, Vec3(1, 0.2, 0.4)), Vec3(0, 2 * wave(t), 0), 0.01);
-      const Placed b(sheet, rotationAt(-0.3 * t, Vec3(0, 1, 1)), Vec3::Zero(), 0);
+      const Placed a(ring, computeRotationAt(t, Vec3(1, 0.2, 0.4)), Vec3(0, 2 * computeWave(t), 0),
+                     0.01);
+      const Placed b(sheet, computeRotationAt(-0.3 * t, Vec3(0, 1, 1)), Vec3::Zero(), 0);
       const auto found = findPairs(a, b, front);
       ASSERT_EQ(found, findPairsByBruteForce(a, b)) << "tick " << tick;
       pairs += found.size();
@@ -110,12 +111,14 @@ TEST(OverlappingParts, EqualThoseOfTheDoubleLoopWithJumpsAndChangingMargins) {
   std::size_t pairs = 0;
   for (int tick = 0; tick < 2000; ++tick) {
     const double step = tick % 10 == 0 ? 3 : tick % 3 == 0 ? 0 : 0.02;  // jump, stand, move
-    rotation = rotationAt(step * uniform(random, -1, 1), randomPoint(random, 1)) * rotation;
+    rotation =
+        computeRotationAt(step * drawUniform(random, -1, 1), makeRandomPoint(random, 1)) * rotation;
     rotation = Quat(rotation).normalized().toRotationMatrix();
-    translation = 0.9 * translation + randomPoint(random, 0.4 * step);
+    translation = 0.9 * translation + makeRandomPoint(random, 0.4 * step);
     const Vec3 far = Vec3::Constant(tick < 1000 ? 0 : 1e6);  // where rounding is coarse
-    const Placed a(ring, rotation, translation + far, uniform(random, 0, 0.05));
-    const Placed b(other, rotationAt(tick / 400, Vec3(1, 1, 0)), far, tick % 7 == 0 ? 0.3 : 0);
+    const Placed a(ring, rotation, translation + far, drawUniform(random, 0, 0.05));
+    const Placed b(other, computeRotationAt(tick / 400, Vec3(1, 1, 0)), far,
+                   tick % 7 == 0 ? 0.3 : 0);
     const auto found = findPairs(a, b, front);
     ASSERT_EQ(found, findPairsByBruteForce(a, b)) << "tick " << tick;
     pairs += found.size();
@@ -134,7 +137,8 @@ TEST(OverlappingParts, EqualThoseOfTheDoubleLoopInDeepTrees) {
   PartFront front;
   std::size_t pairs = 0;
   for (int tick = 0; tick < 100; ++tick) {
-    const Placed a(spiral, rotationAt(0.05 * tick, Vec3(1, 2, 3)), randomPoint(random, 0.01), 0);
+    const Placed a(spiral, computeRotationAt(0.05 * tick, Vec3(1, 2, 3)),
+                   makeRandomPoint(random, 0.01), 0);
     const Placed b(spiral, Mat3::Identity(), Vec3::Zero(), 1e-6);
     const auto found = findPairs(a, b, front);
     ASSERT_EQ(found, findPairsByBruteForce(a, b)) << "tick " << tick;
@@ -148,7 +152,7 @@ TEST(OverlappingParts, OfSinglePartsAndOfNone) {
   PartFront front;
   std::size_t meetings = 0;
   for (int tick = 0; tick < 40; ++tick) {
-    const Placed a(point, Mat3::Identity(), Vec3(wave(0.1 * tick), 0, 0), 0.25);
+    const Placed a(point, Mat3::Identity(), Vec3(computeWave(0.1 * tick), 0, 0), 0.25);
     const Placed b(point, Mat3::Identity(), Vec3::Zero(), 0.25);
     const auto found = findPairs(a, b, front);
     ASSERT_EQ(found, findPairsByBruteForce(a, b));
@@ -166,7 +170,8 @@ TEST(OverlappingParts, AFrontOfOtherTreesIsReset) {
   PartFront front;
   for (int tick = 0; tick < 20; ++tick) {
     const Compound& first = tick % 3 == 0 ? ring : sheet;
-    const Placed a(first, rotationAt(tick, Vec3(1, 1, 0)), Vec3(0, 0.1 * wave(tick), 0), 0.01);
+    const Placed a(first, computeRotationAt(tick, Vec3(1, 1, 0)),
+                   Vec3(0, 0.1 * computeWave(tick), 0), 0.01);
     const Placed b(tick % 2 == 0 ? ring : sheet, Mat3::Identity(), Vec3::Zero(), 0);
     ASSERT_EQ(findPairs(a, b, front), findPairsByBruteForce(a, b)) << "tick " << tick;
   }
@@ -179,7 +184,7 @@ TEST(OverlappingParts, TheFrontRisesAgainWhenTheObjectsPart) {
   std::size_t deepest = 0;
   for (int tick = 0; tick <= 60; ++tick) {
     const Placed a(sheet, Mat3::Identity(), Vec3(0, 0.3 - 0.01 * tick, 0), 0);
-    const Placed b(other, rotationAt(0.1, Vec3(0, 0, 1)), Vec3::Zero(), 0);
+    const Placed b(other, computeRotationAt(0.1, Vec3(0, 0, 1)), Vec3::Zero(), 0);
     ASSERT_EQ(findPairs(a, b, front), findPairsByBruteForce(a, b));
     deepest = std::max(deepest, front.entries.size());
   }
@@ -190,7 +195,7 @@ TEST(OverlappingParts, TheFrontRisesAgainWhenTheObjectsPart) {
 TEST(OverlappingParts, ObjectsAtRestCostOnlyTheirOverlaps) {
   Random random(34);
   const Compound ring = makeRing(random, 40, 1), sheet = makeCrumpledSheet(random, 16);
-  const Placed a(ring, rotationAt(1, Vec3(1, 0, 0)), Vec3::Zero(), 0.01);
+  const Placed a(ring, computeRotationAt(1, Vec3(1, 0, 0)), Vec3::Zero(), 0.01);
   const Placed b(sheet, Mat3::Identity(), Vec3::Zero(), 0);
   PartFront front;
   const auto pairs = findPairs(a, b, front);
@@ -206,7 +211,7 @@ TEST(OverlappingParts, TheFrontSavesMostOfADescentInSmallSteps) {
   PartFront front;
   std::uint64_t fresh = 0;
   for (int tick = 0; tick < 90; ++tick) {  // steps of 2 degrees
-    const Placed a(ring, rotationAt(0.035 * tick, Vec3(0.3, 1, 0.2)), Vec3(0, 0.2, 0), 0.01);
+    const Placed a(ring, computeRotationAt(0.035 * tick, Vec3(0.3, 1, 0.2)), Vec3(0, 0.2, 0), 0.01);
     const Placed b(sheet, Mat3::Identity(), Vec3::Zero(), 0);
     PartFront cold;
     ASSERT_EQ(findPairs(a, b, front), findPairs(a, b, cold));

@@ -21,16 +21,16 @@ struct Posed {
   RigidTransform pose;
   Vec3 reference = Vec3::Zero(), angularVelocity = Vec3::Zero();
 
-  PlacedConvex placed() const { return place({vertices}, pose); }
-  RotatingBody view() const {
+  PlacedConvex getPlaced() const { return place({vertices}, pose); }
+  RotatingBody makeView() const {
     const Vec3 point = pose.translation + reference;
     double radius = 0;
     for (const Vec3& v : vertices)
-      radius = std::max(radius, (placeVertex(placed(), v) - point).norm());
-    return {placed(), reference, angularVelocity, radius * (1 + 1e-12)};
+      radius = std::max(radius, (placeVertex(getPlaced(), v) - point).norm());
+    return {getPlaced(), reference, angularVelocity, radius * (1 + 1e-12)};
   }
   /// After `time`, with the reference point moved by `displacement`.
-  Posed after(double time, const Vec3& displacement) const {
+  Posed computeLater(double time, const Vec3& displacement) const {
     Posed later = *this;
     const double angle = angularVelocity.norm() * time;
     if (angle > 0) {
@@ -49,19 +49,20 @@ struct Pair {
   Vec3 velocity = Vec3::Zero(), acceleration = Vec3::Zero();
   double keptDistance = 0;
 
-  Pair after(double time) const {
+  Pair computeLater(double time) const {
     Pair later = *this;
-    later.a = a.after(time, Vec3::Zero());
-    later.b = b.after(time, time * velocity + 0.5 * time * time * acceleration);
+    later.a = a.computeLater(time, Vec3::Zero());
+    later.b = b.computeLater(time, time * velocity + 0.5 * time * time * acceleration);
     later.velocity = velocity + time * acceleration;
     return later;
   }
-  SeparationResult separation(FeatureCache& cache) const {
-    return computeSeparation(a.placed(), b.placed(), cache);
+  SeparationResult findSeparation(FeatureCache& cache) const {
+    return computeSeparation(a.getPlaced(), b.getPlaced(), cache);
   }
   double step(const SeparationResult& from, const FeatureCache& cache, double cap) const {
     const Vec3 offset = b.pose.translation + b.reference - a.pose.translation - a.reference;
-    const PairMotion motion{a.view(), b.view(), offset, velocity, acceleration, keptDistance};
+    const PairMotion motion{a.makeView(), b.makeView(), offset,
+                            velocity,     acceleration, keptDistance};
     return computeCertifiedStep(motion, {from.normal, from.distance - from.errorBound}, cache, cap);
   }
 };
@@ -69,26 +70,26 @@ struct Pair {
 enum class Kind { bothRotate, onlyARotates, stillAboutAsReference, translation, accelerated };
 
 Mat3 makeRotation(Random& random) {
-  const double angle = uniform(random, 0, 3);
-  return Eigen::AngleAxisd(angle, randomPoint(random, 1).normalized()).toRotationMatrix();
+  const double angle = drawUniform(random, 0, 3);
+  return Eigen::AngleAxisd(angle, makeRandomPoint(random, 1).normalized()).toRotationMatrix();
 }
 
 Posed makePosed(Random& random, int vertices) {
   const Mat3 rotation = makeRotation(random);
-  return {randomPoints(random, vertices, 0.5), {rotation, randomPoint(random, 0.9)}};
+  return {makeRandomPoints(random, vertices, 0.5), {rotation, makeRandomPoint(random, 0.9)}};
 }
 
 Pair makePair(Random& random, Kind kind) {
   Pair pair{makePosed(random, 8), makePosed(random, 3)};  // a triangle has no thickness
   // Positive: a step may lead to this distance up to rounding, and at 0 the poses then overlap.
-  pair.keptDistance = random() % 2 ? uniform(random, 0, 0.05) : 1e-6;
-  pair.velocity = randomPoint(random, 1);
-  if (kind == Kind::accelerated) pair.acceleration = randomPoint(random, 2);
+  pair.keptDistance = random() % 2 ? drawUniform(random, 0, 0.05) : 1e-6;
+  pair.velocity = makeRandomPoint(random, 1);
+  if (kind == Kind::accelerated) pair.acceleration = makeRandomPoint(random, 2);
   if (kind == Kind::translation) return pair;
-  pair.a.angularVelocity = randomPoint(random, 3);
-  if (random() % 2) pair.a.reference = randomPoint(random, 1);
+  pair.a.angularVelocity = makeRandomPoint(random, 3);
+  if (random() % 2) pair.a.reference = makeRandomPoint(random, 1);
   if (kind == Kind::bothRotate || kind == Kind::accelerated)
-    pair.b.angularVelocity = random() % 4 ? randomPoint(random, 3) : pair.a.angularVelocity;
+    pair.b.angularVelocity = random() % 4 ? makeRandomPoint(random, 3) : pair.a.angularVelocity;
   if (kind == Kind::stillAboutAsReference) {
     pair.velocity.setZero();
     pair.b.reference = pair.a.pose.translation + pair.a.reference - pair.b.pose.translation;
@@ -105,7 +106,7 @@ TEST(PlaneBound, NothingComesCloserThanTheKeptDistanceWithinAStep) {
     for (int k = 0; k < 1000; ++k) {
       Pair at = makePair(random, kind);
       FeatureCache cache;
-      SeparationResult start = at.separation(cache);
+      SeparationResult start = at.findSeparation(cache);
       if (start.verdict != Verdict::separated || start.distance < at.keptDistance + 0.02) continue;
       ++tried;
       // Steps one after another: to the end, or to the kept distance.
@@ -114,13 +115,13 @@ TEST(PlaneBound, NothingComesCloserThanTheKeptDistanceWithinAStep) {
         const double step = at.step(start, cache, kCap - time);
         for (int sample = 1; sample <= 24; ++sample) {
           FeatureCache other;
-          const SeparationResult there = at.after(step * sample / 24).separation(other);
+          const SeparationResult there = at.computeLater(step * sample / 24).findSeparation(other);
           ASSERT_EQ(there.verdict, Verdict::separated) << k << " step " << i;
           ASSERT_GT(there.distance, at.keptDistance - 1e-9) << k << " step " << i;
         }
-        at = at.after(step);
+        at = at.computeLater(step);
         time += step;
-        start = at.separation(cache);
+        start = at.findSeparation(cache);
         if (time >= kCap || start.distance - at.keptDistance < 1e-6) break;
       }
       free += time >= kCap;
@@ -135,8 +136,8 @@ TEST(PlaneBound, NothingComesCloserThanTheKeptDistanceWithinAStep) {
 }
 
 ScrewMotion makeScrew(Random& random, const Vec3& position) {
-  return {makeRotation(random), position, randomPoint(random, 0.8),
-          randomPoint(random, 1).normalized(), uniform(random, 0, 2)};
+  return {makeRotation(random), position, makeRandomPoint(random, 0.8),
+          makeRandomPoint(random, 1).normalized(), drawUniform(random, 0, 2)};
 }
 
 double computeDistanceAt(const std::vector<Vec3>& a, const ScrewMotion& motionA,
@@ -153,9 +154,10 @@ TEST(PlaneBound, CastsOfUniformMotionsStopBeforeWhatTheyMeetAndNeverLate) {
   Random random(12);
   int tried = 0, stopped = 0;
   for (int k = 0; k < 800; ++k) {
-    const std::vector<Vec3> a = randomPoints(random, 8, 0.5), b = randomPoints(random, 3, 0.5);
+    const std::vector<Vec3> a = makeRandomPoints(random, 8, 0.5),
+                            b = makeRandomPoints(random, 3, 0.5);
     const ScrewMotion motionA = makeScrew(random, Vec3::Zero());
-    ScrewMotion motionB = makeScrew(random, randomPoint(random, 1));
+    ScrewMotion motionB = makeScrew(random, makeRandomPoint(random, 1));
     const bool isStill = k % 2 == 0;
     if (isStill) motionB.translation.setZero(), motionB.angle = 0;
     if (!(computeDistanceAt(a, motionA, b, motionB, 0) > kOffset.rest)) continue;

@@ -12,25 +12,25 @@ namespace enfilade::collision::testing {
 using Random = std::mt19937_64;
 
 /// Uniform in [low, high); written out because std's distributions differ between libraries.
-inline double uniform(Random& random, double low, double high) {
+inline double drawUniform(Random& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
 }
 
-inline Vec3 randomPoint(Random& random, double size) {
-  const double x = uniform(random, -size, size);
-  const double y = uniform(random, -size, size);
-  const double z = uniform(random, -size, size);
+inline Vec3 makeRandomPoint(Random& random, double size) {
+  const double x = drawUniform(random, -size, size);
+  const double y = drawUniform(random, -size, size);
+  const double z = drawUniform(random, -size, size);
   return {x, y, z};
 }
 
-inline std::vector<Vec3> randomPoints(Random& random, int count, double size) {
+inline std::vector<Vec3> makeRandomPoints(Random& random, int count, double size) {
   std::vector<Vec3> points;
-  for (int i = 0; i < count; ++i) points.push_back(randomPoint(random, size));
+  for (int i = 0; i < count; ++i) points.push_back(makeRandomPoint(random, size));
   return points;
 }
 
 /// Points on a small integer lattice, so that touching, flat and equal shapes are frequent.
-inline std::vector<Vec3> latticePoints(Random& random, int count, int size) {
+inline std::vector<Vec3> makeLatticePoints(Random& random, int count, int size) {
   const auto coordinate = [&] {
     return static_cast<double>(static_cast<int>(random() % (2 * size + 1)) - size);
   };
@@ -45,7 +45,7 @@ inline std::vector<Vec3> latticePoints(Random& random, int count, int size) {
 }
 
 /// The boundary of a hull as triangles (fans of its faces), at `translation`.
-inline std::vector<Triangle> boundary(const Hull& hull, const Vec3& translation) {
+inline std::vector<Triangle> makeBoundary(const Hull& hull, const Vec3& translation) {
   std::vector<Triangle> triangles;
   for (const auto& face : hull.faces)
     for (std::size_t i = 2; i < face.size(); ++i)

@@ -31,17 +31,17 @@ Point operator+(const Point& a, const Point& b) {
 Point operator*(const Rational& s, const Point& a) {
   return {s * a.x, s * a.y, s * a.z};
 }
-Rational dot(const Point& a, const Point& b) {
+Rational computeDotProduct(const Point& a, const Point& b) {
   return a.x * b.x + a.y * b.y + a.z * b.z;
 }
-Point cross(const Point& a, const Point& b) {
+Point computeCrossProduct(const Point& a, const Point& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 bool isZero(const Point& a) {
   return sgn(a.x) == 0 && sgn(a.y) == 0 && sgn(a.z) == 0;
 }
 
-std::vector<Point> worldPoints(const PlacedConvex& body) {
+std::vector<Point> computeWorldPoints(const PlacedConvex& body) {
   const Point translation{body.translation.x(), body.translation.y(), body.translation.z()};
   std::vector<Point> points;
   points.reserve(body.vertices.size());
@@ -59,13 +59,13 @@ struct Support {
 Support findSupport(const Point& direction, const std::vector<Point>& a,
                     const std::vector<Point>& b) {
   const Point* bestA = &a.front();
-  Rational maxA = dot(direction, *bestA);
+  Rational maxA = computeDotProduct(direction, *bestA);
   for (const Point& p : a)
-    if (Rational d = dot(direction, p); d > maxA) maxA = d, bestA = &p;
+    if (Rational d = computeDotProduct(direction, p); d > maxA) maxA = d, bestA = &p;
   const Point* bestB = &b.front();
-  Rational minB = dot(direction, *bestB);
+  Rational minB = computeDotProduct(direction, *bestB);
   for (const Point& p : b)
-    if (Rational d = dot(direction, p); d < minB) minB = d, bestB = &p;
+    if (Rational d = computeDotProduct(direction, p); d < minB) minB = d, bestB = &p;
   return {*bestB - *bestA, *bestA};
 }
 
@@ -104,8 +104,8 @@ bool findNearestInside(const std::vector<Support>& face, NearestPoint& nearest) 
   const Point& base = face[0].difference;
   for (int i = 0; i < n; ++i) {
     const Point edge = face[i + 1].difference - base;
-    right[i] = -dot(edge, base);
-    for (int j = 0; j < n; ++j) gram[i][j] = dot(edge, face[j + 1].difference - base);
+    right[i] = -computeDotProduct(edge, base);
+    for (int j = 0; j < n; ++j) gram[i][j] = computeDotProduct(edge, face[j + 1].difference - base);
   }
   if (n > 0 && !solve(gram, right, n, weight)) return false;
   Rational first = 1;
@@ -133,7 +133,7 @@ NearestPoint findNearest(const std::vector<Support>& simplex) {
       if (mask >> i & 1u) face.push_back(simplex[i]);
     NearestPoint candidate;
     if (!findNearestInside(face, candidate)) continue;
-    const Rational squared = dot(candidate.point, candidate.point);
+    const Rational squared = computeDotProduct(candidate.point, candidate.point);
     if (sgn(bestSquared) < 0 || squared < bestSquared) {
       bestSquared = squared;
       best = std::move(candidate);
@@ -142,10 +142,10 @@ NearestPoint findNearest(const std::vector<Support>& simplex) {
   return best;
 }
 
-bool allOnOneSide(const Point& normal, const std::vector<Point>& directions) {
+bool areAllOnOneSide(const Point& normal, const std::vector<Point>& directions) {
   int side = 0;
   for (const Point& d : directions) {
-    const int s = sgn(dot(normal, d));
+    const int s = sgn(computeDotProduct(normal, d));
     if (s == 0) continue;
     if (side != 0 && s != side) return false;
     side = s;
@@ -158,9 +158,9 @@ bool spanAllOfSpace(const std::vector<Point>& directions) {
   bool spansSpace = false;
   for (std::size_t i = 0; i < directions.size(); ++i) {
     for (std::size_t j = i + 1; j < directions.size(); ++j) {
-      const Point normal = cross(directions[i], directions[j]);
+      const Point normal = computeCrossProduct(directions[i], directions[j]);
       if (isZero(normal)) continue;
-      if (allOnOneSide(normal, directions)) return false;
+      if (areAllOnOneSide(normal, directions)) return false;
       spansSpace = true;  // directions lie on both sides of this plane
     }
   }
@@ -170,12 +170,13 @@ bool spanAllOfSpace(const std::vector<Point>& directions) {
 }  // namespace
 
 Verdict computeRationalVerdict(const PlacedConvex& bodyA, const PlacedConvex& bodyB) {
-  const std::vector<Point> a = worldPoints(bodyA);
-  const std::vector<Point> b = worldPoints(bodyB);
+  const std::vector<Point> a = computeWorldPoints(bodyA);
+  const std::vector<Point> b = computeWorldPoints(bodyB);
   NearestPoint nearest = findNearest({Support{b.front() - a.front(), a.front()}});
   while (!isZero(nearest.point)) {
     Support next = findSupport(nearest.point, a, b);
-    if (dot(nearest.point, next.difference) >= dot(nearest.point, nearest.point))
+    if (computeDotProduct(nearest.point, next.difference) >=
+        computeDotProduct(nearest.point, nearest.point))
       return Verdict::separated;
     std::vector<Support> simplex = std::move(nearest.simplex);
     simplex.push_back(std::move(next));

@@ -22,7 +22,7 @@ std::vector<Vec3> makeBox(const Vec3& size) {
 }
 
 /// A rotation about the vertical; its second row and column are exact.
-Mat3 rotationAboutY(double radians) {
+Mat3 makeRotationAboutY(double radians) {
   const double c = std::cos(radians), s = std::sin(radians);
   Mat3 rotation;
   rotation << c, 0, s, 0, 1, 0, -s, 0, c;
@@ -36,7 +36,7 @@ TEST(RestingContact, AChairTurnedOnAFloorTouchesItByExpansionAtEveryStep) {
   const PlacedConvex floor{kFloor.vertices, {-10, -0.25, -10}, nullptr, &kFloor};
   FeatureCache cache;
   for (int step = 0; step < 200; ++step) {
-    const Mat3 rotation = rotationAboutY(0.03 * step);
+    const Mat3 rotation = makeRotationAboutY(0.03 * step);
     const Vec3 at(0.01 * step, 0, -0.02 * step);
     const SeparationResult d =
         computeSeparation({kChairLeg.vertices, at, &rotation, &kChairLeg}, floor, cache);
@@ -63,7 +63,7 @@ TEST(RestingContact, OneUlpUpOrDownIsSeenAtAnyTurn) {
   const PlacedConvex floor{kFloor.vertices, {-10, -0.25, -10}, nullptr, &kFloor};
   const double ulp = std::nextafter(0.25, 1) - 0.25;
   for (int step = 0; step < 40; ++step) {
-    const Mat3 rotation = rotationAboutY(0.1 * step);
+    const Mat3 rotation = makeRotationAboutY(0.1 * step);
     FeatureCache cache;
     const auto verdictAt = [&](double y) {
       return computeSeparation({kChairLeg.vertices, {0.3, y, 0.7}, &rotation, &kChairLeg}, floor,

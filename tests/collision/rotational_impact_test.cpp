@@ -174,16 +174,18 @@ struct Tumble {
 };
 
 void makeTumble(Random& random, Tumble& tumble) {
-  tumble.pointsA = randomPoints(random, 8, 0.5);
-  tumble.pointsB = randomPoints(random, 6, 0.5);
-  tumble.rotationB = Eigen::AngleAxisd(uniform(random, 0, 6), randomPoint(random, 1).normalized())
-                         .toRotationMatrix();
-  const Vec3 start = randomPoint(random, 1).normalized() * uniform(random, 1, 4);
-  const Vec3 aim = randomPoint(random, 0.8);
-  tumble.a = {{tumble.pointsA}, {aim - start, randomPoint(random, 0.3), randomPoint(random, 3)}};
+  tumble.pointsA = makeRandomPoints(random, 8, 0.5);
+  tumble.pointsB = makeRandomPoints(random, 6, 0.5);
+  tumble.rotationB =
+      Eigen::AngleAxisd(drawUniform(random, 0, 6), makeRandomPoint(random, 1).normalized())
+          .toRotationMatrix();
+  const Vec3 start = makeRandomPoint(random, 1).normalized() * drawUniform(random, 1, 4);
+  const Vec3 aim = makeRandomPoint(random, 0.8);
+  tumble.a = {{tumble.pointsA},
+              {aim - start, makeRandomPoint(random, 0.3), makeRandomPoint(random, 3)}};
   tumble.a.body.translation = start;
   tumble.b = {{tumble.pointsB, Vec3::Zero(), &tumble.rotationB},
-              {randomPoint(random, 0.2), Vec3::Zero(), randomPoint(random, 3)}};
+              {makeRandomPoint(random, 0.2), Vec3::Zero(), makeRandomPoint(random, 3)}};
 }
 
 /// The separation at a time, with a pose by Eigen and libm.

@@ -28,16 +28,16 @@ bool haveMissed(SeparatingPlanes& planes, const std::vector<Vec3>& vertices, con
 }
 
 /// Triangle parallel to the plane x = 0 at `x`.
-std::vector<Vec3> paneAt(double x, double z) {
+std::vector<Vec3> makePaneAt(double x, double z) {
   return {{x, 0, z}, {x, 1, z}, {x, 0, z + 1}};
 }
 
 TEST(SeparatingPlanes, OnePlaneServesTheNeighboursThatHaveNoAxisYet) {
   const PlacedConvex cube{kUnitCube};
   SeparatingPlanes planes(cube, {0.25, 0, 0}, 0.125);
-  EXPECT_FALSE(haveMissed(planes, paneAt(2, 0), Vec3::Zero()));
-  EXPECT_TRUE(haveMissed(planes, paneAt(2, 0), {3, 0, 0}));
-  for (int i = 1; i < 50; ++i) EXPECT_TRUE(haveMissed(planes, paneAt(2, i), Vec3::Zero())) << i;
+  EXPECT_FALSE(haveMissed(planes, makePaneAt(2, 0), Vec3::Zero()));
+  EXPECT_TRUE(haveMissed(planes, makePaneAt(2, 0), {3, 0, 0}));
+  for (int i = 1; i < 50; ++i) EXPECT_TRUE(haveMissed(planes, makePaneAt(2, i), Vec3::Zero())) << i;
   EXPECT_TRUE(planes.haveMissed(Aabb{{2, 0, 0}, {3, 9, 9}}));
   EXPECT_FALSE(planes.haveMissed(Aabb{{1.3, 0, 0}, {3, 9, 9}}));
 }
@@ -46,11 +46,11 @@ TEST(SeparatingPlanes, WhatTheMotionReachesIsNotMissed) {
   const PlacedConvex cube{kUnitCube};
   const Vec3 axis = Vec3::UnitX();
   SeparatingPlanes planes(cube, {0.25, 0, 0}, 0.125);
-  EXPECT_FALSE(haveMissed(planes, paneAt(1.375, 0), axis));  // exactly at the distance
-  EXPECT_TRUE(haveMissed(planes, paneAt(1.375 + 1e-12, 0), axis));
+  EXPECT_FALSE(haveMissed(planes, makePaneAt(1.375, 0), axis));  // exactly at the distance
+  EXPECT_TRUE(haveMissed(planes, makePaneAt(1.375 + 1e-12, 0), axis));
   planes.reduceTo({0.125, 0, 0}, 0.125);
-  EXPECT_TRUE(haveMissed(planes, paneAt(1.26, 0), axis));
-  EXPECT_FALSE(haveMissed(planes, paneAt(1.25, 0), axis));
+  EXPECT_TRUE(haveMissed(planes, makePaneAt(1.26, 0), axis));
+  EXPECT_FALSE(haveMissed(planes, makePaneAt(1.25, 0), axis));
 }
 
 TEST(SeparatingPlanes, ALargeTriangleIsMissedThoughItsBoxIsNot) {
@@ -64,17 +64,17 @@ TEST(SeparatingPlanes, AxesOfAnyLengthAndNoneAreAllowed) {
   const PlacedConvex cube{kUnitCube};
   for (const double length : {5e-324, 1e-200, 2.3e-162, 1e-155, 1e-30, 1.0, 1e30, 1e200, 1e308}) {
     SeparatingPlanes planes(cube, Vec3::Zero(), 0.125);
-    EXPECT_FALSE(haveMissed(planes, paneAt(1.121, 0), {length, 0, 0})) << length;
-    EXPECT_FALSE(haveMissed(planes, paneAt(2, 0), {-length, 0, 0})) << length;
-    EXPECT_TRUE(haveMissed(planes, paneAt(1.126, 0), {length, 0, 0})) << length;
+    EXPECT_FALSE(haveMissed(planes, makePaneAt(1.121, 0), {length, 0, 0})) << length;
+    EXPECT_FALSE(haveMissed(planes, makePaneAt(2, 0), {-length, 0, 0})) << length;
+    EXPECT_TRUE(haveMissed(planes, makePaneAt(1.126, 0), {length, 0, 0})) << length;
   }
   SeparatingPlanes planes(cube, Vec3::Zero(), 0.125);
-  EXPECT_FALSE(haveMissed(planes, paneAt(2, 0), Vec3::Zero()));
+  EXPECT_FALSE(haveMissed(planes, makePaneAt(2, 0), Vec3::Zero()));
 }
 /// Dyadic points up to `size` (a power of two) from the origin: sums with other such points are
 /// exact.
-std::vector<Vec3> dyadicPoints(Random& random, int count, double size) {
-  std::vector<Vec3> points = latticePoints(random, count, 1024);
+std::vector<Vec3> makeDyadicPoints(Random& random, int count, double size) {
+  std::vector<Vec3> points = makeLatticePoints(random, count, 1024);
   for (Vec3& point : points) point *= size / 1024;
   return points;
 }
@@ -86,8 +86,8 @@ struct Tally {
 /// One body among 40 others near `origin`: every proved miss is checked exactly, with the hull of
 /// the body at the start and at the end.
 void checkMotion(Random& random, const Vec3& origin, Tally& tally) {
-  const std::vector<Vec3> vertices = dyadicPoints(random, 12, 0.5);
-  const Vec3 displacement = dyadicPoints(random, 1, 0.25).front();
+  const std::vector<Vec3> vertices = makeDyadicPoints(random, 12, 0.5);
+  const Vec3 displacement = makeDyadicPoints(random, 1, 0.25).front();
   const double distance = 0x1p-6;
   const PlacedConvex a{vertices, origin};
   std::vector<Vec3> swept = vertices;
@@ -95,8 +95,8 @@ void checkMotion(Random& random, const Vec3& origin, Tally& tally) {
   const PlacedConvex whole{swept, origin};
   SeparatingPlanes planes(a, displacement, distance);
   for (int i = 0; i < 40; ++i) {
-    const std::vector<Vec3> obstacle = dyadicPoints(random, 3 + 7 * (i % 2), 0.5);
-    const PlacedConvex b{obstacle, origin + dyadicPoints(random, 1, 2).front()};
+    const std::vector<Vec3> obstacle = makeDyadicPoints(random, 3 + 7 * (i % 2), 0.5);
+    const PlacedConvex b{obstacle, origin + makeDyadicPoints(random, 1, 2).front()};
     FeatureCache cache;
     if (i % 4 != 0) computeSeparation(a, b, cache);
     const bool missed = haveMissed(planes, b, cache.axis);

@@ -65,10 +65,10 @@ TEST(ShapeCast, RandomSweepsEqualSmallStepsAndNeverPenetrate) {
   Random random(7);
   int stops = 0;
   for (int i = 0; i < 300; ++i) {
-    const std::vector<Vec3> a = randomPoints(random, 12, 0.5);
-    const std::vector<Vec3> b = randomPoints(random, 3, 1.5);
-    const Vec3 at = randomPoint(random, 2);
-    const Vec3 by = -2 * at + randomPoint(random, 1);
+    const std::vector<Vec3> a = makeRandomPoints(random, 12, 0.5);
+    const std::vector<Vec3> b = makeRandomPoints(random, 3, 1.5);
+    const Vec3 at = makeRandomPoint(random, 2);
+    const Vec3 by = -2 * at + makeRandomPoint(random, 1);
     FeatureCache cache;
     if (computeSeparation({a, at}, {b}, cache).distance < 2 * kBand.rest) continue;
     const MotionResult result = castShapeCold({a, at}, by, {b});

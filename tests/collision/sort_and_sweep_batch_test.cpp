@@ -15,21 +15,21 @@ constexpr int kProxies = 300;
 
 class BatchedSweep : public ::testing::Test {
  protected:
-  Aabb randomBox(double largest = 1) {
-    const Vec3 size = uniform3(random_, Vec3::Constant(0.05), Vec3::Constant(largest));
-    return boxAt(uniform3(random_, Vec3::Zero(), Vec3::Constant(9)), size);
+  Aabb makeRandomBox(double largest = 1) {
+    const Vec3 size = drawVector(random_, Vec3::Constant(0.05), Vec3::Constant(largest));
+    return makeBoxAt(drawVector(random_, Vec3::Zero(), Vec3::Constant(9)), size);
   }
   void insertAll(double largest = 1) {
-    for (int k = 0; k < kProxies; ++k) ids_.push_back(checked_.insert(randomBox(largest)));
+    for (int k = 0; k < kProxies; ++k) ids_.push_back(checked_.insert(makeRandomBox(largest)));
   }
   void shift(ProxyId id, double step) {
-    const Vec3 by = uniform3(random_, Vec3::Constant(-step), Vec3::Constant(step));
-    const Aabb box = checked_.dynamicBoxes()[id];
+    const Vec3 by = drawVector(random_, Vec3::Constant(-step), Vec3::Constant(step));
+    const Aabb box = checked_.getDynamicBoxes()[id];
     checked_.move(id, {box.min + by, box.max + by});
   }
   void updateAndCheck() {
     ASSERT_NO_FATAL_FAILURE(checked_.updateAndCheck());
-    batched_ = checked_.sweep().counters().batched;
+    batched_ = checked_.getSweep().counters().batched;
   }
   void expectTheAuditFindsInjectedFaults(ProxyId first);
 
@@ -41,10 +41,10 @@ class BatchedSweep : public ::testing::Test {
 
 /// The audit accepts the sweep, and finds faults injected at a pair of proxies from `first` on.
 void BatchedSweep::expectTheAuditFindsInjectedFaults(ProxyId first) {
-  const SortAndSweep& sweep = checked_.sweep();
-  std::vector<std::pair<ProxyId, Aabb>> boxes(checked_.dynamicBoxes().begin(),
-                                              checked_.dynamicBoxes().end());
-  const auto audit = [&] { return compareWithBruteForce(sweep, checked_.staticBoxes(), boxes); };
+  const SortAndSweep& sweep = checked_.getSweep();
+  std::vector<std::pair<ProxyId, Aabb>> boxes(checked_.getDynamicBoxes().begin(),
+                                              checked_.getDynamicBoxes().end());
+  const auto audit = [&] { return compareWithBruteForce(sweep, checked_.getStaticBoxes(), boxes); };
   const BroadPhaseAudit untouched = audit();
   EXPECT_GT(untouched.pairs, 0u);
   EXPECT_EQ(untouched.pairs, sweep.pairCount());
@@ -58,7 +58,7 @@ void BatchedSweep::expectTheAuditFindsInjectedFaults(ProxyId first) {
   ASSERT_NE(found, boxes.end());
   const auto [id, box] = *found;
   const std::size_t overlapCount = sweep.getOverlaps(id).size();
-  found->second = boxAt(Vec3::Constant(1e6), Vec3::Ones());
+  found->second = makeBoxAt(Vec3::Constant(1e6), Vec3::Ones());
   const BroadPhaseAudit gone = audit();
   EXPECT_EQ(gone.extra.size(), overlapCount);
   EXPECT_TRUE(std::ranges::any_of(gone.extra, &ProxyPair::otherIsDynamic));
@@ -87,13 +87,13 @@ TEST_F(BatchedSweep, EqualsBruteForceWhileAllProxiesMoveFast) {
 
 TEST_F(BatchedSweep, EqualsBruteForceWithSizesOfManyMagnitudes) {
   insertAll(0.3);
-  for (int k = 0; k < 12; ++k) ids_.push_back(checked_.insert(randomBox(6)));
+  for (int k = 0; k < 12; ++k) ids_.push_back(checked_.insert(makeRandomBox(6)));
   for (int tick = 0; tick < 60; ++tick) {
     for (const ProxyId id : ids_) {
-      if (randomInt(random_, 0, 9) > 0) {
+      if (drawInteger(random_, 0, 9) > 0) {
         shift(id, 0.3);
       } else {
-        checked_.move(id, randomBox(tick % 3 == 0 ? 5 : 0.2));
+        checked_.move(id, makeRandomBox(tick % 3 == 0 ? 5 : 0.2));
       }
     }
     updateAndCheck();
@@ -108,7 +108,7 @@ TEST_F(BatchedSweep, ProxiesThatRestAreLeftOutUntilTheyMove) {
   for (int tick = 0; tick < 200; ++tick) {
     for (std::size_t k = 0; k < dynamicBoxes; ++k) shift(ids_[k], 0.4);
     if (tick > 100 && tick % 7 == 0) {  // resting ones move a little, two at once, or jump
-      const auto rested = dynamicBoxes + static_cast<std::size_t>(randomInt(random_, 0, 198));
+      const auto rested = dynamicBoxes + static_cast<std::size_t>(drawInteger(random_, 0, 198));
       shift(ids_[rested], 0.2);
       shift(ids_[rested + 1], tick % 3 == 0 ? 5 : 0.01);
     }
@@ -128,12 +128,12 @@ TEST_F(BatchedSweep, ProxiesComeAndGoWhileOthersRestOrMove) {
   for (int tick = 0; tick < 250; ++tick) {
     for (std::size_t k = 0; k < 90; ++k) shift(ids_[k], 0.4);
     for (int change = 0; change < 2; ++change) {
-      const auto k = static_cast<std::size_t>(randomInt(random_, 0, kProxies - 1));
+      const auto k = static_cast<std::size_t>(drawInteger(random_, 0, kProxies - 1));
       checked_.remove(ids_[k]);
       if (change == 1) shift(ids_[k == 0 ? 1 : 0], 0.1);
-      ids_[k] = checked_.insert(randomBox());
+      ids_[k] = checked_.insert(makeRandomBox());
     }
-    if (tick % 20 == 0) checked_.insertStatic(randomBox());
+    if (tick % 20 == 0) checked_.insertStatic(makeRandomBox());
     updateAndCheck();
     if (HasFatalFailure()) return;
   }
@@ -159,7 +159,7 @@ TEST_F(BatchedSweep, ReturnsToTheListsWhenTheMotionIsSlowAndToBatchesWhenItIsFas
 }
 
 TEST_F(BatchedSweep, FewProxiesAreNeverABatch) {
-  for (int k = 0; k < 40; ++k) ids_.push_back(checked_.insert(randomBox()));
+  for (int k = 0; k < 40; ++k) ids_.push_back(checked_.insert(makeRandomBox()));
   for (int tick = 0; tick < 40; ++tick) {
     for (const ProxyId id : ids_) shift(id, 0.8);
     updateAndCheck();
@@ -214,7 +214,7 @@ TEST_F(BatchedSweep, AnIdleBatchDoesNothing) {
   EXPECT_EQ(batched_, static_cast<std::uint64_t>(kProxies));
   updateAndCheck();
   EXPECT_EQ(batched_, 0u);
-  EXPECT_EQ(checked_.sweep().counters().aabbTests, 0u);
+  EXPECT_EQ(checked_.getSweep().counters().aabbTests, 0u);
 }
 
 }  // namespace

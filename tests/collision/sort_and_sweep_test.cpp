@@ -21,18 +21,18 @@ TEST(SortAndSweep, EqualsBruteForceForWalkersAmongFurniture) {
   CheckedSweep scene(makeFurnishedHall(random, 900, extent));
   std::vector<Vec3> velocity;
   for (int k = 0; k < 100; ++k) {
-    scene.insert(boxAt(uniform3(random, Vec3::Zero(), extent), Vec3(0.6, 1.75, 0.6)));
-    velocity.push_back(uniform3(random, Vec3(-0.1, -0.02, -0.1), Vec3(0.1, 0.02, 0.1)));
+    scene.insert(makeBoxAt(drawVector(random, Vec3::Zero(), extent), Vec3(0.6, 1.75, 0.6)));
+    velocity.push_back(drawVector(random, Vec3(-0.1, -0.02, -0.1), Vec3(0.1, 0.02, 0.1)));
   }
   for (int tick = 0; tick < 300; ++tick) {
-    for (const auto& [id, box] : std::map(scene.dynamicBoxes())) {
+    for (const auto& [id, box] : std::map(scene.getDynamicBoxes())) {
       Vec3& v = velocity[id];
       for (int axis = 0; axis < 3; ++axis) {
         if (box.min[axis] < -3 || box.min[axis] > extent[axis] + 3) {
           v[axis] = std::copysign(v[axis], box.min[axis] < 0 ? 1.0 : -1.0);
         }
       }
-      if (randomInt(random, 0, 9) > 0) scene.move(id, {box.min + v, box.max + v});
+      if (drawInteger(random, 0, 9) > 0) scene.move(id, {box.min + v, box.max + v});
     }
     ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "tick " << tick;
   }
@@ -49,7 +49,7 @@ TEST(SortAndSweep, FindsTheStaticBoxesAroundAnUnregisteredBox) {
   std::size_t found = 0;
   for (int k = 0; k < 300; ++k) {
     const Vec3 size = Vec3::Constant(k % 3 == 0 ? 0 : k % 3 == 1 ? 1 : 40);
-    const Aabb box = boxAt(uniform3(random, Vec3::Constant(-2), extent), size);
+    const Aabb box = makeBoxAt(drawVector(random, Vec3::Constant(-2), extent), size);
     std::vector<StaticId> expected;
     for (const ProxyPair& pair :
          findPairsBruteForce(staticBoxes, std::vector{std::pair{ProxyId{0}, box}})) {
@@ -59,7 +59,7 @@ TEST(SortAndSweep, FindsTheStaticBoxesAroundAnUnregisteredBox) {
     found += expected.size();
   }
   EXPECT_GT(found, 3000u);
-  EXPECT_TRUE(SortAndSweep({}).overlapStatic(boxAt(Vec3::Zero(), Vec3::Ones())).empty());
+  EXPECT_TRUE(SortAndSweep({}).overlapStatic(makeBoxAt(Vec3::Zero(), Vec3::Ones())).empty());
 }
 
 TEST(SortAndSweep, EqualsBruteForceForBodiesThatGrowAndShrink) {
@@ -70,15 +70,15 @@ TEST(SortAndSweep, EqualsBruteForceForBodiesThatGrowAndShrink) {
   };
   std::vector<Body> bodies;
   for (int k = 0; k < 40; ++k) {
-    bodies.push_back({uniform3(random, Vec3::Zero(), Vec3(12, 6, 12)),
-                      uniform3(random, Vec3::Zero(), Vec3::Constant(6))});
-    scene.insert(boxAt(bodies.back().centre, Vec3::Zero()));
+    bodies.push_back({drawVector(random, Vec3::Zero(), Vec3(12, 6, 12)),
+                      drawVector(random, Vec3::Zero(), Vec3::Constant(6))});
+    scene.insert(makeBoxAt(bodies.back().centre, Vec3::Zero()));
   }
   for (int tick = 0; tick < 300; ++tick) {
     for (ProxyId id = 0; id < bodies.size(); ++id) {
       Body& body = bodies[id];
       body.phase += Vec3(0.11, 0.07, 0.13);
-      body.centre += uniform3(random, Vec3::Constant(-0.05), Vec3::Constant(0.05));
+      body.centre += drawVector(random, Vec3::Constant(-0.05), Vec3::Constant(0.05));
       const Vec3 half = (body.phase.array().sin().abs() * 0.9).matrix();
       scene.move(id, {body.centre - half, body.centre + half});
     }
@@ -94,7 +94,7 @@ TEST(SortAndSweep, AProxyThatCirclesAnotherOverlapsOnEachSideAndIsTestedOnlyAtCo
   const Vec3 middle(3, 7, -5);
   CheckedSweep scene({});
   std::array<ProxyId, 2> ids;
-  for (ProxyId& id : ids) id = scene.insert(boxAt(middle, Vec3::Ones()));
+  for (ProxyId& id : ids) id = scene.insert(makeBoxAt(middle, Vec3::Ones()));
   std::size_t quiet = 0, tested = 0;
   for (const ProxyId goes : ids) {
     for (int around = 0; around < 3; ++around) {
@@ -106,13 +106,13 @@ TEST(SortAndSweep, AProxyThatCirclesAnotherOverlapsOnEachSideAndIsTestedOnlyAtCo
           Vec3 corner = middle;
           corner[around] += u;
           corner[(around + 1) % 3] += v;
-          scene.move(goes, boxAt(corner, Vec3::Ones()));
+          scene.move(goes, makeBoxAt(corner, Vec3::Ones()));
           ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "radius " << radius << ", step " << k;
-          if (radius < 17 || scene.sweep().counters().windowsBuilt > 0) continue;
-          (scene.sweep().counters().aabbTests == 0 ? quiet : tested) += 1;
+          if (radius < 17 || scene.getSweep().counters().windowsBuilt > 0) continue;
+          (scene.getSweep().counters().aabbTests == 0 ? quiet : tested) += 1;
         }
       }
-      scene.move(goes, boxAt(middle, Vec3::Ones()));
+      scene.move(goes, makeBoxAt(middle, Vec3::Ones()));
     }
   }
   EXPECT_EQ(scene.dynamicPairsAdded, 12u);
@@ -125,29 +125,30 @@ TEST(SortAndSweep, EqualsBruteForceWhenProxiesAppearVanishAndJump) {
   const Vec3 extent(12, 6, 12);
   CheckedSweep scene(makeFurnishedHall(random, 700, extent));
   const auto anyBox = [&] {
-    const Vec3 corner = uniform3(random, Vec3(-4, -3, -4), extent + Vec3(4, 3, 4));
-    return boxAt(corner, uniform3(random, Vec3::Zero(), Vec3::Constant(3)));
+    const Vec3 corner = drawVector(random, Vec3(-4, -3, -4), extent + Vec3(4, 3, 4));
+    return makeBoxAt(corner, drawVector(random, Vec3::Zero(), Vec3::Constant(3)));
   };
   std::size_t removed = 0;
   for (int tick = 0; tick < 300; ++tick) {
-    while (scene.dynamicBoxes().size() < 25 || randomInt(random, 0, 2) == 0) scene.insert(anyBox());
-    for (const auto& [id, box] : std::map(scene.dynamicBoxes())) {
-      const int what = randomInt(random, 0, 11);
+    while (scene.getDynamicBoxes().size() < 25 || drawInteger(random, 0, 2) == 0)
+      scene.insert(anyBox());
+    for (const auto& [id, box] : std::map(scene.getDynamicBoxes())) {
+      const int what = drawInteger(random, 0, 11);
       if (what == 0) {
         scene.move(id, anyBox());
       } else if (what == 1) {
-        if (randomInt(random, 0, 1) == 0) scene.move(id, anyBox());
+        if (drawInteger(random, 0, 1) == 0) scene.move(id, anyBox());
         scene.remove(id);
         ++removed;
-        if (randomInt(random, 0, 1) == 0) scene.insert(box);
+        if (drawInteger(random, 0, 1) == 0) scene.insert(box);
       } else if (what < 8) {
-        const Vec3 step = uniform3(random, Vec3::Constant(-0.1), Vec3::Constant(0.1));
+        const Vec3 step = drawVector(random, Vec3::Constant(-0.1), Vec3::Constant(0.1));
         scene.move(id, {box.min + step, box.max + step});
         scene.move(id, {box.min - step, box.max - step});
       }
     }
     const ProxyId passing = scene.insert(anyBox());
-    if (randomInt(random, 0, 1) == 0) scene.remove(passing);
+    if (drawInteger(random, 0, 1) == 0) scene.remove(passing);
     ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "tick " << tick;
   }
   EXPECT_GT(removed, 300u);
@@ -159,19 +160,19 @@ TEST(SortAndSweep, EqualsBruteForceWhenEndPointsAreTied) {
   for (const double unit : {1.0, 0.1, 1e-200, 1e200}) {
     Random random(4);
     const auto lattice = [&](int low, int high) {
-      const int x = randomInt(random, low, high), y = randomInt(random, low, high),
-                z = randomInt(random, low, high);
+      const int x = drawInteger(random, low, high), y = drawInteger(random, low, high),
+                z = drawInteger(random, low, high);
       return Vec3(x * unit, y * unit, z * unit);
     };
     std::vector<Aabb> staticBoxes;
-    for (int k = 0; k < 300; ++k) staticBoxes.push_back(boxAt(lattice(0, 12), lattice(0, 2)));
+    for (int k = 0; k < 300; ++k) staticBoxes.push_back(makeBoxAt(lattice(0, 12), lattice(0, 2)));
     CheckedSweep scene(staticBoxes);
-    for (int k = 0; k < 30; ++k) scene.insert(boxAt(lattice(0, 12), lattice(0, 2)));
+    for (int k = 0; k < 30; ++k) scene.insert(makeBoxAt(lattice(0, 12), lattice(0, 2)));
     for (int tick = 0; tick < 200; ++tick) {
-      for (const auto& [id, box] : std::map(scene.dynamicBoxes())) {
+      for (const auto& [id, box] : std::map(scene.getDynamicBoxes())) {
         const Vec3 step = lattice(-1, 1);
         const Vec3 low = (box.min + step).cwiseMax(-2 * unit).cwiseMin(14 * unit);
-        if (randomInt(random, 0, 3) > 0) scene.move(id, boxAt(low, lattice(0, 2)));
+        if (drawInteger(random, 0, 3) > 0) scene.move(id, makeBoxAt(low, lattice(0, 2)));
       }
       ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "tick " << tick << " unit " << unit;
     }
@@ -182,17 +183,19 @@ TEST(SortAndSweep, EqualsBruteForceWhenEndPointsAreTied) {
 
 TEST(SortAndSweep, EqualsBruteForceInAStackOfEqualBoxesWithADistantOne) {
   Random random(5);
-  std::vector<Aabb> staticBoxes(200, boxAt(Vec3(1, 1, 1), Vec3(1, 1, 1)));
-  for (int k = 0; k < 100; ++k) staticBoxes.push_back(boxAt(Vec3(2, 0.01 * k, 1), Vec3(0, 0, 0)));
-  staticBoxes.push_back(boxAt(Vec3(1e12, -1e12, 5), Vec3(1, 1, 1)));
-  staticBoxes.push_back(boxAt(Vec3(-1e3, 0, -1e3), Vec3(2e3, 0.1, 2e3)));
+  std::vector<Aabb> staticBoxes(200, makeBoxAt(Vec3(1, 1, 1), Vec3(1, 1, 1)));
+  for (int k = 0; k < 100; ++k)
+    staticBoxes.push_back(makeBoxAt(Vec3(2, 0.01 * k, 1), Vec3(0, 0, 0)));
+  staticBoxes.push_back(makeBoxAt(Vec3(1e12, -1e12, 5), Vec3(1, 1, 1)));
+  staticBoxes.push_back(makeBoxAt(Vec3(-1e3, 0, -1e3), Vec3(2e3, 0.1, 2e3)));
   CheckedSweep scene(staticBoxes);
   for (int k = 0; k < 10; ++k) {
-    scene.insert(boxAt(uniform3(random, Vec3::Zero(), Vec3::Constant(3)), Vec3(0.5, 0.5, 0.5)));
+    scene.insert(
+        makeBoxAt(drawVector(random, Vec3::Zero(), Vec3::Constant(3)), Vec3(0.5, 0.5, 0.5)));
   }
   for (int tick = 0; tick < 200; ++tick) {
-    for (const auto& [id, box] : std::map(scene.dynamicBoxes())) {
-      const Vec3 step = uniform3(random, Vec3::Constant(-0.2), Vec3::Constant(0.2));
+    for (const auto& [id, box] : std::map(scene.getDynamicBoxes())) {
+      const Vec3 step = drawVector(random, Vec3::Constant(-0.2), Vec3::Constant(0.2));
       scene.move(id, {box.min + step, box.max + step});
     }
     ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "tick " << tick;
@@ -204,8 +207,8 @@ TEST(SortAndSweep, EqualsBruteForceOverAHugeRangeOfCoordinatesAndSizes) {
   Random random(6);
   const auto wild = [&] {
     const auto magnitude = [&] {
-      const double value = std::pow(10.0, uniform(random, -6, 300));
-      return randomInt(random, 0, 1) == 0 ? value : -value;
+      const double value = std::pow(10.0, drawBetween(random, -6, 300));
+      return drawInteger(random, 0, 1) == 0 ? value : -value;
     };
     const double a = magnitude(), b = magnitude(), c = magnitude();
     const double d = magnitude(), e = magnitude(), f = magnitude();
@@ -216,13 +219,13 @@ TEST(SortAndSweep, EqualsBruteForceOverAHugeRangeOfCoordinatesAndSizes) {
   };
   std::vector<Aabb> staticBoxes;
   for (int k = 0; k < 150; ++k) staticBoxes.push_back(wild());
-  staticBoxes.push_back(boxAt(Vec3::Constant(-1.7e308), Vec3::Zero()));
-  staticBoxes.push_back(boxAt(Vec3::Constant(1.7e308), Vec3::Zero()));
+  staticBoxes.push_back(makeBoxAt(Vec3::Constant(-1.7e308), Vec3::Zero()));
+  staticBoxes.push_back(makeBoxAt(Vec3::Constant(1.7e308), Vec3::Zero()));
   CheckedSweep scene(staticBoxes);
   for (int k = 0; k < 20; ++k) scene.insert(wild());
   for (int tick = 0; tick < 200; ++tick) {
-    for (const auto& [id, box] : std::map(scene.dynamicBoxes())) {
-      if (randomInt(random, 0, 2) == 0) scene.move(id, wild());
+    for (const auto& [id, box] : std::map(scene.getDynamicBoxes())) {
+      if (drawInteger(random, 0, 2) == 0) scene.move(id, wild());
     }
     ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "tick " << tick;
   }
@@ -234,12 +237,12 @@ TEST(SortAndSweep, AcceptsProxiesMuchLargerThanTheCellsOrTheScene) {
   const Vec3 extent(60, 9, 60);
   CheckedSweep scene(makeFurnishedHall(random, 3000, extent));
   for (int k = 0; k < 4; ++k) {
-    scene.insert(boxAt(uniform3(random, Vec3::Zero(), extent), Vec3(30, 5, 20)));
+    scene.insert(makeBoxAt(drawVector(random, Vec3::Zero(), extent), Vec3(30, 5, 20)));
   }
-  scene.insert(boxAt(Vec3::Constant(-1e9), Vec3::Constant(2e9)));
+  scene.insert(makeBoxAt(Vec3::Constant(-1e9), Vec3::Constant(2e9)));
   for (int tick = 0; tick < 200; ++tick) {
-    for (const auto& [id, box] : std::map(scene.dynamicBoxes())) {
-      const Vec3 step = uniform3(random, Vec3::Constant(-1), Vec3::Constant(1));
+    for (const auto& [id, box] : std::map(scene.getDynamicBoxes())) {
+      const Vec3 step = drawVector(random, Vec3::Constant(-1), Vec3::Constant(1));
       scene.move(id, {box.min + step, box.max + step});
     }
     ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "tick " << tick;
@@ -251,11 +254,11 @@ TEST(SortAndSweep, WorksWithoutStaticBoxes) {
   Random random(8);
   CheckedSweep scene({});
   for (int k = 0; k < 60; ++k) {
-    scene.insert(boxAt(uniform3(random, Vec3::Zero(), Vec3::Constant(5)), Vec3::Ones()));
+    scene.insert(makeBoxAt(drawVector(random, Vec3::Zero(), Vec3::Constant(5)), Vec3::Ones()));
   }
   for (int tick = 0; tick < 200; ++tick) {
-    for (const auto& [id, box] : std::map(scene.dynamicBoxes())) {
-      const Vec3 step = uniform3(random, Vec3::Constant(-0.1), Vec3::Constant(0.1));
+    for (const auto& [id, box] : std::map(scene.getDynamicBoxes())) {
+      const Vec3 step = drawVector(random, Vec3::Constant(-0.1), Vec3::Constant(0.1));
       scene.move(id, {box.min + step, box.max + step});
     }
     ASSERT_NO_FATAL_FAILURE(scene.updateAndCheck()) << "tick " << tick;
@@ -264,51 +267,51 @@ TEST(SortAndSweep, WorksWithoutStaticBoxes) {
 }
 
 TEST(SortAndSweep, BoxesThatShareOnlyABoundaryPointOverlap) {
-  CheckedSweep scene({boxAt(Vec3::Zero(), Vec3::Ones())});
-  const ProxyId id = scene.insert(boxAt(Vec3::Ones(), Vec3::Ones()));
+  CheckedSweep scene({makeBoxAt(Vec3::Zero(), Vec3::Ones())});
+  const ProxyId id = scene.insert(makeBoxAt(Vec3::Ones(), Vec3::Ones()));
   scene.updateAndCheck();
-  EXPECT_EQ(scene.sweep().pairCount(), 1u);
+  EXPECT_EQ(scene.getSweep().pairCount(), 1u);
   const double apart = std::nextafter(1.0, 2.0);
-  scene.move(id, boxAt(Vec3(1, apart, 1), Vec3::Ones()));
+  scene.move(id, makeBoxAt(Vec3(1, apart, 1), Vec3::Ones()));
   scene.updateAndCheck();
-  EXPECT_EQ(scene.sweep().removedPairs().size(), 1u);
-  scene.move(id, boxAt(Vec3(1, 1, 1), Vec3::Ones()));
+  EXPECT_EQ(scene.getSweep().removedPairs().size(), 1u);
+  scene.move(id, makeBoxAt(Vec3(1, 1, 1), Vec3::Ones()));
   scene.updateAndCheck();
-  EXPECT_EQ(scene.sweep().addedPairs().size(), 1u);
+  EXPECT_EQ(scene.getSweep().addedPairs().size(), 1u);
 }
 
 TEST(SortAndSweep, ReportsThePairsOfARemovedProxyAsRemoved) {
-  CheckedSweep scene({boxAt(Vec3::Zero(), Vec3::Ones())});
-  const ProxyId a = scene.insert(boxAt(Vec3::Zero(), Vec3::Ones()));
-  const ProxyId b = scene.insert(boxAt(Vec3::Zero(), Vec3::Ones()));
+  CheckedSweep scene({makeBoxAt(Vec3::Zero(), Vec3::Ones())});
+  const ProxyId a = scene.insert(makeBoxAt(Vec3::Zero(), Vec3::Ones()));
+  const ProxyId b = scene.insert(makeBoxAt(Vec3::Zero(), Vec3::Ones()));
   scene.updateAndCheck();
   scene.remove(a);
-  const ProxyId c = scene.insert(boxAt(Vec3::Zero(), Vec3::Ones()));
+  const ProxyId c = scene.insert(makeBoxAt(Vec3::Zero(), Vec3::Ones()));
   EXPECT_NE(c, a) << "the id is free only after the update that reports its removal";
   scene.updateAndCheck();
-  const Pairs ended(scene.sweep().removedPairs().begin(), scene.sweep().removedPairs().end());
+  const Pairs ended(scene.getSweep().removedPairs().begin(), scene.getSweep().removedPairs().end());
   EXPECT_EQ(ended, (Pairs{{a, 0, false}, {a, b, true}}));
-  EXPECT_TRUE(scene.sweep().getOverlaps(a).empty());
-  EXPECT_EQ(scene.insert(boxAt(Vec3::Zero(), Vec3::Ones())), a);
+  EXPECT_TRUE(scene.getSweep().getOverlaps(a).empty());
+  EXPECT_EQ(scene.insert(makeBoxAt(Vec3::Zero(), Vec3::Ones())), a);
 }
 
 TEST(SortAndSweep, OmitsAPairThatBeginsAndEndsWithinAnUpdate) {
-  CheckedSweep scene({boxAt(Vec3::Zero(), Vec3::Ones())});
-  const ProxyId id = scene.insert(boxAt(Vec3::Constant(5), Vec3::Ones()));
+  CheckedSweep scene({makeBoxAt(Vec3::Zero(), Vec3::Ones())});
+  const ProxyId id = scene.insert(makeBoxAt(Vec3::Constant(5), Vec3::Ones()));
   scene.updateAndCheck();
-  scene.move(id, boxAt(Vec3::Zero(), Vec3::Ones()));
-  scene.move(id, boxAt(Vec3::Constant(5), Vec3::Ones()));
+  scene.move(id, makeBoxAt(Vec3::Zero(), Vec3::Ones()));
+  scene.move(id, makeBoxAt(Vec3::Constant(5), Vec3::Ones()));
   scene.updateAndCheck();
-  EXPECT_TRUE(scene.sweep().addedPairs().empty());
-  EXPECT_TRUE(scene.sweep().removedPairs().empty());
+  EXPECT_TRUE(scene.getSweep().addedPairs().empty());
+  EXPECT_TRUE(scene.getSweep().removedPairs().empty());
 }
 
 TEST(SortAndSweep, RefusesBoxesThatAreEmptyOrNotFinite) {
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const double infinity = std::numeric_limits<double>::infinity();
-  const Aabb good = boxAt(Vec3::Zero(), Vec3::Ones());
+  const Aabb good = makeBoxAt(Vec3::Zero(), Vec3::Ones());
   const std::vector<Aabb> bad{Aabb{},
-                              boxAt(Vec3(0, nan, 0), Vec3::Ones()),
+                              makeBoxAt(Vec3(0, nan, 0), Vec3::Ones()),
                               {Vec3(0, 0, -infinity), Vec3::Ones()},
                               {Vec3(0, 2, 0), Vec3::Ones()}};
   SortAndSweep sweep(std::vector<Aabb>{good});
@@ -329,24 +332,24 @@ TEST(SortAndSweep, CountsNothingWhileNothingMoves) {
   Random random(9);
   CheckedSweep scene(makeFurnishedHall(random, 500, Vec3(10, 3, 10)));
   for (int k = 0; k < 20; ++k) {
-    scene.insert(boxAt(uniform3(random, Vec3::Zero(), Vec3(10, 3, 10)), Vec3::Ones()));
+    scene.insert(makeBoxAt(drawVector(random, Vec3::Zero(), Vec3(10, 3, 10)), Vec3::Ones()));
   }
   scene.updateAndCheck();
-  EXPECT_GT(scene.sweep().counters().windowsBuilt, 0u);
-  EXPECT_GT(scene.sweep().pairCount(), 50u);
-  for (const auto& [id, box] : scene.dynamicBoxes()) scene.sweep().move(id, box);
+  EXPECT_GT(scene.getSweep().counters().windowsBuilt, 0u);
+  EXPECT_GT(scene.getSweep().pairCount(), 50u);
+  for (const auto& [id, box] : scene.getDynamicBoxes()) scene.getSweep().move(id, box);
   scene.updateAndCheck();
-  EXPECT_EQ(scene.sweep().counters().swaps, 0u);
-  EXPECT_EQ(scene.sweep().counters().windowsBuilt, 0u);
-  EXPECT_EQ(scene.sweep().counters().aabbTests, 0u);
+  EXPECT_EQ(scene.getSweep().counters().swaps, 0u);
+  EXPECT_EQ(scene.getSweep().counters().windowsBuilt, 0u);
+  EXPECT_EQ(scene.getSweep().counters().aabbTests, 0u);
 }
 
 TEST(SortAndSweep, BuildsNoWindowsForStationaryProxies) {
-  const Aabb staticBoxes = boxAt({0, 0, 0}, {1, 1, 1});
+  const Aabb staticBoxes = makeBoxAt({0, 0, 0}, {1, 1, 1});
   for (const Vec3& size : {Vec3(1, 0, 1), Vec3(0, 0, 0), Vec3(1, 1, 1)}) {
     for (const double far : {0.0, 1e17}) {
       SortAndSweep sweep(std::span(&staticBoxes, 1));
-      const Aabb box = boxAt({far, 0, 0}, size);
+      const Aabb box = makeBoxAt({far, 0, 0}, size);
       const ProxyId id = sweep.insert(box);
       sweep.update();
       for (int tick = 0; tick < 100; ++tick) {
@@ -359,10 +362,10 @@ TEST(SortAndSweep, BuildsNoWindowsForStationaryProxies) {
 }
 
 TEST(SortAndSweep, RemovesAllPairsWhenAllProxiesJump) {
-  const Aabb slab = boxAt({-5000, -1, -5000}, {10000, 1, 10000});
+  const Aabb slab = makeBoxAt({-5000, -1, -5000}, {10000, 1, 10000});
   SortAndSweep sweep(std::span(&slab, 1));
   constexpr int kDynamicBoxes = 100;
-  const auto makeBox = [](int k, double x) { return boxAt({x + 3 * k, 0.5, 0}, {1, 1, 1}); };
+  const auto makeBox = [](int k, double x) { return makeBoxAt({x + 3 * k, 0.5, 0}, {1, 1, 1}); };
   for (int k = 0; k < kDynamicBoxes; ++k) sweep.insert(makeBox(k, 0));
   sweep.update();
   for (int tick = 1; tick < 5; ++tick) {
@@ -375,7 +378,7 @@ TEST(SortAndSweep, RemovesAllPairsWhenAllProxiesJump) {
 }
 
 TEST(SortAndSweep, ARemovedProxyCannotBeMovedEvenToItsPosition) {
-  const Aabb box = boxAt({0.5, 0.5, 0.5}, {1, 1, 1});
+  const Aabb box = makeBoxAt({0.5, 0.5, 0.5}, {1, 1, 1});
   SortAndSweep sweep(std::span(&box, 1));
   const ProxyId id = sweep.insert(box);
   sweep.update();
@@ -387,13 +390,13 @@ TEST(SortAndSweep, ARemovedProxyCannotBeMovedEvenToItsPosition) {
 TEST(SortAndSweep, CountsTheEndpointsThatAProxyPasses) {
   // Ten posts in a row; a walker passes both ends of the first five on x.
   std::vector<Aabb> posts;
-  for (int k = 0; k < 10; ++k) posts.push_back(boxAt(Vec3(k, 0, 0), Vec3(0.1, 2, 0.1)));
+  for (int k = 0; k < 10; ++k) posts.push_back(makeBoxAt(Vec3(k, 0, 0), Vec3(0.1, 2, 0.1)));
   SortAndSweep sweep(posts);
-  const ProxyId id = sweep.insert(boxAt(Vec3(-1, 0.5, 0), Vec3(0.05, 1, 0.05)));
+  const ProxyId id = sweep.insert(makeBoxAt(Vec3(-1, 0.5, 0), Vec3(0.05, 1, 0.05)));
   sweep.update();
   std::uint64_t swaps = 0, begins = 0, ends = 0;
   for (int tick = 1; tick <= 55; ++tick) {
-    sweep.move(id, boxAt(Vec3(-1 + 0.1 * tick, 0.5, 0), Vec3(0.05, 1, 0.05)));
+    sweep.move(id, makeBoxAt(Vec3(-1 + 0.1 * tick, 0.5, 0), Vec3(0.05, 1, 0.05)));
     sweep.update();
     swaps += sweep.counters().swaps;
     begins += sweep.addedPairs().size();
@@ -414,7 +417,7 @@ double measureWorkPerProxy(std::size_t count) {
   std::vector<ProxyId> ids;
   for (int k = 0; k < 20; ++k) {
     boxes.push_back(
-        boxAt(uniform3(random, Vec3::Zero(), Vec3(side, 1, side)), Vec3(0.6, 1.75, 0.6)));
+        makeBoxAt(drawVector(random, Vec3::Zero(), Vec3(side, 1, side)), Vec3(0.6, 1.75, 0.6)));
     ids.push_back(sweep.insert(boxes.back()));
   }
   sweep.update();
@@ -444,7 +447,8 @@ TEST(SortAndSweep, AStraightWalkRarelyRebuildsTheWindow) {
   SortAndSweep sweep(makeFurnishedHall(random, 20000, Vec3(100, 3, 100)));
   std::vector<Aabb> boxes;
   for (int k = 0; k < 50; ++k) {
-    boxes.push_back(boxAt(uniform3(random, Vec3(5, 0, 5), Vec3(80, 1, 80)), Vec3(0.6, 1.75, 0.6)));
+    boxes.push_back(
+        makeBoxAt(drawVector(random, Vec3(5, 0, 5), Vec3(80, 1, 80)), Vec3(0.6, 1.75, 0.6)));
     sweep.insert(boxes.back());
   }
   sweep.update();
@@ -477,7 +481,7 @@ TEST(SortAndSweep, ResultsDoNotDependOnTheOrderOfTheStaticBoxes) {
   Random random(11);
   std::vector<Aabb> staticBoxes = makeFurnishedHall(random, 400, Vec3(10, 3, 10));
   SortAndSweep sweep(staticBoxes);
-  const Aabb box = boxAt(Vec3(3, 0, 3), Vec3(2, 2, 2));
+  const Aabb box = makeBoxAt(Vec3(3, 0, 3), Vec3(2, 2, 2));
   const ProxyId id = sweep.insert(box);
   sweep.update();
   const auto last = static_cast<std::uint32_t>(staticBoxes.size() - 1);

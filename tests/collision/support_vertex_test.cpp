@@ -12,8 +12,8 @@
 namespace enfilade::collision {
 namespace {
 
+using testing::drawUniform;
 using testing::Random;
-using testing::uniform;
 
 /// direction . (rotation * vertex) of all vertices, exactly.
 std::vector<mpq_class> projectExactly(const PlacedConvex& body, const Vec3& direction) {
@@ -31,12 +31,12 @@ std::vector<mpq_class> projectExactly(const PlacedConvex& body, const Vec3& dire
 /// Solid bodies with few and many vertices, flat ones, and boxes, whose faces tie four vertices.
 Hull makeHull(Random& random, int kind) {
   std::vector<Vec3> points;
-  if (kind % 4 == 0) points = testing::latticePoints(random, 12, 1);
-  if (kind % 4 == 1) points = testing::randomPoints(random, 7, 1);
+  if (kind % 4 == 0) points = testing::makeLatticePoints(random, 12, 1);
+  if (kind % 4 == 1) points = testing::makeRandomPoints(random, 7, 1);
   if (kind % 4 == 2)
-    for (int i = 0; i < 60; ++i) points.push_back(testing::randomPoint(random, 1).normalized());
+    for (int i = 0; i < 60; ++i) points.push_back(testing::makeRandomPoint(random, 1).normalized());
   if (kind % 4 == 3) {
-    points = testing::randomPoints(random, 9, 1);
+    points = testing::makeRandomPoints(random, 9, 1);
     for (Vec3& p : points) p.z() = 0;
   }
   return buildHull(points);
@@ -50,7 +50,7 @@ Vec3 makeDirection(Random& random, const PlacedConvex& body, int kind) {
     const auto& face = faces[static_cast<std::size_t>(kind) % faces.size()];
     return body.vertices[face[k % face.size()]];
   };
-  const Vec3 any = testing::randomPoint(random, 1), edge = corner(1) - corner(0);
+  const Vec3 any = testing::makeRandomPoint(random, 1), edge = corner(1) - corner(0);
   Vec3 local = kind % 3 == 0 ? any : edge.cross(kind % 3 == 1 ? corner(2) - corner(0) : any);
   if (kind % 2 == 0) local += any * std::ldexp(local.norm(), -50 - kind % 7);
   return (*body.rotation * local).stableNormalized();
@@ -87,8 +87,8 @@ TEST(SupportVertex, ClaimsToBeTheFarthestOnlyIfItIs) {
   for (int i = 0; i < 2000; ++i) {
     SCOPED_TRACE(i);
     const Hull hullA = makeHull(random, i), hullB = makeHull(random, i / 4);
-    const Vec3 axis = testing::randomPoint(random, 1).stableNormalized();
-    const Mat3 turned = Eigen::AngleAxisd(uniform(random, 0, 6), axis).toRotationMatrix();
+    const Vec3 axis = testing::makeRandomPoint(random, 1).stableNormalized();
+    const Mat3 turned = Eigen::AngleAxisd(drawUniform(random, 0, 6), axis).toRotationMatrix();
     const Mat3 sheared = turned + 1e-9 * Mat3::Ones();
     const bool withHull = i % 5 != 0;
     const PlacedConvex a{hullA.vertices, Vec3::Zero(), &turned, &hullA},
@@ -110,8 +110,8 @@ TEST(SupportVertex, ScansTwoVerticesAtOnceAsOneByOne) {
   Random random(12);
   for (std::size_t count = 1; count <= kMaxScannedVertices; ++count) {
     SCOPED_TRACE(count);
-    const auto vertices = testing::randomPoints(random, static_cast<int>(count), 1);
-    const Vec3 direction = testing::randomPoint(random, 1);
+    const auto vertices = testing::makeRandomPoints(random, static_cast<int>(count), 1);
+    const Vec3 direction = testing::makeRandomPoint(random, 1);
     for (const Vec3& limit : vertices) {
       const double threshold = dot(direction, limit);
       const std::uint64_t above = findVerticesAbove(vertices, direction, threshold);

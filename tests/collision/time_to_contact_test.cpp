@@ -17,14 +17,14 @@ using namespace testing;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 /// The bound of Lin 1993, section 5.1; `speed` is the closing speed of the closest points.
-double referenceTimeToContact(double distance, double speed, double acceleration) {
+double computeReferenceTime(double distance, double speed, double acceleration) {
   if (acceleration == 0) return distance / speed;
   return (std::sqrt(speed * speed + 2 * acceleration * distance) - speed) / acceleration;
 }
 
 /// A power of ten between 10^-maxExponent and 10^maxExponent.
-double randomMagnitude(Random& random, double maxExponent) {
-  const double exponent = uniform(random, -maxExponent, maxExponent);
+double drawMagnitude(Random& random, double maxExponent) {
+  const double exponent = drawUniform(random, -maxExponent, maxExponent);
   return std::pow(10.0, exponent);
 }
 
@@ -36,8 +36,8 @@ mpq_class computeClosedDistance(const ClosingBounds& closing, const mpq_class& t
 TEST(TimeToContact, IsNeverAboveTheTruthAndHardlyBelow) {
   Random random(11);
   for (int i = 0; i < 3000; ++i) {
-    const double distance = randomMagnitude(random, 100);
-    ClosingBounds closing{randomMagnitude(random, 100), randomMagnitude(random, 100)};
+    const double distance = drawMagnitude(random, 100);
+    ClosingBounds closing{drawMagnitude(random, 100), drawMagnitude(random, 100)};
     if (i % 5 == 0) closing.speed = 0;
     if (i % 7 == 0) closing.acceleration = 0;
     const double time = computeTimeToContact(distance, closing);
@@ -80,7 +80,7 @@ TEST(TimeToContact, WithoutAGapIsNowAndWithoutMotionNever) {
 TEST(TimeToContact, ARodAlongAWallArrivesBeforeTheSeedsBoundAndAfterOurs) {
   constexpr double kHalfLength = 1, kHeight = 1e-4, kSpin = 2;
   const double arrival = std::asin(kHeight / kHalfLength) / kSpin;
-  const double seed = referenceTimeToContact(kHeight, 0, kSpin * kSpin * kHalfLength);
+  const double seed = computeReferenceTime(kHeight, 0, kSpin * kSpin * kHalfLength);
   EXPECT_GT(seed, 100 * arrival);
   const MotionBounds rod{Vec3::Zero(), 0, {0, 0, kSpin}, 0, kHalfLength};
   const double ours =
@@ -93,10 +93,11 @@ TEST(ClosingBounds, NoVertexClosesFasterThanTheBound) {
   Random random(12);
   double tightest = 0;
   for (int i = 0; i < 300; ++i) {
-    const Vec3 n = randomPoint(random, 1).normalized();
-    const Vec3 velocity = randomPoint(random, 2), pull = randomPoint(random, 1);
-    const Vec3 spin = randomPoint(random, 3), twist = spin.normalized() * uniform(random, 0, 2);
-    const Vec3 vertex = randomPoint(random, 1);
+    const Vec3 n = makeRandomPoint(random, 1).normalized();
+    const Vec3 velocity = makeRandomPoint(random, 2), pull = makeRandomPoint(random, 1);
+    const Vec3 spin = makeRandomPoint(random, 3),
+               twist = spin.normalized() * drawUniform(random, 0, 2);
+    const Vec3 vertex = makeRandomPoint(random, 1);
     const MotionBounds a{velocity, pull.norm(), spin, twist.norm(), vertex.norm()};
     const double interval = 1.5;
     const ClosingBounds closing = computeClosingBounds(a, {}, n, interval);
@@ -148,7 +149,7 @@ TEST(TimeOfImpact, IsProvedUpToTheContactAndNotBeyond) {
 
 using PreciseMatrix = std::array<std::array<mpf_class, 3>, 3>;
 
-PreciseMatrix preciseMatrix(const Mat3& from) {
+PreciseMatrix toPreciseMatrix(const Mat3& from) {
   PreciseMatrix result;
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j) result[i][j] = mpf_class(from(i, j), 512);
@@ -156,7 +157,7 @@ PreciseMatrix preciseMatrix(const Mat3& from) {
 }
 
 PreciseMatrix operator*(const PreciseMatrix& a, const PreciseMatrix& b) {
-  PreciseMatrix result = preciseMatrix(Mat3::Zero());
+  PreciseMatrix result = toPreciseMatrix(Mat3::Zero());
   for (int i = 0; i < 3; ++i)
     for (int j = 0; j < 3; ++j)
       for (int k = 0; k < 3; ++k) result[i][j] += a[i][k] * b[k][j];
@@ -170,13 +171,13 @@ PreciseMatrix computePreciseRotation(const Vec3& angularVelocity, double time) {
   Mat3 cross;
   cross << 0, -angularVelocity.z(), angularVelocity.y(), angularVelocity.z(), 0,
       -angularVelocity.x(), -angularVelocity.y(), angularVelocity.x(), 0;
-  PreciseMatrix part = preciseMatrix(cross);
+  PreciseMatrix part = toPreciseMatrix(cross);
   for (auto& row : part)
     for (mpf_class& entry : row) {
       entry *= time;
       mpf_div_2exp(entry.get_mpf_t(), entry.get_mpf_t(), kHalvings);
     }
-  PreciseMatrix sum = preciseMatrix(Mat3::Identity()), term = sum;
+  PreciseMatrix sum = toPreciseMatrix(Mat3::Identity()), term = sum;
   for (int n = 1; n < 20; ++n) {
     term = term * part;
     for (int i = 0; i < 3; ++i)
@@ -190,12 +191,13 @@ TEST(MovingPose, ATurnIsWithinItsBoundOfTheMatrixExponential) {
   Random random(13);
   double worst = 0;
   for (int i = 0; i < 300; ++i) {
-    const Mat3 start = Eigen::AngleAxisd(uniform(random, 0, 6), randomPoint(random, 1).normalized())
-                           .toRotationMatrix();
-    const Vec3 spin = randomPoint(random, 1) * randomMagnitude(random, 3);
-    const double time = randomMagnitude(random, 1);
+    const Mat3 start =
+        Eigen::AngleAxisd(drawUniform(random, 0, 6), makeRandomPoint(random, 1).normalized())
+            .toRotationMatrix();
+    const Vec3 spin = makeRandomPoint(random, 1) * drawMagnitude(random, 3);
+    const double time = drawMagnitude(random, 1);
     const Mat3 ours = integrateRotation(start, spin, time);
-    const PreciseMatrix truth = computePreciseRotation(spin, time) * preciseMatrix(start);
+    const PreciseMatrix truth = computePreciseRotation(spin, time) * toPreciseMatrix(start);
     Mat3 off;
     for (int r = 0; r < 3; ++r)
       for (int c = 0; c < 3; ++c) off(r, c) = mpf_class(truth[r][c] - ours(r, c)).get_d();
@@ -226,7 +228,7 @@ TEST(MovingPose, DisplacementIsExactWithinItsErrorBound) {
   Random random(14);
   int exact = 0;
   for (int i = 0; i < 2000; ++i) {
-    const auto number = [&] { return uniform(random, -1, 1) * randomMagnitude(random, 6); };
+    const auto number = [&] { return drawUniform(random, -1, 1) * drawMagnitude(random, 6); };
     const Difference place{number(), number()}, velocity{number(), number()};
     Difference pull{number(), number()};
     double time = std::abs(number());

@@ -16,15 +16,15 @@ TEST(TriangleTree, EqualsBruteForce) {
   for (const std::size_t size : {0u, 1u, 4u, 5u, 300u, 3000u}) {
     std::vector<Triangle> triangles;
     for (std::size_t i = 0; i < size; ++i) {
-      const Vec3 at = randomPoint(random, 10);
-      triangles.push_back({at, at + randomPoint(random, 1), at + randomPoint(random, 1)});
+      const Vec3 at = makeRandomPoint(random, 10);
+      triangles.push_back({at, at + makeRandomPoint(random, 1), at + makeRandomPoint(random, 1)});
     }
     const TriangleTree tree(triangles);
     ASSERT_EQ(tree.triangles().size(), size);
     std::size_t hits = 0;
     for (int q = 0; q < 50; ++q) {
-      const Aabb box = inflated(Aabb{Vec3::Zero(), Vec3::Zero()}, uniform(random, 0, 4));
-      const Vec3 at = randomPoint(random, 8);
+      const Aabb box = inflated(Aabb{Vec3::Zero(), Vec3::Zero()}, drawUniform(random, 0, 4));
+      const Vec3 at = makeRandomPoint(random, 8);
       const Aabb query{box.min + at, box.max + at};
       std::vector<std::uint32_t> found, expected;
       tree.query(query, found);

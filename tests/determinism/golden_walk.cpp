@@ -20,7 +20,7 @@ void order(World& world, const std::string& name, Order o) {
   if (submitAvatarCommand(world, {name, std::move(o), 0})) ++refusedCommands;
 }
 
-void ticks(World& world, int count) {
+void runTicks(World& world, int count) {
   for (int i = 0; i < count; ++i) tickWorld(world);
 }
 
@@ -31,16 +31,17 @@ void print(const char* name, const World& world) {
               world.snapshot()->avatars.size());
 }
 
-Vec3 anyVelocity(Seeded& random, double maxSpeed, bool flies) {
-  const double x = random.uniform(-maxSpeed, maxSpeed), z = random.uniform(-maxSpeed, maxSpeed);
-  return {x, flies ? random.uniform(-maxSpeed, maxSpeed) : 0, z};
+Vec3 drawVelocity(Seeded& random, double maxSpeed, bool flies) {
+  const double x = random.drawUniform(-maxSpeed, maxSpeed),
+               z = random.drawUniform(-maxSpeed, maxSpeed);
+  return {x, flies ? random.drawUniform(-maxSpeed, maxSpeed) : 0, z};
 }
 
-void stairs() {
+void runStairs() {
   Builder b;
-  b.box("floor", {-10, -0.2, -10}, {10, 0, 10});
+  b.addBox("floor", {-10, -0.2, -10}, {10, 0, 10});
   for (int i = 0; i < 10; ++i)
-    b.box("step", {0.3 * i, -0.1, -2}, {0.3 * i + 0.3, 0.17 * i + 0.17, 2});
+    b.addBox("step", {0.3 * i, -0.1, -2}, {0.3 * i + 0.3, 0.17 * i + 0.17, 2});
   World world(std::make_shared<const Scene>(b.model));
   for (int i = 0; i < 6; ++i) {
     const std::string name = "walker" + std::to_string(i);
@@ -52,32 +53,33 @@ void stairs() {
     order(world, name, Walk{{{-3, 0, z}}, 1.4});
     order(world, name, Crouch{});
   }
-  ticks(world, 700);
+  runTicks(world, 700);
   print("stairs", world);
 }
 
-void crowd() {
+void runCrowd() {
   Builder b;
-  sheetCell(b, "hall", {-6, 0, -2}, {6, 3, 2}, true);
+  addSheetCell(b, "hall", {-6, 0, -2}, {6, 3, 2}, true);
   World world(std::make_shared<const Scene>(b.model));
   Seeded random(11);
   for (int i = 0; i < 40; ++i)
     order(world, "w" + std::to_string(i), Spawn{{-4.9 + i / 4, 0, -1.4 + 0.9 * (i % 4)}});
   for (int k = 0; k < 8; ++k) {
-    ticks(world, 40);
+    runTicks(world, 40);
     for (int i = 0; i < 40; ++i)
-      order(world, "w" + std::to_string(i), Drive{anyVelocity(random, 3, false)});
+      order(world, "w" + std::to_string(i), Drive{drawVelocity(random, 3, false)});
   }
   print("crowd", world);
 }
 
-void flyers() {
+void runFlyers() {
   Builder b;
   Seeded random(12);
-  sheetCell(b, "hall", {-4, 0, -4}, {4, 6, 4}, true);
+  addSheetCell(b, "hall", {-4, 0, -4}, {4, 6, 4}, true);
   for (int i = 0; i < 40; ++i) {
-    const Vec3 at = anyVelocity(random, 3.5, true) + Vec3(0, 3.2, 0);
-    b.sheet("pane", {at, at + Vec3(0.3, 0.1, 0), at + Vec3(0.4, 0.8, 0.3), at + Vec3(0, 0.7, 0.2)});
+    const Vec3 at = drawVelocity(random, 3.5, true) + Vec3(0, 3.2, 0);
+    b.addSheet("pane",
+               {at, at + Vec3(0.3, 0.1, 0), at + Vec3(0.4, 0.8, 0.3), at + Vec3(0, 0.7, 0.2)});
   }
   World world(std::make_shared<const Scene>(b.model));
   for (int i = 0; i < 16; ++i) {
@@ -88,18 +90,18 @@ void flyers() {
     order(world, "f" + std::to_string(i), spawn);
   }
   for (int k = 0; k < 10; ++k) {
-    ticks(world, 20);
+    runTicks(world, 20);
     for (int i = 0; i < 16; ++i)
-      order(world, "f" + std::to_string(i), Drive{anyVelocity(random, k + 1, true)});
+      order(world, "f" + std::to_string(i), Drive{drawVelocity(random, k + 1, true)});
   }
   print("flyers", world);
 }
 
 void arm() {
   Builder b;
-  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
-  b.box("table", {0.9, 0, -2}, {2.4, 0.6, 2});
-  b.sheet("pane", {{-5, 0, -1.2}, {5, 0, -1.2}, {5, 3, -1.2}, {-5, 3, -1.2}});
+  b.addBox("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.addBox("table", {0.9, 0, -2}, {2.4, 0.6, 2});
+  b.addSheet("pane", {{-5, 0, -1.2}, {5, 0, -1.2}, {5, 3, -1.2}, {-5, 3, -1.2}});
   World world(std::make_shared<const Scene>(b.model));
   Spawn spawn;
   spawn.facing = 7;
@@ -112,22 +114,22 @@ void arm() {
   spawn.links = {upper, lower};
   order(world, "arm", spawn);
   order(world, "bob", Spawn{{-1.5, 0, 1}});
-  ticks(world, 2);
+  runTicks(world, 2);
   Seeded random(13);
   for (int k = 0; k < 20; ++k) {
-    const double turn = random.uniform(-3, 3);
-    order(world, "arm", DriveJoints{{turn, random.uniform(-2.5, 2.5)}, 1.0 + k, true});
-    if (k % 4 == 0) order(world, "bob", Drive{anyVelocity(random, 2, false)});
-    ticks(world, 20);
+    const double turn = random.drawUniform(-3, 3);
+    order(world, "arm", DriveJoints{{turn, random.drawUniform(-2.5, 2.5)}, 1.0 + k, true});
+    if (k % 4 == 0) order(world, "bob", Drive{drawVelocity(random, 2, false)});
+    runTicks(world, 20);
   }
   print("arm", world);
 }
 
-void doors() {
+void runDoors() {
   Builder b;
-  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
-  b.box("door", {0, 0.01, 0}, {0.9, 2, 0.04});
-  b.box("platform", {2, 0.01, -1}, {4, 0.1, 1});
+  b.addBox("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.addBox("door", {0, 0.01, 0}, {0.9, 2, 0.04});
+  b.addBox("platform", {2, 0.01, -1}, {4, 0.1, 1});
   BodySpec door;
   door.name = "door";
   door.kind = BodyKind::hinged;
@@ -150,7 +152,7 @@ void doors() {
   order(world, "ann", Spawn{{0.5, 0, -1}});
   order(world, "bob", Spawn{{3, 0.1, 0}});
   order(world, "ann", Walk{{{0.5, 0, 1}}, 1});
-  ticks(world, 30);
+  runTicks(world, 30);
   for (int k = 0; k < 4; ++k) {
     BodyCommand swing, rise;
     swing.body = "door";
@@ -160,20 +162,20 @@ void doors() {
     rise.target = k % 2 ? 0 : 3;
     if (submitBodyCommand(world, swing)) ++refusedCommands;
     if (submitBodyCommand(world, rise)) ++refusedCommands;
-    ticks(world, 150);
+    runTicks(world, 150);
   }
   print("doors", world);
 }
 
 /// Leaves that turn into one another and a cart through a shelf, fast enough to pass between ticks.
-void clashes() {
+void runClashes() {
   Builder b;
-  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
-  b.box("shelf", {1, 0, 1}, {1.05, 2, 3});
+  b.addBox("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.addBox("shelf", {1, 0, 1}, {1.05, 2, 3});
   Seeded random(31);
   for (std::uint32_t i = 0; i < 6; ++i) {
-    const Vec3 at(0.7 * i - 2, 0.01, random.uniform(-0.4, 0.4));
-    b.box("leaf", at, at + Vec3(random.uniform(0.8, 1.2), 2, 0.04));
+    const Vec3 at(0.7 * i - 2, 0.01, random.drawUniform(-0.4, 0.4));
+    b.addBox("leaf", at, at + Vec3(random.drawUniform(0.8, 1.2), 2, 0.04));
     BodySpec leaf;
     leaf.name = "leaf" + std::to_string(i);
     leaf.kind = BodyKind::hinged;
@@ -181,10 +183,10 @@ void clashes() {
     leaf.anchor = at;
     leaf.axis = Vec3::UnitY();
     leaf.low = -3, leaf.high = 3;
-    leaf.speed = random.uniform(1, 40);
+    leaf.speed = random.drawUniform(1, 40);
     b.model.bodies.push_back(leaf);
   }
-  b.box("cart", {-3, 0.1, 1.5}, {-2.9, 1, 2});
+  b.addBox("cart", {-3, 0.1, 1.5}, {-2.9, 1, 2});
   BodySpec cart;
   cart.name = "cart";
   cart.kind = BodyKind::path;
@@ -201,46 +203,46 @@ void clashes() {
     BodyCommand swing;
     swing.body = "leaf" + std::to_string(k % 6);
     swing.action = BodyCommand::Action::moveTo;
-    swing.target = random.uniform(-3, 3);
+    swing.target = random.drawUniform(-3, 3);
     if (submitBodyCommand(world, swing)) ++refusedCommands;
-    ticks(world, 6);
+    runTicks(world, 6);
   }
   print("clashes", world);
 }
 
 /// Boxes, slabs and wedges thrown on a heap, with an avatar that walks into it.
-void heap() {
+void runHeap() {
   Builder b;
-  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.addBox("floor", {-5, -0.2, -5}, {5, 0, 5});
   Seeded random(14);
   for (std::uint32_t i = 0; i < 24; ++i) {
     const Vec3 at(0.45 * (i % 3) - 0.45, 0.1 + 0.5 * (i / 6), 0.4 * (i % 2));
-    const double wide = random.uniform(0.15, 0.35), high = random.uniform(0.1, 0.4);
-    b.box("piece", at, at + Vec3(wide, high, random.uniform(0.15, 0.35)));
+    const double wide = random.drawUniform(0.15, 0.35), high = random.drawUniform(0.1, 0.4);
+    b.addBox("piece", at, at + Vec3(wide, high, random.drawUniform(0.15, 0.35)));
     BodySpec piece;
     piece.name = "piece" + std::to_string(i);
     piece.objects = {i + 1};
-    piece.friction = random.uniform(0.1, 0.8);
-    piece.restitution = random.uniform(0, 0.4);
+    piece.friction = random.drawUniform(0.1, 0.8);
+    piece.restitution = random.drawUniform(0, 0.4);
     b.model.bodies.push_back(piece);
   }
   World world(std::make_shared<const Scene>(b.model));
   order(world, "ann", Spawn{{-2.5, 0, 0.2}});
   order(world, "ann", Walk{{{2.5, 0, 0.2}}, 1.2});
-  ticks(world, 300);
+  runTicks(world, 300);
   print("heap", world);
 }
 
 /// Small boxes on a vibrating tray: enough of them for the solver to use several threads.
-void tray(int threads, const char* name) {
+void runTray(int threads, const char* name) {
   Builder b;
-  b.box("floor", {-5, -0.2, -5}, {5, 0, 5});
-  b.box("plate", {-0.2, 0.5, -0.2}, {0.2, 0.52, 0.2});
+  b.addBox("floor", {-5, -0.2, -5}, {5, 0, 5});
+  b.addBox("plate", {-0.2, 0.5, -0.2}, {0.2, 0.52, 0.2});
   Seeded random(15);
   for (std::uint32_t i = 0; i < 120; ++i) {
     const Vec3 at(0.032 * (i % 5) - 0.08, 0.525 + 0.03 * (i / 25), 0.032 * (i / 5 % 5) - 0.08);
-    const double wide = random.uniform(0.01, 0.03), high = random.uniform(0.01, 0.025);
-    b.box("piece", at, at + Vec3(wide, high, random.uniform(0.01, 0.03)));
+    const double wide = random.drawUniform(0.01, 0.03), high = random.drawUniform(0.01, 0.025);
+    b.addBox("piece", at, at + Vec3(wide, high, random.drawUniform(0.01, 0.03)));
     BodySpec piece;
     piece.name = "piece" + std::to_string(i);
     piece.objects = {i + 2};
@@ -258,21 +260,21 @@ void tray(int threads, const char* name) {
   b.model.bodies.push_back(plate);
   World world(std::make_shared<const Scene>(b.model));
   setThreadCount(world, threads);
-  ticks(world, 90);
+  runTicks(world, 90);
   print(name, world);
 }
 
 }  // namespace
 
 int main() {
-  stairs();
-  crowd();
-  flyers();
+  runStairs();
+  runCrowd();
+  runFlyers();
   arm();
-  doors();
-  clashes();
-  heap();
-  tray(1, "tray/1");
-  tray(2, "tray/2");
+  runDoors();
+  runClashes();
+  runHeap();
+  runTray(1, "tray/1");
+  runTray(2, "tray/2");
   std::printf("refused  %d commands\n", refusedCommands);
 }

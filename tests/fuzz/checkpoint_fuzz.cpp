@@ -12,14 +12,14 @@ namespace {
 
 using Bytes = std::span<const std::uint8_t>;
 
-std::shared_ptr<const scene::Scene> room() {
-  static const std::shared_ptr<const scene::Scene> one = server::testing::bodyRoom();
+std::shared_ptr<const scene::Scene> getRoom() {
+  static const std::shared_ptr<const scene::Scene> one = server::testing::makeBodyRoom();
   return one;
 }
 
 /// Two avatars that walk towards one another, one in the air, and a door that opens.
-std::vector<std::uint8_t> busyRoom() {
-  scene::World world(room());
+std::vector<std::uint8_t> saveBusyRoom() {
+  scene::World world(getRoom());
   for (const double x : {-4.0, -1.0, 4.0}) {
     const std::string name = "from" + std::to_string(static_cast<int>(x));
     scene::Spawn spawn;
@@ -33,15 +33,15 @@ std::vector<std::uint8_t> busyRoom() {
   return scene::makeCheckpoint(world);
 }
 
-const std::vector<std::uint8_t>& genuine() {
-  static const std::vector<std::uint8_t> one = busyRoom();
+const std::vector<std::uint8_t>& getGenuine() {
+  static const std::vector<std::uint8_t> one = saveBusyRoom();
   return one;
 }
 
 /// Magic, version, scene, length of the world, the world, room for the checksum.
-std::vector<std::uint8_t> wrapped(Bytes world) {
+std::vector<std::uint8_t> wrapWorld(Bytes world) {
   constexpr std::size_t kWord = 8;
-  std::vector<std::uint8_t> bytes(genuine().begin(), genuine().begin() + 3 * kWord);
+  std::vector<std::uint8_t> bytes(getGenuine().begin(), getGenuine().begin() + 3 * kWord);
   for (std::size_t i = 0; i < kWord; ++i)
     bytes.push_back(static_cast<std::uint8_t>(world.size() >> (8 * i)));
   bytes.insert(bytes.end(), world.begin(), world.end());
@@ -49,8 +49,8 @@ std::vector<std::uint8_t> wrapped(Bytes world) {
   return bytes;
 }
 
-std::vector<std::uint8_t> overlaid(Bytes changes) {
-  std::vector<std::uint8_t> bytes = genuine();
+std::vector<std::uint8_t> overlayGenuine(Bytes changes) {
+  std::vector<std::uint8_t> bytes = getGenuine();
   for (; changes.size() >= 3; changes = changes.subspan(3))
     bytes[(changes[0] | std::size_t{changes[1]} << 8) % bytes.size()] = changes[2];
   return bytes;
@@ -61,10 +61,10 @@ std::vector<std::uint8_t> overlaid(Bytes changes) {
 void tryBytes(Bytes bytes) {
   if (bytes.empty()) return;
   const Bytes rest = bytes.subspan(1);
-  std::vector<std::uint8_t> checkpoint = bytes[0] & 1 ? overlaid(rest) : wrapped(rest);
+  std::vector<std::uint8_t> checkpoint = bytes[0] & 1 ? overlayGenuine(rest) : wrapWorld(rest);
   scene::recomputeChecksum(checkpoint);
   try {
-    scene::World world = scene::restoreWorld(room(), checkpoint);
+    scene::World world = scene::restoreWorld(getRoom(), checkpoint);
     for (int i = 0; i < 3; ++i) scene::tickWorld(world);
     scene::makeCheckpoint(world);
   } catch (const scene::CheckpointError& error) {

@@ -9,7 +9,7 @@
 
 namespace {
 
-std::vector<std::filesystem::path> filesIn(const char* folder) {
+std::vector<std::filesystem::path> listFilesIn(const char* folder) {
   std::vector<std::filesystem::path> files;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (entry.is_regular_file()) files.push_back(entry.path());
@@ -31,7 +31,7 @@ std::vector<std::uint8_t> readBytes(const std::filesystem::path& file) {
 int main(int count, char** arguments) {
   std::size_t tried = 0;
   for (int i = 1; i < count; ++i) {
-    for (const auto& file : filesIn(arguments[i])) {
+    for (const auto& file : listFilesIn(arguments[i])) {
       // Printed before the call, so that the last line names a crashing file.
       std::fprintf(stderr, "%s\n", file.c_str());
       enfilade::fuzz::tryBytes(readBytes(file));

@@ -19,7 +19,7 @@ struct Decoded {
   bool failed = false;
 };
 
-Decoded decoded(Bytes stream, Decoder::Expect expect, std::size_t piece) {
+Decoded decodeAll(Bytes stream, Decoder::Expect expect, std::size_t piece) {
   Decoder decoder(protocol::kServerLimits, expect);
   Decoded all;
   while (!stream.empty() && !decoder.error()) {
@@ -34,7 +34,7 @@ Decoded decoded(Bytes stream, Decoder::Expect expect, std::size_t piece) {
   return all;
 }
 
-bool same(const std::vector<Message>& a, const std::vector<Message>& b) {
+bool areSame(const std::vector<Message>& a, const std::vector<Message>& b) {
   return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const Message& x, const Message& y) {
     return x.header == y.header && x.attachment == y.attachment;
   });
@@ -59,9 +59,9 @@ void tryBytes(Bytes bytes) {
   const auto expect = bytes[0] & 1 ? Decoder::Expect::magicFirst : Decoder::Expect::messages;
   const std::size_t piece = std::size_t{1} + (bytes[0] >> 1);
   const Bytes stream = bytes.subspan(1);
-  const Decoded whole = decoded(stream, expect, stream.size() + 1);
-  const Decoded cut = decoded(stream, expect, piece);
-  require(same(whole.messages, cut.messages), "messages do not depend on how the stream is cut");
+  const Decoded whole = decodeAll(stream, expect, stream.size() + 1);
+  const Decoded cut = decodeAll(stream, expect, piece);
+  require(areSame(whole.messages, cut.messages), "messages do not depend on how the stream is cut");
   require(whole.failed == cut.failed, "errors do not depend on how the stream is cut");
   require(whole.failed || whole.offset == stream.size(), "all bytes are counted");
   for (const Message& message : whole.messages) {

@@ -68,10 +68,10 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
   try {
     const auto format = text ? scene::ModelFormat::gltf : scene::ModelFormat::glb;
     scene::PlainGltf plain =
-        scene::makePlainGltf(file.path(), format, {.ignoreAppearance = ignoresAppearance});
+        scene::makePlainGltf(file.getPath(), format, {.ignoreAppearance = ignoresAppearance});
     if (plain.isRewritten) requirePlainData(plain);
     requireTree(plain);
-    requireMeshFile(scene::takeMeshFile(plain, file.path(), format), plain.meshes.size(),
+    requireMeshFile(scene::takeMeshFile(plain, file.getPath(), format), plain.meshes.size(),
                     bytes.size());
   } catch (const scene::ImportError& error) {
     require(error.what()[0] != '\0', "an error has a message");

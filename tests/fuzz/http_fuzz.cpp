@@ -19,7 +19,7 @@ std::string_view takeLine(std::string_view& text) {
   return line;
 }
 
-server::Access twoTokens() {
+server::Access makeTwoTokens() {
   server::Access access;
   access.tokens = {{server::Role::observe, "0123456789abcdef"},
                    {server::Role::drive, "fedcba9876543210"}};
@@ -31,7 +31,7 @@ server::Access twoTokens() {
 }  // namespace
 
 void tryBytes(std::span<const std::uint8_t> bytes) {
-  static const server::Access access = twoTokens();
+  static const server::Access access = makeTwoTokens();
   std::string_view text(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   const server::Target target = server::parseTarget(takeLine(text));
   const std::string token = server::extractToken(takeLine(text), target);

@@ -24,7 +24,7 @@ std::string formatMessage(const Message& message) {
          std::string(message.data);
 }
 
-Read frontToBack(const std::filesystem::path& file) {
+Read readFrontToBack(const std::filesystem::path& file) {
   Read read;
   try {
     Reader reader(file);
@@ -36,7 +36,7 @@ Read frontToBack(const std::filesystem::path& file) {
   return read;
 }
 
-Read byIndex(const std::filesystem::path& file) {
+Read readByIndex(const std::filesystem::path& file) {
   Read read;
   try {
     IndexedReader reader(file);
@@ -53,7 +53,7 @@ Read byIndex(const std::filesystem::path& file) {
 }
 
 /// A file that was cut off after its first chunk, which is not compressed.
-std::vector<std::uint8_t> fileAround(std::string_view records) {
+std::vector<std::uint8_t> makeFileAround(std::string_view records) {
   std::string head, chunk, file(kMagic);
   putString(head, "");
   putString(head, "fuzz");
@@ -76,9 +76,9 @@ void tryBytes(std::span<const std::uint8_t> bytes) {
   const bool wrapped = bytes[0] & 1;
   bytes = bytes.subspan(1);
   const std::string_view records(reinterpret_cast<const char*>(bytes.data()), bytes.size());
-  const MemoryFile file(wrapped ? fileAround(records)
+  const MemoryFile file(wrapped ? makeFileAround(records)
                                 : std::vector<std::uint8_t>(bytes.begin(), bytes.end()));
-  const Read whole = frontToBack(file.path()), sought = byIndex(file.path());
+  const Read whole = readFrontToBack(file.getPath()), sought = readByIndex(file.getPath());
   if (whole.whole && sought.whole)
     require(whole.messages == sought.messages, "both readers give the same messages");
 }

@@ -21,27 +21,27 @@ using protocol::mcap::RecordingError;
 constexpr std::size_t kMaxItems = 64;  // of one input, so that a finding is small
 constexpr std::uint64_t kMaxTicks = 64;
 
-std::shared_ptr<const scene::Scene> room() {
+std::shared_ptr<const scene::Scene> getRoom() {
   spdlog::set_level(spdlog::level::off);
-  static const std::shared_ptr<const scene::Scene> one = server::testing::bodyRoom();
+  static const std::shared_ptr<const scene::Scene> one = server::testing::makeBodyRoom();
   return one;
 }
 
 /// The start of the room's recording.
-v1::RecordingStart trueStart() {
+v1::RecordingStart makeTrueStart() {
   const MemoryFile file;
   server::RecordingOptions options;
-  options.choice.file = file.path();
+  options.choice.file = file.getPath();
   options.model.file = "room.obj";
-  server::RecordableWorld world{scene::World(room())};
+  server::RecordableWorld world{scene::World(getRoom())};
   world.record(options);
   world.tick();
   world.recorder()->close();
-  return protocol::SeekableRecording(file.path()).start();
+  return protocol::SeekableRecording(file.getPath()).start();
 }
 
 template <class Message>
-Message parsed(Bytes bytes) {
+Message parseMessage(Bytes bytes) {
   Message message;
   message.ParseFromArray(bytes.data(), static_cast<int>(bytes.size()));
   return message;
@@ -50,21 +50,21 @@ Message parsed(Bytes bytes) {
 void writeItem(RecordingWriter& file, std::uint8_t kind, Bytes bytes, double time) {
   switch (kind % 6) {
     case 0: {
-      static const v1::RecordingStart start = trueStart();
+      static const v1::RecordingStart start = makeTrueStart();
       v1::RecordingStart changed = start;
-      changed.MergeFrom(parsed<v1::RecordingStart>(bytes));
+      changed.MergeFrom(parseMessage<v1::RecordingStart>(bytes));
       return file.write(changed, time);
     }
     case 1:
-      return file.write(parsed<v1::RecordedCommands>(bytes), time);
+      return file.write(parseMessage<v1::RecordedCommands>(bytes), time);
     case 2:
-      return file.write(parsed<v1::TickEvents>(bytes));
+      return file.write(parseMessage<v1::TickEvents>(bytes));
     case 3:
-      return file.write(parsed<v1::State>(bytes));
+      return file.write(parseMessage<v1::State>(bytes));
     case 4:
-      return file.write(parsed<v1::RecordedNames>(bytes));
+      return file.write(parseMessage<v1::RecordedNames>(bytes));
     default:
-      file.write(parsed<v1::RecordedCheckpoint>(bytes), time);
+      file.write(parseMessage<v1::RecordedCheckpoint>(bytes), time);
   }
 }
 
@@ -100,20 +100,20 @@ void readBy(const Work& work) {
 void tryBytes(Bytes bytes) {
   const MemoryFile file;
   try {
-    writeItems(file.path(), bytes);
+    writeItems(file.getPath(), bytes);
   } catch (const RecordingError&) {
     return;  // times that no file can have
   }
-  readBy([&] { server::readWalk(file.path()); });
+  readBy([&] { server::readWalk(file.getPath()); });
   readBy([&] {
-    server::Playback playback(file.path());
-    scene::World world = playback.restoreWorldAfter(playback.firstTick(), room());
+    server::Playback playback(file.getPath());
+    scene::World world = playback.restoreWorldAfter(playback.firstTick(), getRoom());
     for (std::uint64_t i = 0; i < kMaxTicks && playback.step(world); ++i) continue;
   });
   readBy([&] {
-    server::Playback playback(file.path());
+    server::Playback playback(file.getPath());
     if (playback.lastTick() - playback.firstTick() < kMaxTicks)
-      playback.restoreWorldAfter(playback.lastTick(), room());
+      playback.restoreWorldAfter(playback.lastTick(), getRoom());
   });
 }
 

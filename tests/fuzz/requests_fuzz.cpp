@@ -54,18 +54,18 @@ class Inbox {
 /// State shared by all inputs, since no request changes it.
 struct House {
   House() { spdlog::set_level(spdlog::level::off); }
-  std::shared_ptr<const scene::Scene> scene = server::testing::bodyRoom();
+  std::shared_ptr<const scene::Scene> scene = server::testing::makeBodyRoom();
   server::FrameService frames{scene, {render::RendererKind::rays, {}}};
   server::QueryService questions{scene};
   Inbox inbox;
 };
 
-House& house() {
+House& getHouse() {
   static House one;
   return one;
 }
 
-server::ServerLimits smallLimits() {
+server::ServerLimits makeSmallLimits() {
   server::ServerLimits limits;
   limits.avatars = 4;
   limits.ticksPerStep = 16;
@@ -80,8 +80,9 @@ server::ServerLimits smallLimits() {
 class SmallServer {
  public:
   SmallServer()
-      : served_(house().scene, house().frames, house().questions, {smallLimits(), {}, 0, {}, {}}) {
-    served_.post = [](Job job) { house().inbox.post(std::move(job)); };
+      : served_(getHouse().scene, getHouse().frames, getHouse().questions,
+                {makeSmallLimits(), {}, 0, {}, {}}) {
+    served_.post = [](Job job) { getHouse().inbox.post(std::move(job)); };
     for (const ClientId id : {1, 2}) {
       Client& client = served_.clients[id];
       client.role = server::Role::admin;
@@ -96,20 +97,20 @@ class SmallServer {
     Client& client = served_.clients.at(id);
     client.queue.push_back({message, {}});
     server::processQueue(served_, id);
-    while (client.pendingReply || drawing()) house().inbox.next()(served_);
+    while (client.pendingReply || isDrawing()) getHouse().inbox.next()(served_);
     for (std::uint32_t ticks = 0; client.pendingStep; ++ticks) {
       require(ticks < served_.limits.ticksPerStep, "a step's length is limited");
       server::advance(served_);
-      while (drawing()) house().inbox.next()(served_);
+      while (isDrawing()) getHouse().inbox.next()(served_);
     }
     if (!message.has_bye())
-      require(replied(client, message.request_id()), "each request is answered");
+      require(hasReplied(client, message.request_id()), "each request is answered");
     require(served_.statistics.makeMetrics().worst_penetration() == 0, "nothing penetrates");
   }
   void end() { server::closeWorld(served_); }
 
  private:
-  bool drawing() const {
+  bool isDrawing() const {
     return std::any_of(served_.clients.begin(), served_.clients.end(), [](const auto& one) {
       const auto& subscriptions = one.second.frameSubscriptions;
       return std::any_of(subscriptions.begin(), subscriptions.end(),
@@ -117,7 +118,7 @@ class SmallServer {
     });
   }
   /// Reads all messages that were sent.
-  static bool replied(Client& client, std::uint64_t requestId) {
+  static bool hasReplied(Client& client, std::uint64_t requestId) {
     bool found = false;
     for (auto next = client.out->pop(); next.message; next = client.out->pop()) {
       protocol::Decoder decoder(protocol::kClientLimits, protocol::Decoder::Expect::messages);

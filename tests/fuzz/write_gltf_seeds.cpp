@@ -11,23 +11,23 @@ int main(int argc, char** argv) {
   namespace tests = enfilade::tests;
   using Options = tests::MeshoptOptions;
   const std::vector<std::pair<const char*, tests::GltfWriter>> seeds{
-      {"plain", tests::plainTerrace()},
-      {"quantized", tests::quantizedTerrace(true)},
-      {"meshopt", tests::meshoptTerrace({})},
-      {"meshopt-sequence", tests::meshoptTerrace(Options{.fallback = true, .sequence = true})},
-      {"meshopt-exponential", tests::meshoptTerrace(Options{.exponential = true})},
-      {"meshopt-version1", tests::meshoptTerrace(Options{.version = 1})},
-      {"draco", tests::dracoTerrace(10, false)},
-      {"draco-sequential", tests::dracoTerrace(10, true)},
-      {"sparse", tests::sparseTerrace(false)},
-      {"strip", tests::stripTerrace()},
-      {"instances", tests::instancedTerrace(true)},
-      {"posed", tests::posedTerrace()}};
+      {"plain", tests::makePlainTerrace()},
+      {"quantized", tests::makeQuantizedTerrace(true)},
+      {"meshopt", tests::makeMeshoptTerrace({})},
+      {"meshopt-sequence", tests::makeMeshoptTerrace(Options{.fallback = true, .sequence = true})},
+      {"meshopt-exponential", tests::makeMeshoptTerrace(Options{.exponential = true})},
+      {"meshopt-version1", tests::makeMeshoptTerrace(Options{.version = 1})},
+      {"draco", tests::makeDracoTerrace(10, false)},
+      {"draco-sequential", tests::makeDracoTerrace(10, true)},
+      {"sparse", tests::makeSparseTerrace(false)},
+      {"strip", tests::makeStripTerrace()},
+      {"instances", tests::makeInstancedTerrace(true)},
+      {"posed", tests::makePosedTerrace()}};
   for (const auto& [name, file] : seeds)
-    std::ofstream(std::filesystem::path(argv[1]) / name, std::ios::binary) << file.glb();
+    std::ofstream(std::filesystem::path(argv[1]) / name, std::ios::binary) << file.toGlb();
   const std::string uri = "data:application/octet-stream;base64,";
-  const tests::GltfWriter text = tests::quantizedTerrace(false);
+  const tests::GltfWriter text = tests::makeQuantizedTerrace(false);
   std::ofstream(std::filesystem::path(argv[1]) / "text", std::ios::binary)
-      << text.gltf(uri + tests::base64(text.binary));
+      << text.toGltf(uri + tests::encodeBase64(text.binary));
   return 0;
 }

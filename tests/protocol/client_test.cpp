@@ -14,7 +14,7 @@ Client connectTo(const TestServer& server,
   ClientOptions options;
   options.name = "client test";
   options.timeout = timeout;
-  return Client("127.0.0.1", server.port(), options);
+  return Client("127.0.0.1", server.getPort(), options);
 }
 
 /// The exception's message; fails the test if nothing was thrown.
@@ -33,7 +33,7 @@ template <typename Action>
 void expectConnectionError(const TestServer& server, const std::string& part, Action action) {
   const std::string what = catchMessage<ConnectionError>(action);
   EXPECT_NE(what.find(part), std::string::npos) << what;
-  EXPECT_NE(what.find("127.0.0.1:" + std::to_string(server.port())), std::string::npos) << what;
+  EXPECT_NE(what.find("127.0.0.1:" + std::to_string(server.getPort())), std::string::npos) << what;
 }
 
 v1::ServerMessage replyTo(const v1::ClientMessage& request) {
@@ -65,11 +65,11 @@ TEST(Client, GreetsAndIsWelcomed) {
 TEST(Client, RefusesAServerOfAnotherMajorVersion) {
   for (const std::string version : {"2.0.0", "", "1", "x.1", "10.0.0"}) {
     const TestServer server([&](TestConnection& connection) {
-      v1::ServerMessage reply = welcomeTo(*connection.receive());
+      v1::ServerMessage reply = makeWelcomeTo(*connection.receive());
       reply.mutable_welcome()->set_protocol_version(version);
       connection.sendRaw(std::span<const std::uint8_t>(kMagic));
       connection.send(reply);
-      connection.untilClosed();
+      connection.waitUntilClosed();
     });
     try {
       connectTo(server);
@@ -83,14 +83,14 @@ TEST(Client, RefusesAServerOfAnotherMajorVersion) {
 
 TEST(Client, AcceptsALaterMinorVersionAndUnknownFields) {
   const TestServer server([](TestConnection& connection) {
-    v1::ServerMessage reply = welcomeTo(*connection.receive());
+    v1::ServerMessage reply = makeWelcomeTo(*connection.receive());
     reply.mutable_welcome()->set_protocol_version("1.99.0");
     auto* unknown =
         reply.mutable_welcome()->GetReflection()->MutableUnknownFields(reply.mutable_welcome());
     unknown->AddLengthDelimited(1000, "from the future");
     connection.sendRaw(std::span<const std::uint8_t>(kMagic));
     connection.send(reply);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   EXPECT_EQ(connectTo(server).welcome().protocol_version(), "1.99.0");
 }
@@ -102,7 +102,7 @@ TEST(Client, ReportsWhyAServerRefusedTheGreeting) {
     reply.mutable_error()->set_message("too old");
     connection.sendRaw(std::span<const std::uint8_t>(kMagic));
     connection.send(reply);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   EXPECT_NE(catchMessage<ProtocolError>([&] { connectTo(server); }).find("too old"),
             std::string::npos);
@@ -110,11 +110,11 @@ TEST(Client, ReportsWhyAServerRefusedTheGreeting) {
 
 TEST(Client, RefusesAWelcomeWithoutATick) {
   const TestServer server([](TestConnection& connection) {
-    v1::ServerMessage reply = welcomeTo(*connection.receive());
+    v1::ServerMessage reply = makeWelcomeTo(*connection.receive());
     reply.mutable_welcome()->mutable_policies()->clear_tick();
     connection.sendRaw(std::span<const std::uint8_t>(kMagic));
     connection.send(reply);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   EXPECT_THROW(connectTo(server), ProtocolError);
 }
@@ -123,7 +123,7 @@ TEST(Client, NamesHostAndPortIfNoServerListens) {
   std::uint16_t port = 0;
   {
     const TestServer server([](TestConnection&) {});
-    port = server.port();
+    port = server.getPort();
   }
   const std::string what = catchMessage<ConnectionError>([&] { Client("127.0.0.1", port); });
   EXPECT_NE(what.find("cannot connect to 127.0.0.1:" + std::to_string(port)), std::string::npos);
@@ -133,7 +133,7 @@ TEST(Client, RefusesAnotherProtocolByItsFirstBytes) {
   const TestServer server([](TestConnection& connection) {
     connection.receive();
     connection.sendRaw("HTTP/1.1 400 Bad Request\r\n\r\n");
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   expectConnectionError(server, "does not speak this protocol", [&] { connectTo(server); });
 }
@@ -141,14 +141,14 @@ TEST(Client, RefusesAnotherProtocolByItsFirstBytes) {
 // ---- silence and ends --------------------------------------------------------------------------
 
 TEST(Client, DoesNotWaitForeverForAWelcome) {
-  const TestServer server([](TestConnection& connection) { connection.untilClosed(); });
+  const TestServer server([](TestConnection& connection) { connection.waitUntilClosed(); });
   expectConnectionError(server, "did not answer the greeting", [&] { connectTo(server, kShort); });
 }
 
 TEST(Client, DoesNotWaitForeverForAReply) {
   const TestServer server([](TestConnection& connection) {
     connection.greet();
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server, kShort);
   expectConnectionError(server, "did not answer within 150 ms", [&] { client.step(); });
@@ -161,7 +161,7 @@ TEST(Client, EventsWithoutAnEndDoNotReplaceAReply) {
     connection.greet();
     const auto request = connection.receive();
     for (std::uint64_t i = 1; i <= 10; ++i) connection.send(makeEvents(i));
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server, kShort);
   expectConnectionError(server, "did not answer", [&] { client.step(); });
@@ -214,7 +214,7 @@ TEST(Client, AnErrorOfTheConnectionEndsIt) {
     error.mutable_error()->set_code(v1::ERROR_TOO_SLOW);
     error.mutable_error()->set_message("you do not read");
     connection.send(error);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   EXPECT_THROW(client.command({}), ProtocolError);
@@ -226,11 +226,11 @@ TEST(Client, RefusesAMessageAboveItsLimit) {
     connection.greet();
     connection.receive();
     connection.send(v1::ServerMessage{}, std::vector<std::uint8_t>(1000));
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   ClientOptions options;
   options.limits = {500, 500};
-  Client client("127.0.0.1", server.port(), options);
+  Client client("127.0.0.1", server.getPort(), options);
   expectConnectionError(server, "exceeds the limit of 500", [&] { client.step(); });
 }
 
@@ -240,7 +240,7 @@ TEST(Client, RefusesBytesThatAreNoMessage) {
     connection.receive();
     const std::vector<std::uint8_t> bytes{6, 0, 0, 0, 2, 0, 0, 0, 0xFF, 0xFF};
     connection.sendRaw(std::span<const std::uint8_t>(bytes));
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   expectConnectionError(server, "not a ServerMessage", [&] { client.step(); });
@@ -258,7 +258,7 @@ TEST(Client, EventsThatComeBeforeAReplyAreKeptInOrder) {
     reply.mutable_step()->set_tick(request->step().ticks());
     connection.send(reply);
     connection.send(makeEvents(3));
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   EXPECT_EQ(client.step(42).tick(), 42u);
@@ -279,7 +279,7 @@ TEST(Client, ATimeoutKeepsAnIncompleteMessage) {
     v1::ServerMessage reply = replyTo(*request);
     reply.mutable_step();
     connection.send(reply);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   EXPECT_FALSE(client.nextEvent(kShort));
@@ -301,7 +301,7 @@ TEST(Client, ACommandIsAcceptedOrRefusedWithItsField) {
     v1::ServerMessage failed = replyTo(*connection.receive());
     failed.mutable_error()->set_code(v1::ERROR_NOT_ALLOWED);
     connection.send(failed);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   EXPECT_FALSE(client.command({}));
@@ -319,7 +319,7 @@ TEST(Client, AnErrorReplyIsThrownAndTheConnectionContinues) {
     reply = replyTo(*connection.receive());
     reply.mutable_metrics()->set_ticks(5);
     connection.send(reply);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   try {
@@ -338,7 +338,7 @@ TEST(Client, AReplyOfAnotherKindIsAnError) {
     v1::ServerMessage reply = replyTo(*connection.receive());
     reply.mutable_metrics();
     connection.send(reply);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   EXPECT_THROW(client.step(), ProtocolError);
@@ -351,7 +351,7 @@ TEST(Client, AReplyToAnotherRequestBreaksTheConnection) {
     reply.set_reply_to(reply.reply_to() + 1);
     reply.mutable_step();
     connection.send(reply);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   expectConnectionError(server, "instead of", [&] { client.step(); });
@@ -372,7 +372,7 @@ TEST(Client, AFrameGivesItsPlanes) {
       ids->set_length(length);
       connection.send(reply, pixels);
     }
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client client = connectTo(server);
   const ReceivedFrame frame = client.frame({});
@@ -392,7 +392,7 @@ TEST(Client, AFrameOfManyMegabytesComesWhole) {
     v1::ServerMessage reply = replyTo(*connection.receive());
     reply.mutable_frame();
     connection.send(reply, pixels);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   EXPECT_EQ(connectTo(server).frame({}).pixels, pixels);
 }
@@ -403,7 +403,7 @@ TEST(Client, MovesAsAValue) {
     v1::ServerMessage reply = replyTo(*connection.receive());
     reply.mutable_names()->add_entities()->set_name("Hall");
     connection.send(reply);
-    connection.untilClosed();
+    connection.waitUntilClosed();
   });
   Client first = connectTo(server);
   Client second = std::move(first);

@@ -14,7 +14,7 @@ namespace {
 
 using Bytes = std::vector<std::uint8_t>;
 
-std::string document(const std::string& name) {
+std::string readDocument(const std::string& name) {
   std::ifstream stream(std::string(ENFILADE_PROTOCOL_FOLDER) + "/" + name);
   EXPECT_TRUE(stream) << name;
   std::ostringstream text;
@@ -23,7 +23,7 @@ std::string document(const std::string& name) {
 }
 
 /// The content of the fenced block that begins with ````mark`.
-std::string fenced(const std::string& text, const std::string& mark) {
+std::string findFencedBlock(const std::string& text, const std::string& mark) {
   const std::string fence = "```" + mark + "\n";
   const std::size_t start = text.find(fence);
   if (start == std::string::npos) return "";
@@ -32,7 +32,7 @@ std::string fenced(const std::string& text, const std::string& mark) {
 }
 
 /// The pairs of hexadecimal digits at the beginning of each line.
-Bytes hexBytes(const std::string& block) {
+Bytes parseHexBytes(const std::string& block) {
   Bytes bytes;
   std::istringstream lines(block);
   for (std::string line; std::getline(lines, line);) {
@@ -46,9 +46,9 @@ Bytes hexBytes(const std::string& block) {
 }
 
 /// The message's fields that a page does not name in the given form.
-std::vector<std::string> notNamed(const google::protobuf::Descriptor* message, bool byType,
-                                  const char* file = "PROTOCOL.md") {
-  const std::string page = document(file);
+std::vector<std::string> findUnnamedFields(const google::protobuf::Descriptor* message, bool byType,
+                                           const char* file = "PROTOCOL.md") {
+  const std::string page = readDocument(file);
   std::vector<std::string> missing;
   for (int i = 0; i < message->field_count(); ++i) {
     const google::protobuf::FieldDescriptor& field = *message->field(i);
@@ -61,11 +61,11 @@ std::vector<std::string> notNamed(const google::protobuf::Descriptor* message, b
 
 TEST(Documents, ProtocolMdNamesEveryMessageLimitAndError) {
   const std::vector<std::string> none;
-  EXPECT_EQ(notNamed(v1::ClientMessage::descriptor(), true), none);
-  EXPECT_EQ(notNamed(v1::ServerMessage::descriptor(), true), none);
-  EXPECT_EQ(notNamed(v1::Command::descriptor(), true), none);
-  EXPECT_EQ(notNamed(v1::Limits::descriptor(), false, "LIMITS.md"), none);
-  const std::string page = document("PROTOCOL.md");
+  EXPECT_EQ(findUnnamedFields(v1::ClientMessage::descriptor(), true), none);
+  EXPECT_EQ(findUnnamedFields(v1::ServerMessage::descriptor(), true), none);
+  EXPECT_EQ(findUnnamedFields(v1::Command::descriptor(), true), none);
+  EXPECT_EQ(findUnnamedFields(v1::Limits::descriptor(), false, "LIMITS.md"), none);
+  const std::string page = readDocument("PROTOCOL.md");
   for (int i = 1; i < v1::ErrorCode_descriptor()->value_count(); ++i) {
     const std::string name = "`" + v1::ErrorCode_descriptor()->value(i)->name() + "`";
     EXPECT_NE(page.find(name), std::string::npos) << name;
@@ -73,12 +73,13 @@ TEST(Documents, ProtocolMdNamesEveryMessageLimitAndError) {
 }
 
 TEST(Documents, TheScriptOfScriptMdParses) {
-  const Script script = parseScript(fenced(document("SCRIPT.md"), "jsonl"), "SCRIPT.md");
+  const Script script =
+      parseScript(findFencedBlock(readDocument("SCRIPT.md"), "jsonl"), "SCRIPT.md");
   EXPECT_EQ(script.lines.size(), 12u);
 }
 
 TEST(Documents, EveryCommandOfScriptMdParses) {
-  std::istringstream lines(document("SCRIPT.md"));
+  std::istringstream lines(readDocument("SCRIPT.md"));
   int commands = 0;
   for (std::string line; std::getline(lines, line);) {
     if (!line.starts_with("| `{")) continue;
@@ -99,7 +100,7 @@ TEST(Documents, EveryCommandOfScriptMdParses) {
 }
 
 TEST(Documents, TheClientsBytesOfProtocolMdAreAHello) {
-  const Bytes bytes = hexBytes(fenced(document("PROTOCOL.md"), "hex client"));
+  const Bytes bytes = parseHexBytes(findFencedBlock(readDocument("PROTOCOL.md"), "hex client"));
   v1::ClientMessage message;
   message.set_request_id(1);
   message.mutable_hello()->set_protocol_version(kVersion);
@@ -111,7 +112,7 @@ TEST(Documents, TheClientsBytesOfProtocolMdAreAHello) {
 }
 
 TEST(Documents, TheServersBytesOfProtocolMdAreAFrame) {
-  const Bytes bytes = hexBytes(fenced(document("PROTOCOL.md"), "hex server"));
+  const Bytes bytes = parseHexBytes(findFencedBlock(readDocument("PROTOCOL.md"), "hex server"));
   Decoder decoder(kClientLimits, Decoder::Expect::messages);
   std::span<const std::uint8_t> rest(bytes);
   const auto message = decoder.next(rest);
@@ -130,7 +131,7 @@ TEST(Documents, TheServersBytesOfProtocolMdAreAFrame) {
 }
 
 TEST(Documents, ProtocolMdNamesTheVersionAndEachError) {
-  const std::string text = document("PROTOCOL.md");
+  const std::string text = readDocument("PROTOCOL.md");
   EXPECT_NE(text.find(std::string("version ") + kVersion), std::string::npos);
   const auto* codes = v1::ErrorCode_descriptor();
   for (int i = 1; i < codes->value_count(); ++i) {
@@ -139,7 +140,7 @@ TEST(Documents, ProtocolMdNamesTheVersionAndEachError) {
 }
 
 TEST(Documents, ProtocolMdNamesEachRequestAndReply) {
-  const std::string text = document("PROTOCOL.md");
+  const std::string text = readDocument("PROTOCOL.md");
   for (const auto* envelope : {v1::ClientMessage::descriptor(), v1::ServerMessage::descriptor()}) {
     for (int i = 0; i < envelope->field_count(); ++i) {
       const auto* body = envelope->field(i)->message_type();

@@ -25,8 +25,8 @@ class FakeWorld : public ScriptDriver {
   std::optional<v1::Error> submit(const v1::BodyCommand& command) override;
   StepOutcome step() override;
 
-  std::uint64_t tick() const { return tick_; }
-  const std::vector<std::string>& diary() const { return diary_; }
+  std::uint64_t getTick() const { return tick_; }
+  const std::vector<std::string>& getDiary() const { return diary_; }
 
  private:
   struct Avatar {

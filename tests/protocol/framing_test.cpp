@@ -14,7 +14,7 @@ using Bytes = std::vector<std::uint8_t>;
 
 constexpr FramingLimits kSmall{4096, 1024};
 
-v1::ClientMessage walkMessage(int waypoints) {
+v1::ClientMessage makeWalkMessage(int waypoints) {
   v1::ClientMessage message;
   message.set_request_id(7);
   message.mutable_command()->set_avatar("ann");
@@ -29,10 +29,10 @@ void append(Bytes& stream, const Bytes& more) {
 }
 
 /// Magic, and three messages: with an attachment, without one, and with an empty header.
-Bytes sampleStream() {
+Bytes makeSampleStream() {
   Bytes stream(kMagic.begin(), kMagic.end());
-  append(stream, encode(walkMessage(3), Bytes{1, 2, 3, 4, 5}));
-  append(stream, encode(walkMessage(1)));
+  append(stream, encode(makeWalkMessage(3), Bytes{1, 2, 3, 4, 5}));
+  append(stream, encode(makeWalkMessage(1)));
   append(stream, encode(v1::ClientMessage{}, Bytes(300, 9)));
   return stream;
 }
@@ -43,7 +43,7 @@ struct Outcome {
   bool betweenMessages = false;
 };
 
-bool same(const Outcome& a, const Outcome& b) {
+bool areSame(const Outcome& a, const Outcome& b) {
   const bool sameError =
       a.error.has_value() == b.error.has_value() &&
       (!a.error || (a.error->code == b.error->code && a.error->offset == b.error->offset));
@@ -75,7 +75,7 @@ Outcome decodeAtOnce(const Bytes& stream, const FramingLimits& limits) {
   return decodeInPieces(stream, limits, [&] { return stream.size(); });
 }
 
-std::uint32_t u32At(const Bytes& bytes, std::size_t place) {
+std::uint32_t readU32At(const Bytes& bytes, std::size_t place) {
   std::uint32_t value = 0;
   for (std::size_t i = 4; i-- > 0;) value = value << 8 | bytes[place + i];
   return value;
@@ -93,7 +93,7 @@ Outcome decodeWholeStream(const Bytes& stream, const FramingLimits& limits) {
   if (stream.size() < kMagic.size()) return outcome;
   std::size_t at = kMagic.size();
   while (at + 8 <= stream.size()) {
-    const std::size_t total = u32At(stream, at), header = u32At(stream, at + 4);
+    const std::size_t total = readU32At(stream, at), header = readU32At(stream, at + 4);
     if (total > limits.total)
       outcome.error = FramingError{Code::tooLarge, "", at};
     else if (header > limits.header)
@@ -113,13 +113,13 @@ Outcome decodeWholeStream(const Bytes& stream, const FramingLimits& limits) {
 }
 
 TEST(Framing, EncodedMessagesAreDecoded) {
-  const Outcome outcome = decodeAtOnce(sampleStream(), kSmall);
+  const Outcome outcome = decodeAtOnce(makeSampleStream(), kSmall);
   ASSERT_FALSE(outcome.error);
   ASSERT_EQ(outcome.messages.size(), 3u);
   EXPECT_TRUE(outcome.betweenMessages);
   v1::ClientMessage first;
   ASSERT_TRUE(parseHeader(outcome.messages[0].header, first));
-  EXPECT_EQ(first.SerializeAsString(), walkMessage(3).SerializeAsString());
+  EXPECT_EQ(first.SerializeAsString(), makeWalkMessage(3).SerializeAsString());
   EXPECT_EQ(outcome.messages[0].attachment, (Bytes{1, 2, 3, 4, 5}));
   EXPECT_TRUE(outcome.messages[1].attachment.empty());
   EXPECT_TRUE(outcome.messages[2].header.empty());
@@ -127,25 +127,25 @@ TEST(Framing, EncodedMessagesAreDecoded) {
 }
 
 TEST(Framing, WhereTheStreamIsSplitDoesNotMatter) {
-  const Bytes stream = sampleStream();
+  const Bytes stream = makeSampleStream();
   const Outcome whole = decodeAtOnce(stream, kSmall);
   for (std::size_t first = 1; first < stream.size(); ++first) {
     bool firstPiece = true;
     const Outcome split = decodeInPieces(
         stream, kSmall, [&] { return std::exchange(firstPiece, false) ? first : stream.size(); });
-    EXPECT_TRUE(same(split, whole)) << "split after byte " << first;
+    EXPECT_TRUE(areSame(split, whole)) << "split after byte " << first;
   }
-  EXPECT_TRUE(same(decodeInPieces(stream, kSmall, [] { return 1; }), whole));
+  EXPECT_TRUE(areSame(decodeInPieces(stream, kSmall, [] { return 1; }), whole));
 }
 
 TEST(Framing, ATruncatedStreamGivesItsWholeMessagesAndNoError) {
-  const Bytes stream = sampleStream();
+  const Bytes stream = makeSampleStream();
   std::size_t between = 0;
   for (std::size_t length = 0; length <= stream.size(); ++length) {
     const Bytes cut(stream.begin(), stream.begin() + static_cast<std::ptrdiff_t>(length));
     const Outcome outcome = decodeAtOnce(cut, kSmall);
     EXPECT_FALSE(outcome.error) << length;
-    EXPECT_TRUE(same(outcome, decodeWholeStream(cut, kSmall))) << length;
+    EXPECT_TRUE(areSame(outcome, decodeWholeStream(cut, kSmall))) << length;
     between += outcome.betweenMessages ? 1 : 0;
   }
   EXPECT_EQ(between, 4u);  // after the magic and after each message
@@ -236,7 +236,7 @@ TEST(Framing, AfterAnErrorNothingIsAccepted) {
 }
 
 /// Flips, cuts, repeats or overwrites a few bytes.
-Bytes corrupted(Bytes stream, std::mt19937& random) {
+Bytes corruptStream(Bytes stream, std::mt19937& random) {
   const auto below = [&](std::size_t end) { return random() % end; };
   for (std::size_t count = 1 + below(3); count > 0 && !stream.empty(); --count) {
     const std::size_t at = below(stream.size());
@@ -264,15 +264,15 @@ Bytes corrupted(Bytes stream, std::mt19937& random) {
 
 TEST(Framing, CorruptStreamsDecodeAsTheReferenceDecoderSays) {
   std::mt19937 random(20'000);
-  const Bytes sound = sampleStream();
+  const Bytes sound = makeSampleStream();
   constexpr int kStreams = 20'000;
   int errors = 0, messages = 0;
   for (int i = 0; i < kStreams; ++i) {
-    const Bytes stream = corrupted(sound, random);
+    const Bytes stream = corruptStream(sound, random);
     const Outcome expected = decodeWholeStream(stream, kSmall);
     const Outcome outcome =
         decodeInPieces(stream, kSmall, [&] { return std::size_t{1} + random() % 97; });
-    ASSERT_TRUE(same(outcome, expected)) << "stream " << i;
+    ASSERT_TRUE(areSame(outcome, expected)) << "stream " << i;
     errors += outcome.error ? 1 : 0;
     messages += outcome.messages.size() == 3 ? 1 : 0;
     for (const Message& message : outcome.messages) {  // parsing them must not crash, either

@@ -16,8 +16,8 @@ namespace {
 
 using Item = std::pair<std::uint64_t, std::string>;  // time and data
 
-std::filesystem::path fileFor(const std::string& name) {
-  return tests::ownFile(name + ".mcap");
+std::filesystem::path makeFileName(const std::string& name) {
+  return tests::makeOwnFile(name + ".mcap");
 }
 
 std::vector<Item> makeItems(std::size_t count) {
@@ -32,7 +32,7 @@ std::vector<Item> makeItems(std::size_t count) {
 }
 
 /// Many small chunks, so that a short file has all features of a long one.
-WriterOptions smallChunks() {
+WriterOptions makeSmallChunks() {
   return {"mcap_test", 700, std::chrono::hours(1)};
 }
 
@@ -53,9 +53,9 @@ void put(const std::filesystem::path& file, const std::string& bytes) {
       .write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
 }
 
-std::string closedFile(const std::vector<Item>& items) {
-  const auto file = fileFor("closed");
-  Writer writer(file, smallChunks());
+std::string makeClosedFile(const std::vector<Item>& items) {
+  const auto file = makeFileName("closed");
+  Writer writer(file, makeSmallChunks());
   writeAll(writer, items);
   writer.close();
   return readBytes(file);
@@ -88,8 +88,8 @@ bool isPrefix(const std::vector<Item>& part, const std::vector<Item>& whole) {
 
 TEST(Mcap, ReadsMessagesInTheirWrittenOrder) {
   const auto items = makeItems(500);
-  const auto file = fileFor("back");
-  put(file, closedFile(items));
+  const auto file = makeFileName("back");
+  put(file, makeClosedFile(items));
   const Read read = readAll(file);
   EXPECT_EQ(read.error, "");
   EXPECT_TRUE(read.closed);
@@ -98,8 +98,8 @@ TEST(Mcap, ReadsMessagesInTheirWrittenOrder) {
 }
 
 TEST(Mcap, ReportsChannelsSequencesAndTheWriter) {
-  const auto file = fileFor("channels");
-  put(file, closedFile(makeItems(4)));
+  const auto file = makeFileName("channels");
+  put(file, makeClosedFile(makeItems(4)));
   Reader reader(file);
   EXPECT_EQ(reader.library(), "mcap_test");
   std::vector<std::string> texts;
@@ -111,8 +111,8 @@ TEST(Mcap, ReportsChannelsSequencesAndTheWriter) {
 }
 
 TEST(Mcap, AFileWithoutMessagesIsValid) {
-  const auto file = fileFor("nothing");
-  put(file, closedFile({}));
+  const auto file = makeFileName("nothing");
+  put(file, makeClosedFile({}));
   const Read read = readAll(file);
   EXPECT_EQ(read.error, "");
   EXPECT_TRUE(read.closed);
@@ -121,8 +121,8 @@ TEST(Mcap, AFileWithoutMessagesIsValid) {
 
 TEST(Mcap, ATruncatedFileIsReadUpToTheLastCompleteChunk) {
   const auto items = makeItems(200);
-  const std::string bytes = closedFile(items);
-  const auto file = fileFor("cut");
+  const std::string bytes = makeClosedFile(items);
+  const auto file = makeFileName("cut");
   std::mt19937 random(11);
   std::size_t maxItems = 0;
   for (int i = 0; i < 300; ++i) {
@@ -140,8 +140,8 @@ TEST(Mcap, ATruncatedFileIsReadUpToTheLastCompleteChunk) {
 
 TEST(Mcap, AFlippedBitIsReported) {
   const auto items = makeItems(60);
-  const std::string bytes = closedFile(items);
-  const auto file = fileFor("flip");
+  const std::string bytes = makeClosedFile(items);
+  const auto file = makeFileName("flip");
   std::mt19937 random(13);
   for (int i = 0; i < 2500; ++i) {
     std::string spoilt = bytes;
@@ -157,9 +157,9 @@ TEST(Mcap, AFlippedBitIsReported) {
 
 TEST(Mcap, AFlippedBitInATruncatedFileNeverChangesData) {
   const auto items = makeItems(60);
-  const std::string whole = closedFile(items);
+  const std::string whole = makeClosedFile(items);
   const std::string bytes = whole.substr(0, whole.size() / 2);
-  const auto file = fileFor("flip_cut");
+  const auto file = makeFileName("flip_cut");
   std::mt19937 random(17);
   for (int i = 0; i < 1000; ++i) {
     std::string spoilt = bytes;
@@ -171,23 +171,23 @@ TEST(Mcap, AFlippedBitInATruncatedFileNeverChangesData) {
 }
 
 TEST(Mcap, BytesAfterTheEndAreReported) {
-  const auto file = fileFor("after");
-  put(file, closedFile(makeItems(5)) + "x");
+  const auto file = makeFileName("after");
+  put(file, makeClosedFile(makeItems(5)) + "x");
   EXPECT_NE(readAll(file).error.find("the closing magic bytes are missing"), std::string::npos);
 }
 
 TEST(Mcap, OtherFilesAreNamedAndRefused) {
-  const auto file = fileFor("other");
+  const auto file = makeFileName("other");
   put(file, "this is a text, and no recording");
   EXPECT_NE(readAll(file).error.find(file.string() + ": at byte 0: not an MCAP file"),
             std::string::npos);
-  EXPECT_NE(readAll(fileFor("missing")).error.find("cannot be read"), std::string::npos);
+  EXPECT_NE(readAll(makeFileName("missing")).error.find("cannot be read"), std::string::npos);
 }
 
 TEST(Mcap, FlushedDataIsReadableWithoutClose) {
   const auto items = makeItems(9);
-  const auto file = fileFor("flushed");
-  Writer writer(file, smallChunks());
+  const auto file = makeFileName("flushed");
+  Writer writer(file, makeSmallChunks());
   writeAll(writer, items);
   writer.flush();
   const Read read = readAll(file);
@@ -218,11 +218,11 @@ class FullDisk {
 
 TEST(Mcap, AFullDiskIsReportedOnceAndLeavesAReadableFile) {
   const auto items = makeItems(400);
-  const auto file = fileFor("full");
+  const auto file = makeFileName("full");
   std::string message;
   {
     const FullDisk disk(6000);
-    Writer writer(file, smallChunks());
+    Writer writer(file, makeSmallChunks());
     try {
       writeAll(writer, items);
     } catch (const RecordingError& error) {

@@ -23,7 +23,7 @@ v1::State makeState(std::uint64_t tick) {
 }
 
 TEST(Recording, ReturnsItsMessagesInOrder) {
-  const auto file = tests::ownFile("messages.mcap");
+  const auto file = tests::makeOwnFile("messages.mcap");
   v1::RecordingStart start;
   start.set_scene_file("/models/house.glb");
   v1::RecordedCommands commands;

@@ -8,14 +8,14 @@
 namespace enfilade::protocol {
 namespace {
 
-Script script(std::string_view text) {
+Script parseTour(std::string_view text) {
   return parseScript(text, "tour.jsonl");
 }
 
 /// The ticks at which `world` received commands, with the commands' tags.
-std::vector<std::string> diaryStarts(const FakeWorld& world) {
+std::vector<std::string> findDiaryStarts(const FakeWorld& world) {
   std::vector<std::string> starts;
-  for (const std::string& entry : world.diary()) {
+  for (const std::string& entry : world.getDiary()) {
     starts.push_back(entry.substr(0, entry.find(": ") + 2) +
                      entry.substr(entry.find("avatar"), entry.find(" tag") - entry.find("avatar")));
   }
@@ -24,7 +24,7 @@ std::vector<std::string> diaryStarts(const FakeWorld& world) {
 
 TEST(RunScript, AllIsSubmittedUpToAGlobalWait) {
   FakeWorld world;
-  const ScriptResult result = runScript(script(R"({"spawn":"ann","at":[1,0,0]}
+  const ScriptResult result = runScript(parseTour(R"({"spawn":"ann","at":[1,0,0]}
 {"walk":"ann","along":[[2,0,0],[3,0,0]]}
 {"spawn":"bob","at":[5,0,0]}
 {"wait":0.1}
@@ -34,11 +34,11 @@ TEST(RunScript, AllIsSubmittedUpToAGlobalWait) {
                                         world);
   // Ann: 1 + 10 ticks, then 6 of waiting, then one to leave.
   EXPECT_EQ(
-      diaryStarts(world),
+      findDiaryStarts(world),
       (std::vector<std::string>{"0: avatar: \"ann\"", "0: avatar: \"ann\"", "0: avatar: \"bob\"",
                                 "17: avatar: \"bob\"", "17: avatar: \"ann\""}));
   EXPECT_EQ(result.ticks, 18u);
-  EXPECT_EQ(world.tick(), 18u);
+  EXPECT_EQ(world.getTick(), 18u);
   EXPECT_DOUBLE_EQ(result.time, 18 / 60.0);
   EXPECT_EQ(result.spawned, 2u);
   EXPECT_EQ(result.arrived, 1u);
@@ -48,7 +48,7 @@ TEST(RunScript, AllIsSubmittedUpToAGlobalWait) {
 TEST(RunScript, AGlobalWaitIsRoundedUpToTicksAndNotByRounding) {
   const auto countTicks = [](const std::string& seconds) {
     FakeWorld world;
-    return runScript(script("{\"wait\":" + seconds + "}"), world).ticks;
+    return runScript(parseTour("{\"wait\":" + seconds + "}"), world).ticks;
   };
   EXPECT_EQ(countTicks("0"), 0u);
   EXPECT_EQ(countTicks("1"), 60u);
@@ -66,7 +66,7 @@ TEST(RunScript, AGlobalWaitIsRoundedUpToTicksAndNotByRounding) {
 TEST(RunScript, AnAvatarsWaitHoldsUpOnlyThatAvatar) {
   FakeWorld world;
   std::map<std::string, std::uint64_t> arrivals;
-  runScript(script(R"({"spawn":"ann","at":[0,0,0]}
+  runScript(parseTour(R"({"spawn":"ann","at":[0,0,0]}
 {"wait":0.5,"for":"ann"}
 {"walk":"ann","to":[1,0,0]}
 {"spawn":"bob","at":[0,0,0]}
@@ -85,12 +85,12 @@ TEST(RunScript, AnAvatarsWaitHoldsUpOnlyThatAvatar) {
 
 TEST(RunScript, AnEmptyScriptMakesNoTick) {
   FakeWorld world;
-  EXPECT_EQ(runScript(script("# nothing\n"), world).ticks, 0u);
+  EXPECT_EQ(runScript(parseTour("# nothing\n"), world).ticks, 0u);
 }
 
 TEST(RunScript, ARefusedCommandIsReportedWithItsLineAndTheScriptContinues) {
   FakeWorld world;
-  const ScriptResult result = runScript(script(R"({"spawn":"ann","at":[0,0,0]}
+  const ScriptResult result = runScript(parseTour(R"({"spawn":"ann","at":[0,0,0]}
 
 {"walk":"ann","to":[1,0,0],"speed":11}
 {"walk":"ann","to":[2,0,0]}
@@ -106,7 +106,7 @@ TEST(RunScript, ARefusedCommandIsReportedWithItsLineAndTheScriptContinues) {
 
 TEST(RunScript, ARefusedSpawnReportsTheDroppedLines) {
   FakeWorld world;
-  const ScriptResult result = runScript(script(R"({"spawn":"ghost","at":[0,0,0]}
+  const ScriptResult result = runScript(parseTour(R"({"spawn":"ghost","at":[0,0,0]}
 {"walk":"ghost","to":[1,0,0]}
 {"spawn":"ann","at":[0,0,0]}
 {"walk":"ann","to":[1,0,0]}
@@ -124,7 +124,7 @@ TEST(RunScript, ARefusedSpawnReportsTheDroppedLines) {
 
 TEST(RunScript, LinesAfterARefusedSpawnAreReportedInOneLine) {
   FakeWorld world;
-  const ScriptResult result = runScript(script(R"({"spawn":"ghost","at":[0,0,0]}
+  const ScriptResult result = runScript(parseTour(R"({"spawn":"ghost","at":[0,0,0]}
 {"walk":"ghost","to":[1,0,0]}
 {"wait":0.1}
 {"look":"ghost","at":[1,0,0]}
@@ -143,7 +143,7 @@ TEST(RunScript, LinesAfterARefusedSpawnAreReportedInOneLine) {
 
 TEST(RunScript, ABlockedWalkNamesItsObstacleAndTheNextCommandBegins) {
   FakeWorld world;
-  const ScriptResult result = runScript(script(R"({"spawn":"stuck","at":[4,0,0]}
+  const ScriptResult result = runScript(parseTour(R"({"spawn":"stuck","at":[4,0,0]}
 {"walk":"stuck","to":[1,0,0]}
 {"leave":"stuck"}
 )"),
@@ -160,7 +160,7 @@ TEST(RunScript, CapturesShowTheTickInWhichTheyRun) {
   FakeWorld world;
   std::vector<std::string> frames;
   const ScriptResult result =
-      runScript(script(R"({"spawn":"ann","at":[0,0,0]}
+      runScript(parseTour(R"({"spawn":"ann","at":[0,0,0]}
 {"capture":"ann","as":"first"}
 {"walk":"ann","to":[1,0,0]}
 {"capture":"ann","as":"second"}
@@ -183,7 +183,7 @@ TEST(RunScript, CapturesShowTheTickInWhichTheyRun) {
 
 TEST(RunScript, AnEndlessWaitIsBoundedAndReported) {
   FakeWorld world;
-  const ScriptResult result = runScript(script(R"({"spawn":"restless","at":[0,0,0]}
+  const ScriptResult result = runScript(parseTour(R"({"spawn":"restless","at":[0,0,0]}
 {"wait":1}
 {"leave":"restless"}
 )"),
@@ -203,7 +203,7 @@ TEST(RunScript, ProgressCountsEachLineOnce) {
   FakeWorld world;
   std::size_t last = 0;
   bool backwards = false;
-  runScript(script(R"({"spawn":"ann","at":[0,0,0]}
+  runScript(parseTour(R"({"spawn":"ann","at":[0,0,0]}
 {"walk":"ann","to":[1,0,0],"speed":11}
 {"wait":1}
 {"spawn":"ghost","at":[0,0,0]}
@@ -234,7 +234,7 @@ TEST(RunScript, NoticesOfOthersEndNoLine) {
       return outcome;
     }
   } world;
-  const ScriptResult result = runScript(script(R"({"spawn":"ann","at":[0,0,0]}
+  const ScriptResult result = runScript(parseTour(R"({"spawn":"ann","at":[0,0,0]}
 {"walk":"ann","to":[1,0,0]}
 )"),
                                         world);
@@ -247,7 +247,7 @@ TEST(RunScript, ExceptionsOfTheDriverPassThrough) {
   struct Broken : FakeWorld {
     StepOutcome step() override { throw std::runtime_error("gone"); }
   } world;
-  EXPECT_THROW(runScript(script(R"({"spawn":"ann","at":[0,0,0]})"), world), std::runtime_error);
+  EXPECT_THROW(runScript(parseTour(R"({"spawn":"ann","at":[0,0,0]})"), world), std::runtime_error);
 }
 
 }  // namespace

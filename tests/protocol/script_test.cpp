@@ -25,7 +25,7 @@ void expectError(std::string_view text, const std::string& start) {
       << text << "\n  said: " << error << "\n  and not: " << start;
 }
 
-v1::Command onlyCommand(std::string_view text) {
+v1::Command parseCommand(std::string_view text) {
   const Script script = parseScript(text, "tour.jsonl");
   EXPECT_EQ(script.lines.size(), 1u);
   return std::get<v1::Command>(script.lines.at(0).action);
@@ -38,7 +38,7 @@ TEST(Script, DeeplyNestedBracketsAreAnError) {
 }
 
 TEST(Script, ASpawnHasItsPositionAndOptions) {
-  const v1::Command plain = onlyCommand(R"({"spawn":"ann","at":[1,-2.5,3e2]})");
+  const v1::Command plain = parseCommand(R"({"spawn":"ann","at":[1,-2.5,3e2]})");
   EXPECT_EQ(plain.avatar(), "ann");
   EXPECT_EQ(plain.tag(), 1u);
   EXPECT_EQ(plain.spawn().at().x(), 1);
@@ -48,7 +48,7 @@ TEST(Script, ASpawnHasItsPositionAndOptions) {
   EXPECT_FALSE(plain.spawn().has_radius());
   EXPECT_FALSE(plain.spawn().has_height());
   const v1::Command full =
-      onlyCommand(R"({"at":[0,0,0],"height":1.2,"facing":-90,"spawn":"B.o-b_2","radius":0.25})");
+      parseCommand(R"({"at":[0,0,0],"height":1.2,"facing":-90,"spawn":"B.o-b_2","radius":0.25})");
   EXPECT_EQ(full.avatar(), "B.o-b_2");
   EXPECT_EQ(full.spawn().facing(), -90);
   EXPECT_EQ(full.spawn().radius(), 0.25);
@@ -56,23 +56,23 @@ TEST(Script, ASpawnHasItsPositionAndOptions) {
 }
 
 TEST(Script, AWalkGoesToOnePointOrAlongMany) {
-  const v1::Command to = onlyCommand(R"({"walk":"ann","to":[1,2,3],"speed":1.5})");
+  const v1::Command to = parseCommand(R"({"walk":"ann","to":[1,2,3],"speed":1.5})");
   ASSERT_EQ(to.walk().along_size(), 1);
   EXPECT_EQ(to.walk().along(0).z(), 3);
   EXPECT_EQ(to.walk().speed(), 1.5);
-  const v1::Command along = onlyCommand(R"({"walk":"ann","along":[[1,2,3],[4,5,6]]})");
+  const v1::Command along = parseCommand(R"({"walk":"ann","along":[[1,2,3],[4,5,6]]})");
   ASSERT_EQ(along.walk().along_size(), 2);
   EXPECT_EQ(along.walk().along(1).y(), 5);
   EXPECT_FALSE(along.walk().has_speed());
 }
 
 TEST(Script, LookWaitCaptureAndLeaveAreRead) {
-  EXPECT_EQ(onlyCommand(R"({"look":"ann","at":[1,2,3]})").look().at().y(), 2);
-  const v1::Command wait = onlyCommand(R"({"wait":0.5,"for":"ann"})");
+  EXPECT_EQ(parseCommand(R"({"look":"ann","at":[1,2,3]})").look().at().y(), 2);
+  const v1::Command wait = parseCommand(R"({"wait":0.5,"for":"ann"})");
   EXPECT_EQ(wait.avatar(), "ann");
   EXPECT_EQ(wait.wait().seconds(), 0.5);
-  EXPECT_EQ(onlyCommand(R"({"capture":"ann","as":"hall.1"})").capture().as(), "hall.1");
-  EXPECT_TRUE(onlyCommand(R"({"leave":"ann"})").has_leave());
+  EXPECT_EQ(parseCommand(R"({"capture":"ann","as":"hall.1"})").capture().as(), "hall.1");
+  EXPECT_TRUE(parseCommand(R"({"leave":"ann"})").has_leave());
 }
 
 TEST(Script, AWaitWithoutForIsForAll) {
@@ -162,17 +162,17 @@ TEST(Script, NumbersOutOfRangeAreRefusedBeforeTheWalk) {
 }
 
 TEST(Script, JumpsFlightsCrouchesAndJointsAreRead) {
-  const v1::Command jump = onlyCommand(R"({"jump":"ann","height":0.4,"velocity":[2,0,1]})");
+  const v1::Command jump = parseCommand(R"({"jump":"ann","height":0.4,"velocity":[2,0,1]})");
   EXPECT_EQ(jump.jump().height(), 0.4);
   EXPECT_EQ(jump.jump().velocity().z(), 1);
-  EXPECT_FALSE(onlyCommand(R"({"jump":"ann"})").jump().has_velocity());
-  EXPECT_TRUE(onlyCommand(R"({"fly":"ann"})").fly().on());
-  EXPECT_FALSE(onlyCommand(R"({"fly":"ann","on":false})").fly().on());
-  EXPECT_EQ(onlyCommand(R"({"crouch":"ann","height":0.9})").crouch().height(), 0.9);
-  const v1::Command stand = onlyCommand(R"({"stand":"ann"})");
+  EXPECT_FALSE(parseCommand(R"({"jump":"ann"})").jump().has_velocity());
+  EXPECT_TRUE(parseCommand(R"({"fly":"ann"})").fly().on());
+  EXPECT_FALSE(parseCommand(R"({"fly":"ann","on":false})").fly().on());
+  EXPECT_EQ(parseCommand(R"({"crouch":"ann","height":0.9})").crouch().height(), 0.9);
+  const v1::Command stand = parseCommand(R"({"stand":"ann"})");
   EXPECT_TRUE(stand.has_crouch());
   EXPECT_FALSE(stand.crouch().has_height());
-  const v1::Command joints = onlyCommand(R"({"joints":"arm","to":[1.5,null,-0.2],"speed":2})");
+  const v1::Command joints = parseCommand(R"({"joints":"arm","to":[1.5,null,-0.2],"speed":2})");
   ASSERT_EQ(joints.drive_joints().to_size(), 3);
   EXPECT_EQ(joints.drive_joints().to(0).value(), 1.5);
   EXPECT_FALSE(joints.drive_joints().to(1).has_value());
@@ -180,7 +180,7 @@ TEST(Script, JumpsFlightsCrouchesAndJointsAreRead) {
 }
 
 TEST(Script, ASpawnHasPartsAndLinks) {
-  const v1::Command command = onlyCommand(
+  const v1::Command command = parseCommand(
       R"({"spawn":"arm","at":[0,0,0],"self_contact":true,"flying":true,)"
       R"("parts":[{"box":[[-1,0,-1],[1,0.5,1]]},{"points":[[0,0,0],[1,0,0],[0,1,0],[0,0,1]]}],)"
       R"("links":[{"joint":"revolute","axis":[0,1,0],"anchor":[0,0.5,0],"limits":[-1,2],"value":1,)"
@@ -207,29 +207,29 @@ TEST(Script, ASpawnHasPartsAndLinks) {
               "tour.jsonl:1: parts[0].box: must be two");
 }
 
-v1::BodyCommand onlyBodyCommand(std::string_view text) {
+v1::BodyCommand parseBodyCommand(std::string_view text) {
   const Script script = parseScript(text, "tour.jsonl");
   EXPECT_EQ(script.lines.size(), 1u);
   return std::get<v1::BodyCommand>(script.lines.at(0).action);
 }
 
 TEST(Script, ABodyCommandUsesTheBodysUnits) {
-  const v1::BodyCommand open = onlyBodyCommand(R"({"body":"Hall/Front door","do":"open"})");
+  const v1::BodyCommand open = parseBodyCommand(R"({"body":"Hall/Front door","do":"open"})");
   EXPECT_EQ(open.body(), "Hall/Front door");
   EXPECT_TRUE(open.has_open());
   EXPECT_FALSE(open.has_speed());
-  EXPECT_TRUE(onlyBodyCommand(R"({"body":"d","do":"close"})").has_close());
-  EXPECT_TRUE(onlyBodyCommand(R"({"body":"d","do":"stop"})").has_stop());
-  EXPECT_TRUE(onlyBodyCommand(R"({"body":"d","do":"run"})").has_run());
-  const v1::BodyCommand turned = onlyBodyCommand(R"({"body":"d","turn":90,"turn_speed":45})");
+  EXPECT_TRUE(parseBodyCommand(R"({"body":"d","do":"close"})").has_close());
+  EXPECT_TRUE(parseBodyCommand(R"({"body":"d","do":"stop"})").has_stop());
+  EXPECT_TRUE(parseBodyCommand(R"({"body":"d","do":"run"})").has_run());
+  const v1::BodyCommand turned = parseBodyCommand(R"({"body":"d","turn":90,"turn_speed":45})");
   EXPECT_NEAR(turned.to(), 1.5707963267948966, 1e-15);
   EXPECT_NEAR(turned.speed(), 0.78539816339744831, 1e-15);
-  const v1::BodyCommand slid = onlyBodyCommand(R"({"body":"gate","to":-0.75,"speed":2})");
+  const v1::BodyCommand slid = parseBodyCommand(R"({"body":"gate","to":-0.75,"speed":2})");
   EXPECT_EQ(slid.to(), -0.75);
   EXPECT_EQ(slid.speed(), 2);
-  const v1::BodyCommand called = onlyBodyCommand(R"({"body":"lift","level":0})");
+  const v1::BodyCommand called = parseBodyCommand(R"({"body":"lift","level":0})");
   EXPECT_TRUE(called.has_level());
-  EXPECT_EQ(onlyBodyCommand(R"({"body":"lift","level":10000})").level(), 10000u);
+  EXPECT_EQ(parseBodyCommand(R"({"body":"lift","level":10000})").level(), 10000u);
 }
 
 TEST(Script, AnInvalidBodyLineIsReportedWithItsField) {
@@ -316,7 +316,7 @@ TEST(Script, AFileThatCannotBeReadIsNamed) {
 }
 
 TEST(Script, AFileIsReadAsItsText) {
-  const auto file = tests::ownFile("script.jsonl");
+  const auto file = tests::makeOwnFile("script.jsonl");
   std::ofstream(file, std::ios::binary) << "{\"wait\":1}\r\n{\"leave\":\"ann\"}";
   const Script script = readScript(file);
   EXPECT_EQ(script.source, file.string());

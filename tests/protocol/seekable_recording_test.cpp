@@ -69,7 +69,7 @@ std::vector<std::uint64_t> writeRun(RecordingWriter& writer, std::uint64_t first
 
 WrittenRecording writeRecording(const std::string& name, std::uint64_t first, std::uint64_t last,
                                 bool close) {
-  WrittenRecording written{tests::ownFile(name + ".mcap"), {}};
+  WrittenRecording written{tests::makeOwnFile(name + ".mcap"), {}};
   RecordingWriter writer(written.file, "test");
   written.checkpoints = writeRun(writer, first, last);
   if (close) {
@@ -125,7 +125,7 @@ TEST(SeekableRecording, ABranchBeginsWhereItLeftItsParent) {
 /// One short run after another, as tests of agents record them.
 TEST(SeekableRecording, EachRunOfAFileIsReadAloneFromAnyTickOn) {
   const std::vector<std::uint64_t> lasts{1700, 3, 1, 2, 1200};
-  const auto file = tests::ownFile("runs.mcap");
+  const auto file = tests::makeOwnFile("runs.mcap");
   std::vector<WrittenRecording> runs;
   {
     RecordingWriter writer(file, "test");

@@ -49,7 +49,7 @@ struct FakeServer {
     } else if (request.has_step()) {
       step(request.step(), *reply.mutable_step(), connection);
     } else if (request.has_frame()) {
-      frame(request.frame(), reply);
+      answerFrame(request.frame(), reply);
     } else if (request.has_set_clock()) {
       lockstepRequested = request.set_clock().has_lockstep();
       reply.mutable_set_clock();
@@ -89,9 +89,9 @@ struct FakeServer {
     }
   }
 
-  void frame(const v1::FrameRequest& request, v1::ServerMessage& reply) {
+  void answerFrame(const v1::FrameRequest& request, v1::ServerMessage& reply) {
     requestedFrames.push_back(request.eyes().avatar() + " " + std::to_string(request.tick()));
-    if (request.tick() != world.tick()) {
+    if (request.tick() != world.getTick()) {
       reply.mutable_error()->set_code(v1::ERROR_TICK_GONE);
     } else if (request.eyes().avatar() == "stuck") {
       reply.mutable_error()->set_code(v1::ERROR_NO_RENDERER);
@@ -117,13 +117,13 @@ TEST(SocketDriver, AScriptRunsAsItDoesInProcess) {
   ScriptResult there;
   {
     const TestServer server([&](TestConnection& connection) { fake.serve(connection); });
-    Client client("127.0.0.1", server.port());
+    Client client("127.0.0.1", server.getPort());
     SocketDriver driver(client);
     there = runScript(script, driver, [](StepOutcome& outcome, const ScriptProgress&) {
       EXPECT_FALSE(outcome.avatars.empty());
     });
   }
-  EXPECT_EQ(fake.world.diary(), inProcess.diary());
+  EXPECT_EQ(fake.world.getDiary(), inProcess.getDiary());
   EXPECT_EQ(there.stateHash, here.stateHash);
   EXPECT_EQ(there.ticks, here.ticks);
   EXPECT_EQ(there.refused, 1u);
@@ -140,7 +140,7 @@ TEST(SocketDriver, SetsTheClockAndSubscribes) {
   FakeServer fake;
   {
     const TestServer server([&](TestConnection& connection) { fake.serve(connection); });
-    Client client("127.0.0.1", server.port());
+    Client client("127.0.0.1", server.getPort());
     const SocketDriver driver(client);
     EXPECT_DOUBLE_EQ(driver.tickSeconds(), 1.0 / 60.0);
   }
@@ -153,7 +153,7 @@ TEST(SocketDriver, NoticesOfOtherClientsAvatarsAreIgnored) {
   FakeServer fake;
   fake.stranger = true;
   const TestServer server([&](TestConnection& connection) { fake.serve(connection); });
-  Client client("127.0.0.1", server.port());
+  Client client("127.0.0.1", server.getPort());
   SocketDriver driver(client);
   const Script script = parseScript(R"({"spawn":"ann","at":[1,0,0]})", "tour.jsonl");
   EXPECT_FALSE(driver.submit(std::get<v1::Command>(script.lines.at(0).action)));

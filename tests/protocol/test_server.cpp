@@ -49,11 +49,11 @@ v1::ClientMessage TestConnection::greet() {
   const auto hello = receive();
   if (!hello) throw std::runtime_error("the client closed before its hello");
   sendRaw(std::span<const std::uint8_t>(kMagic));
-  send(welcomeTo(*hello));
+  send(makeWelcomeTo(*hello));
   return *hello;
 }
 
-void TestConnection::untilClosed() {
+void TestConnection::waitUntilClosed() {
   while (receive()) {
   }
 }
@@ -64,7 +64,7 @@ v1::ServerMessage makeEvents(std::uint64_t sequence) {
   return message;
 }
 
-v1::ServerMessage welcomeTo(const v1::ClientMessage& hello) {
+v1::ServerMessage makeWelcomeTo(const v1::ClientMessage& hello) {
   v1::ServerMessage reply;
   reply.set_reply_to(hello.request_id());
   v1::Welcome& welcome = *reply.mutable_welcome();

@@ -26,7 +26,7 @@ class TestConnection {
   void send(const v1::ServerMessage& message, std::span<const std::uint8_t> attachment = {});
   /// Receives Hello, then sends the magic and a Welcome. Returns the Hello.
   v1::ClientMessage greet();
-  void untilClosed();  ///< discards input until the client closes
+  void waitUntilClosed();  ///< discards input until the client closes
 
  private:
   int descriptor_;
@@ -35,7 +35,7 @@ class TestConnection {
   std::span<const std::uint8_t> unread_;
 };
 
-v1::ServerMessage welcomeTo(const v1::ClientMessage& hello);
+v1::ServerMessage makeWelcomeTo(const v1::ClientMessage& hello);
 v1::ServerMessage makeEvents(std::uint64_t sequence);
 
 class TestServer {
@@ -46,7 +46,7 @@ class TestServer {
   TestServer(const TestServer&) = delete;
   TestServer& operator=(const TestServer&) = delete;
 
-  std::uint16_t port() const { return port_; }
+  std::uint16_t getPort() const { return port_; }
 
  private:
   int listener_;

@@ -10,7 +10,7 @@ namespace {
 
 constexpr int kWidth = 161, kHeight = 121;  // odd: the last pixel has no neighbour
 
-Camera camera() {
+Camera makeOcclusionCamera() {
   Camera camera;
   camera.width = kWidth;
   camera.height = kHeight;
@@ -25,19 +25,19 @@ std::vector<std::uint8_t> computeLight(const std::function<double(double, double
   for (int y = 0; y < kHeight; ++y)
     for (int x = 0; x < kWidth; ++x)
       depths.push_back(static_cast<float>(depth((x + 0.5 - 80) / 100, (y + 0.5 - 60) / 100)));
-  const AmbientOcclusion occlusion(depths, camera());
+  const AmbientOcclusion occlusion(depths, makeOcclusionCamera());
   std::vector<std::uint8_t> left(depths.size());
   for (int y = 0; y < kHeight; ++y)
     occlusion.computeRow(y, std::span(left).subspan(static_cast<std::size_t>(y) * kWidth, kWidth));
   return left;
 }
 
-int at(const std::vector<std::uint8_t>& left, int x, int y) {
+int getPixel(const std::vector<std::uint8_t>& left, int x, int y) {
   return left[static_cast<std::size_t>(y * kWidth + x)];
 }
 
 /// A floor 1.5 m below the eye, in front of a wall 4 m ahead.
-double corner(double, double y) {
+double computeCornerDepth(double, double y) {
   return std::min(4.0, y > 0 ? 1.5 / y : 1e9);
 }
 
@@ -51,11 +51,11 @@ TEST(AmbientOcclusion, PlanesOfAnyOrientationHaveNone) {
 }
 
 TEST(AmbientOcclusion, ACornerIsDarkerThanAPointHalfAMetreAway) {
-  const auto left = computeLight(corner);
+  const auto left = computeLight(computeCornerDepth);
   const int row = 60 + 37;  // where floor and wall meet
   for (const int x : {20, 80, 81, 140}) {
-    EXPECT_LT(at(left, x, row), 245) << x;
-    EXPECT_EQ(at(left, x, row - 16), 255) << x;
+    EXPECT_LT(getPixel(left, x, row), 245) << x;
+    EXPECT_EQ(getPixel(left, x, row - 16), 255) << x;
   }
 }
 
@@ -66,26 +66,27 @@ TEST(AmbientOcclusion, ADistantForegroundLeavesNoOutlineOnTheWall) {
 
 TEST(AmbientOcclusion, ANearForegroundShadesTheWallWithoutABand) {
   const auto left = computeLight([](double x, double) { return std::abs(x) < 0.2 ? 3.8 : 4.0; });
-  int before = at(left, 103, 60);
+  int before = getPixel(left, 103, 60);
   EXPECT_LT(before, 250);
   for (int x = 104; x < 125; ++x) {  // with distance the wall only becomes lighter
-    EXPECT_GE(at(left, x, 60), before - 2) << x;
-    before = at(left, x, 60);
+    EXPECT_GE(getPixel(left, x, 60), before - 2) << x;
+    before = getPixel(left, x, 60);
   }
   EXPECT_EQ(before, 255);
   for (int x = 101; x < 125; ++x) {  // no pattern of the sample offsets is visible
-    for (int y = 50; y < 70; ++y) EXPECT_NEAR(at(left, x, y), at(left, x, 60), 3) << x << ' ' << y;
+    for (int y = 50; y < 70; ++y)
+      EXPECT_NEAR(getPixel(left, x, y), getPixel(left, x, 60), 3) << x << ' ' << y;
   }
 }
 
 TEST(AmbientOcclusion, WhereNothingIsSeenThereAreNone) {
   constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
   const auto left =
-      computeLight([&](double x, double y) { return x > 0 ? kNothing : corner(x, y); });
+      computeLight([&](double x, double y) { return x > 0 ? kNothing : computeCornerDepth(x, y); });
   for (int y = 0; y < kHeight; ++y) {
-    for (int x = 80; x < kWidth; ++x) EXPECT_EQ(at(left, x, y), 255) << x << ' ' << y;
+    for (int x = 80; x < kWidth; ++x) EXPECT_EQ(getPixel(left, x, y), 255) << x << ' ' << y;
   }
-  EXPECT_LT(at(left, 40, 97), 245);
+  EXPECT_LT(getPixel(left, 40, 97), 245);
 }
 
 TEST(AmbientOcclusion, GlassBeforeThemHidesThemAsFarAsItIsSeen) {

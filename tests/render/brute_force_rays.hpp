@@ -19,7 +19,7 @@ struct BruteHit {
   double inside = 0;
 };
 
-inline BruteHit bruteForceHit(
+inline BruteHit findBruteHit(
     const std::vector<std::pair<scene::EntityId, collision::Triangle>>& all, const Camera& camera,
     const Vec3& from, const Vec3& way) {
   BruteHit best;
@@ -47,7 +47,7 @@ inline BruteHit bruteForceHit(
 }
 
 /// Pixels are stored row by row.
-inline std::vector<BruteHit> bruteForceFrame(const scene::Model& model, const Camera& camera) {
+inline std::vector<BruteHit> computeBruteFrame(const scene::Model& model, const Camera& camera) {
   std::vector<std::pair<scene::EntityId, collision::Triangle>> all;
   for (std::uint32_t o = 0; o < model.objects.size(); ++o)
     for (const collision::Triangle& t : scene::collectSolidTriangles(model, o))
@@ -60,8 +60,8 @@ inline std::vector<BruteHit> bruteForceFrame(const scene::Model& model, const Ca
       const double up = (1 - (y + 0.5) / camera.height * 2 - view.shiftY) / view.scaleY;
       const Vec3 aside = right * view.right + up * view.up;
       const bool perspective = camera.projection == Camera::Projection::perspective;
-      hits.push_back(bruteForceHit(all, camera, perspective ? camera.eye : Vec3(camera.eye + aside),
-                                   perspective ? Vec3(view.forward + aside) : view.forward));
+      hits.push_back(findBruteHit(all, camera, perspective ? camera.eye : Vec3(camera.eye + aside),
+                                  perspective ? Vec3(view.forward + aside) : view.forward));
     }
   }
   return hits;

@@ -16,11 +16,11 @@ namespace {
 /// positions are rounded. With `raised`, rafters and hatch stand out by some millimetres instead:
 /// nothing is coplanar, and the same objects are visible but for pixels at edges.
 std::shared_ptr<const scene::Scene> makeRoof(bool raised) {
-  std::vector<PlacedBox> boxes{{{0, 0, 0}, {12, 0.4, 9}, coloured(0.8f, 0.3f, 0.1f)}};
+  std::vector<PlacedBox> boxes{{{0, 0, 0}, {12, 0.4, 9}, makeColoured(0.8f, 0.3f, 0.1f)}};
   const auto addFlush = [&](const Vec3& centre, const Vec3& size, double rise) {
     const double top = 0.2 + (raised ? rise : 0);
     boxes.push_back(
-        {{centre.x(), top - size.y() / 2, centre.z()}, size, coloured(0.9f, 0.8f, 0.5f)});
+        {{centre.x(), top - size.y() / 2, centre.z()}, size, makeColoured(0.9f, 0.8f, 0.5f)});
   };
   for (int i = 0; i < 5; ++i) addFlush({-4.6 + 2.3 * i, 0, 0}, {0.7, 0.3, 8.5}, 0.002);
   addFlush({0, 0, 1.5}, {5, 0.1, 1.2}, 0.004);
@@ -75,7 +75,7 @@ void expectSmallestVisible(FlushRenderer& renderer, const std::vector<Camera>& c
       const FrameOptions options{.channels = {rgb, true, true, false}};
       const Frame frame = renderer.render({}, camera, options);
       const Frame expected = raised.render({}, camera, options);
-      const std::set<std::uint32_t> seen = idsIn(frame);
+      const std::set<std::uint32_t> seen = findIdsIn(frame);
       EXPECT_TRUE(seen.contains(1) && seen.contains(7));
       EXPECT_LT(countDifferentIds(frame, expected), frame.ids.size() / 50) << rgb;
       EXPECT_LT(countRoofDepthErrors(frame, expected), frame.ids.size() / 100) << rgb;
@@ -111,8 +111,8 @@ std::vector<std::uint8_t> listRanks(const scene::Model& model) {
 
 TEST(Coplanar, APanelThatIsFlushWithAMovedLeafStaysVisible) {
   // A leaf in a frame and a panel on it; both are of a body, and slide.
-  scene::Model model = makeScene({{{0, 0, 0}, {4, 3, 0.2}, coloured(0.2f, 0.2f, 0.8f)},
-                                  {{0, 0, 0.05}, {1, 1, 0.1}, coloured(0.9f, 0.1f, 0.1f)}})
+  scene::Model model = makeScene({{{0, 0, 0}, {4, 3, 0.2}, makeColoured(0.2f, 0.2f, 0.8f)},
+                                  {{0, 0, 0.05}, {1, 1, 0.1}, makeColoured(0.9f, 0.1f, 0.1f)}})
                            ->model();
   scene::BodySpec door;
   door.name = "door";
@@ -142,8 +142,8 @@ TEST(Coplanar, APanelThatIsFlushWithAMovedLeafStaysVisible) {
   for (int y = 0; y < camera.height; ++y) {
     int changes = 0;
     for (int x = 1; x < camera.width; ++x)
-      changes += (traced.ids[render::at(traced, x, y)] == 2) !=
-                 (traced.ids[render::at(traced, x - 1, y)] == 2);
+      changes += (traced.ids[render::getPixelIndex(traced, x, y)] == 2) !=
+                 (traced.ids[render::getPixelIndex(traced, x - 1, y)] == 2);
     EXPECT_LE(changes, 2) << y;
   }
 }

@@ -13,33 +13,34 @@ namespace {
 
 using Random = std::mt19937;
 
-double uniform(Random& random, double low, double high) {
+double drawUniform(Random& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 5) * 0x1p-27);
 }
 
-Vec3 within(Random& random, double size) {
-  const double x = uniform(random, -size, size), y = uniform(random, -size, size);
-  const double z = uniform(random, -size, size);
+Vec3 drawWithin(Random& random, double size) {
+  const double x = drawUniform(random, -size, size), y = drawUniform(random, -size, size);
+  const double z = drawUniform(random, -size, size);
   return {x, y, z};
 }
 
 /// Walls with many boxes behind them, some transparent, some in the same place as others.
-std::vector<PlacedBox> rooms(unsigned seed) {
+std::vector<PlacedBox> makeRooms(unsigned seed) {
   Random random(seed);
   std::vector<PlacedBox> boxes;
   for (int i = -3; i <= 3; ++i) {
-    boxes.push_back({{4.0 * i, 0, 0}, {0.2, 4, 30}, coloured(0.7f, 0.7f, 0.6f)});
-    boxes.push_back({{0, 0, 4.0 * i}, {30, 4, 0.2}, coloured(0.5f, 0.6f, 0.7f)});
+    boxes.push_back({{4.0 * i, 0, 0}, {0.2, 4, 30}, makeColoured(0.7f, 0.7f, 0.6f)});
+    boxes.push_back({{0, 0, 4.0 * i}, {30, 4, 0.2}, makeColoured(0.5f, 0.6f, 0.7f)});
   }
-  boxes.push_back({{0, -2, 0}, {30, 0.2, 30}, coloured(0.3f, 0.3f, 0.3f)});
+  boxes.push_back({{0, -2, 0}, {30, 0.2, 30}, makeColoured(0.3f, 0.3f, 0.3f)});
   for (int i = 0; i < 600; ++i) {
-    PlacedBox box{within(random, 12), (within(random, 0.5).cwiseAbs() + Vec3(0.05, 0.05, 0.05)),
-                  coloured(0.1f * static_cast<float>(i % 9), 0.5f, 0.4f, i % 11 == 0 ? 0.4f : 1)};
+    PlacedBox box{
+        drawWithin(random, 12), (drawWithin(random, 0.5).cwiseAbs() + Vec3(0.05, 0.05, 0.05)),
+        makeColoured(0.1f * static_cast<float>(i % 9), 0.5f, 0.4f, i % 11 == 0 ? 0.4f : 1)};
     box.centre.y() *= 0.15;
     if (i % 5 == 0) box.size.x() *= -1;
     boxes.push_back(box);
     if (i % 20 == 0) {  // in the same place, with another colour: a depth tie in every pixel
-      box.material = coloured(0.9f, 0.1f, 0.1f);
+      box.material = makeColoured(0.9f, 0.1f, 0.1f);
       boxes.push_back(box);
     }
   }
@@ -55,11 +56,11 @@ void expectSame(const Frame& a, const Frame& b, const std::string& where) {
       << "depth, " << where;
 }
 
-Camera cameraAt(Random& random, int kind) {
+Camera makeCameraAt(Random& random, int kind) {
   Camera camera;
-  camera.eye = within(random, 11);
+  camera.eye = drawWithin(random, 11);
   camera.eye.y() *= 0.15;
-  camera.forward = within(random, 1);
+  camera.forward = drawWithin(random, 1);
   camera.forward.y() *= 0.3;
   camera.width = 90;
   camera.height = 70;
@@ -100,11 +101,11 @@ TEST(DepthPyramid, HidesABoxExactlyIfEveryPixelHidesIt) {
 }
 
 void expectSameFromAnywhere(DepthSource depthSource) {
-  GlRenderer renderer(makeScene(rooms(1)), {.device = "", .depthSource = depthSource});
+  GlRenderer renderer(makeScene(makeRooms(1)), {.device = "", .depthSource = depthSource});
   Random random(5);
   std::uint64_t occluded = 0;
   for (int i = 0; i < 60; ++i) {
-    const Camera camera = cameraAt(random, i % 4);
+    const Camera camera = makeCameraAt(random, i % 4);
     const bool all = i % 5 != 0;  // otherwise ids and depth alone, which use another code path
     FrameOptions options{
         .channels = {all, true, true, all},
@@ -128,7 +129,7 @@ TEST(Culling, ThePlaneDepthIsThatOfDrawingEverything) {
 }
 
 TEST(Culling, AWalkKeepsItsPicturesAndMostlyDrawsOnce) {
-  GlRenderer renderer(makeScene(rooms(2)));
+  GlRenderer renderer(makeScene(makeRooms(2)));
   Camera camera;
   camera.width = camera.height = 80;
   std::uint32_t passes = 0, drawn = 0, inside = 0;
@@ -151,14 +152,14 @@ TEST(Culling, CoincidentObjectsThatAppearLaterAreDrawnAsWithoutCulling) {
   // A red and a blue box in one place. A smaller box hides the red one, the first in order, from
   // the occlusion guess: the blue one is found a frame earlier.
   for (const bool swapped : {false, true}) {
-    PlacedBox red{{0, 0, -6}, {2, 2, 2}, coloured(1, 0, 0)};
-    PlacedBox blue{{0, 0, -5.5}, {2, 2, 1}, coloured(0, 0, 1)};
+    PlacedBox red{{0, 0, -6}, {2, 2, 2}, makeColoured(1, 0, 0)};
+    PlacedBox blue{{0, 0, -5.5}, {2, 2, 1}, makeColoured(0, 0, 1)};
     if (swapped) std::swap(red, blue);
-    std::vector<PlacedBox> boxes{red, blue, {{0, 0, -2}, {1, 6, 0.1}, coloured(0, 1, 0)}};
+    std::vector<PlacedBox> boxes{red, blue, {{0, 0, -2}, {1, 6, 0.1}, makeColoured(0, 1, 0)}};
     // Behind the eye: enough boxes to start the search for occluded ones in any case.
     for (int i = 0; i < 300; ++i) boxes.push_back({{0, 0, 10.0 + i}, {0.5, 0.5, 0.5}, {}});
     GlRenderer renderer(makeScene(boxes));
-    Camera camera = squareCamera(64);
+    Camera camera = makeSquareCamera(64);
     for (int i = -40; i <= 40; ++i) {
       camera.eye.x() = 0.1 * i;
       for (const bool colours : {true, false}) {
@@ -172,7 +173,7 @@ TEST(Culling, CoincidentObjectsThatAppearLaterAreDrawnAsWithoutCulling) {
 }
 
 TEST(Culling, AWalkThatShowsIdsAloneKeepsThem) {
-  GlRenderer renderer(makeScene(rooms(7)));
+  GlRenderer renderer(makeScene(makeRooms(7)));
   Camera camera;
   camera.width = camera.height = 80;
   int once = 0, again = 0;
@@ -190,10 +191,10 @@ TEST(Culling, AWalkThatShowsIdsAloneKeepsThem) {
 }
 
 TEST(Culling, SeveralCamerasInTurnEachKeepTheirPictures) {
-  GlRenderer renderer(makeScene(rooms(4)));
+  GlRenderer renderer(makeScene(makeRooms(4)));
   std::vector<Camera> cameras;
   Random random(8);
-  for (int i = 0; i < 6; ++i) cameras.push_back(cameraAt(random, 0));
+  for (int i = 0; i < 6; ++i) cameras.push_back(makeCameraAt(random, 0));
   for (int turn = 0; turn < 8; ++turn) {
     for (Camera& camera : cameras) {
       camera.eye += 0.05 * camera.forward;
@@ -205,7 +206,7 @@ TEST(Culling, SeveralCamerasInTurnEachKeepTheirPictures) {
 
 TEST(Culling, NothingIsLostWhereNothingHides) {
   GlRenderer renderer(makeScene({{{-1, 0, -5}, {0.5, 1, 1}, {}}, {{1, 0, -5}, {0.5, 1, 1}, {}}}));
-  const Frame frame = renderer.render({}, squareCamera(64));
+  const Frame frame = renderer.render({}, makeSquareCamera(64));
   EXPECT_EQ(frame.statistics.drawn, 2u);
   EXPECT_EQ(frame.statistics.occluded, 0u);
   EXPECT_EQ(frame.statistics.frustumCulled, 0u);
@@ -217,7 +218,7 @@ TEST(Culling, ASmallSceneDrawsPoorOccludersAtOnce) {
   for (int i = 0; i < 3; ++i) boxes.push_back({{-1.0 + i, 0, -6}, {0.3, 0.3, 0.3}, {}});
   const auto renderSecond = [](const std::vector<PlacedBox>& some) {
     GlRenderer renderer(makeScene(some));
-    const Camera camera = squareCamera(64);
+    const Camera camera = makeSquareCamera(64);
     const Frame first = renderer.render({}, camera);
     EXPECT_EQ(first.statistics.drawn, 4u);  // the visibility cache was empty
     const Frame second = renderer.render({}, camera);

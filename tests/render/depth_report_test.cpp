@@ -13,7 +13,7 @@
 namespace enfilade::render {
 namespace {
 
-Camera lookingIn(int width, int height, bool parallel = false) {
+Camera makeCameraLookingIn(int width, int height, bool parallel = false) {
   Camera camera;
   camera.eye = {1, 2, 13};
   camera.forward = {-0.1, -0.2, -1};
@@ -26,13 +26,13 @@ Camera lookingIn(int width, int height, bool parallel = false) {
 }
 
 TEST(ReferenceTracer, AreThoseOfABruteForceSearchInDoubles) {
-  const auto scene = makeScene(opaque(crowd(150)));
+  const auto scene = makeScene(makeOpaque(makeCrowd(150)));
   ReferenceTracer rays(scene);
   std::size_t hits = 0, others = 0;
   for (const bool parallel : {false, true}) {
-    const Camera camera = lookingIn(97, 71, parallel);
+    const Camera camera = makeCameraLookingIn(97, 71, parallel);
     const ReferenceFrame truth = rays.render({}, camera);
-    const std::vector<BruteHit> brute = bruteForceFrame(scene->model(), camera);
+    const std::vector<BruteHit> brute = computeBruteFrame(scene->model(), camera);
     EXPECT_EQ(truth.undecided, 0u);
     for (std::size_t i = 0; i < brute.size(); ++i) {
       if (truth.ids[i] != brute[i].id) ++others;  // two formulas may differ on one edge
@@ -47,7 +47,8 @@ TEST(ReferenceTracer, AreThoseOfABruteForceSearchInDoubles) {
 
 TEST(ReferenceTracer, EdgesAreWhereSomethingElseBegins) {
   ReferenceTracer rays(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}}));
-  const ReferenceFrame truth = rays.render({}, squareCamera());  // the box covers pixels 75 to 124
+  const ReferenceFrame truth =
+      rays.render({}, makeSquareCamera());  // the box covers pixels 75 to 124
   const auto edge = [&](int x, int y) { return truth.edge[static_cast<std::size_t>(200 * y + x)]; };
   EXPECT_TRUE(edge(75, 100));
   EXPECT_TRUE(edge(74, 100));
@@ -58,12 +59,12 @@ TEST(ReferenceTracer, EdgesAreWhereSomethingElseBegins) {
 }
 
 TEST(DepthReport, GlIsWithinItsPromiseAndRaysWithinTheirs) {
-  const auto scene = makeScene(opaque(crowd(300)));
+  const auto scene = makeScene(makeOpaque(makeCrowd(300)));
   ReferenceTracer rays(scene);
   GlRenderer gl(scene);
   RayRenderer cast(scene);
   DepthReport glReport, castReport;
-  Camera camera = lookingIn(160, 120);
+  Camera camera = makeCameraLookingIn(160, 120);
   for (int i = 0; i < 4; ++i) {
     camera.forward = {std::cos(1.5 * i), -0.1, std::sin(1.5 * i)};
     const ReferenceFrame truth = rays.render({}, camera);
@@ -87,10 +88,10 @@ TEST(DepthReport, GlIsWithinItsPromiseAndRaysWithinTheirs) {
 
 /// Errors of a GPU, which rounds vertices to 1/256 pixel.
 DepthReport reportRoundedVertices(DepthSource depthSource, bool orthographic) {
-  const auto scene = makeScene(opaque(crowd(300)));
+  const auto scene = makeScene(makeOpaque(makeCrowd(300)));
   ReferenceTracer rays(scene);
   GlRenderer gl(scene, {.device = "", .depthSource = depthSource, .roundsVertices = true});
-  Camera camera = lookingIn(160, 120, orthographic);
+  Camera camera = makeCameraLookingIn(160, 120, orthographic);
   DepthReport report;
   for (int i = 0; i < 4; ++i) {
     camera.forward = {std::cos(1.5 * i), -0.4, std::sin(1.5 * i)};
@@ -120,15 +121,15 @@ TEST(DepthReport, ErrorsAreFoundWhereTheyWereMade) {
   const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {40, 40, 1}, {}}});
   ReferenceTracer rays(scene);
   RayRenderer renderer(scene);
-  const ReferenceFrame truth = rays.render({}, squareCamera());
-  Frame frame = renderer.render({}, squareCamera());
+  const ReferenceFrame truth = rays.render({}, makeSquareCamera());
+  Frame frame = renderer.render({}, makeSquareCamera());
   const DepthReport exact = compareWithReference(frame, truth);
   EXPECT_EQ(exact.idsEqual, 40000u);
   EXPECT_LT(exact.awayFromEdges.max, 1e-6);
-  frame.depth[at(frame, 100, 100)] += 0.25f;       // on the box, 4 m away
-  frame.depth[at(frame, 10, 10)] = std::nanf("");  // on the wall
-  frame.ids[at(frame, 100, 90)] = 2;               // far from any edge
-  frame.ids[at(frame, 76, 100)] = 2;               // next to an edge
+  frame.depth[getPixelIndex(frame, 100, 100)] += 0.25f;       // on the box, 4 m away
+  frame.depth[getPixelIndex(frame, 10, 10)] = std::nanf("");  // on the wall
+  frame.ids[getPixelIndex(frame, 100, 90)] = 2;               // far from any edge
+  frame.ids[getPixelIndex(frame, 76, 100)] = 2;               // next to an edge
   const DepthReport wrong = compareWithReference(frame, truth);
   EXPECT_NEAR(wrong.awayFromEdges.max, 0.25, 1e-6);
   EXPECT_NEAR(wrong.bands[1].max, 0.25, 1e-6);
@@ -144,8 +145,8 @@ TEST(DepthReport, ObjectsInOnePlaceAreTiesAndNoDisagreement) {
   const PlacedBox box{{0, 0, -5}, {2, 2, 2}, {}};
   const auto scene = makeScene({box, box});
   ReferenceTracer rays(scene);
-  const ReferenceFrame truth = rays.render({}, squareCamera());
-  Frame frame = RayRenderer(scene).render({}, squareCamera());
+  const ReferenceFrame truth = rays.render({}, makeSquareCamera());
+  Frame frame = RayRenderer(scene).render({}, makeSquareCamera());
   for (std::uint32_t& id : frame.ids) id = id == 0 ? 0 : 2;
   const DepthReport report = compareWithReference(frame, truth);
   EXPECT_EQ(report.idsTied, 2500u);
@@ -164,8 +165,8 @@ TEST(DepthReport, ItsPercentileIsThatOfTheSortedErrorsWithinABin) {
 TEST(DepthReport, ItsTextIsJsonWithAllBands) {
   const auto scene = makeScene({{{0, 0, -5}, {2, 2, 2}, {}}});
   const DepthReport report =
-      compareWithReference(RayRenderer(scene).render({}, squareCamera()),
-                           ReferenceTracer(scene).render({}, squareCamera()));
+      compareWithReference(RayRenderer(scene).render({}, makeSquareCamera()),
+                           ReferenceTracer(scene).render({}, makeSquareCamera()));
   const nlohmann::json read = nlohmann::json::parse(formatReportJson(report));
   EXPECT_EQ(read["pixels"], 40000);
   EXPECT_EQ(read["depth"]["bands"].size(), 6u);

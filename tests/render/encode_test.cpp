@@ -19,7 +19,7 @@ namespace {
 constexpr float kNan = std::numeric_limits<float>::quiet_NaN();
 
 template <class Value>
-std::vector<Value> noise(std::size_t count) {
+std::vector<Value> makeNoise(std::size_t count) {
   std::mt19937 random(5);
   std::vector<Value> values(count);
   for (Value& value : values) value = static_cast<Value>(random());
@@ -64,7 +64,7 @@ Grey16 readPng16(const Bytes& file) {
 }
 
 TEST(EncodePng, SixteenBitsComeBackAsTheyWere) {
-  const auto values = noise<std::uint16_t>(13 * 7);
+  const auto values = makeNoise<std::uint16_t>(13 * 7);
   const Grey16 back = readPng16(encodePng(Raster<std::uint16_t>{13, 7, 1, values}));
   EXPECT_EQ(back.width, 13U);
   EXPECT_EQ(back.height, 7U);
@@ -146,7 +146,7 @@ TEST(EncodeNpy, HeaderAndValuesAreThoseOfTheFormat) {
 }
 
 TEST(EncodeNpy, ThreeChannelsAreAThirdAxis) {
-  const auto colour = noise<std::uint8_t>(30);
+  const auto colour = makeNoise<std::uint8_t>(30);
   const Bytes file = encodeNpy(Raster<std::uint8_t>{5, 2, 3, colour});
   EXPECT_NE(std::string(file.begin(), file.end())
                 .find("'|u1', 'fortran_order': False, 'shape': "
@@ -179,7 +179,7 @@ std::vector<std::uint16_t> unpackDepth(const Bytes& packed, std::size_t width, s
 }
 
 TEST(PackDepth, EveryValueComesBackAndSmoothDepthIsSmall) {
-  const auto rough = noise<std::uint16_t>(31 * 17);
+  const auto rough = makeNoise<std::uint16_t>(31 * 17);
   EXPECT_EQ(unpackDepth(packDepth({31, 17, 1, rough}), 31, 17), rough);
   std::vector<std::uint16_t> smooth;
   for (unsigned i = 0; i < 640 * 480; ++i)

@@ -18,9 +18,9 @@ namespace enfilade::render {
 namespace {
 
 /// A person of the given height at the spawn, now `height` high, who looks along `view`.
-scene::AvatarSnapshot personAt(scene::EntityId id, const Vec3& feet, const Vec3& view,
-                               double height = 1.75, double radius = 0.3,
-                               double spawnHeight = 1.75) {
+scene::AvatarSnapshot makePersonAt(scene::EntityId id, const Vec3& feet, const Vec3& view,
+                                   double height = 1.75, double radius = 0.3,
+                                   double spawnHeight = 1.75) {
   scene::AvatarSnapshot person;
   person.id = id;
   person.footPosition = feet;
@@ -53,7 +53,7 @@ Triangles makeTriangles(const scene::AvatarSnapshot& person) {
 }
 
 /// The greatest distance of a point of the figure outside the collision shape, metres.
-double farthestOutside(const scene::AvatarSnapshot& person) {
+double computeFarthestOutside(const scene::AvatarSnapshot& person) {
   const collision::Hull& hull = *person.shape->parts.front().hull;
   double farthest = -1;
   for (const auto& [id, triangle] : makeTriangles(person)) {
@@ -84,16 +84,16 @@ TEST(Figure, LiesWithinTheCollisionShapeAndIsAsHigh) {
     const double height = standing * (i % 3 == 0 ? 1 : 0.3 + 0.7 * fraction(random));
     const Vec3 feet(10 * fraction(random), fraction(random), -4);
     const auto person =
-        personAt(9, feet, computeDirection(360 * fraction(random)), height, radius, standing);
+        makePersonAt(9, feet, computeDirection(360 * fraction(random)), height, radius, standing);
     ASSERT_TRUE(isPerson(person));
-    EXPECT_LT(farthestOutside(person), 1e-6) << standing << ' ' << radius << ' ' << height;
+    EXPECT_LT(computeFarthestOutside(person), 1e-6) << standing << ' ' << radius << ' ' << height;
     EXPECT_NEAR(computeTop(person), height, 1e-6);
   }
 }
 
 TEST(Figure, MeshesAreClosedAndTheirNormalsPointOutwards) {
   for (double height = 1.75; height > 0.5; height -= 0.05) {
-    const Figure figure = placeFigure(personAt(9, Vec3(1, 2, 3), computeDirection(70), height));
+    const Figure figure = placeFigure(makePersonAt(9, Vec3(1, 2, 3), computeDirection(70), height));
     const scene::Mesh& mesh = *figure.mesh;
     ASSERT_EQ(mesh.normals.size(), mesh.positions.size());
     const Eigen::Matrix3d worldFromNormal = figure.worldFromMesh.linear().inverse().transpose();
@@ -124,19 +124,19 @@ TEST(Figure, MeshesAreClosedAndTheirNormalsPointOutwards) {
 }
 
 TEST(Figure, OnlyAMerePrismIsAPerson) {
-  auto person = personAt(9, Vec3::Zero(), Vec3::UnitX());
+  auto person = makePersonAt(9, Vec3::Zero(), Vec3::UnitX());
   EXPECT_TRUE(isPerson(person));
   person.joints.resize(1);
   EXPECT_FALSE(isPerson(person)) << "a machine with links";
-  EXPECT_FALSE(isPerson(avatarAt(9, Vec3::Zero()))) << "parts of its own";
+  EXPECT_FALSE(isPerson(makeAvatarAt(9, Vec3::Zero()))) << "parts of its own";
 }
 
-/// Three people ahead of squareCamera(), before a wall (object 1).
-scene::Snapshot group() {
+/// Three people ahead of makeSquareCamera(), before a wall (object 1).
+scene::Snapshot makeGroup() {
   scene::Snapshot snapshot;
-  snapshot.avatars = {personAt(2, {-1.2, -1, -4}, computeDirection(-60)),
-                      personAt(3, {0, -1, -3.4}, computeDirection(200), 1.1),
-                      personAt(4, {1.1, -1, -3.7}, computeDirection(90), 1.3, 0.25, 1.4)};
+  snapshot.avatars = {makePersonAt(2, {-1.2, -1, -4}, computeDirection(-60)),
+                      makePersonAt(3, {0, -1, -3.4}, computeDirection(200), 1.1),
+                      makePersonAt(4, {1.1, -1, -3.7}, computeDirection(90), 1.3, 0.25, 1.4)};
   return snapshot;
 }
 
@@ -152,18 +152,18 @@ class Figures : public testing::TestWithParam<RendererKind> {
 };
 
 TEST_P(Figures, IdsAndDepthAreThoseOfTheDrawnShape) {
-  const scene::Snapshot snapshot = group();
+  const scene::Snapshot snapshot = makeGroup();
   Triangles all;
   for (const auto& person : snapshot.avatars)
     for (const auto& one : makeTriangles(person)) all.push_back(one);
-  const Frame frame = renderer_->render(snapshot, squareCamera(160));
+  const Frame frame = renderer_->render(snapshot, makeSquareCamera(160));
   EXPECT_EQ(frame.avatars, AvatarForm::figure);
   std::size_t people = 0, others = 0;
   for (int y = 40; y < 130; ++y) {
     for (int x = 20; x < 150; ++x) {
       const Vec3 way((x + 0.5) / 80 - 1, 1 - (y + 0.5) / 80, -1);
-      const BruteHit hit = bruteForceHit(all, frame.camera, Vec3::Zero(), way);
-      const std::size_t pixel = at(frame, x, y);
+      const BruteHit hit = findBruteHit(all, frame.camera, Vec3::Zero(), way);
+      const std::size_t pixel = getPixelIndex(frame, x, y);
       if (hit.id != 0) ++people;
       if (frame.ids[pixel] != (hit.id != 0 ? hit.id : 1)) {
         ++others;
@@ -178,8 +178,8 @@ TEST_P(Figures, IdsAndDepthAreThoseOfTheDrawnShape) {
 
 TEST_P(Figures, ColourShowsTheSamePixelsAsIds) {
   FrameOptions options;
-  const Frame people = renderer_->render(group(), squareCamera(160), options);
-  const Frame empty = renderer_->render({}, squareCamera(160), options);
+  const Frame people = renderer_->render(makeGroup(), makeSquareCamera(160), options);
+  const Frame empty = renderer_->render({}, makeSquareCamera(160), options);
   std::size_t differ = 0, covered = 0;
   for (std::size_t i = 0; i < people.ids.size(); ++i) {
     int change = 0;
@@ -193,12 +193,12 @@ TEST_P(Figures, ColourShowsTheSamePixelsAsIds) {
 }
 
 TEST_P(Figures, TheCollisionShapeIsDrawnOnRequest) {
-  const scene::Snapshot snapshot = group();
+  const scene::Snapshot snapshot = makeGroup();
   FrameOptions options;
   options.channels.normals = true;
-  const Frame figures = renderer_->render(snapshot, squareCamera(), options);
+  const Frame figures = renderer_->render(snapshot, makeSquareCamera(), options);
   options.avatars = AvatarForm::collision;
-  const Frame shapes = renderer_->render(snapshot, squareCamera(), options);
+  const Frame shapes = renderer_->render(snapshot, makeSquareCamera(), options);
   EXPECT_EQ(shapes.avatars, AvatarForm::collision);
   std::size_t figurePixels = 0, shapePixels = 0, outside = 0, nearer = 0;
   for (std::size_t i = 0; i < shapes.ids.size(); ++i) {
@@ -211,7 +211,7 @@ TEST_P(Figures, TheCollisionShapeIsDrawnOnRequest) {
   EXPECT_EQ(outside, 0u);
   EXPECT_EQ(nearer, 0u);
   options.avatars = AvatarForm::figure;
-  const Frame again = renderer_->render(snapshot, squareCamera(), options);
+  const Frame again = renderer_->render(snapshot, makeSquareCamera(), options);
   EXPECT_TRUE(again.rgb == figures.rgb && again.ids == figures.ids);
   EXPECT_TRUE(again.normals == figures.normals);
 }
@@ -219,8 +219,8 @@ TEST_P(Figures, TheCollisionShapeIsDrawnOnRequest) {
 TEST_P(Figures, ACrouchingPersonIsLowerAndATurnedOneFacesTheOtherWay) {
   const auto outline = [&](double height, double degrees) {
     scene::Snapshot snapshot;
-    snapshot.avatars = {personAt(2, {0, -1, -3}, computeDirection(degrees), height)};
-    return renderer_->render(snapshot, squareCamera(), {}).ids;
+    snapshot.avatars = {makePersonAt(2, {0, -1, -3}, computeDirection(degrees), height)};
+    return renderer_->render(snapshot, makeSquareCamera(), {}).ids;
   };
   const auto top = [](const std::vector<std::uint32_t>& ids) {
     return std::ranges::find(ids, 2u) - ids.begin();
@@ -241,32 +241,34 @@ TEST_P(Figures, ACrouchingPersonIsLowerAndATurnedOneFacesTheOtherWay) {
 }
 
 TEST_P(Figures, AnAvatarsOwnEyesDoNotSeeItsFigure) {
-  scene::Snapshot snapshot = group();
+  scene::Snapshot snapshot = makeGroup();
   const scene::AvatarSnapshot& viewer = snapshot.avatars[1];
   const Camera camera = makeFirstPersonCamera(viewer, 64, 64, 2.5);
-  EXPECT_EQ(idsIn(renderer_->render(snapshot, camera)).count(3), 1u) << "from within its head";
-  EXPECT_EQ(idsIn(renderer_->render(snapshot, camera, {.hiddenEntity = 3})).count(3), 0u);
+  EXPECT_EQ(findIdsIn(renderer_->render(snapshot, camera)).count(3), 1u) << "from within its head";
+  EXPECT_EQ(findIdsIn(renderer_->render(snapshot, camera, {.hiddenEntity = 3})).count(3), 0u);
 }
 
 TEST_P(Figures, FlowFollowsTheTurningFigure) {
   scene::Snapshot then, now;
-  then.avatars = {personAt(2, {0.1, -1, -2}, computeDirection(20))};
-  now.avatars = {personAt(2, {0, -1, -1.9}, computeDirection(40))};
+  then.avatars = {makePersonAt(2, {0.1, -1, -2}, computeDirection(20))};
+  now.avatars = {makePersonAt(2, {0, -1, -1.9}, computeDirection(40))};
   now.avatars[0].shape = then.avatars[0].shape;
-  const Frame before = renderer_->render(then, squareCamera(400));
-  const Frame after = renderer_->render(now, squareCamera(400));
-  const std::vector<float> flow = computeOpticalFlow(after, *wall_, now, then, squareCamera(400));
+  const Frame before = renderer_->render(then, makeSquareCamera(400));
+  const Frame after = renderer_->render(now, makeSquareCamera(400));
+  const std::vector<float> flow =
+      computeOpticalFlow(after, *wall_, now, then, makeSquareCamera(400));
   // Where the flow says that a point was, the earlier picture shows the figure, too.
   std::size_t found = 0, all = 0;
   for (int y = 0; y < 400; ++y) {
     for (int x = 0; x < 400; ++x) {
-      const std::size_t pixel = at(after, x, y);
+      const std::size_t pixel = getPixelIndex(after, x, y);
       if (after.ids[pixel] != 2) continue;
       const int u = static_cast<int>(std::floor(x + 0.5 - static_cast<double>(flow[2 * pixel])));
       const int v =
           static_cast<int>(std::floor(y + 0.5 - static_cast<double>(flow[2 * pixel + 1])));
       ++all;
-      if (u >= 0 && v >= 0 && u < 400 && v < 400 && before.ids[at(before, u, v)] == 2) ++found;
+      if (u >= 0 && v >= 0 && u < 400 && v < 400 && before.ids[getPixelIndex(before, u, v)] == 2)
+        ++found;
     }
   }
   EXPECT_GT(all, 4000u);
@@ -276,8 +278,8 @@ TEST_P(Figures, FlowFollowsTheTurningFigure) {
 TEST(FiguresOfBothRenderers, AreShadedEquallyAndSmoothly) {
   const auto wall = makeScene({{{0, 0, -8}, {40, 40, 1}, {}}});
   const FrameOptions all{.channels = {true, true, true, true}};
-  const Frame gl = GlRenderer(wall).render(group(), squareCamera(), all);
-  const Frame rays = RayRenderer(wall).render(group(), squareCamera(), all);
+  const Frame gl = GlRenderer(wall).render(makeGroup(), makeSquareCamera(), all);
+  const Frame rays = RayRenderer(wall).render(makeGroup(), makeSquareCamera(), all);
   std::size_t people = 0, turned = 0, tinted = 0;
   for (std::size_t i = 0; i < gl.ids.size(); ++i) {
     if (gl.ids[i] < 2 || gl.ids[i] != rays.ids[i]) continue;

@@ -11,7 +11,7 @@
 namespace enfilade::render {
 
 /// A box from -1/2 to 1/2 on each axis, eight corners, no normals.
-inline scene::Mesh unitCube() {
+inline scene::Mesh makeUnitCube() {
   return scene::makeBoxMesh({Vec3::Constant(-0.5), Vec3::Constant(0.5)});
 }
 
@@ -26,7 +26,7 @@ inline std::shared_ptr<const scene::Scene> makeScene(const std::vector<PlacedBox
   model.source = "boxes made by hand";
   for (const PlacedBox& box : boxes) {
     const auto index = static_cast<std::uint32_t>(model.objects.size());
-    scene::Mesh mesh = unitCube();
+    scene::Mesh mesh = makeUnitCube();
     mesh.material = index;
     model.materials.push_back(box.material);
     model.meshes.push_back(std::move(mesh));
@@ -40,7 +40,7 @@ inline std::shared_ptr<const scene::Scene> makeScene(const std::vector<PlacedBox
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-inline scene::Material coloured(float r, float g, float b, float alpha = 1) {
+inline scene::Material makeColoured(float r, float g, float b, float alpha = 1) {
   scene::Material material;
   material.baseColour = {r, g, b, alpha};
   if (alpha < 1) material.alpha = scene::Material::Alpha::blend;
@@ -49,7 +49,7 @@ inline scene::Material coloured(float r, float g, float b, float alpha = 1) {
 
 /// A camera at the origin that looks along -z, 90 degrees both ways: at distance z the image is 2 z
 /// wide.
-inline Camera squareCamera(int size = 200) {
+inline Camera makeSquareCamera(int size = 200) {
   Camera camera;
   camera.forward = -Vec3::UnitZ();
   camera.fovY = 1.5707963267948966;
@@ -58,7 +58,7 @@ inline Camera squareCamera(int size = 200) {
   return camera;
 }
 
-inline std::size_t at(const Frame& frame, int x, int y) {
+inline std::size_t getPixelIndex(const Frame& frame, int x, int y) {
   return static_cast<std::size_t>(y) * static_cast<std::size_t>(frame.camera.width) +
          static_cast<std::size_t>(x);
 }

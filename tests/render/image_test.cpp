@@ -22,24 +22,24 @@ namespace {
 
 namespace fs = std::filesystem;
 
-Image plain(int width, int height, std::uint8_t value = 0) {
+Image makePlainImage(int width, int height, std::uint8_t value = 0) {
   Image image{width, height, {}};
   image.rgb.assign(3 * static_cast<std::size_t>(width * height), value);
   return image;
 }
 
-int red(const Image& image, int x, int y) {
+int getRed(const Image& image, int x, int y) {
   return image.rgb[3 * static_cast<std::size_t>(y * image.width + x)];
 }
 
-long entriesIn(const tests::TemporaryFolder& folder) {
-  return std::distance(fs::directory_iterator(folder.path()), {});
+long countEntriesIn(const tests::TemporaryFolder& folder) {
+  return std::distance(fs::directory_iterator(folder.getPath()), {});
 }
 
 TEST(Png, RoundTripKeepsEveryByte) {
   std::mt19937 random(3);
   for (const auto& [width, height] : {std::pair(1, 1), std::pair(37, 5), std::pair(64, 64)}) {
-    Image image = plain(width, height);
+    Image image = makePlainImage(width, height);
     for (auto& byte : image.rgb) byte = static_cast<std::uint8_t>(random() & 255u);
     const Image back = decodePng(encodePng(image));
     EXPECT_EQ(back.width, width);
@@ -49,28 +49,28 @@ TEST(Png, RoundTripKeepsEveryByte) {
 }
 
 TEST(Png, BrokenBytesAndWrongSizesAreErrors) {
-  std::vector<std::uint8_t> png = encodePng(plain(20, 20, 90));
+  std::vector<std::uint8_t> png = encodePng(makePlainImage(20, 20, 90));
   png.resize(png.size() / 2);
   EXPECT_THROW(decodePng(png), std::runtime_error);
   EXPECT_THROW(decodePng({}), std::runtime_error);
-  Image wrong = plain(4, 4);
+  Image wrong = makePlainImage(4, 4);
   wrong.width = 5;
   EXPECT_THROW(encodePng(wrong), std::runtime_error);
 }
 
 TEST(AtomicFile, ReplacesAFileAndLeavesNothingElse) {
   const tests::TemporaryFolder folder;
-  const fs::path file = folder.path() / "a.bin";
+  const fs::path file = folder.getPath() / "a.bin";
   writeFileAtomically(file, "first", 5);
   writeFileAtomically(file, "second!", 7);
   std::ifstream in(file);
   EXPECT_EQ(std::string(std::istreambuf_iterator<char>(in), {}), "second!");
-  EXPECT_EQ(entriesIn(folder), 1);
+  EXPECT_EQ(countEntriesIn(folder), 1);
 }
 
 TEST(AtomicFile, APipeIsWrittenAndALinkFollowed) {
   const tests::TemporaryFolder folder;
-  const fs::path pipe = folder.path() / "pipe", link = folder.path() / "link";
+  const fs::path pipe = folder.getPath() / "pipe", link = folder.getPath() / "link";
   ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
   const int reader = ::open(pipe.c_str(), O_RDONLY | O_NONBLOCK | O_CLOEXEC);
   ASSERT_GE(reader, 0);
@@ -85,26 +85,26 @@ TEST(AtomicFile, APipeIsWrittenAndALinkFollowed) {
   writeFileAtomically(link, "first", 5);
   writeFileAtomically(link, "second", 6);
   EXPECT_TRUE(fs::is_symlink(link));
-  EXPECT_EQ(fs::file_size(folder.path() / "file"), 6U);
-  EXPECT_EQ(entriesIn(folder), 3);
+  EXPECT_EQ(fs::file_size(folder.getPath() / "file"), 6U);
+  EXPECT_EQ(countEntriesIn(folder), 3);
 
-  fs::create_symlink("circle", folder.path() / "circle");
-  EXPECT_THROW(writeFileAtomically(folder.path() / "circle", "x", 1), std::runtime_error);
+  fs::create_symlink("circle", folder.getPath() / "circle");
+  EXPECT_THROW(writeFileAtomically(folder.getPath() / "circle", "x", 1), std::runtime_error);
 }
 
 TEST(AtomicFile, AFailureNamesTheFileAndLeavesNoPart) {
   const tests::TemporaryFolder folder;
-  const fs::path taken = folder.path() / "taken";
+  const fs::path taken = folder.getPath() / "taken";
   fs::create_directories(taken / "inside");
-  for (const fs::path& file : {taken, folder.path() / "missing" / "a.png"}) {
+  for (const fs::path& file : {taken, folder.getPath() / "missing" / "a.png"}) {
     try {
-      writePng(file, plain(2, 2));
+      writePng(file, makePlainImage(2, 2));
       ADD_FAILURE() << "written to " << file;
     } catch (const std::runtime_error& error) {
       EXPECT_NE(std::string(error.what()).find(file.string()), std::string::npos);
     }
   }
-  EXPECT_EQ(entriesIn(folder), 1);
+  EXPECT_EQ(countEntriesIn(folder), 1);
 }
 
 constexpr Colour kBlack{0, 0, 0}, kWhite{255, 255, 255};
@@ -118,7 +118,7 @@ double computeArea(const Canvas& canvas) {
 }
 
 TEST(Canvas, ImagesComeBackAsTheyWere) {
-  Image image = plain(7, 5);
+  Image image = makePlainImage(7, 5);
   for (std::size_t i = 0; i < image.rgb.size(); ++i)
     image.rgb[i] = static_cast<std::uint8_t>(2 * i + 1);
   EXPECT_EQ(Canvas(image).toImage().rgb, image.rgb);
@@ -189,7 +189,7 @@ TEST(Canvas, TextIsAlignedMeasuredAndShortened) {
   int left = 400, right = 0;
   for (int x = 0; x < 400; ++x)
     for (int y = 0; y < 30; ++y)
-      if (red(image, x, y) > 128) left = std::min(left, x), right = std::max(right, x);
+      if (getRed(image, x, y) > 128) left = std::min(left, x), right = std::max(right, x);
   EXPECT_NEAR(left, 300 - width, 3);
   EXPECT_NEAR(right, 300, 3);
 }
@@ -255,32 +255,32 @@ TEST(Canvas, PagesAreWrittenWhole) {
   const tests::TemporaryFolder folder;
   for (const auto& [name, start] :
        {std::pair("page.svg", std::string("<?xml")), {"page.pdf", std::string("%PDF")}}) {
-    Canvas page(folder.path() / name, 200, 100, kWhite);
+    Canvas page(folder.getPath() / name, 200, 100, kWhite);
     page.line({0, 0}, {200, 100}, 1, kBlack);
     page.text({10, 10}, "Grundriß", {});
     page.finish();
-    std::ifstream file(folder.path() / name);
+    std::ifstream file(folder.getPath() / name);
     const std::string bytes{std::istreambuf_iterator<char>(file), {}};
     EXPECT_TRUE(bytes.starts_with(start)) << name;
     EXPECT_GT(bytes.size(), 500u) << name;
   }
-  EXPECT_THROW(Canvas(folder.path() / "page.png", 10, 10, kWhite), std::invalid_argument);
-  Canvas nowhere(folder.path() / "missing" / "page.svg", 10, 10, kWhite);
+  EXPECT_THROW(Canvas(folder.getPath() / "page.png", 10, 10, kWhite), std::invalid_argument);
+  Canvas nowhere(folder.getPath() / "missing" / "page.svg", 10, 10, kWhite);
   EXPECT_THROW(nowhere.finish(), std::runtime_error);
 }
 
 TEST(ResizeImage, TheMeanIsComputedInLinearLight) {
-  Image image = plain(2, 1);
+  Image image = makePlainImage(2, 1);
   image.rgb = {0, 0, 0, 255, 255, 255};
   const Image one = resizeImage(image, 1, 1);
   EXPECT_EQ(one.rgb, (std::vector<std::uint8_t>{188, 188, 188}));  // half the light, in sRGB
-  EXPECT_EQ(resizeImage(plain(31, 17, 93), 7, 40).rgb, plain(7, 40, 93).rgb);
+  EXPECT_EQ(resizeImage(makePlainImage(31, 17, 93), 7, 40).rgb, makePlainImage(7, 40, 93).rgb);
 }
 
 TEST(ContactSheet, ShowsEveryPictureOnceInAGrid) {
   std::vector<CaptionedImage> pictures;
   for (int i = 0; i < 5; ++i) {
-    pictures.push_back({plain(100 + 20 * i, 80), "picture " + std::to_string(i)});
+    pictures.push_back({makePlainImage(100 + 20 * i, 80), "picture " + std::to_string(i)});
     for (std::size_t p = 0; p < pictures.back().image.rgb.size(); p += 3) {
       pictures.back().image.rgb[p] = static_cast<std::uint8_t>(200 + i);
     }
@@ -299,7 +299,7 @@ TEST(ContactSheet, ShowsEveryPictureOnceInAGrid) {
 
 TEST(ContactSheet, LongTextsHaveMoreLines) {
   const auto computeHeight = [](const std::string& title, const std::string& caption) {
-    return makeContactSheet({{plain(320, 240), caption}}, title, 4).height;
+    return makeContactSheet({{makePlainImage(320, 240), caption}}, title, 4).height;
   };
   const int small = computeHeight("es.jsonl", "lamp");
   EXPECT_GT(computeHeight("es.jsonl in schependomlaan_establishment.ifc", "lamp"), small);

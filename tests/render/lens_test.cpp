@@ -17,7 +17,7 @@ namespace {
 
 constexpr double kPi = std::numbers::pi;
 
-Camera lensCamera(Camera::Lens::Kind kind, int width, int height) {
+Camera makeLensCamera(Camera::Lens::Kind kind, int width, int height) {
   Camera camera;
   camera.eye = {0.3, 0.2, -0.1};
   camera.forward = {1, 0.3, -0.4};
@@ -69,7 +69,7 @@ TEST(Lens, AFisheyeIsThatOfOpenCv) {
       {{-0.3, -1.05, 0.04}, {-0.02, 0.003, 0, 0}, 228.2726298148, -21.7435058659},
   };
   for (const auto& [point, k, x, y] : projections) {
-    Camera camera = lensCamera(Camera::Lens::Kind::fisheye, 640, 480);
+    Camera camera = makeLensCamera(Camera::Lens::Kind::fisheye, 640, 480);
     camera.pinhole = Pinhole{200, 190, 310, 250};
     camera.lens->k = k;
     const auto direction = LensMapping(camera).directionAt(x, y);
@@ -83,7 +83,7 @@ TEST(Lens, AFisheyeInvertsOpenCvsProjection) {
   std::normal_distribution<double> normal;
   for (const std::array<double, 4>& k :
        {std::array<double, 4>{}, {0.05, -0.01, 0.002, -0.0003}, {-0.02, 0.003, 0, 0}}) {
-    Camera camera = lensCamera(Camera::Lens::Kind::fisheye, 640, 480);
+    Camera camera = makeLensCamera(Camera::Lens::Kind::fisheye, 640, 480);
     camera.pinhole = Pinhole{200, 190, 310, 250};
     camera.lens->k = k;
     ASSERT_FALSE(validateCamera(camera));
@@ -103,7 +103,7 @@ TEST(Lens, AFisheyeInvertsOpenCvsProjection) {
 }
 
 TEST(Lens, WidthOfAFisheyeAndTheRimOfItsModel) {
-  Camera camera = lensCamera(Camera::Lens::Kind::fisheye, 200, 100);
+  Camera camera = makeLensCamera(Camera::Lens::Kind::fisheye, 200, 100);
   const Vec3 forward = camera.forward.normalized();
   EXPECT_NEAR(LensMapping(camera).directionAt(0, 50)->dot(forward), 0, 1e-12);
   EXPECT_LT((*LensMapping(camera).directionAt(100, 50) - forward).norm(), 1e-12);
@@ -117,7 +117,7 @@ TEST(Lens, WidthOfAFisheyeAndTheRimOfItsModel) {
 }
 
 TEST(Lens, AnEquirectangularPictureHasAnglesAsARangeScan) {
-  const Camera camera = lensCamera(Camera::Lens::Kind::equirectangular, 720, 360);
+  const Camera camera = makeLensCamera(Camera::Lens::Kind::equirectangular, 720, 360);
   const LensMapping lens(camera);
   scene::RangeScan scan;
   scan.forward = camera.forward;
@@ -135,12 +135,12 @@ TEST(Lens, AnEquirectangularPictureHasAnglesAsARangeScan) {
 }
 
 TEST(Lens, FramesShowWhatRaysInDoublesMeet) {
-  const auto scene = makeScene(crowd(60));
+  const auto scene = makeScene(makeCrowd(60));
   scene::RayCaster caster(scene);
   caster.update({});
   RayRenderer renderer(scene);
   for (const auto kind : {Camera::Lens::Kind::fisheye, Camera::Lens::Kind::equirectangular}) {
-    Camera camera = lensCamera(kind, 96, 64);
+    Camera camera = makeLensCamera(kind, 96, 64);
     camera.lens->width = 1.6 * kPi;
     FrameOptions options;
     options.channels = {true, true, true, true};
@@ -177,9 +177,9 @@ TEST(Lens, FramesShowWhatRaysInDoublesMeet) {
 }
 
 TEST(Lens, InTheMiddleColoursAreThoseOfAPinhole) {
-  const auto scene = makeScene(crowd(60));
+  const auto scene = makeScene(makeCrowd(60));
   RayRenderer renderer(scene);
-  Camera pinhole = lensCamera(Camera::Lens::Kind::fisheye, 64, 64);
+  Camera pinhole = makeLensCamera(Camera::Lens::Kind::fisheye, 64, 64);
   pinhole.pinhole = Pinhole{600, 600, 32, 32};  // 6 degrees: almost no distortion
   Camera fisheye = pinhole;
   pinhole.lens.reset();
@@ -194,10 +194,10 @@ TEST(Lens, CornersAreDarkerThanTheMiddleOfWalls) {
   PlacedBox floor, wall;
   floor.centre = {2, -1.6, 0}, floor.size = {8, 0.2, 8};
   wall.centre = {3.1, 0, 0}, wall.size = {0.2, 4, 8};
-  floor.material = wall.material = coloured(0.6f, 0.6f, 0.6f, 1);
+  floor.material = wall.material = makeColoured(0.6f, 0.6f, 0.6f, 1);
   RayRenderer renderer(makeScene({floor, wall}));
   for (const auto kind : {Camera::Lens::Kind::fisheye, Camera::Lens::Kind::equirectangular}) {
-    Camera camera = lensCamera(kind, 400, 200);
+    Camera camera = makeLensCamera(kind, 400, 200);
     camera.eye = Vec3::Zero();
     camera.forward = Vec3::UnitX();
     camera.up = Vec3::UnitY();
@@ -227,7 +227,7 @@ TEST(Lens, CornersAreDarkerThanTheMiddleOfWalls) {
 }
 
 TEST(Lens, UnusableLensesAreNamed) {
-  Camera camera = lensCamera(Camera::Lens::Kind::fisheye, 64, 64);
+  Camera camera = makeLensCamera(Camera::Lens::Kind::fisheye, 64, 64);
   camera.lens->width = 7;
   EXPECT_NE(validateCamera(camera).value_or("").find("lens.width"), std::string::npos);
   camera.lens = Camera::Lens{Camera::Lens::Kind::equirectangular};

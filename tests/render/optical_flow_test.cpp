@@ -11,7 +11,7 @@ namespace enfilade::render {
 namespace {
 
 TEST(OpticalFlow, OfAMovedCameraIsTheProjectionOfTheSamePoints) {
-  const auto scene = makeScene(crowd(40));
+  const auto scene = makeScene(makeCrowd(40));
   RayRenderer renderer(scene);
   Camera now;
   now.eye = {0.3, 0.1, -0.2};

@@ -17,7 +17,7 @@ namespace {
 
 /// Cameras all around a crowd that reaches 10 m from `middle`: by field of view, by a pinhole with
 /// an off-centre axis, and orthographic ones.
-std::vector<Camera> camerasAround(const Vec3& middle, int count, int width, int height) {
+std::vector<Camera> makeCamerasAround(const Vec3& middle, int count, int width, int height) {
   std::mt19937 random(5);
   std::uniform_real_distribution<double> unit(-1, 1);
   std::vector<Camera> cameras;
@@ -38,13 +38,14 @@ std::vector<Camera> camerasAround(const Vec3& middle, int count, int width, int 
 }
 
 /// Whether a neighbouring pixel shows another object.
-bool nearAnEdge(const Frame& frame, int x, int y) {
+bool isNearAnEdge(const Frame& frame, int x, int y) {
   const Camera& camera = frame.camera;
   for (int dy = -1; dy <= 1; ++dy) {
     for (int dx = -1; dx <= 1; ++dx) {
       const int u = std::clamp(x + dx, 0, camera.width - 1);
       const int v = std::clamp(y + dy, 0, camera.height - 1);
-      if (frame.ids[at(frame, u, v)] != frame.ids[at(frame, x, y)]) return true;
+      if (frame.ids[getPixelIndex(frame, u, v)] != frame.ids[getPixelIndex(frame, x, y)])
+        return true;
     }
   }
   return false;
@@ -61,7 +62,7 @@ Agreement compareWithBruteForce(const std::shared_ptr<const scene::Scene>& scene
   Agreement result;
   for (const Camera& camera : cameras) {
     const Frame frame = renderer.render({}, camera);
-    const std::vector<BruteHit> truth = bruteForceFrame(scene->model(), camera);
+    const std::vector<BruteHit> truth = computeBruteFrame(scene->model(), camera);
     for (std::size_t i = 0; i < truth.size(); ++i) {
       // At a silhouette, and where two surfaces meet, floats may select the other one.
       const bool clear =
@@ -81,8 +82,8 @@ Agreement compareWithBruteForce(const std::shared_ptr<const scene::Scene>& scene
 }
 
 TEST(RayRenderer, DepthAndIdsAreThoseOfABruteForceSearchInDoubles) {
-  const auto scene = makeScene(opaque(crowd(150)));
-  const auto cameras = camerasAround(Vec3::Zero(), 12, 67, 41);
+  const auto scene = makeScene(makeOpaque(makeCrowd(150)));
+  const auto cameras = makeCamerasAround(Vec3::Zero(), 12, 67, 41);
   const Agreement found = compareWithBruteForce(scene, cameras);
   EXPECT_GT(found.hits, 12u * 67u * 41u / 4);
   EXPECT_LT(found.undecided, 12u * 67u * 41u / 100);
@@ -90,23 +91,24 @@ TEST(RayRenderer, DepthAndIdsAreThoseOfABruteForceSearchInDoubles) {
 }
 
 TEST(RayRenderer, DepthIsAsTrueAKilometreFromTheOriginOfTheScene) {
-  std::vector<PlacedBox> boxes = opaque(crowd(150));
+  std::vector<PlacedBox> boxes = makeOpaque(makeCrowd(150));
   const Vec3 far(900, 20, -700);
   for (PlacedBox& box : boxes) box.centre += far;
   boxes.push_back({{0, 0, 0}, {1, 1, 1}, {}});  // moves the scene's centre
-  const Agreement found = compareWithBruteForce(makeScene(boxes), camerasAround(far, 6, 67, 41));
+  const Agreement found =
+      compareWithBruteForce(makeScene(boxes), makeCamerasAround(far, 6, 67, 41));
   EXPECT_GT(found.hits, 6u * 67u * 41u / 4);
   EXPECT_LT(found.worst, 1e-5);
 }
 
 TEST(RayRenderer, APaneSeenSquarelyIsTintedOnceAlongItsDiagonalToo) {
   // The image centre is the pane's centre: rays hit the shared edge of its two triangles.
-  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
-  const PlacedBox pane{{0, 0, -3}, {1, 1, 0}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
+  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, makeColoured(0.8f, 0.8f, 0.8f)};
+  const PlacedBox pane{{0, 0, -3}, {1, 1, 0}, makeColoured(0.05f, 0.05f, 0.9f, 0.5f)};
   RayRenderer renderer(makeScene({pane, wall}));
-  Camera camera = squareCamera(201);
+  Camera camera = makeSquareCamera(201);
   const Frame frame = renderer.render({}, camera);
-  const auto red = [&](int x, int y) { return int{frame.rgb[3 * at(frame, x, y)]}; };
+  const auto red = [&](int x, int y) { return int{frame.rgb[3 * getPixelIndex(frame, x, y)]}; };
   for (int i = -14; i <= 14; ++i) {
     EXPECT_NEAR(red(100 + i, 100 + i), red(100 + i, 100 + i + 2), 3) << i;
     EXPECT_NEAR(red(100 + i, 100 - i), red(100 + i, 100 - i + 2), 3) << i;
@@ -115,49 +117,50 @@ TEST(RayRenderer, APaneSeenSquarelyIsTintedOnceAlongItsDiagonalToo) {
 
 TEST(RayRenderer, AnOrthographicCameraSeesBehindItsEyeWithNegativeNear) {
   RayRenderer renderer(makeScene({{{0, 0, 5}, {2, 2, 2}, {}}, {{0, 0, -5}, {20, 20, 2}, {}}}));
-  Camera camera = squareCamera();
+  Camera camera = makeSquareCamera();
   camera.projection = Camera::Projection::orthographic;
   camera.heightY = 4;
   camera.near = -10;
   const Frame frame = renderer.render({}, camera);
-  EXPECT_EQ(frame.ids[at(frame, 100, 100)], 1u);
-  EXPECT_EQ(frame.depth[at(frame, 100, 100)], -6);
-  EXPECT_EQ(frame.ids[at(frame, 10, 10)], 2u);
-  EXPECT_EQ(frame.depth[at(frame, 10, 10)], 4);
+  EXPECT_EQ(frame.ids[getPixelIndex(frame, 100, 100)], 1u);
+  EXPECT_EQ(frame.depth[getPixelIndex(frame, 100, 100)], -6);
+  EXPECT_EQ(frame.ids[getPixelIndex(frame, 10, 10)], 2u);
+  EXPECT_EQ(frame.depth[getPixelIndex(frame, 10, 10)], 4);
 }
 
 TEST(RayRenderer, AFlatBodyIsVisible) {
-  const auto lift = sceneWithLift();
+  const auto lift = makeSceneWithLift();
   scene::Model model = lift->model();
   const std::uint32_t object = model.bodies.front().objects.front();
   model.objects[object].worldFromMesh.linear().col(2).setZero();
   const auto scene = std::make_shared<const scene::Scene>(std::move(model));
   RayRenderer renderer(scene);
-  const Frame frame = renderer.render(snapshotOfLift(*scene, 0), squareCamera());
-  EXPECT_TRUE(idsIn(frame).contains(object + 1));
+  const Frame frame = renderer.render(makeSnapshotOfLift(*scene, 0), makeSquareCamera());
+  EXPECT_TRUE(findIdsIn(frame).contains(object + 1));
 }
 
 TEST(RayRenderer, ABodyIsSeenWhereTheSnapshotHasIt) {
-  const auto scene = sceneWithLift();
+  const auto scene = makeSceneWithLift();
   RayRenderer renderer(scene);
-  const scene::Snapshot authored = snapshotOfLift(*scene, 0), lifted = snapshotOfLift(*scene, 2);
-  const Frame before = renderer.render(authored, squareCamera());
-  const Frame after = renderer.render(lifted, squareCamera());
-  EXPECT_EQ(before.ids[at(before, 100, 100)], 2u);
-  EXPECT_EQ(before.ids[at(before, 100, 60)], 1u);
-  EXPECT_EQ(after.ids[at(after, 100, 100)], 1u);
-  EXPECT_EQ(after.ids[at(after, 100, 60)], 2u);
-  EXPECT_EQ(renderer.render(authored, squareCamera()).ids, before.ids);
+  const scene::Snapshot authored = makeSnapshotOfLift(*scene, 0),
+                        lifted = makeSnapshotOfLift(*scene, 2);
+  const Frame before = renderer.render(authored, makeSquareCamera());
+  const Frame after = renderer.render(lifted, makeSquareCamera());
+  EXPECT_EQ(before.ids[getPixelIndex(before, 100, 100)], 2u);
+  EXPECT_EQ(before.ids[getPixelIndex(before, 100, 60)], 1u);
+  EXPECT_EQ(after.ids[getPixelIndex(after, 100, 100)], 1u);
+  EXPECT_EQ(after.ids[getPixelIndex(after, 100, 60)], 2u);
+  EXPECT_EQ(renderer.render(authored, makeSquareCamera()).ids, before.ids);
 }
 
 TEST(RayRenderer, PicturesDoNotDependOnTheNumberOfThreads) {
-  const auto scene = makeScene(crowd(300));
+  const auto scene = makeScene(makeCrowd(300));
   scene::Snapshot snapshot;
-  snapshot.avatars = {avatarAt(301, {1, -1, -4})};
+  snapshot.avatars = {makeAvatarAt(301, {1, -1, -4})};
   RayRenderer one(scene, {1}), two(scene, {2}), five(scene, {5});
   FrameOptions options;
   options.channels.normals = true;
-  for (const Camera& camera : camerasAround(Vec3::Zero(), 6, 131, 97)) {
+  for (const Camera& camera : makeCamerasAround(Vec3::Zero(), 6, 131, 97)) {
     const Frame a = one.render(snapshot, camera, options);
     for (RayRenderer* other : {&two, &five, &one}) {
       const Frame b = other->render(snapshot, camera, options);
@@ -170,8 +173,8 @@ TEST(RayRenderer, PicturesDoNotDependOnTheNumberOfThreads) {
 }
 
 TEST(RayRenderer, UnrequestedChannelsAreEmptyAndTheOthersAreEqual) {
-  RayRenderer renderer(makeScene(crowd(100)));
-  const Camera camera = camerasAround(Vec3::Zero(), 1, 80, 60).front();
+  RayRenderer renderer(makeScene(makeCrowd(100)));
+  const Camera camera = makeCamerasAround(Vec3::Zero(), 1, 80, 60).front();
   FrameOptions all;
   all.channels.normals = true;
   const Frame whole = renderer.render({}, camera, all);
@@ -190,8 +193,9 @@ TEST(RayRenderer, NormalsHaveUnitLengthAndFaceTheEye) {
   RayRenderer renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
   FrameOptions options;
   options.channels.normals = true;
-  const Frame frame = renderer.render({}, squareCamera(), options);
-  const std::size_t box = 3 * at(frame, 100, 100), sky = 3 * at(frame, 10, 10);
+  const Frame frame = renderer.render({}, makeSquareCamera(), options);
+  const std::size_t box = 3 * getPixelIndex(frame, 100, 100),
+                    sky = 3 * getPixelIndex(frame, 10, 10);
   EXPECT_EQ(frame.normals[box + 2], 1);
   EXPECT_EQ(frame.normals[box], 0);
   for (std::size_t i = 0; i < 3; ++i) EXPECT_EQ(frame.normals[sky + i], 0);
@@ -199,42 +203,43 @@ TEST(RayRenderer, NormalsHaveUnitLengthAndFaceTheEye) {
 
 TEST(RayRenderer, NearAndFarCutAsInEveryPicture) {
   RayRenderer renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{0, 0, -9}, {9, 9, 1}, {}}}));
-  Camera camera = squareCamera();
+  Camera camera = makeSquareCamera();
   camera.near = 4.5;
   const Frame inside = renderer.render({}, camera);
-  EXPECT_NEAR(inside.depth[at(inside, 100, 100)], 6, 1e-6);  // the box's back face, from inside
+  EXPECT_NEAR(inside.depth[getPixelIndex(inside, 100, 100)], 6,
+              1e-6);  // the box's back face, from inside
   camera.near = 6.5;
-  EXPECT_EQ(renderer.render({}, camera).ids[at(inside, 100, 100)], 2u);
+  EXPECT_EQ(renderer.render({}, camera).ids[getPixelIndex(inside, 100, 100)], 2u);
   camera.far = 8;
-  EXPECT_EQ(idsIn(renderer.render({}, camera)), (std::set<std::uint32_t>{0}));
+  EXPECT_EQ(findIdsIn(renderer.render({}, camera)), (std::set<std::uint32_t>{0}));
 }
 
 TEST(RayRenderer, NamesEmbreeInItsFrames) {
   RayRenderer renderer(std::make_shared<const scene::Scene>(scene::Model{}));
-  EXPECT_TRUE(renderer.render({}, squareCamera(8)).renderer.starts_with("Embree "));
+  EXPECT_TRUE(renderer.render({}, makeSquareCamera(8)).renderer.starts_with("Embree "));
 }
 
 TEST(RayRenderer, IdsEqualThoseOfOpenGlExceptAtEdges) {
-  const auto scene = makeScene(crowd(300));
+  const auto scene = makeScene(makeCrowd(300));
   scene::Snapshot snapshot;
-  snapshot.avatars = {avatarAt(301, {1, -1, -4})};
+  snapshot.avatars = {makeAvatarAt(301, {1, -1, -4})};
   RayRenderer rays(scene);
   GlRenderer gl(scene);
   std::size_t pixels = 0, differ = 0, awayFromEdges = 0, turned = 0;
   double meanColour = 0;
   const FrameOptions all{.channels = {true, true, true, true}};
-  for (const Camera& camera : camerasAround(Vec3::Zero(), 9, 201, 133)) {
+  for (const Camera& camera : makeCamerasAround(Vec3::Zero(), 9, 201, 133)) {
     const Frame a = rays.render(snapshot, camera, all), b = gl.render(snapshot, camera, all);
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
-        const std::size_t i = at(a, x, y);
+        const std::size_t i = getPixelIndex(a, x, y);
         ++pixels;
         for (std::size_t c = 0; c < 3; ++c)
           meanColour += std::abs(int{a.rgb[3 * i + c]} - int{b.rgb[3 * i + c]}) / 3.0;
         if (a.ids[i] != b.ids[i]) {
           ++differ;
-          if (!nearAnEdge(a, x, y)) ++awayFromEdges;
-        } else if (a.ids[i] != 0 && !nearAnEdge(a, x, y)) {
+          if (!isNearAnEdge(a, x, y)) ++awayFromEdges;
+        } else if (a.ids[i] != 0 && !isNearAnEdge(a, x, y)) {
           // GL's orthographic images spread 24 bits evenly over 60 m.
           ASSERT_NEAR(a.depth[i], b.depth[i], 3e-3);
           using Normal = Eigen::Map<const Eigen::Vector3f>;
@@ -255,7 +260,7 @@ TEST(RayRenderer, EveryShadeFromBlackToWhiteIsWithinAStepOfGl) {
   std::vector<PlacedBox> boxes;
   for (int i = 0; i < kBoxes; ++i) {
     const float t = static_cast<float>(i) / kBoxes;
-    scene::Material material = coloured(0, 0, 0);
+    scene::Material material = makeColoured(0, 0, 0);
     material.emissive = {4 * t * t * t, t * t, 0.02f * t};
     material.roughness = 1;
     boxes.push_back({{-4.95 + 0.1 * i, 0, -5}, {0.1, 1, 0.1}, material});
@@ -263,11 +268,11 @@ TEST(RayRenderer, EveryShadeFromBlackToWhiteIsWithinAStepOfGl) {
   const auto scene = makeScene(boxes);
   RayRenderer rays(scene);
   GlRenderer gl(scene);
-  const Frame a = rays.render({}, squareCamera(400)), b = gl.render({}, squareCamera(400));
+  const Frame a = rays.render({}, makeSquareCamera(400)), b = gl.render({}, makeSquareCamera(400));
   std::set<int> shades;
   for (int x = 2; x < 398; ++x) {
-    const std::size_t i = 3 * at(a, x, 200);
-    if (nearAnEdge(a, x, 200)) continue;
+    const std::size_t i = 3 * getPixelIndex(a, x, 200);
+    if (isNearAnEdge(a, x, 200)) continue;
     for (std::size_t c = 0; c < 3; ++c) {
       shades.insert(a.rgb[i + c]);
       EXPECT_NEAR(a.rgb[i + c], b.rgb[i + c], 1) << x << ' ' << c;
@@ -279,11 +284,11 @@ TEST(RayRenderer, EveryShadeFromBlackToWhiteIsWithinAStepOfGl) {
 }
 
 TEST(RayRenderer, ColoursOfTexturesAndPlansAreThoseOfGl) {
-  const auto scene = texturedRoom();
+  const auto scene = makeTexturedRoom();
   RayRenderer rays(scene);
   GlRenderer gl(scene);
   for (const Camera& camera :
-       {squareCamera(), makePlanCamera(scene->bounds(), -1, 0.2, 190, 121)}) {
+       {makeSquareCamera(), makePlanCamera(scene->bounds(), -1, 0.2, 190, 121)}) {
     const Frame a = rays.render({}, camera), b = gl.render({}, camera);
     double sum = 0;
     for (std::size_t i = 0; i < a.rgb.size(); ++i) sum += std::abs(int{a.rgb[i]} - int{b.rgb[i]});

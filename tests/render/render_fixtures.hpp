@@ -10,7 +10,7 @@
 namespace enfilade::render {
 
 /// Boxes within 10 m of the origin; some mirrored, some transparent.
-inline std::vector<PlacedBox> crowd(int count) {
+inline std::vector<PlacedBox> makeCrowd(int count) {
   std::mt19937 random(11);
   std::uniform_real_distribution<double> place(-10, 10);
   std::uniform_real_distribution<double> length(0.3, 2);
@@ -21,23 +21,23 @@ inline std::vector<PlacedBox> crowd(int count) {
     for (int axis = 0; axis < 3; ++axis) box.size[axis] = length(random);
     if (i % 3 == 0) box.size.x() = -box.size.x();
     const float shade = 0.1f * static_cast<float>(i % 9 + 1);
-    box.material = coloured(shade, 1 - shade, 0.5f, i % 7 == 0 ? 0.4f : 1.0f);
+    box.material = makeColoured(shade, 1 - shade, 0.5f, i % 7 == 0 ? 0.4f : 1.0f);
     boxes.push_back(box);
   }
   return boxes;
 }
 
-inline std::set<std::uint32_t> idsIn(const Frame& frame) {
+inline std::set<std::uint32_t> findIdsIn(const Frame& frame) {
   return {frame.ids.begin(), frame.ids.end()};
 }
 
-inline std::vector<PlacedBox> opaque(std::vector<PlacedBox> boxes) {
+inline std::vector<PlacedBox> makeOpaque(std::vector<PlacedBox> boxes) {
   for (PlacedBox& box : boxes) box.material.alpha = scene::Material::Alpha::opaque;
   return boxes;
 }
 
 /// An avatar: a prism 0.6 m wide and 1.75 m high.
-inline scene::AvatarSnapshot avatarAt(scene::EntityId id, const Vec3& feet) {
+inline scene::AvatarSnapshot makeAvatarAt(scene::EntityId id, const Vec3& feet) {
   std::vector<Vec3> points;
   for (const double y : {0.0, 1.75}) {
     for (const double x : {-0.3, 0.3}) {
@@ -53,7 +53,7 @@ inline scene::AvatarSnapshot avatarAt(scene::EntityId id, const Vec3& feet) {
 }
 
 /// A square two metres ahead of squareCamera(); its left half is opaque, its right half cut out.
-inline std::shared_ptr<const scene::Scene> maskedSquare() {
+inline std::shared_ptr<const scene::Scene> makeMaskedSquare() {
   scene::Model model;
   scene::Material leaf;
   leaf.alpha = scene::Material::Alpha::mask;
@@ -71,11 +71,11 @@ inline std::shared_ptr<const scene::Scene> maskedSquare() {
 }
 
 /// A floor with a repeated chequered texture, in front of squareCamera(), and a mirrored box.
-inline std::shared_ptr<const scene::Scene> texturedRoom() {
+inline std::shared_ptr<const scene::Scene> makeTexturedRoom() {
   scene::Model model;
   scene::Material tiles;
   tiles.baseColourTexture = 0;
-  model.materials = {tiles, coloured(0.7f, 0.3f, 0.2f)};
+  model.materials = {tiles, makeColoured(0.7f, 0.3f, 0.2f)};
   scene::Texture chequers{"chequers", 16, 8, {}};
   for (std::uint32_t i = 0; i < 16 * 8; ++i) {
     const bool dark = (i / 4 + i / 32) % 2 == 0;
@@ -89,7 +89,7 @@ inline std::shared_ptr<const scene::Scene> texturedRoom() {
   floor.uvs = {{0, 0}, {6, 0}, {6, 10}, {0, 10}};
   floor.normals.assign(4, Eigen::Vector3f::UnitY());
   floor.indices = {0, 1, 2, 0, 2, 3};
-  scene::Mesh cube = unitCube();
+  scene::Mesh cube = makeUnitCube();
   cube.material = 1;
   model.meshes = {floor, cube};
   model.objects.resize(2);
@@ -103,9 +103,9 @@ inline std::shared_ptr<const scene::Scene> texturedRoom() {
 }
 
 /// A wall (object 1) and in front of it a cube of one metre (object 2), which is a lift.
-inline std::shared_ptr<const scene::Scene> sceneWithLift() {
+inline std::shared_ptr<const scene::Scene> makeSceneWithLift() {
   scene::Model model = makeScene({{{0, 0, -8}, {40, 40, 1}, {}},
-                                  {{0, 0, -5}, {1, 1, 1}, coloured(0.9f, 0.2f, 0.1f)}})
+                                  {{0, 0, -5}, {1, 1, 1}, makeColoured(0.9f, 0.2f, 0.1f)}})
                            ->model();
   scene::BodySpec lift;
   lift.name = "lift";
@@ -118,7 +118,7 @@ inline std::shared_ptr<const scene::Scene> sceneWithLift() {
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-inline scene::Snapshot snapshotOfLift(const scene::Scene& scene, double height) {
+inline scene::Snapshot makeSnapshotOfLift(const scene::Scene& scene, double height) {
   scene::BodySnapshot lift;
   lift.id = 2;
   lift.displaced = height != 0;

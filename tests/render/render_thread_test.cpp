@@ -20,11 +20,11 @@ TEST(RenderThread, SeveralThreadsEachGetTheirOwnPictures) {
   RenderThread renders(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}, {{5, 0, 0}, {2, 2, 2}, {}}}));
   const auto ask = [&](std::uint64_t first, const Vec3& forward, std::uint32_t expected) {
     for (std::uint64_t tick = first; tick < first + 10; ++tick) {
-      Camera camera = squareCamera(32);
+      Camera camera = makeSquareCamera(32);
       camera.forward = forward;
       const Frame frame = renders.render(makeSnapshot(tick), camera).get();
       EXPECT_EQ(frame.tick, tick);
-      EXPECT_EQ(frame.ids[at(frame, 16, 16)], expected);
+      EXPECT_EQ(frame.ids[getPixelIndex(frame, 16, 16)], expected);
     }
   };
   std::thread one(ask, 100, -Vec3::UnitZ(), 1u);
@@ -38,11 +38,11 @@ TEST(RenderThread, SeveralThreadsEachGetTheirOwnPictures) {
 
 TEST(RenderThread, ARefusedCameraFailsItsFutureAndTheThreadContinues) {
   RenderThread renders(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
-  Camera bad = squareCamera(32);
+  Camera bad = makeSquareCamera(32);
   bad.eye.x() = std::nan("");
   auto refused = renders.render(makeSnapshot(1), bad);
-  auto missing = renders.render(nullptr, squareCamera(32));
-  auto fine = renders.render(makeSnapshot(2), squareCamera(32));
+  auto missing = renders.render(nullptr, makeSquareCamera(32));
+  auto fine = renders.render(makeSnapshot(2), makeSquareCamera(32));
   EXPECT_THROW(refused.get(), RenderError);
   EXPECT_THROW(missing.get(), RenderError);
   EXPECT_EQ(fine.get().tick, 2u);
@@ -53,7 +53,7 @@ TEST(RenderThread, QueuedImagesAreFinishedBeforeTheEnd) {
   {
     RenderThread renders(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
     for (std::uint64_t tick = 0; tick < 8; ++tick) {
-      frames.push_back(renders.render(makeSnapshot(tick), squareCamera(32)));
+      frames.push_back(renders.render(makeSnapshot(tick), makeSquareCamera(32)));
     }
   }
   for (std::uint64_t tick = 0; tick < frames.size(); ++tick) {
@@ -64,11 +64,11 @@ TEST(RenderThread, QueuedImagesAreFinishedBeforeTheEnd) {
 TEST(RenderThread, WithoutADeviceEachImageIsRefusedWithTheReason) {
   RenderThread renders(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}), {.device = "no such device"});
   auto first =
-      renders.render(makeSnapshot(1), squareCamera(32));  // while the device is being opened
+      renders.render(makeSnapshot(1), makeSquareCamera(32));  // while the device is being opened
   EXPECT_TRUE(renders.deviceName().empty());
   EXPECT_NE(renders.unavailableReason().find("no such device"), std::string::npos)
       << renders.unavailableReason();
-  auto second = renders.render(makeSnapshot(2), squareCamera(32));
+  auto second = renders.render(makeSnapshot(2), makeSquareCamera(32));
   EXPECT_THROW(first.get(), RendererUnavailable);
   EXPECT_THROW(second.get(), RendererUnavailable);
 }

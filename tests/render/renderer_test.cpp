@@ -36,12 +36,12 @@ TYPED_TEST(BothRenderers, SeeABoxExactlyWhereItsGeometrySays) {
   // The box's face is 2 m square, 4 m ahead; the image is 8 m wide there: the middle 50 pixels of
   // 200.
   TypeParam renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
-  const Frame frame = renderer.render({}, squareCamera());
+  const Frame frame = renderer.render({}, makeSquareCamera());
   for (int y = 0; y < 200; ++y) {
     for (int x = 0; x < 200; ++x) {
       const bool inside = x >= 75 && x < 125 && y >= 75 && y < 125;
-      ASSERT_EQ(frame.ids[at(frame, x, y)], inside ? 1u : 0u) << x << ' ' << y;
-      const float depth = frame.depth[at(frame, x, y)];
+      ASSERT_EQ(frame.ids[getPixelIndex(frame, x, y)], inside ? 1u : 0u) << x << ' ' << y;
+      const float depth = frame.depth[getPixelIndex(frame, x, y)];
       if (inside) {
         ASSERT_NEAR(depth, 4, 4 * kDepthError<TypeParam>);
       } else {
@@ -52,18 +52,19 @@ TYPED_TEST(BothRenderers, SeeABoxExactlyWhereItsGeometrySays) {
 }
 
 TYPED_TEST(BothRenderers, TintTheColourByGlassAndLetIdsAndDepthThrough) {
-  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, coloured(0.8f, 0.8f, 0.8f)};
-  const PlacedBox pane{{0, 0, -3}, {1, 1, 0.1}, coloured(0.05f, 0.05f, 0.9f, 0.5f)};
+  const PlacedBox wall{{0, 0, -6}, {20, 20, 2}, makeColoured(0.8f, 0.8f, 0.8f)};
+  const PlacedBox pane{{0, 0, -3}, {1, 1, 0.1}, makeColoured(0.05f, 0.05f, 0.9f, 0.5f)};
   TypeParam renderer(makeScene({pane, wall}));
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{2}));
-  const std::size_t through = at(frame, 100, 100), nextTo = at(frame, 20, 100);
+  const Frame frame = renderer.render({}, makeSquareCamera());
+  EXPECT_EQ(findIdsIn(frame), (std::set<std::uint32_t>{2}));
+  const std::size_t through = getPixelIndex(frame, 100, 100),
+                    nextTo = getPixelIndex(frame, 20, 100);
   EXPECT_NEAR(frame.depth[through], 5, 5 * kDepthError<TypeParam>);
   EXPECT_LT(frame.rgb[3 * through] + 30, frame.rgb[3 * nextTo]);
   EXPECT_GT(frame.rgb[3 * through + 2], frame.rgb[3 * through] + 30);
   EXPECT_NEAR(frame.rgb[3 * nextTo], frame.rgb[3 * nextTo + 2], 25);
   const Frame solid =
-      renderer.render({}, squareCamera(), {.transparency = TransparencyMode::opaque});
+      renderer.render({}, makeSquareCamera(), {.transparency = TransparencyMode::opaque});
   EXPECT_EQ(solid.ids[through], 1u);
   EXPECT_NEAR(solid.depth[through], 2.95, 3 * kDepthError<TypeParam>);
   EXPECT_EQ(solid.ids[nextTo], 2u);
@@ -71,55 +72,55 @@ TYPED_TEST(BothRenderers, TintTheColourByGlassAndLetIdsAndDepthThrough) {
 
 TYPED_TEST(BothRenderers, DoNotShowGlassBehindAWall) {
   const PlacedBox wall{{0, 0, -3}, {20, 20, 1}, {}};
-  const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, coloured(0.9f, 0.0f, 0.0f, 0.5f)};
+  const PlacedBox pane{{0, 0, -6}, {9, 9, 0.1}, makeColoured(0.9f, 0.0f, 0.0f, 0.5f)};
   TypeParam with(makeScene({wall, pane}));
   TypeParam without(makeScene({wall}));
-  EXPECT_EQ(with.render({}, squareCamera()).rgb, without.render({}, squareCamera()).rgb);
+  EXPECT_EQ(with.render({}, makeSquareCamera()).rgb, without.render({}, makeSquareCamera()).rgb);
 }
 
 TYPED_TEST(BothRenderers, CutTheHolesOfAMaskIntoIdsAndDepth) {
-  TypeParam renderer(maskedSquare());
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(frame.ids[at(frame, 60, 100)], 1u);
-  EXPECT_EQ(frame.ids[at(frame, 140, 100)], 0u);
-  EXPECT_TRUE(std::isnan(frame.depth[at(frame, 140, 100)]));
+  TypeParam renderer(makeMaskedSquare());
+  const Frame frame = renderer.render({}, makeSquareCamera());
+  EXPECT_EQ(frame.ids[getPixelIndex(frame, 60, 100)], 1u);
+  EXPECT_EQ(frame.ids[getPixelIndex(frame, 140, 100)], 0u);
+  EXPECT_TRUE(std::isnan(frame.depth[getPixelIndex(frame, 140, 100)]));
 }
 
 TYPED_TEST(BothRenderers, DrawAllAvatarsWhereTheyStandExceptTheHiddenOne) {
   TypeParam renderer(makeScene({{{0, 0, -20}, {60, 60, 1}, {}}}));
   scene::Snapshot snapshot;
   snapshot.tick = 42;
-  snapshot.avatars = {avatarAt(2, {-1, -1, -4}), avatarAt(3, {1, -1, -4})};
-  const Frame both = renderer.render(snapshot, squareCamera());
+  snapshot.avatars = {makeAvatarAt(2, {-1, -1, -4}), makeAvatarAt(3, {1, -1, -4})};
+  const Frame both = renderer.render(snapshot, makeSquareCamera());
   EXPECT_EQ(both.tick, 42u);
-  EXPECT_EQ(idsIn(both), (std::set<std::uint32_t>{1, 2, 3}));
-  EXPECT_EQ(both.ids[at(both, 75, 100)], 2u);
-  EXPECT_EQ(both.ids[at(both, 125, 100)], 3u);
-  EXPECT_NEAR(both.depth[at(both, 75, 100)], 3.7, 4 * kDepthError<TypeParam>);
-  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), {.hiddenEntity = 2})),
+  EXPECT_EQ(findIdsIn(both), (std::set<std::uint32_t>{1, 2, 3}));
+  EXPECT_EQ(both.ids[getPixelIndex(both, 75, 100)], 2u);
+  EXPECT_EQ(both.ids[getPixelIndex(both, 125, 100)], 3u);
+  EXPECT_NEAR(both.depth[getPixelIndex(both, 75, 100)], 3.7, 4 * kDepthError<TypeParam>);
+  EXPECT_EQ(findIdsIn(renderer.render(snapshot, makeSquareCamera(), {.hiddenEntity = 2})),
             (std::set<std::uint32_t>{1, 3}));
   snapshot.avatars.front().footPosition.x() = 1;
   snapshot.avatars.back().footPosition.x() = -1;
-  const Frame moved = renderer.render(snapshot, squareCamera());
-  EXPECT_EQ(moved.ids[at(moved, 75, 100)], 3u);
+  const Frame moved = renderer.render(snapshot, makeSquareCamera());
+  EXPECT_EQ(moved.ids[getPixelIndex(moved, 75, 100)], 3u);
   snapshot.avatars.clear();
-  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera())), (std::set<std::uint32_t>{1}));
+  EXPECT_EQ(findIdsIn(renderer.render(snapshot, makeSquareCamera())), (std::set<std::uint32_t>{1}));
 }
 
 TYPED_TEST(BothRenderers, ShowSkyInAnEmptyScene) {
   TypeParam renderer(std::make_shared<const scene::Scene>(scene::Model{}));
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(idsIn(frame), (std::set<std::uint32_t>{0}));
+  const Frame frame = renderer.render({}, makeSquareCamera());
+  EXPECT_EQ(findIdsIn(frame), (std::set<std::uint32_t>{0}));
   EXPECT_GT(frame.rgb[2], 100);
   EXPECT_EQ(frame.rgb.size(), 200u * 200u * 3u);
 }
 
 TYPED_TEST(BothRenderers, RefuseABadCameraAndDrawTheNextPicture) {
   TypeParam renderer(makeScene({{{0, 0, -5}, {2, 2, 2}, {}}}));
-  Camera bad = squareCamera();
+  Camera bad = makeSquareCamera();
   bad.far = std::nan("");
   EXPECT_THROW(renderer.render({}, bad), RenderError);
-  EXPECT_EQ(idsIn(renderer.render({}, squareCamera())), (std::set<std::uint32_t>{0, 1}));
+  EXPECT_EQ(findIdsIn(renderer.render({}, makeSquareCamera())), (std::set<std::uint32_t>{0, 1}));
 }
 
 }  // namespace

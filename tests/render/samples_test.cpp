@@ -44,7 +44,7 @@ TEST(SamplePositions, AreCentredAndNoTwoShareARowOrAColumn) {
   }
 }
 
-std::vector<Camera> camerasOfAllProjections() {
+std::vector<Camera> makeCamerasOfAllProjections() {
   Camera camera;
   camera.eye = {1, 2, 6};
   camera.forward = {-0.2, -0.3, -1};
@@ -59,7 +59,7 @@ std::vector<Camera> camerasOfAllProjections() {
 
 TEST(ShiftCamera, MovesThePictureByTheOffset) {
   const Eigen::Vector2d offset(0.3, -0.2);
-  for (const Camera& camera : camerasOfAllProjections()) {
+  for (const Camera& camera : makeCamerasOfAllProjections()) {
     const Vec3 point(0.4, -0.5, 0.6);
     const Vec3 whole = project(camera, point),
                shifted = project(shiftCamera(camera, offset), point);
@@ -68,7 +68,7 @@ TEST(ShiftCamera, MovesThePictureByTheOffset) {
     EXPECT_NEAR(whole.z(), shifted.z(), 1e-9);
   }
   for (const auto kind : {Camera::Lens::Kind::fisheye, Camera::Lens::Kind::equirectangular}) {
-    Camera camera = camerasOfAllProjections().front();
+    Camera camera = makeCamerasOfAllProjections().front();
     camera.lens = Camera::Lens{.kind = kind};
     const auto a = LensMapping(camera).directionAt(20.5 + offset.x(), 9.5 + offset.y());
     const auto b = LensMapping(shiftCamera(camera, offset)).directionAt(20.5, 9.5);
@@ -100,8 +100,10 @@ double computeMeanDifference(const Frame& large, const Frame& frame) {
         double mean = 0;
         for (int v = 0; v < kScale; ++v)
           for (int u = 0; u < kScale; ++u)
-            mean += toLinear(large.rgb[3 * at(large, kScale * x + u, kScale * y + v) + c]);
-        sum += std::abs(mean / (kScale * kScale) - toLinear(frame.rgb[3 * at(frame, x, y) + c]));
+            mean +=
+                toLinear(large.rgb[3 * getPixelIndex(large, kScale * x + u, kScale * y + v) + c]);
+        sum += std::abs(mean / (kScale * kScale) -
+                        toLinear(frame.rgb[3 * getPixelIndex(frame, x, y) + c]));
       }
     }
   }
@@ -109,18 +111,18 @@ double computeMeanDifference(const Frame& large, const Frame& frame) {
 }
 
 /// Boxes so far apart that ambient occlusion, which depends on the size of the picture, is absent.
-std::shared_ptr<const scene::Scene> boxesApart() {
+std::shared_ptr<const scene::Scene> makeBoxesApart() {
   std::vector<PlacedBox> boxes;
   for (int i = 0; i < 27; ++i) {
     const Vec3 place(i % 3 - 1, i / 3 % 3 - 1, i / 9 - 2);
-    boxes.push_back({3.5 * place, {1, 1.2, 0.8}, coloured(0.9f, 0.2f, 0.1f)});
+    boxes.push_back({3.5 * place, {1, 1.2, 0.8}, makeColoured(0.9f, 0.2f, 0.1f)});
   }
   return makeScene(boxes);
 }
 
 TEST_P(Samples, ApproachThePictureOfEightTimesTheSize) {
-  const auto renderer = makeRenderer(boxesApart());
-  for (const Camera& camera : camerasOfAllProjections()) {
+  const auto renderer = makeRenderer(makeBoxesApart());
+  for (const Camera& camera : makeCamerasOfAllProjections()) {
     Camera enlarged = camera;
     enlarged.width *= 8;
     enlarged.height *= 8;
@@ -141,9 +143,9 @@ TEST_P(Samples, ApproachThePictureOfEightTimesTheSize) {
 }
 
 TEST_P(Samples, ChangeOnlyTheColour) {
-  const auto renderer = makeRenderer(makeScene(crowd(200)));
+  const auto renderer = makeRenderer(makeScene(makeCrowd(200)));
   FrameOptions options{.channels = {true, true, true, true}};
-  for (const Camera& camera : camerasOfAllProjections()) {
+  for (const Camera& camera : makeCamerasOfAllProjections()) {
     options.samples = 1;
     const Frame one = renderer->render({}, camera, options);
     options.samples = 4;
@@ -160,10 +162,10 @@ TEST_P(Samples, ChangeOnlyTheColour) {
 }
 
 TEST_P(Samples, OfOtherNumbersAreRefusedByName) {
-  const auto renderer = makeRenderer(makeScene(crowd(3)));
+  const auto renderer = makeRenderer(makeScene(makeCrowd(3)));
   for (const std::uint32_t samples : {0u, 2u, 3u, 8u, 64u}) {
     try {
-      renderer->render({}, squareCamera(8), {.samples = samples});
+      renderer->render({}, makeSquareCamera(8), {.samples = samples});
       ADD_FAILURE() << samples;
     } catch (const RenderError& error) {
       EXPECT_EQ(error.what(), "samples is " + std::to_string(samples) + "; it must be 1, 4 or 16");
@@ -172,9 +174,9 @@ TEST_P(Samples, OfOtherNumbersAreRefusedByName) {
 }
 
 TEST(SamplesOfALens, SmoothItsEdges) {
-  RayRenderer renderer(makeScene(opaque(crowd(200))));
+  RayRenderer renderer(makeScene(makeOpaque(makeCrowd(200))));
   for (const auto kind : {Camera::Lens::Kind::fisheye, Camera::Lens::Kind::equirectangular}) {
-    Camera camera = camerasOfAllProjections().front();
+    Camera camera = makeCamerasOfAllProjections().front();
     camera.lens = Camera::Lens{.kind = kind};
     Camera enlarged = camera;
     enlarged.width *= 8;

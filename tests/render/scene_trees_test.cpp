@@ -20,9 +20,9 @@ using scene::SceneTrees;
 constexpr scene::EntityId kWall = 1, kPane = 2, kLift = 3;
 
 /// A wall, a pane, and before them a lift of two cubes with one mesh.
-std::shared_ptr<const scene::Scene> twoCubesLift() {
+std::shared_ptr<const scene::Scene> makeTwoCubesLift() {
   scene::Model model = makeScene({{{0, 0, -9}, {40, 40, 1}, {}},
-                                  {{0, 0, -7}, {40, 40, 0.1}, coloured(0, 0, 1, 0.5f)},
+                                  {{0, 0, -7}, {40, 40, 0.1}, makeColoured(0, 0, 1, 0.5f)},
                                   {{-1, 0, -5}, {1, 1, 1}, {}},
                                   {{1, 0, -5}, {1, 1, 1}, {}}})
                            ->model();
@@ -38,7 +38,7 @@ std::shared_ptr<const scene::Scene> twoCubesLift() {
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-scene::Snapshot liftAt(const scene::Scene& scene, double height) {
+scene::Snapshot makeLiftAt(const scene::Scene& scene, double height) {
   scene::BodySnapshot lift;
   lift.id = kLift;
   lift.displaced = height != 0;
@@ -49,26 +49,27 @@ scene::Snapshot liftAt(const scene::Scene& scene, double height) {
 }
 
 /// The entity seen along -z from (x, 0, 0); 0: none.
-scene::EntityId entityAhead(const RayCaster& caster, double x, const scene::RayFilter& filter) {
+scene::EntityId findEntityAhead(const RayCaster& caster, double x, const scene::RayFilter& filter) {
   const auto hit = caster.firstHit({{x, 0, 0}, -Vec3::UnitZ()}, filter);
   return hit ? hit->entity : 0;
 }
 
 /// Counts after frames, rays, or both, at two heights of the lift.
 SceneTrees::Counts countTrees(int renderers, int casters) {
-  const auto scene = twoCubesLift();
-  const std::vector<scene::Snapshot> snapshots{liftAt(*scene, 0), liftAt(*scene, 2)};
+  const auto scene = makeTwoCubesLift();
+  const std::vector<scene::Snapshot> snapshots{makeLiftAt(*scene, 0), makeLiftAt(*scene, 2)};
   std::vector<std::unique_ptr<RayRenderer>> allRenderers;
   for (int i = 0; i < renderers; ++i) {
     allRenderers.push_back(std::make_unique<RayRenderer>(scene));
     for (const scene::Snapshot& snapshot : snapshots)
-      EXPECT_TRUE(idsIn(allRenderers.back()->render(snapshot, squareCamera(20))).contains(kLift));
+      EXPECT_TRUE(
+          findIdsIn(allRenderers.back()->render(snapshot, makeSquareCamera(20))).contains(kLift));
   }
   std::vector<RayCaster> allCasters;
   for (int i = 0; i < casters; ++i) {
     allCasters.emplace_back(scene);
     for (const scene::Snapshot& snapshot : snapshots) allCasters.back().update(snapshot);
-    EXPECT_EQ(entityAhead(allCasters.back(), 0, {}), kPane);
+    EXPECT_EQ(findEntityAhead(allCasters.back(), 0, {}), kPane);
   }
   return SceneTrees::of(*scene).counts();
 }
@@ -83,41 +84,41 @@ TEST(SceneTrees, AreBuiltOnceForRaysAndFrames) {
 }
 
 TEST(SceneTrees, ABodyIsOneEntityOfRaysAndSeveralObjectsOfFrames) {
-  const auto scene = twoCubesLift();
+  const auto scene = makeTwoCubesLift();
   RayCaster caster(scene);
-  EXPECT_EQ(entityAhead(caster, 1, {}), kPane) << "bodies appear with the first update()";
-  const scene::Snapshot snapshot = liftAt(*scene, 0);
+  EXPECT_EQ(findEntityAhead(caster, 1, {}), kPane) << "bodies appear with the first update()";
+  const scene::Snapshot snapshot = makeLiftAt(*scene, 0);
   caster.update(snapshot);
-  EXPECT_EQ(entityAhead(caster, -1, {}), kLift);
-  EXPECT_EQ(entityAhead(caster, 1, {}), kLift);
-  EXPECT_EQ(entityAhead(caster, 1, {kLift, false}), kPane);
-  EXPECT_EQ(entityAhead(caster, 1, {kLift, true}), kWall);
+  EXPECT_EQ(findEntityAhead(caster, -1, {}), kLift);
+  EXPECT_EQ(findEntityAhead(caster, 1, {}), kLift);
+  EXPECT_EQ(findEntityAhead(caster, 1, {kLift, false}), kPane);
+  EXPECT_EQ(findEntityAhead(caster, 1, {kLift, true}), kWall);
   RayRenderer renderer(scene);
   FrameOptions options;
   options.hiddenEntity = kLift;
-  EXPECT_EQ(idsIn(renderer.render(snapshot, squareCamera(), options)),
+  EXPECT_EQ(findIdsIn(renderer.render(snapshot, makeSquareCamera(), options)),
             (std::set<std::uint32_t>{kWall, kLift + 1}));
 }
 
 TEST(SceneTrees, PicturesCutOutMaskedTexelsAndRaysDoNot) {
-  const auto scene = maskedSquare();
+  const auto scene = makeMaskedSquare();
   RayRenderer renderer(scene);
-  const Frame frame = renderer.render({}, squareCamera());
-  EXPECT_EQ(frame.ids[at(frame, 70, 100)], 1u);
-  EXPECT_EQ(frame.ids[at(frame, 130, 100)], 0u);
+  const Frame frame = renderer.render({}, makeSquareCamera());
+  EXPECT_EQ(frame.ids[getPixelIndex(frame, 70, 100)], 1u);
+  EXPECT_EQ(frame.ids[getPixelIndex(frame, 130, 100)], 0u);
   const RayCaster caster(scene);
-  EXPECT_EQ(entityAhead(caster, -0.5, {}), 1u);
-  EXPECT_EQ(entityAhead(caster, 0.5, {}), 1u);
+  EXPECT_EQ(findEntityAhead(caster, -0.5, {}), 1u);
+  EXPECT_EQ(findEntityAhead(caster, 0.5, {}), 1u);
   EXPECT_EQ(SceneTrees::of(*scene).counts().placed, 1u);
 }
 
 TEST(SceneTrees, ServeARendererAndCastersAtOnce) {
   constexpr int kHeights = 40, kThreads = 3;
-  const auto scene = twoCubesLift();
+  const auto scene = makeTwoCubesLift();
   std::vector<scene::Snapshot> snapshots;
   for (int i = 0; i < kHeights; ++i) {
-    snapshots.push_back(liftAt(*scene, 0.05 * i));
-    snapshots.back().avatars = {avatarAt(9, {3 + 0.05 * i, -1, -5})};
+    snapshots.push_back(makeLiftAt(*scene, 0.05 * i));
+    snapshots.back().avatars = {makeAvatarAt(9, {3 + 0.05 * i, -1, -5})};
   }
   std::vector<std::vector<double>> distances(kThreads);
   std::vector<Frame> frames;
@@ -126,7 +127,7 @@ TEST(SceneTrees, ServeARendererAndCastersAtOnce) {
     threads.emplace_back([&] {
       RayRenderer renderer(scene);
       for (const scene::Snapshot& snapshot : snapshots)
-        frames.push_back(renderer.render(snapshot, squareCamera(16)));
+        frames.push_back(renderer.render(snapshot, makeSquareCamera(16)));
     });
     for (std::vector<double>& mine : distances) {
       threads.emplace_back([&] {
@@ -138,11 +139,11 @@ TEST(SceneTrees, ServeARendererAndCastersAtOnce) {
       });
     }
   }
-  RayRenderer alone(twoCubesLift());
+  RayRenderer alone(makeTwoCubesLift());
   for (std::size_t i = 0; i < kHeights; ++i) {
     for (const std::vector<double>& mine : distances)
       EXPECT_NEAR(mine[i], 8.5 - 0.05 * static_cast<double>(i), 1e-12);
-    const Frame expected = alone.render(snapshots[i], squareCamera(16));
+    const Frame expected = alone.render(snapshots[i], makeSquareCamera(16));
     EXPECT_EQ(frames[i].ids, expected.ids);
     EXPECT_EQ(frames[i].rgb, expected.rgb);
   }

@@ -30,7 +30,8 @@ bool passes(const PlacedBox& box, const Vec3& start, double inwards, double end)
 }
 
 /// For a point on a sunlit face of box `own`; a box never shadows its own sunlit faces.
-Sun sunAt(const std::vector<PlacedBox>& boxes, std::size_t own, const Vec3& start, double end) {
+Sun computeSunAt(const std::vector<PlacedBox>& boxes, std::size_t own, const Vec3& start,
+                 double end) {
   Sun sun = Sun::reaches;
   for (const PlacedBox& box : boxes) {
     if (&box == &boxes[own]) continue;
@@ -40,7 +41,7 @@ Sun sunAt(const std::vector<PlacedBox>& boxes, std::size_t own, const Vec3& star
   return sun;
 }
 
-Camera slantedCamera() {
+Camera makeSlantedCamera() {
   Camera camera;
   camera.eye = {-7, 9, 8};
   camera.forward = Vec3(0, -1, 0) - camera.eye;
@@ -49,20 +50,20 @@ Camera slantedCamera() {
   return camera;
 }
 
-std::vector<PlacedBox> boxesOnAFloor() {
-  std::vector<PlacedBox> boxes = opaque(crowd(30));
-  boxes.push_back({{0, -11, 0}, {60, 1, 60}, coloured(0.6f, 0.6f, 0.6f)});
+std::vector<PlacedBox> makeBoxesOnAFloor() {
+  std::vector<PlacedBox> boxes = makeOpaque(makeCrowd(30));
+  boxes.push_back({{0, -11, 0}, {60, 1, 60}, makeColoured(0.6f, 0.6f, 0.6f)});
   return boxes;
 }
 
-FrameOptions withShadows(bool shadows = true) {
+FrameOptions makeShadowOptions(bool shadows = true) {
   FrameOptions options;
   options.shadows = shadows;
   return options;
 }
 
 /// Faces turned away from the sun are dark with or without other occluders.
-bool turnedToTheSun(const Frame& frame, std::size_t pixel) {
+bool isTurnedToTheSun(const Frame& frame, std::size_t pixel) {
   const float* n = &frame.normals[3 * pixel];
   return Eigen::Vector3f(n[0], n[1], n[2]).cast<double>().dot(computeSunDirection()) > 0.05;
 }
@@ -70,12 +71,12 @@ bool turnedToTheSun(const Frame& frame, std::size_t pixel) {
 class Shadows : public testing::TestWithParam<RendererKind> {};
 
 TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
-  const std::vector<PlacedBox> boxes = boxesOnAFloor();
+  const std::vector<PlacedBox> boxes = makeBoxesOnAFloor();
   RendererSelector renderer(makeScene(boxes), GetParam());
   for (const bool parallel : {false, true}) {
-    Camera camera = slantedCamera();
+    Camera camera = makeSlantedCamera();
     if (parallel) camera.projection = Camera::Projection::orthographic, camera.heightY = 16;
-    FrameOptions options = withShadows();
+    FrameOptions options = makeShadowOptions();
     options.channels.normals = true;
     const Frame shaded = renderer.render({}, camera, options);
     options.shadows = false;
@@ -85,14 +86,14 @@ TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
     int kept = 0, reached = 0;
     for (int y = 0; y < camera.height; ++y) {
       for (int x = 0; x < camera.width; ++x) {
-        const std::size_t pixel = at(shaded, x, y);
+        const std::size_t pixel = getPixelIndex(shaded, x, y);
         const auto z = static_cast<double>(shaded.depth[pixel]);
-        if (std::isnan(z) || !turnedToTheSun(shaded, pixel)) continue;
+        if (std::isnan(z) || !isTurnedToTheSun(shaded, pixel)) continue;
         const double up = computeSunDirection().dot(rays.forward);
         const double end = parallel ? ((up < 0 ? camera.near : camera.far) - z) / up
                                     : std::numeric_limits<double>::infinity();
         const Vec3 point = rays.eye + rays.originAt(x, y) + z * rays.directionAt(x, y);
-        const Sun sun = sunAt(boxes, shaded.ids[pixel] - 1, point, end);
+        const Sun sun = computeSunAt(boxes, shaded.ids[pixel] - 1, point, end);
         const int less = sunny.rgb[3 * pixel] - shaded.rgb[3 * pixel];
         if (sun == Sun::kept) {
           ASSERT_GT(less, 0) << x << ", " << y;
@@ -110,30 +111,30 @@ TEST_P(Shadows, AreWhereLinesTowardsTheSunPassBoxes) {
 
 TEST_P(Shadows, OnlySolidGlassCastsShadows) {
   const PlacedBox floor{{0, -1, 0}, {20, 1, 20}, {}};
-  const PlacedBox pane{{0, 2, 0}, {6, 0.1, 6}, coloured(0.2f, 0.2f, 0.9f, 0.3f)};
+  const PlacedBox pane{{0, 2, 0}, {6, 0.1, 6}, makeColoured(0.2f, 0.2f, 0.9f, 0.3f)};
   RendererSelector renderer(makeScene({floor, pane}), GetParam());
-  Camera camera = squareCamera(40);  // below the pane, towards its shadow
+  Camera camera = makeSquareCamera(40);  // below the pane, towards its shadow
   camera.eye = {-2, 1, -2};
   camera.forward = {0, -1, 0};
   camera.up = Vec3::UnitX();
-  FrameOptions options = withShadows();
+  FrameOptions options = makeShadowOptions();
   EXPECT_EQ(renderer.render({}, camera, options).rgb,
-            renderer.render({}, camera, withShadows(false)).rgb);
+            renderer.render({}, camera, makeShadowOptions(false)).rgb);
   options.transparency = TransparencyMode::opaque;
   const Frame shaded = renderer.render({}, camera, options);
   options.shadows = false;
   const Frame sunny = renderer.render({}, camera, options);
-  const std::size_t middle = 3 * at(shaded, 20, 20);
+  const std::size_t middle = 3 * getPixelIndex(shaded, 20, 20);
   EXPECT_LT(shaded.rgb[middle] + 5, sunny.rgb[middle]);
 }
 
 TEST_P(Shadows, HolesOfTexturesLetTheSunThrough) {
   // The left half of the square (x < 0) is a leaf, its right half a hole; a floor behind it is
   // perpendicular to the sun.
-  scene::Model model = maskedSquare()->model();
+  scene::Model model = makeMaskedSquare()->model();
   scene::Mesh floor;
   floor.material = 1;
-  model.materials.push_back(coloured(0.7f, 0.7f, 0.7f));
+  model.materials.push_back(makeColoured(0.7f, 0.7f, 0.7f));
   for (const auto& [x, z] : {std::pair{-9, -9}, {9, -9}, {9, 9}, {-9, 9}})
     floor.positions.emplace_back(static_cast<float>(x), -1.5f, static_cast<float>(z) - 2);
   floor.indices = {0, 1, 2, 0, 2, 3};
@@ -148,8 +149,8 @@ TEST_P(Shadows, HolesOfTexturesLetTheSunThrough) {
     camera.eye = below + Vec3(0, 0.5, -0.5);
     camera.forward = below - camera.eye;
     camera.width = camera.height = 1;
-    return renderer.render({}, camera, withShadows(false)).rgb[0] -
-           renderer.render({}, camera, withShadows()).rgb[0];
+    return renderer.render({}, camera, makeShadowOptions(false)).rgb[0] -
+           renderer.render({}, camera, makeShadowOptions()).rgb[0];
   };
   EXPECT_GT(darker(-0.5), 5);
   EXPECT_EQ(darker(0.5), 0);
@@ -161,11 +162,11 @@ TEST_P(Shadows, GeometryThatAPlanCutsAwayCastsNone) {
   const PlacedBox wall{{0, 1.25, 0}, {0.2, 2.5, 8}, {}};
   RendererSelector renderer(makeScene({floor, roof, wall}), GetParam());
   Camera camera = makePlanCamera({Vec3(-4, 0, -4), Vec3(4, 0, 4)}, -0.1, 2, 80, 80);
-  const Frame shaded = renderer.render({}, camera, withShadows());
-  const Frame sunny = renderer.render({}, camera, withShadows(false));
+  const Frame shaded = renderer.render({}, camera, makeShadowOptions());
+  const Frame sunny = renderer.render({}, camera, makeShadowOptions(false));
   const auto less = [&](double x, double z) {
-    const std::size_t pixel =
-        3 * at(shaded, static_cast<int>(40 + 10 * x * 0.9), static_cast<int>(40 + 10 * z * 0.9));
+    const std::size_t pixel = 3 * getPixelIndex(shaded, static_cast<int>(40 + 10 * x * 0.9),
+                                                static_cast<int>(40 + 10 * z * 0.9));
     return sunny.rgb[pixel] - shaded.rgb[pixel];
   };
   EXPECT_GT(less(-0.5, 0), 5) << "behind the wall, up to the cut";
@@ -176,15 +177,17 @@ TEST_P(Shadows, GeometryThatAPlanCutsAwayCastsNone) {
 TEST_P(Shadows, APersonCastsOneButForTheirOwnEyes) {
   RendererSelector renderer(makeScene({{{0, -0.5, 0}, {20, 1, 20}, {}}}), GetParam());
   scene::Snapshot snapshot;
-  snapshot.avatars = {avatarAt(7, Vec3::Zero())};
-  Camera camera = slantedCamera();
-  FrameOptions options = withShadows();
+  snapshot.avatars = {makeAvatarAt(7, Vec3::Zero())};
+  Camera camera = makeSlantedCamera();
+  FrameOptions options = makeShadowOptions();
   const Frame seen = renderer.render(snapshot, camera, options);
   EXPECT_GT(std::count(seen.ids.begin(), seen.ids.end(), 7u), 20);
   camera.eye = {-0.6, 3, -0.8};  // above the shadow
   camera.forward = {0, -1, 0};
   camera.up = Vec3::UnitX();
-  const auto getFloorRed = [&](const Frame& frame) { return frame.rgb[3 * at(frame, 75, 55)]; };
+  const auto getFloorRed = [&](const Frame& frame) {
+    return frame.rgb[3 * getPixelIndex(frame, 75, 55)];
+  };
   const int shaded = getFloorRed(renderer.render(snapshot, camera, options));
   options.hiddenEntity = 7;
   EXPECT_GT(getFloorRed(renderer.render(snapshot, camera, options)), shaded + 5);
@@ -195,20 +198,20 @@ INSTANTIATE_TEST_SUITE_P(OfBothRenderers, Shadows,
                          [](const auto& kind) { return std::string(toString(kind.param)); });
 
 TEST(ShadowsOfGl, NeedAShadowMask) {
-  GlRenderer renderer(makeScene(boxesOnAFloor()));
-  EXPECT_THROW(renderer.render({}, squareCamera(20), withShadows()), RenderError);
-  EXPECT_EQ(renderer.render({}, squareCamera(20)).rgb.size(), 1200u);
+  GlRenderer renderer(makeScene(makeBoxesOnAFloor()));
+  EXPECT_THROW(renderer.render({}, makeSquareCamera(20), makeShadowOptions()), RenderError);
+  EXPECT_EQ(renderer.render({}, makeSquareCamera(20)).rgb.size(), 1200u);
 }
 
 TEST(ShadowsOfGl, AreTheSameWhateverIsLeftOutOfTheDrawing) {
-  const auto scene = makeScene(crowd(600));
+  const auto scene = makeScene(makeCrowd(600));
   RayRenderer rays(scene);
   GlRenderer gl(scene, {}, [&](const auto&... frame) { return rays.computeShadowMask(frame...); });
   for (int i = 0; i < 12; ++i) {
-    Camera camera = slantedCamera();
+    Camera camera = makeSlantedCamera();
     camera.eye = Vec3(12 * std::cos(0.5 * i), 3, 12 * std::sin(0.5 * i));
     camera.forward = -camera.eye;
-    FrameOptions options = withShadows();
+    FrameOptions options = makeShadowOptions();
     options.transparency = i % 3 == 0 ? TransparencyMode::opaque : TransparencyMode::blend;
     const auto drawn = [&](Culling culling) {
       options.culling = culling;

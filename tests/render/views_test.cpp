@@ -18,16 +18,16 @@ namespace enfilade::render {
 namespace {
 
 /// More items than a renderer draws without culling, some transparent, in a dense heap.
-std::shared_ptr<const scene::Scene> heap() {
-  std::vector<PlacedBox> boxes = crowd(400);
-  boxes.push_back({{0, -6, 0}, {60, 1, 60}, coloured(0.4f, 0.4f, 0.4f)});
+std::shared_ptr<const scene::Scene> makeHeap() {
+  std::vector<PlacedBox> boxes = makeCrowd(400);
+  boxes.push_back({{0, -6, 0}, {60, 1, 60}, makeColoured(0.4f, 0.4f, 0.4f)});
   return makeScene(boxes);
 }
 
-std::shared_ptr<const scene::Snapshot> twoAvatars() {
+std::shared_ptr<const scene::Snapshot> makeTwoAvatars() {
   auto snapshot = std::make_shared<scene::Snapshot>();
   snapshot->tick = 7;
-  snapshot->avatars = {avatarAt(1000, {1, -4, -6}), avatarAt(1001, {-1, -4, -7})};
+  snapshot->avatars = {makeAvatarAt(1000, {1, -4, -6}), makeAvatarAt(1001, {-1, -4, -7})};
   return snapshot;
 }
 
@@ -40,7 +40,7 @@ std::vector<View> makeViews(const std::vector<const scene::Snapshot*>& snapshots
   };
   for (int i = 0; i < 14; ++i) {
     View view{snapshots[static_cast<std::size_t>(i) % snapshots.size()],
-              squareCamera(i % 3 == 0 ? 48 : 64),
+              makeSquareCamera(i % 3 == 0 ? 48 : 64),
               {}};
     view.camera.eye = {number(4), number(2), number(4) + 6};
     view.camera.forward = {number(1), number(0.3), -1};
@@ -85,20 +85,20 @@ void expectFramesOfEachAlone(const std::vector<View>& views, Renderer& together,
 }
 
 TEST(Views, TogetherHaveTheFramesOfEachAlone) {
-  const auto snapshot = twoAvatars();
+  const auto snapshot = makeTwoAvatars();
   const std::vector<View> views = makeViews({snapshot.get()});
   for (const DepthSource depthSource : {DepthSource::buffer, DepthSource::plane}) {
     const DeviceChoice device{.device = "", .depthSource = depthSource};
-    GlRenderer together(heap(), device), alone(heap(), device);
+    GlRenderer together(makeHeap(), device), alone(makeHeap(), device);
     expectFramesOfEachAlone(views, together, alone);
   }
-  RayRenderer together(heap()), alone(heap());
+  RayRenderer together(makeHeap()), alone(makeHeap());
   expectFramesOfEachAlone(views, together, alone);
 }
 
 /// A heap whose second box is a lift.
 std::shared_ptr<const scene::Scene> makeHeapWithLift() {
-  scene::Model model = heap()->model();
+  scene::Model model = makeHeap()->model();
   scene::BodySpec lift;
   lift.name = "lift";
   lift.kind = scene::BodyKind::lift;
@@ -114,14 +114,14 @@ TEST(Views, OfSeveralWorldsHaveTheFramesOfEachAlone) {
   std::vector<scene::Snapshot> snapshots;
   std::vector<const scene::Snapshot*> shown;
   for (const double height : {0.0, 0.6, 1.2, 3.0}) {
-    snapshots.push_back(snapshotOfLift(*scene, height));
-    if (height != 1.2) snapshots.back().avatars = {avatarAt(1000, {1 - height, -4, -6})};
+    snapshots.push_back(makeSnapshotOfLift(*scene, height));
+    if (height != 1.2) snapshots.back().avatars = {makeAvatarAt(1000, {1 - height, -4, -6})};
   }
   for (const scene::Snapshot& snapshot : snapshots) shown.push_back(&snapshot);
   const std::vector<View> views = makeViews(shown);
   GlRenderer any(scene);
-  EXPECT_NE(any.render(snapshots[0], squareCamera(64)).ids,
-            any.render(snapshots[3], squareCamera(64)).ids);
+  EXPECT_NE(any.render(snapshots[0], makeSquareCamera(64)).ids,
+            any.render(snapshots[3], makeSquareCamera(64)).ids);
   GlRenderer together(scene), alone(scene);
   expectFramesOfEachAlone(views, together, alone);
   RayRenderer raysTogether(scene), raysAlone(scene);
@@ -129,29 +129,29 @@ TEST(Views, OfSeveralWorldsHaveTheFramesOfEachAlone) {
 }
 
 /// A few panes before a few boxes on a floor: fewer items than a renderer culls.
-std::shared_ptr<const scene::Scene> room() {
-  std::vector<PlacedBox> boxes{{{0, -1.5, -6}, {20, 1, 20}, coloured(0.6f, 0.5f, 0.4f)}};
+std::shared_ptr<const scene::Scene> makePanesBeforeBoxes() {
+  std::vector<PlacedBox> boxes{{{0, -1.5, -6}, {20, 1, 20}, makeColoured(0.6f, 0.5f, 0.4f)}};
   for (int i = 0; i < 12; ++i) {
     boxes.push_back({{i - 6.0, 0, -6.0 - i % 3},
                      {0.7, 1.6, 0.7},
-                     coloured(0.1f, 0.05f * static_cast<float>(i), 0.5f)});
-    boxes.push_back({{i - 6.0, 0, -4}, {0.5, 1, 0.05}, coloured(0.8f, 0.2f, 0.2f, 0.5f)});
+                     makeColoured(0.1f, 0.05f * static_cast<float>(i), 0.5f)});
+    boxes.push_back({{i - 6.0, 0, -4}, {0.5, 1, 0.05}, makeColoured(0.8f, 0.2f, 0.2f, 0.5f)});
   }
   return makeScene(boxes);
 }
 
 /// Views that take each of the renderer's ways, in one order and in the other.
 TEST(Views, NoneLeavesItsStateToAnother) {
-  const auto snapshot = twoAvatars();
-  View drawsAll{snapshot.get(), squareCamera(64), {}};
+  const auto snapshot = makeTwoAvatars();
+  View drawsAll{snapshot.get(), makeSquareCamera(64), {}};
   drawsAll.options.culling = Culling::frustum;
-  View culled{snapshot.get(), squareCamera(64), {}};
+  View culled{snapshot.get(), makeSquareCamera(64), {}};
   culled.camera.forward = {0.4, -0.1, -1};
   View shadowed = drawsAll;
   shadowed.options.shadows = true;
   View depthAlone = culled;
   depthAlone.options.channels = {false, true, true, false};
-  for (const auto& scene : {room(), heap()}) {
+  for (const auto& scene : {makePanesBeforeBoxes(), makeHeap()}) {
     RayRenderer caster(scene);
     const auto makeRenderer = [&] {
       return std::make_unique<GlRenderer>(scene, DeviceChoice{}, [&](const auto&... frame) {
@@ -175,10 +175,10 @@ TEST(Views, NoneLeavesItsStateToAnother) {
 }
 
 TEST(Views, MoreThanATraversalTakesAreDivided) {
-  GlRenderer renderer(heap());
-  const auto snapshot = twoAvatars();
+  GlRenderer renderer(makeHeap());
+  const auto snapshot = makeTwoAvatars();
   std::vector<View> views(OcclusionCuller::kMaxViews + 3,
-                          View{snapshot.get(), squareCamera(16), {}});
+                          View{snapshot.get(), makeSquareCamera(16), {}});
   for (std::size_t i = 0; i < views.size(); ++i)
     views[i].camera.forward = Vec3(0.02 * static_cast<double>(i) - 0.7, 0, -1);
   const std::vector<Frame> frames = renderer.render(views);
@@ -187,8 +187,8 @@ TEST(Views, MoreThanATraversalTakesAreDivided) {
 }
 
 TEST(Views, ARefusedViewFailsAndTheOthersAreRendered) {
-  RenderThread renders(heap());
-  std::vector<RenderRequest> requests(3, {twoAvatars(), {squareCamera(16), {}}});
+  RenderThread renders(makeHeap());
+  std::vector<RenderRequest> requests(3, {makeTwoAvatars(), {makeSquareCamera(16), {}}});
   requests[1].view.camera.eye.x() = std::numeric_limits<double>::quiet_NaN();
   std::promise<RenderThread::Frames> promise;
   renders.render(requests,

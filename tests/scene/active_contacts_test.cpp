@@ -16,15 +16,15 @@ using Event = ContactEvent::Kind;
 using Living = std::set<std::tuple<EntityId, EntityId, Event>>;
 
 /// A wall, a volume, and a tower of boxes with an avatar that walks into it.
-std::shared_ptr<const Scene> towerRoom() {
+std::shared_ptr<const Scene> makeTowerRoom() {
   std::vector<NamedBox> boxes{
-      floorBox(), {"wall", {5, 0, -10}, {5.2, 3, 10}}, {"zone", {-1, 0, -1}, {1, 2, 1}}};
+      makeFloorBox(), {"wall", {5, 0, -10}, {5.2, 3, 10}}, {"zone", {-1, 0, -1}, {1, 2, 1}}};
   for (int i = 0; i < 3; ++i)
     boxes.push_back({"box" + std::to_string(i), {3, 0.301 * i, -0.2}, {3.4, 0.301 * i + 0.3, 0.2}});
-  Model model = boxModel(boxes);
-  model.bodies = {bodySpec("zone", BodyKind::trigger, {2})};
+  Model model = makeBoxModel(boxes);
+  model.bodies = {makeBodySpec("zone", BodyKind::trigger, {2})};
   for (std::uint32_t i = 3; i < 6; ++i)
-    model.bodies.push_back(bodySpec(boxes[i].path, BodyKind::rigid, {i}));
+    model.bodies.push_back(makeBodySpec(boxes[i].path, BodyKind::rigid, {i}));
   return std::make_shared<const Scene>(std::move(model));
 }
 
@@ -39,7 +39,7 @@ void follow(Living& living, const std::vector<ContactEvent>& events) {
 }
 
 TEST(ActiveContacts, AreTheReportedBeginsWithoutAnEnd) {
-  World world(towerRoom());
+  World world(makeTowerRoom());
   submitAvatarCommand(world, {"ann", Spawn{{-4, 0, 0}}});
   submitAvatarCommand(world, {"ann", Walk{{Vec3(8, 0, 0)}}});
   submitAvatarCommand(world, {"bob", Spawn{{4, 0, 4}}});

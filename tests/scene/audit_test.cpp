@@ -20,8 +20,8 @@ using Finding = AuditFinding::Kind;
 
 const NamedBox kWall{"wall", {3, 0, -2}, {3.2, 3, 2}};
 
-World room(int avatars) {
-  World world(boxScene({floorBox(), kWall, {"table", {-3, 0, 1}, {-2, 0.8, 2}}}));
+World makeRoomWithAvatars(int avatars) {
+  World world(makeBoxScene({makeFloorBox(), kWall, {"table", {-3, 0, 1}, {-2, 0.8, 2}}}));
   for (int i = 0; i < avatars; ++i) {
     EXPECT_FALSE(
         submitAvatarCommand(world, {"a" + std::to_string(i), Spawn{{0.9 * i - 4, 0, -1}}, 0}));
@@ -49,7 +49,7 @@ void deceive(WorldData& world, collision::StaticId still, const Aabb& box) {
 }
 
 TEST(Audit, FindsPairsAndNothingWrongOnAWalk) {
-  World world = room(8);
+  World world = makeRoomWithAvatars(8);
   setAuditInterval(world, 3);
   std::mt19937_64 random(11);
   std::uint64_t audits = 0, pairs = 0;
@@ -70,7 +70,7 @@ TEST(Audit, FindsPairsAndNothingWrongOnAWalk) {
 }
 
 TEST(Audit, IsOffByDefault) {
-  World world = room(1);
+  World world = makeRoomWithAvatars(1);
   for (int i = 0; i < 10; ++i) EXPECT_FALSE(tickWorld(world).audit);
   setAuditInterval(world, 1);
   EXPECT_TRUE(tickWorld(world).audit);
@@ -79,7 +79,7 @@ TEST(Audit, IsOffByDefault) {
 }
 
 TEST(Audit, AnEmptyWorldIsRight) {
-  World world(boxScene({floorBox()}));
+  World world(makeBoxScene({makeFloorBox()}));
   setAuditInterval(world, 1);
   const TickReport report = tickWorld(world);
   ASSERT_TRUE(report.audit);
@@ -88,7 +88,7 @@ TEST(Audit, AnEmptyWorldIsRight) {
 }
 
 TEST(Audit, ChangesNoBitOfTheWorld) {
-  World plain = room(5), audited = room(5);
+  World plain = makeRoomWithAvatars(5), audited = makeRoomWithAvatars(5);
   setAuditInterval(audited, 1);
   std::mt19937_64 random(5), same(5);
   for (int i = 0; i < 120; ++i) {
@@ -98,7 +98,7 @@ TEST(Audit, ChangesNoBitOfTheWorld) {
 }
 
 TEST(Audit, NamesThePairOfAWithheldStaticBox) {
-  World world = room(1);
+  World world = makeRoomWithAvatars(1);
   deceive(world.data(), 0, {Vec3::Constant(900), Vec3::Constant(901)});  // no floor
   setAuditInterval(world, 1);
   const TickReport report = tickWorld(world);
@@ -113,7 +113,7 @@ TEST(Audit, NamesThePairOfAWithheldStaticBox) {
 }
 
 TEST(Audit, NamesThePairThatIsHeldWithoutAnOverlap) {
-  World world = room(1);
+  World world = makeRoomWithAvatars(1);
   deceive(world.data(), 1, {Vec3::Constant(-9), Vec3::Constant(9)});  // a wall everywhere
   setAuditInterval(world, 1);
   const TickReport report = tickWorld(world);
@@ -124,7 +124,7 @@ TEST(Audit, NamesThePairThatIsHeldWithoutAnOverlap) {
 }
 
 TEST(Audit, AProxyMovedWithoutTheBroadPhaseIsFound) {
-  World world = room(2);
+  World world = makeRoomWithAvatars(2);
   WorldData& state = world.data();
   EXPECT_TRUE(auditTick(state).findings.empty());
   Avatar& avatar = state.avatars[1];
@@ -142,7 +142,7 @@ TEST(Audit, AProxyMovedWithoutTheBroadPhaseIsFound) {
 
 TEST(Audit, WhereItWouldTakeTooLongTheAvatarsTakeTurns) {
   constexpr int kAvatars = 7;
-  World world = room(kAvatars);
+  World world = makeRoomWithAvatars(kAvatars);
   WorldData& state = world.data();
   const std::size_t testsForOne = state.scene->staticBoxes().size() + kAvatars;
   for (Avatar& avatar : state.avatars) {  // moves the avatar into the air without updating

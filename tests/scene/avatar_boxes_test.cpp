@@ -20,7 +20,7 @@ using namespace testing;
 constexpr std::size_t kLinks = 8;
 
 /// A flying prism with a chain of 8 bars of 0.2 m along +X.
-Spawn snakeAt(const Vec3& at) {
+Spawn makeSnakeAt(const Vec3& at) {
   Spawn spawn;
   spawn.position = at;
   spawn.flying = true;
@@ -28,7 +28,7 @@ Spawn snakeAt(const Vec3& at) {
     const Vec3 anchor = i == 0 ? Vec3(0.35, 0.5, 0) : Vec3(0.21, 0, 0);
     spawn.links.push_back({static_cast<std::int32_t>(i) - 1,
                            {LinkJoint::Kind::revolute, anchor, {0, 0, 1}, -1, 1},
-                           boxPoints({0, -0.02, -0.02}, {0.2, 0.02, 0.02})});
+                           makeBoxPoints({0, -0.02, -0.02}, {0.2, 0.02, 0.02})});
   }
   return spawn;
 }
@@ -46,8 +46,8 @@ DriveJoints driveAll() {
 
 /// Boxes of parts made in each of the ticks after the start of `drive`.
 std::vector<std::uint64_t> countBoxes(WorldFixture& run, const DriveJoints& drive) {
-  run.order("snake", snakeAt({0, 3, 0}));
-  run.ticks(3);
+  run.order("snake", makeSnakeAt({0, 3, 0}));
+  run.runTicks(3);
   run.order("snake", drive);
   std::vector<std::uint64_t> boxes;
   for (int i = 0; i < 8; ++i) {
@@ -59,17 +59,17 @@ std::vector<std::uint64_t> countBoxes(WorldFixture& run, const DriveJoints& driv
 }
 
 TEST(AvatarBoxes, OfAChainAreMadeForMovedLinksAlone) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   EXPECT_EQ(countBoxes(run, driveLast()), std::vector<std::uint64_t>(8, 1));
 }
 
 TEST(AvatarBoxes, OfAChainInFreeSpaceAreMadeOnceATick) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   EXPECT_EQ(countBoxes(run, driveAll()), std::vector<std::uint64_t>(8, kLinks));
 }
 
 TEST(AvatarBoxes, OfAChainFollowEachJointNextToAnObstacle) {
-  WorldFixture run({floorBox(), {"wall", {0.4, 2.5, 0.03}, {3, 5, 0.1}}});
+  WorldFixture run({makeFloorBox(), {"wall", {0.4, 2.5, 0.03}, {3, 5, 0.1}}});
   for (const std::uint64_t boxes : countBoxes(run, driveAll())) {
     EXPECT_GT(boxes, kLinks);
     EXPECT_LE(boxes, kLinks * (kLinks + 1) / 2);
@@ -77,9 +77,9 @@ TEST(AvatarBoxes, OfAChainFollowEachJointNextToAnObstacle) {
 }
 
 TEST(AvatarBoxes, OfAChainAreThoseOfAllLinksMadeTogether) {
-  WorldFixture run({floorBox(), {"post", {1.2, 3.6, -0.1}, {1.3, 6, 0.1}}});
-  run.order("snake", snakeAt({0, 3, 0}));
-  run.ticks(3);
+  WorldFixture run({makeFloorBox(), {"post", {1.2, 3.6, -0.1}, {1.3, 6, 0.1}}});
+  run.order("snake", makeSnakeAt({0, 3, 0}));
+  run.runTicks(3);
   run.order("snake", driveAll());
   run.order("snake", driveLast());
   for (int i = 0; i < 40; ++i) {
@@ -93,15 +93,15 @@ TEST(AvatarBoxes, OfAChainAreThoseOfAllLinksMadeTogether) {
     }
     EXPECT_EQ(copy.shape->box.max, whole->box.max);
   }
-  EXPECT_TRUE(run.touched("post"));
+  EXPECT_TRUE(run.hasTouched("post"));
 }
 
 /// A flying cross of two parts, one of them of many vertices.
-Spawn crossAt(const Vec3& at) {
+Spawn makeCrossAt(const Vec3& at) {
   Spawn spawn;
   spawn.position = at;
   spawn.flying = true;
-  spawn.parts = {boxPoints({-1, 0, -0.1}, {1, 1, 0.1}), {}};
+  spawn.parts = {makeBoxPoints({-1, 0, -0.1}, {1, 1, 0.1}), {}};
   for (int i = 0; i < 200; ++i) {
     const double height = (i + 0.5) / 100 - 1;
     const Vec3 rim = std::sqrt(1 - height * height) * makeHeadingFromDegrees(137.5 * i);
@@ -111,16 +111,16 @@ Spawn crossAt(const Vec3& at) {
 }
 
 TEST(AvatarBoxes, OfTurningPartsAreMadeByTheExtremalVerticesOfTheLastTick) {
-  WorldFixture run({floorBox()});
-  run.order("cross", crossAt({0, 3, 0}));
-  run.ticks(3);
+  WorldFixture run({makeFloorBox()});
+  run.order("cross", makeCrossAt({0, 3, 0}));
+  run.runTicks(3);
   EXPECT_EQ(run.step().partBoxesMade, 0u) << "at rest";
   run.order("cross", Turn{90, true, 60});
   for (int i = 0; i < 20; ++i) {
     const TickReport report = run.step();
     EXPECT_EQ(report.partBoxesMade, 2u) << "tick " << i;
     EXPECT_LT(report.verticesLookedAt, 8u + 100) << "of 208, tick " << i;
-    const AvatarSnapshot cross = run.view("cross");
+    const AvatarSnapshot cross = run.getView("cross");
     for (const AvatarPart& part : cross.shape->parts) {
       Aabb exact;
       for (const Vec3& v : part.hull->vertices) exact.include(part.rotation * v);
@@ -148,10 +148,10 @@ bool containsExactly(const Aabb& box, const AvatarPart& part, const Vec3& footPo
 }
 
 TEST(AvatarBoxes, OfPartsAndLinksAreConservativeAKilometreAway) {
-  Spawn order = snakeAt(Vec3::Zero());
-  order.parts = crossAt(Vec3::Zero()).parts;
+  Spawn order = makeSnakeAt(Vec3::Zero());
+  order.parts = makeCrossAt(Vec3::Zero()).parts;
   for (Link& link : order.links) link.joint.axis = Vec3(1, 2, 3);
-  order.links[3].points = boxPoints({0.7, 0.1, 0.2}, {0.9, 0.15, 0.3});  // far from its joint
+  order.links[3].points = makeBoxPoints({0.7, 0.1, 0.2}, {0.9, 0.15, 0.3});  // far from its joint
   Avatar avatar;
   applySpawnShape(order, {}, avatar);
   std::mt19937 random(3);

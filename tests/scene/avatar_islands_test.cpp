@@ -10,7 +10,7 @@ namespace {
 
 using namespace testing;
 
-std::vector<NamedBox> wideFloor() {
+std::vector<NamedBox> makeWideFloor() {
   return {{"floor", {-40, -0.2, -40}, {40, 0, 40}},
           {"west", {-40.1, 0, -40}, {-40, 3, 40}},
           {"east", {40, 0, -40}, {40.1, 3, 40}},
@@ -27,12 +27,12 @@ std::vector<std::vector<std::string>> getNames(const World& world) {
 }
 
 TEST(AvatarIslands, UniteAllWhoseBoundsOverlapInAChainAndLeaveOutTheIdle) {
-  WorldFixture run(wideFloor());
+  WorldFixture run(makeWideFloor());
   const std::vector<std::pair<std::string, double>> places{{"a", 0},  {"b", 20},  {"c", 0.65},
                                                            {"d", 30}, {"e", 1.3}, {"f", 20.65}};
   for (const auto& [name, x] : places) run.order(name, Spawn{{x, 0, 5}});
-  run.untilIdle();
-  run.ticks(5);
+  run.waitUntilIdle();
+  run.runTicks(5);
   run.order("a", Drive{{0.6, 0, 0}});
   run.order("f", Drive{{0.6, 0, 0}});
   run.step();
@@ -42,18 +42,18 @@ TEST(AvatarIslands, UniteAllWhoseBoundsOverlapInAChainAndLeaveOutTheIdle) {
 }
 
 /// Walkers that meet, block one another and part again, in several islands at a time.
-std::vector<std::uint64_t> hashesOfWalk(int threads, std::vector<ContactEvent>& events) {
-  WorldFixture run(wideFloor());
+std::vector<std::uint64_t> computeHashesOfWalk(int threads, std::vector<ContactEvent>& events) {
+  WorldFixture run(makeWideFloor());
   setThreadCount(run.world, threads);
   Seeded random(7);
   for (int i = 0; i < 120; ++i)
     run.order("walker" + std::to_string(i),
-              Spawn{{random.uniform(-9, 9), 0, random.uniform(-9, 9)}});
+              Spawn{{random.drawUniform(-9, 9), 0, random.drawUniform(-9, 9)}});
   std::vector<std::uint64_t> hashes;
   for (int tick = 0; tick < 240; ++tick) {
     if (tick % 60 == 1)
       for (const AvatarSnapshot& avatar : run.world.snapshot()->avatars)
-        run.order(avatar.name, Drive{{random.uniform(-2, 2), 0, random.uniform(-2, 2)}});
+        run.order(avatar.name, Drive{{random.drawUniform(-2, 2), 0, random.drawUniform(-2, 2)}});
     hashes.push_back(run.step().snapshot->stateHash);
   }
   EXPECT_GT(run.world.snapshot()->avatars.size(), 60u);
@@ -71,11 +71,11 @@ bool isSameEvent(const ContactEvent& x, const ContactEvent& y) {
 
 TEST(AvatarIslands, OneTwoAndEightThreadsGiveTheSameBitsAndEvents) {
   std::vector<ContactEvent> alone;
-  const std::vector<std::uint64_t> hashes = hashesOfWalk(1, alone);
+  const std::vector<std::uint64_t> hashes = computeHashesOfWalk(1, alone);
   EXPECT_GT(alone.size(), 200u);
   for (const int threads : {2, 8}) {
     std::vector<ContactEvent> events;
-    EXPECT_EQ(hashesOfWalk(threads, events), hashes) << threads;
+    EXPECT_EQ(computeHashesOfWalk(threads, events), hashes) << threads;
     EXPECT_TRUE(std::ranges::equal(events, alone, isSameEvent)) << threads;
   }
 }

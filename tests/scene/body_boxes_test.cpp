@@ -10,15 +10,15 @@ using namespace testing;
 
 /// A shuttle of four bars that turns on a path, high above the floor; with or without a post near
 /// it.
-Model shuttleModel(bool withPost) {
+Model makeShuttleModel(bool withPost) {
   std::vector<NamedBox> boxes;
   for (int i = 0; i < 4; ++i)
     boxes.push_back(
         {"bar" + std::to_string(i), Vec3(0.3 * i, 10, 0), Vec3(0.3 * i + 0.2, 10.1, 1)});
-  boxes.push_back(floorBox());
+  boxes.push_back(makeFloorBox());
   if (withPost) boxes.push_back({"post", Vec3(0, 9.5, 1.06), Vec3(0.2, 10.5, 1.3)});
-  Model model = boxModel(boxes);
-  BodySpec shuttle = bodySpec("shuttle", BodyKind::path, {0, 1, 2, 3});
+  Model model = makeBoxModel(boxes);
+  BodySpec shuttle = makeBodySpec("shuttle", BodyKind::path, {0, 1, 2, 3});
   shuttle.axis = Vec3::UnitY();
   shuttle.anchor = Vec3(0.5, 10, 0.5);
   shuttle.keys = {{0, Vec3::Zero(), 0}, {2, Vec3(0, 0, 0.1), 1}};
@@ -32,7 +32,7 @@ struct BoxWork {
 };
 
 BoxWork countWork(bool withPost) {
-  BodyFixture t(shuttleModel(withPost));
+  BodyFixture t(makeShuttleModel(withPost));
   BoxWork work;
   for (int i = 0; i < 30; ++i) {
     const TickReport report = t.step();
@@ -51,15 +51,15 @@ TEST(BodyBoxes, OfPartsAreMadeOnlyWhileTheBodyOverlapsSomething) {
 }
 
 TEST(BodyBoxes, OfAStationaryBodyAreMadeOnceForAWalkerNextToIt) {
-  Model model = boxModel({{"left", Vec3(0, 0, 0), Vec3(0.2, 2, 1)},
-                          {"right", Vec3(0.3, 0, 0), Vec3(0.5, 2, 1)},
-                          floorBox()});
-  BodySpec doors = bodySpec("doors", BodyKind::sliding, {0, 1});
+  Model model = makeBoxModel({{"left", Vec3(0, 0, 0), Vec3(0.2, 2, 1)},
+                              {"right", Vec3(0.3, 0, 0), Vec3(0.5, 2, 1)},
+                              makeFloorBox()});
+  BodySpec doors = makeBodySpec("doors", BodyKind::sliding, {0, 1});
   doors.high = 1;
   model.bodies.push_back(doors);
   BodyFixture t(std::move(model));
   t.order("ann", Spawn{Vec3(-0.4, 0.001, 0.5), 0, 0.3, 1.75});
-  t.ticks(5);
+  t.runTicks(5);
   t.order("ann", Walk{{Vec3(-0.4, 0, 2)}, 1});
   for (int i = 0; i < 30; ++i) {
     const TickReport report = t.step();
@@ -69,7 +69,7 @@ TEST(BodyBoxes, OfAStationaryBodyAreMadeOnceForAWalkerNextToIt) {
 }
 
 TEST(BodyBoxes, ContainEveryVertexAndTheBoxesOfTheParts) {
-  BodyFixture t(shuttleModel(true));
+  BodyFixture t(makeShuttleModel(true));
   for (int i = 0; i < 60; ++i) {
     t.step();
     const Body& body = t.world.data().bodies[0];

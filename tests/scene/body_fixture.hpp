@@ -16,8 +16,8 @@ namespace enfilade::scene::testing {
 
 inline constexpr double kQuarter = 1.5707963267948966;  ///< of a turn, radians
 
-inline BodySpec bodySpec(const std::string& name, BodyKind kind,
-                         std::vector<std::uint32_t> objects) {
+inline BodySpec makeBodySpec(const std::string& name, BodyKind kind,
+                             std::vector<std::uint32_t> objects) {
   BodySpec spec;
   spec.name = name;
   spec.kind = kind;
@@ -27,7 +27,7 @@ inline BodySpec bodySpec(const std::string& name, BodyKind kind,
 
 /// Names every penetrating pair by the exact verdict of each avatar on each triangle, part and
 /// other avatar. Reference implementation of TickReport::maxPenetration.
-inline std::string whoPenetrates(const World& world) {
+inline std::string namePenetratingPairs(const World& world) {
   const WorldData& state = world.data();
   std::string found;
   const auto penetrates = [](const collision::PlacedConvex& a, const collision::PlacedConvex& b) {
@@ -69,10 +69,10 @@ struct BodyFixture : WorldControls<BodyFixture> {
     events.insert(events.end(), report.contacts.begin(), report.contacts.end());
     return report;
   }
-  Vec3 feet(const std::string& name) const {
+  Vec3 getFeet(const std::string& name) const {
     return world.data().findAvatarByName(name)->footPosition;
   }
-  const Body& body(const std::string& name) const {
+  const Body& getBody(const std::string& name) const {
     for (const Body& b : world.data().bodies)
       if (b.spec->name == name) return b;
     throw std::out_of_range(name);

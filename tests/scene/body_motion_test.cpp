@@ -7,15 +7,15 @@
 namespace enfilade::scene {
 namespace {
 
-BodyMotion tumbler() {
-  BodyMotion body = makeDynamicMotion(computeHullMass(boxHull({0.1, 0.3, 0.7}), 500), {});
+BodyMotion makeTumbler() {
+  BodyMotion body = makeDynamicMotion(computeHullMass(makeBoxHull({0.1, 0.3, 0.7}), 500), {});
   body.angularVelocity = {0.1, 12, 0.2};  // about the intermediate axis, which is unstable
                                           // (Dzhanibekov effect)
   return body;
 }
 
 TEST(BodyMotion, AdvancingKeepsTheRotationUnit) {
-  BodyMotion body = tumbler();
+  BodyMotion body = makeTumbler();
   for (int i = 0; i < 10000; ++i) integratePose(body, 1.0 / 60);
   EXPECT_NEAR(body.rotation.squaredNorm(), 1, 1e-14);
 }
@@ -29,7 +29,7 @@ TEST(BodyMotion, AQuarterTurnIsAQuarterTurn) {
 
 TEST(BodyMotion, BendingTheSpinNeverAddsEnergyAtAnySpeed) {
   for (const double speed : {1.0, 10.0, 100.0, 1e4, 1e8}) {
-    BodyMotion body = tumbler();
+    BodyMotion body = makeTumbler();
     body.angularVelocity *= speed;
     double energy = computeKineticEnergy(body);
     for (int i = 0; i < 1000; ++i) {
@@ -44,7 +44,7 @@ TEST(BodyMotion, BendingTheSpinNeverAddsEnergyAtAnySpeed) {
 }
 
 TEST(BodyMotion, ASpinAboutTheMiddleAxisFlipsOver) {
-  BodyMotion body = tumbler();
+  BodyMotion body = makeTumbler();
   bool flipped = false;
   for (int i = 0; i < 2000; ++i) {
     applyGyroscopicTorque(body, 1.0 / 1000);

@@ -14,44 +14,44 @@ using collision::InterpolatedMotion;
 
 class BodyPairs : public ::testing::Test {
  protected:
-  double number(double size) {
+  double drawNumber(double size) {
     return std::uniform_real_distribution<double>(-size, size)(random_);
   }
-  Vec3 vector(double size) {
-    const double x = number(size), y = number(size);
-    return {x, y, number(size)};
+  Vec3 drawVector(double size) {
+    const double x = drawNumber(size), y = drawNumber(size);
+    return {x, y, drawNumber(size)};
   }
-  Quat rotation() { return Quat(1, number(1), number(1), number(1)).normalized(); }
-  PhysicsBody box(const Vec3& at) {
+  Quat drawRotation() { return Quat(1, drawNumber(1), drawNumber(1), drawNumber(1)).normalized(); }
+  PhysicsBody makeBox(const Vec3& at) {
     const collision::Hull* hull = &hull_;
-    return makeDynamicBody({&hull, 1}, 1000, {rotation(), at});
+    return makeDynamicBody({&hull, 1}, 1000, {drawRotation(), at});
   }
   /// Part of the motion is a rotation.
   InterpolatedMotion makeMotion(const PhysicsBody& solid, double length) {
     InterpolatedMotion way = makeStationaryMotion(solid);
     way.isStationary = false;
-    way.to.centre += vector(length);
+    way.to.centre += drawVector(length);
     way.to.rotation =
-        (way.to.rotation * Quat(1, number(0.1), number(0.1), number(0.1))).normalized();
+        (way.to.rotation * Quat(1, drawNumber(0.1), drawNumber(0.1), drawNumber(0.1))).normalized();
     updateDerived(way);
     return way;
   }
 
   std::mt19937 random_{1};
-  collision::Hull hull_ = boxHull({0.1, 0.2, 0.3});
+  collision::Hull hull_ = makeBoxHull({0.1, 0.2, 0.3});
 };
 
 TEST_F(BodyPairs, CertifiedFarPairsAreFarByQuery) {
   const PairStepSettings step{1.0 / 60, {0, -9.8, 0}, 0.5e-3};
   int far = 0, near = 0;
   for (int i = 0; i < 4000; ++i) {
-    PhysicsBody a = box(Vec3::Zero()), b = box(vector(0.8));
+    PhysicsBody a = makeBox(Vec3::Zero()), b = makeBox(drawVector(0.8));
     BodyPair pair;
     pair.key = {0, 1, 0, 0};
     updatePair(pair, a, b, step);
-    const Vec3 wind = vector(5);
+    const Vec3 wind = drawVector(5);
     for (PhysicsBody* solid : {&a, &b})
-      solid->motion.velocity = wind + vector(4), solid->motion.angularVelocity = vector(3);
+      solid->motion.velocity = wind + drawVector(4), solid->motion.angularVelocity = drawVector(3);
     if (i % 5 == 0) a.teleportedDistance += 0.05;
     const bool isFar =
         isCertifiedFar(pair, computeSpeedBound(a, wind), computeSpeedBound(b, wind), step);
@@ -69,7 +69,7 @@ TEST_F(BodyPairs, CertifiedFarPairsAreFarByQuery) {
 
 TEST_F(BodyPairs, NonFiniteDistancesAreNeverFar) {
   const PairStepSettings step{1.0 / 60, {0, -9.8, 0}, 0.5e-3};
-  PhysicsBody a = box(Vec3::Zero()), b = box({3, 0, 0});
+  PhysicsBody a = makeBox(Vec3::Zero()), b = makeBox({3, 0, 0});
   BodyPair pair;
   updatePair(pair, a, b, step);
   EXPECT_TRUE(isCertifiedFar(pair, computeSpeedBound(a, Vec3::Zero()),
@@ -107,7 +107,7 @@ TEST_F(BodyPairs, FrictionInsideAKinematicBodyActsOnlyAheadOfIt) {
 
 TEST_F(BodyPairs, AFractionOfAMotionEqualsRepeatedHalving) {
   constexpr int kParts = 1 << collision::kMaxHalvings;
-  const InterpolatedMotion way = makeMotion(box(vector(1)), 0.5);
+  const InterpolatedMotion way = makeMotion(makeBox(drawVector(1)), 0.5);
   for (int n = 1; n < kParts; ++n) {
     InterpolatedMotion rest = way, done = way;
     for (int bit = kParts / 2, left = n; left > 0; bit /= 2) {
@@ -130,7 +130,7 @@ TEST_F(BodyPairs, AFractionOfAMotionEqualsRepeatedHalving) {
 TEST_F(BodyPairs, AMotionClearedByACachedBoundIsClear) {
   int whole = 0, cut = 0;
   for (int i = 0; i < 1500; ++i) {
-    const PhysicsBody a = box(Vec3::Zero()), b = box(vector(0.5));
+    const PhysicsBody a = makeBox(Vec3::Zero()), b = makeBox(drawVector(0.5));
     collision::FeatureCache cache;
     const auto placeFirstPart = [](const PhysicsBody& solid) { return placePart(solid, 0); };
     const collision::SeparationResult start =
@@ -138,7 +138,7 @@ TEST_F(BodyPairs, AMotionClearedByACachedBoundIsClear) {
     if (start.verdict != collision::Verdict::separated) continue;
     // Earlier knowledge: a distance bound below the true distance, and an outdated axis.
     const double apart = 0.5 * start.distance;
-    cache.axis += 0.1 * cache.axis.norm() * vector(1);
+    cache.axis += 0.1 * cache.axis.norm() * drawVector(1);
     const collision::ConvexShape part = getPartShape(a, 0);
     const InterpolatedMotion wayA = makeMotion(a, 0.3), wayB = makeMotion(b, 0.3);
     const double fraction = computeClearance({part, wayA}, {part, wayB}, cache, apart).lo;
@@ -154,31 +154,31 @@ TEST_F(BodyPairs, AMotionClearedByACachedBoundIsClear) {
 }
 
 /// Boxes that fall on one another, on the floor, and on a turntable that carries them along.
-RigidScene boxesOnATurntable() {
+RigidScene makeBoxesOnATurntable() {
   RigidScene scene;
   scene.addFloor();
-  const auto table = scene.addStill(boxHull({0.6, 0.05, 0.6}), {0, 0.3, 0});
-  scene.body(table).velocity = {0.3, 0, 0.1};
-  scene.body(table).angularVelocity = {0, 0.8, 0};
+  const auto table = scene.addStill(makeBoxHull({0.6, 0.05, 0.6}), {0, 0.3, 0});
+  scene.getBody(table).velocity = {0.3, 0, 0.1};
+  scene.getBody(table).angularVelocity = {0, 0.8, 0};
   std::mt19937 random(5);
   std::uniform_real_distribution<double> number(-1, 1);
   for (int i = 0; i < 24; ++i) {
     const double x = 0.9 * number(random), z = 0.9 * number(random);
     const Quat turned = turnBy(Vec3::UnitX(), number(random));
-    const auto box = scene.addFree(boxHull({0.05, 0.08, 0.06}), {x, 0.6 + 0.2 * i, z}, turned);
-    scene.body(box).angularVelocity = {number(random), 2, number(random)};
+    const auto box = scene.addFree(makeBoxHull({0.05, 0.08, 0.06}), {x, 0.6 + 0.2 * i, z}, turned);
+    scene.getBody(box).angularVelocity = {number(random), 2, number(random)};
   }
   scene.pairAll();
   return scene;
 }
 
 /// Rods that rotate in place within reach of one another; only their ends come close.
-RigidScene rodsThatTurn() {
+RigidScene makeRodsThatTurn() {
   RigidScene scene;
   scene.settings.solver.gravity = Vec3::Zero();
   for (int i = 0; i < 6; ++i) {
-    const auto rod = scene.addFree(boxHull({1, 0.02, 0.02}), {0.3 * i, 0.9 * i, 0.06 * i});
-    scene.body(rod).angularVelocity = {0, 0.1 * i, i % 2 == 0 ? 0.9 : -1.1};
+    const auto rod = scene.addFree(makeBoxHull({1, 0.02, 0.02}), {0.3 * i, 0.9 * i, 0.06 * i});
+    scene.getBody(rod).angularVelocity = {0, 0.1 * i, i % 2 == 0 ? 0.9 : -1.1};
   }
   scene.pairAll();
   return scene;
@@ -206,8 +206,8 @@ void expectKnownDistances(RigidScene scene) {
 }
 
 TEST(KnownDistances, AreNeverMoreThanTheDistancesThoughFewPairsAreLookedAt) {
-  expectKnownDistances(boxesOnATurntable());
-  expectKnownDistances(rodsThatTurn());
+  expectKnownDistances(makeBoxesOnATurntable());
+  expectKnownDistances(makeRodsThatTurn());
 }
 
 }  // namespace

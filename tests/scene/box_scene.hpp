@@ -17,7 +17,7 @@ struct NamedBox {
   Vec3 min, max;
 };
 
-inline std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
+inline std::vector<Vec3> makeBoxPoints(const Vec3& min, const Vec3& max) {
   std::vector<Vec3> points;
   for (int i = 0; i < 8; ++i)
     points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
@@ -26,12 +26,12 @@ inline std::vector<Vec3> boxPoints(const Vec3& min, const Vec3& max) {
 }
 
 /// Twelve triangles, wound outward.
-inline Mesh boxMesh(const Vec3& min, const Vec3& max) {
+inline Mesh buildBoxMesh(const Vec3& min, const Vec3& max) {
   return makeBoxMesh({min, max});
 }
 
 /// The same surface, wound the other way round.
-inline Mesh insideOut(Mesh mesh) {
+inline Mesh turnInsideOut(Mesh mesh) {
   for (std::size_t i = 0; i < mesh.indices.size(); i += 3)
     std::swap(mesh.indices[i + 1], mesh.indices[i + 2]);
   return mesh;
@@ -42,12 +42,12 @@ inline Shape buildMeshShape(const Mesh& mesh) {
   return buildShape({&mesh, 1}, {&first, 1});
 }
 
-inline Model boxModel(const std::vector<NamedBox>& boxes) {
+inline Model makeBoxModel(const std::vector<NamedBox>& boxes) {
   Model model;
   model.source = "boxes";
   model.materials.emplace_back();
   for (const NamedBox& box : boxes) {
-    model.meshes.push_back(boxMesh(box.min, box.max));
+    model.meshes.push_back(buildBoxMesh(box.min, box.max));
     model.objects.push_back({box.path,
                              "",
                              {static_cast<std::uint32_t>(model.meshes.size() - 1)},
@@ -56,12 +56,12 @@ inline Model boxModel(const std::vector<NamedBox>& boxes) {
   return model;
 }
 
-inline std::shared_ptr<const Scene> boxScene(const std::vector<NamedBox>& boxes) {
-  return std::make_shared<const Scene>(boxModel(boxes));
+inline std::shared_ptr<const Scene> makeBoxScene(const std::vector<NamedBox>& boxes) {
+  return std::make_shared<const Scene>(makeBoxModel(boxes));
 }
 
 /// A floor of 20 x 20 m whose top is y = 0.
-inline NamedBox floorBox() {
+inline NamedBox makeFloorBox() {
   return {"floor", {-10, -0.2, -10}, {10, 0, 10}};
 }
 

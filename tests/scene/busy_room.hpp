@@ -9,31 +9,31 @@
 namespace enfilade::scene::testing {
 
 /// A floor, a ceiling over a lift, a door in a wall, a body on a loop, falling crates.
-inline Model busyRoom() {
-  Model model = boxModel({floorBox(),
-                          {"ceiling", {-6, 4, -6}, {-2, 4.2, -2}},
-                          {"wall", {0, 0, 1}, {0.1, 3, 9}},
-                          {"post", {3, 0, -3}, {3.2, 3, -2.8}},
-                          {"car", {-5, 0.05, -5}, {-3, 0.1, -3}},
-                          {"leaf", {0.02, 0.01, 0}, {0.08, 2.1, 0.95}},
-                          {"plate", {4, 0.02, 4}, {6, 0.3, 5}},
-                          {"crate", {2, 3, 0}, {2.5, 3.5, 0.5}},
-                          {"plank", {-2, 3, 2}, {0.5, 3.1, 2.2}}});
-  BodySpec lift = bodySpec("lift", BodyKind::lift, {4});
+inline Model makeBusyRoom() {
+  Model model = makeBoxModel({makeFloorBox(),
+                              {"ceiling", {-6, 4, -6}, {-2, 4.2, -2}},
+                              {"wall", {0, 0, 1}, {0.1, 3, 9}},
+                              {"post", {3, 0, -3}, {3.2, 3, -2.8}},
+                              {"car", {-5, 0.05, -5}, {-3, 0.1, -3}},
+                              {"leaf", {0.02, 0.01, 0}, {0.08, 2.1, 0.95}},
+                              {"plate", {4, 0.02, 4}, {6, 0.3, 5}},
+                              {"crate", {2, 3, 0}, {2.5, 3.5, 0.5}},
+                              {"plank", {-2, 3, 2}, {0.5, 3.1, 2.2}}});
+  BodySpec lift = makeBodySpec("lift", BodyKind::lift, {4});
   lift.high = 4;
   lift.stops = {0, 2, 4};
   lift.speed = 1;
-  BodySpec door = bodySpec("door", BodyKind::hinged, {5});
+  BodySpec door = makeBodySpec("door", BodyKind::hinged, {5});
   door.low = -1.5, door.high = 1.5;
   door.anchor = {0.05, 0, 0};
-  BodySpec ferry = bodySpec("ferry", BodyKind::path, {6});
+  BodySpec ferry = makeBodySpec("ferry", BodyKind::path, {6});
   ferry.anchor = {5, 0, 4.5};
   ferry.keys = {{0, Vec3::Zero(), 0}, {2, {-2, 0, 0}, 1}, {4, {-2, 0, 2}, 3}, {6, Vec3::Zero(), 0}};
   ferry.loops = true;
-  BodySpec crate = bodySpec("crate", BodyKind::rigid, {7});
+  BodySpec crate = makeBodySpec("crate", BodyKind::rigid, {7});
   crate.velocity = {1, 2, 0};
   crate.angularVelocity = {1, 0.5, 2};
-  BodySpec plank = bodySpec("plank", BodyKind::rigid, {8});
+  BodySpec plank = makeBodySpec("plank", BodyKind::rigid, {8});
   plank.velocity = {0, 4, 0};
   plank.angularVelocity = {5, 0.1, 0.1};
   model.bodies = {lift, door, ferry, crate, plank};
@@ -45,19 +45,19 @@ inline Spawn makeFoldedArm(const Vec3& at) {
   Spawn spawn;
   spawn.position = at;
   spawn.flying = true;
-  spawn.parts = {boxPoints({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
+  spawn.parts = {makeBoxPoints({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
   for (int i = 0; i < 3; ++i) {
     Link link;
     link.parent = i - 1;
     link.joint = {LinkJoint::Kind::revolute, {i == 0 ? 0 : 0.8, i == 0 ? 0.7 : 0.12, 0}, {0, 1, 0}};
-    link.points = boxPoints({0, -0.05, -0.05}, {0.8, 0.05, 0.05});
+    link.points = makeBoxPoints({0, -0.05, -0.05}, {0.8, 0.05, 0.05});
     link.value = i == 0 ? 0 : 3;
     spawn.links.push_back(link);
   }
   return spawn;
 }
 
-inline WorldSettings busySettings() {
+inline WorldSettings makeBusySettings() {
   WorldSettings settings;
   settings.maxSpeed = 4;  // so that bounds over all possible orders are finite and useful
   settings.maxJointSpeed = 2;
@@ -67,7 +67,7 @@ inline WorldSettings busySettings() {
 /// All kinds of moving entities at once, with new orders now and then.
 struct BusyRoom {
   explicit BusyRoom(std::uint32_t seed)
-      : random(seed), world(std::make_shared<const Scene>(busyRoom()), busySettings()) {
+      : random(seed), world(std::make_shared<const Scene>(makeBusyRoom()), makeBusySettings()) {
     order("rider", Spawn{Vec3(-4, 0.11, -4), 0});
     order("walker", Spawn{Vec3(-2, 0.001, -1), 0});
     order("pushed", Spawn{Vec3(0.5, 0.001, 0.4), 0});
@@ -81,29 +81,31 @@ struct BusyRoom {
   void order(const std::string& who, Order what) {
     EXPECT_FALSE(submitAvatarCommand(world, {who, std::move(what), 0}));
   }
-  double number(double low, double high) {
+  double drawNumber(double low, double high) {
     return std::uniform_real_distribution(low, high)(random);
   }
   void sendRandomCommand() {
-    const auto velocity = [this] { return Vec3(number(-2, 2), number(-1, 1), number(-2, 2)); };
+    const auto velocity = [this] {
+      return Vec3(drawNumber(-2, 2), drawNumber(-1, 1), drawNumber(-2, 2));
+    };
     order("walker", Drive{velocity()});
     order("flyer", Drive{velocity()});
-    order("rider", Drive{number(0, 1) < 0.7 ? Vec3(Vec3::Zero()) : Vec3(0.3 * velocity())});
-    order("jumper", Jump{number(0.2, 1), velocity()});
-    order("pushed", Crouch{number(0, 1) < 0.5 ? 0.0 : 1.0});
-    order("arm", DriveJoints{{number(-3, 3), number(-3, 3), number(-3, 3)}, 2, true});
-    order("arm", Turn{number(-120, 120), true, 90});
-    order("walker", Look{Vec3(number(-5, 5), 1, number(-5, 5))});
+    order("rider", Drive{drawNumber(0, 1) < 0.7 ? Vec3(Vec3::Zero()) : Vec3(0.3 * velocity())});
+    order("jumper", Jump{drawNumber(0.2, 1), velocity()});
+    order("pushed", Crouch{drawNumber(0, 1) < 0.5 ? 0.0 : 1.0});
+    order("arm", DriveJoints{{drawNumber(-3, 3), drawNumber(-3, 3), drawNumber(-3, 3)}, 2, true});
+    order("arm", Turn{drawNumber(-120, 120), true, 90});
+    order("walker", Look{Vec3(drawNumber(-5, 5), 1, drawNumber(-5, 5))});
     const auto submit = [this](BodyCommand command) {
       EXPECT_FALSE(submitBodyCommand(world, command));
     };
     submit({"lift",
             BodyCommand::Action::moveToLevel,
             0,
-            static_cast<std::uint32_t>(number(0, 2.999)),
+            static_cast<std::uint32_t>(drawNumber(0, 2.999)),
             {}});
-    submit({"door", BodyCommand::Action::moveTo, number(-1.5, 1.5), 0, number(0.5, 1.5)});
-    submit({"ferry", BodyCommand::Action::run, 0, 0, number(0.2, 0.8)});
+    submit({"door", BodyCommand::Action::moveTo, drawNumber(-1.5, 1.5), 0, drawNumber(0.5, 1.5)});
+    submit({"ferry", BodyCommand::Action::run, 0, 0, drawNumber(0.2, 0.8)});
   }
 
   std::mt19937 random;

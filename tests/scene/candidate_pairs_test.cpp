@@ -16,7 +16,7 @@ using namespace testing;
 constexpr std::uint32_t kParts = 24;
 
 /// The boxes of a comb: a spine along x and, at every second place, a tooth along z.
-std::vector<NamedBox> comb(const std::string& name, const Vec3& at) {
+std::vector<NamedBox> makeComb(const std::string& name, const Vec3& at) {
   std::vector<NamedBox> boxes;
   for (std::uint32_t i = 0; i < kParts; ++i) {
     const double x = 0.1 * (i / 2);
@@ -26,15 +26,15 @@ std::vector<NamedBox> comb(const std::string& name, const Vec3& at) {
   return boxes;
 }
 
-Model twoCombs() {
-  std::vector<NamedBox> boxes = comb("a", {0, 50, 0});
-  for (const NamedBox& box : comb("b", {0.03, 50.4, 0.2})) boxes.push_back(box);
-  boxes.push_back(floorBox());
-  Model model = boxModel(boxes);
+Model makeTwoCombs() {
+  std::vector<NamedBox> boxes = makeComb("a", {0, 50, 0});
+  for (const NamedBox& box : makeComb("b", {0.03, 50.4, 0.2})) boxes.push_back(box);
+  boxes.push_back(makeFloorBox());
+  Model model = makeBoxModel(boxes);
   for (const std::uint32_t first : {0u, kParts}) {
     std::vector<std::uint32_t> objects;
     for (std::uint32_t i = 0; i < kParts; ++i) objects.push_back(first + i);
-    BodySpec spec = bodySpec(first == 0 ? "a" : "b", BodyKind::rigid, objects);
+    BodySpec spec = makeBodySpec(first == 0 ? "a" : "b", BodyKind::rigid, objects);
     spec.velocity = first == 0 ? Vec3(0, 0, 0) : Vec3(0.5, -1, 0);
     spec.angularVelocity = first == 0 ? Vec3(0.5, 2, 3) : Vec3(-2, 1, 0.5);
     model.bodies.push_back(std::move(spec));
@@ -69,7 +69,7 @@ std::vector<PartPairKey> collectNextPairs(WorldData& world) {
 TEST(CandidatePairs, OfTumblingConcaveBodiesEqualTheDoubleLoop) {
   WorldSettings settings;
   settings.gravity = 0;
-  BodyFixture t(twoCombs(), settings);
+  BodyFixture t(makeTwoCombs(), settings);
   WorldData& world = t.world.data();
   ASSERT_EQ(world.bodies[0].boxes.parts.size(), kParts);
   std::size_t pairs = 0, withFront = 0;
@@ -85,11 +85,11 @@ TEST(CandidatePairs, OfTumblingConcaveBodiesEqualTheDoubleLoop) {
 }
 
 /// A sheet of waves below a tumbling comb, and a second comb that slides past it on a path.
-Model combOverWaves() {
-  std::vector<NamedBox> boxes = comb("a", {0, 0.35, 0});
-  for (const NamedBox& box : comb("b", {1.4, 0.4, 0.1})) boxes.push_back(box);
-  boxes.push_back(floorBox());
-  Model model = boxModel(boxes);
+Model makeCombOverWaves() {
+  std::vector<NamedBox> boxes = makeComb("a", {0, 0.35, 0});
+  for (const NamedBox& box : makeComb("b", {1.4, 0.4, 0.1})) boxes.push_back(box);
+  boxes.push_back(makeFloorBox());
+  Model model = makeBoxModel(boxes);
   Mesh& waves = model.meshes.back();
   waves = {};
   constexpr std::uint32_t kSide = 40;
@@ -104,16 +104,16 @@ Model combOverWaves() {
     }
   std::vector<std::uint32_t> falling, sliding;
   for (std::uint32_t i = 0; i < kParts; ++i) falling.push_back(i), sliding.push_back(kParts + i);
-  model.bodies.push_back(bodySpec("a", BodyKind::rigid, falling));
+  model.bodies.push_back(makeBodySpec("a", BodyKind::rigid, falling));
   model.bodies.back().angularVelocity = Vec3(0.5, 2, 3);
-  model.bodies.push_back(bodySpec("b", BodyKind::path, sliding));
+  model.bodies.push_back(makeBodySpec("b", BodyKind::path, sliding));
   model.bodies.back().loops = true;
   model.bodies.back().keys = {{0, Vec3::Zero(), 0}, {1, Vec3(-1.2, 0, 0), 0}, {2, Vec3::Zero(), 0}};
   return model;
 }
 
 TEST(CandidatePairs, WithAMeshAndWithAKinematicBodyEqualTheDoubleLoop) {
-  BodyFixture t(combOverWaves());
+  BodyFixture t(makeCombOverWaves());
   WorldData& world = t.world.data();
   const std::uint32_t waves = 2 * kParts;  // the object
   const CollisionGeometry& mesh = world.scene->collisionGeometry(waves);

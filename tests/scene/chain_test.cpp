@@ -12,38 +12,38 @@ using namespace testing;
 using Kind = Notice::Kind;
 
 /// A turntable on a low base, an upper and a lower arm of 0.8 m, and a hand that slides out.
-Spawn armAt(const Vec3& at) {
+Spawn makeArmAt(const Vec3& at) {
   Spawn spawn;
   spawn.position = at;
-  spawn.parts = {boxPoints({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
+  spawn.parts = {makeBoxPoints({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
   Link table{-1,
              {LinkJoint::Kind::revolute, {0, 0.51, 0}, {0, 1, 0}, -3, 3},
-             boxPoints({-0.15, 0, -0.15}, {0.15, 0.1, 0.15})};
+             makeBoxPoints({-0.15, 0, -0.15}, {0.15, 0.1, 0.15})};
   Link upper{0,
              {LinkJoint::Kind::revolute, {0, 0.2, 0}, {0, 0, 1}, -0.5, 3.2},
-             boxPoints({0, -0.05, -0.05}, {0.8, 0.05, 0.05}),
+             makeBoxPoints({0, -0.05, -0.05}, {0.8, 0.05, 0.05}),
              1.5};
   Link lower{1,
              {LinkJoint::Kind::revolute, {0.85, 0, 0}, {0, 0, 1}, -2.8, 2.8},
-             boxPoints({0, -0.04, -0.04}, {0.8, 0.04, 0.04})};
+             makeBoxPoints({0, -0.04, -0.04}, {0.8, 0.04, 0.04})};
   Link hand{2,
             {LinkJoint::Kind::prismatic, {0.82, 0, 0}, {1, 0, 0}, 0, 0.4},
-            boxPoints({0, -0.1, -0.1}, {0.05, 0.1, 0.1})};
+            makeBoxPoints({0, -0.1, -0.1}, {0.05, 0.1, 0.1})};
   spawn.links = {table, upper, lower, hand};
   return spawn;
 }
 
-DriveJoints joints(std::vector<std::optional<double>> to, double speed = 1) {
+DriveJoints makeDriveJoints(std::vector<std::optional<double>> to, double speed = 1) {
   return {std::move(to), speed};
 }
 
 TEST(Chain, JointsComeExactlyToTheirTargets) {
-  WorldFixture run({floorBox()});
-  run.order("arm", armAt({0, 0, 0}));
-  run.order("arm", joints({1.0, 0.7, {}, 0.25}));
-  run.untilIdle();
+  WorldFixture run({makeFloorBox()});
+  run.order("arm", makeArmAt({0, 0, 0}));
+  run.order("arm", makeDriveJoints({1.0, 0.7, {}, 0.25}));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::done), 1);
-  const auto view = run.view("arm");
+  const auto view = run.getView("arm");
   ASSERT_EQ(view.joints.size(), 4u);
   EXPECT_EQ(view.joints[0].value, 1.0);
   EXPECT_EQ(view.joints[1].value, 0.7);
@@ -57,28 +57,28 @@ TEST(Chain, JointsComeExactlyToTheirTargets) {
 }
 
 TEST(Chain, TheDurationOfARotationFollowsFromItsSpeed) {
-  WorldFixture run({floorBox()});
-  run.order("arm", armAt({0, 0, 0}));
-  run.untilIdle();
-  run.order("arm", joints({1.5}, 3));
-  run.ticks(29);
-  EXPECT_NEAR(run.view("arm").joints[0].value, 1.45, 1e-9);
+  WorldFixture run({makeFloorBox()});
+  run.order("arm", makeArmAt({0, 0, 0}));
+  run.waitUntilIdle();
+  run.order("arm", makeDriveJoints({1.5}, 3));
+  run.runTicks(29);
+  EXPECT_NEAR(run.getView("arm").joints[0].value, 1.45, 1e-9);
   EXPECT_EQ(run.count(Kind::done), 0);
 }
 
 TEST(Chain, AWallStopsTheArmAtEpsilonAndIsNamed) {
-  WorldFixture run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
-  run.order("arm", armAt({0, 0, 0}));
-  run.order("arm", joints({0, 0}));
-  run.order("arm", joints({1.5}, 2));  // towards -Z
-  run.untilIdle();
+  WorldFixture run({makeFloorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+  run.order("arm", makeArmAt({0, 0, 0}));
+  run.order("arm", makeDriveJoints({0, 0}));
+  run.order("arm", makeDriveJoints({1.5}, 2));  // towards -Z
+  run.waitUntilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "wall");
-  const double value = run.view("arm").joints[0].value;
+  const double value = run.getView("arm").joints[0].value;
   EXPECT_GT(value, 0.5);
   EXPECT_LT(value, 0.8);
   EXPECT_NE(run.notices.back().text.find("joints at ["), std::string::npos);
-  EXPECT_TRUE(run.touched("wall"));
+  EXPECT_TRUE(run.hasTouched("wall"));
   EXPECT_EQ(run.worstPenetration, 0);
   double nearest = 1;
   for (const ContactEvent& e : run.events)
@@ -88,7 +88,7 @@ TEST(Chain, AWallStopsTheArmAtEpsilonAndIsNamed) {
 }
 
 TEST(Chain, AtAnySpeedAPaneOfNoThicknessIsNotCrossed) {
-  Model model = boxModel({floorBox()});
+  Model model = makeBoxModel({makeFloorBox()});
   Mesh pane;
   pane.positions = {{-5, 0, -1.2F}, {5, 0, -1.2F}, {5, 3, -1.2F}, {-5, 3, -1.2F}};
   pane.indices = {0, 1, 2, 0, 2, 3};
@@ -97,19 +97,19 @@ TEST(Chain, AtAnySpeedAPaneOfNoThicknessIsNotCrossed) {
   const auto scene = std::make_shared<const Scene>(model);
   for (const double speed : {0.3, 5.0, 20.0}) {
     WorldFixture run(scene);
-    run.order("arm", armAt({0, 0, 0}));
-    run.order("arm", joints({0, 0}, speed));
-    run.order("arm", joints({3}, speed));
-    run.untilIdle();
+    run.order("arm", makeArmAt({0, 0, 0}));
+    run.order("arm", makeDriveJoints({0, 0}, speed));
+    run.order("arm", makeDriveJoints({3}, speed));
+    run.waitUntilIdle();
     EXPECT_EQ(run.count(Kind::blocked), 1) << speed;
-    EXPECT_NEAR(run.view("arm").joints[0].value, 0.69, 0.05) << speed;
+    EXPECT_NEAR(run.getView("arm").joints[0].value, 0.69, 0.05) << speed;
     EXPECT_EQ(run.worstPenetration, 0);
   }
 }
 
 TEST(Chain, AnArmThatSwingsWhileItsBaseSlidesOffARoofCrossesNoPane) {
   // The base falls as far as it can and then slides sideways, while the arm swings fast.
-  Model model = boxModel({{"ground", {-20, -0.2, -20}, {20, 0, 20}}});
+  Model model = makeBoxModel({{"ground", {-20, -0.2, -20}, {20, 0, 20}}});
   Mesh roof;
   roof.positions = {{-1, 2.4F, -3}, {-1, 2.4F, 3}, {0.4F, 0, 3}, {0.4F, 0, -3}};
   roof.indices = {0, 1, 2, 0, 2, 3};
@@ -122,17 +122,17 @@ TEST(Chain, AnArmThatSwingsWhileItsBaseSlidesOffARoofCrossesNoPane) {
   const auto scene = std::make_shared<const Scene>(model);
   for (double height = 20; height < 21; height += 0.13) {
     WorldFixture run(scene);
-    run.order("arm", armAt({0, height, 0}));
-    run.order("arm", joints({{}, 0.0}, 20));
-    run.ticks(10);
+    run.order("arm", makeArmAt({0, height, 0}));
+    run.order("arm", makeDriveJoints({{}, 0.0}, 20));
+    run.runTicks(10);
     for (int i = 0; i < 240; ++i) {
       if (i % 20 == 0) {
-        DriveJoints swing = joints({i % 40 == 0 ? 2.9 : -2.9, 0.0}, 20);
+        DriveJoints swing = makeDriveJoints({i % 40 == 0 ? 2.9 : -2.9, 0.0}, 20);
         swing.immediate = true;
         run.order("arm", swing);
       }
       run.step();
-      const AvatarSnapshot arm = run.view("arm");
+      const AvatarSnapshot arm = run.getView("arm");
       for (const AvatarPart& part : arm.shape->parts)
         ASSERT_LT(placeBox(part.box, arm.footPosition).max.x(), 2.2001)
             << height << " m, tick " << i;
@@ -141,68 +141,68 @@ TEST(Chain, AnArmThatSwingsWhileItsBaseSlidesOffARoofCrossesNoPane) {
 }
 
 TEST(Chain, TheOtherJointsContinueIfOneIsStopped) {
-  WorldFixture run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
-  run.order("arm", armAt({0, 0, 0}));
-  run.order("arm", joints({0, 0}));
-  run.order("arm", joints({1.5, 0.4, {}, 0.1}));
-  run.untilIdle();
-  EXPECT_EQ(run.view("arm").joints[1].value, 0.4);
-  EXPECT_LT(run.view("arm").joints[0].value, 1.5);
+  WorldFixture run({makeFloorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+  run.order("arm", makeArmAt({0, 0, 0}));
+  run.order("arm", makeDriveJoints({0, 0}));
+  run.order("arm", makeDriveJoints({1.5, 0.4, {}, 0.1}));
+  run.waitUntilIdle();
+  EXPECT_EQ(run.getView("arm").joints[1].value, 0.4);
+  EXPECT_LT(run.getView("arm").joints[0].value, 1.5);
 }
 
 TEST(Chain, AHandSlidesAlongATableAndPushesOntoIt) {
-  WorldFixture run({floorBox(), {"table", {0.9, 0, -2}, {2.4, 0.6, 2}}});
-  run.order("arm", armAt({0, 0, 0}));
-  run.order("arm", joints({-0.5, 0.3}));
-  run.order("arm", joints({{}, -0.5}));  // down onto the table
-  run.untilIdle();
+  WorldFixture run({makeFloorBox(), {"table", {0.9, 0, -2}, {2.4, 0.6, 2}}});
+  run.order("arm", makeArmAt({0, 0, 0}));
+  run.order("arm", makeDriveJoints({-0.5, 0.3}));
+  run.order("arm", makeDriveJoints({{}, -0.5}));  // down onto the table
+  run.waitUntilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
-  EXPECT_TRUE(run.touched("table"));
-  run.order("arm", joints({0.5}));  // along the table
-  run.untilIdle();
-  EXPECT_EQ(run.view("arm").joints[0].value, 0.5);
+  EXPECT_TRUE(run.hasTouched("table"));
+  run.order("arm", makeDriveJoints({0.5}));  // along the table
+  run.waitUntilIdle();
+  EXPECT_EQ(run.getView("arm").joints[0].value, 0.5);
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
 TEST(Chain, AnAvatarStopsTheArmAndTheArmStopsAnAvatar) {
-  WorldFixture run({floorBox()});
-  run.order("arm", armAt({0, 0, 0}));
-  run.order("arm", joints({-1.2, 0.2}));
+  WorldFixture run({makeFloorBox()});
+  run.order("arm", makeArmAt({0, 0, 0}));
+  run.order("arm", makeDriveJoints({-1.2, 0.2}));
   run.order("bob", Spawn{{1.2, 0, 0}});
-  run.untilIdle();
-  run.order("arm", joints({1.2}));
-  run.untilIdle();
+  run.waitUntilIdle();
+  run.order("arm", makeDriveJoints({1.2}));
+  run.waitUntilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "bob");
   run.order("ann", Spawn{{-2, 0, 1.2}});
-  run.order("ann", to(4, 1.2));
-  run.order("ann", to(4, 0.5));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(4, 1.2));
+  run.order("ann", makeWalkTo(4, 0.5));
+  run.waitUntilIdle();
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
 TEST(Chain, NonNeighbourLinksStopEachOtherIfRequested) {
   for (const bool selfContact : {false, true}) {
-    WorldFixture run({floorBox()});
-    Spawn arm = armAt({0, 0, 0});
+    WorldFixture run({makeFloorBox()});
+    Spawn arm = makeArmAt({0, 0, 0});
     arm.selfContact = selfContact;
     run.order("arm", arm);
-    run.order("arm", joints({{}, 2.6}));
-    run.order("arm", joints({{}, {}, 2.8}));  // would move the hand down into the base
-    run.untilIdle();
+    run.order("arm", makeDriveJoints({{}, 2.6}));
+    run.order("arm", makeDriveJoints({{}, {}, 2.8}));  // would move the hand down into the base
+    run.waitUntilIdle();
     EXPECT_EQ(run.count(Kind::blocked) > 0, selfContact);
   }
 }
 
 TEST(Chain, AnArmOnABaseThatWalksIsSweptWhole) {
-  WorldFixture run({floorBox(), {"post", {3, 0, 0.9}, {3.1, 3, 1.0}}});
-  run.order("arm", armAt({0, 0, 0}));
-  run.order("arm", joints({-1.5, 0}));  // the arm points towards +Z
-  run.order("arm", to(6, 0));
-  run.untilIdle();
+  WorldFixture run({makeFloorBox(), {"post", {3, 0, 0.9}, {3.1, 3, 1.0}}});
+  run.order("arm", makeArmAt({0, 0, 0}));
+  run.order("arm", makeDriveJoints({-1.5, 0}));  // the arm points towards +Z
+  run.order("arm", makeWalkTo(6, 0));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "post");
-  EXPECT_LT(run.feet("arm").x(), 3);
+  EXPECT_LT(run.getFeet("arm").x(), 3);
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
@@ -211,7 +211,7 @@ TEST(Chain, RandomDrivesThroughClutterNeverPenetrate) {
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
   };
-  std::vector<NamedBox> boxes{floorBox()};
+  std::vector<NamedBox> boxes{makeFloorBox()};
   for (int i = 0; i < 30; ++i) {
     const double angle = uniform(0, 6.28), far = uniform(0.8, 2), y = uniform(0, 1.8);
     const double x = far * std::cos(angle), z = far * std::sin(angle);
@@ -219,58 +219,58 @@ TEST(Chain, RandomDrivesThroughClutterNeverPenetrate) {
     boxes.push_back({"box" + std::to_string(i), {x, y, z}, {x + size, y + 0.5 * size, z + 0.05}});
   }
   WorldFixture run(boxes);
-  run.order("arm", armAt({0, 0, 0}));
+  run.order("arm", makeArmAt({0, 0, 0}));
   run.step();
-  if (run.count(Kind::spawned) == 0) GTEST_FAIL() << run.text(Kind::refused);
+  if (run.count(Kind::spawned) == 0) GTEST_FAIL() << run.getText(Kind::refused);
   for (int k = 0; k < 60; ++k) {
     const double turn = uniform(-3, 3), up = uniform(-0.5, 3.2), bend = uniform(-2.8, 2.8);
     run.order("arm", DriveJoints{{turn, up, bend, uniform(0, 0.4)}, uniform(0.5, 20), true});
-    run.ticks(30);
+    run.runTicks(30);
   }
   EXPECT_EQ(run.worstPenetration, 0);
   EXPECT_GT(run.events.size(), 15u);
 }
 
 TEST(Chain, AbsurdLinksAndTargetsAreRefusedAndChangeNothing) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   const auto refused = [&](Spawn spawn) {
     return submitAvatarCommand(run.world, {"x", spawn, 0}).value_or("");
   };
-  Spawn bad = armAt({0, 0, 0});
+  Spawn bad = makeArmAt({0, 0, 0});
   bad.links[1].parent = 1;
   EXPECT_NE(refused(bad).find("links[1].parent"), std::string::npos);
-  bad = armAt({0, 0, 0});
+  bad = makeArmAt({0, 0, 0});
   bad.links[2].joint.axis = Vec3::Zero();
   EXPECT_NE(refused(bad).find("links[2].axis"), std::string::npos);
-  bad = armAt({0, 0, 0});
+  bad = makeArmAt({0, 0, 0});
   bad.links[0].points[3].y() = std::nan("");
   EXPECT_NE(refused(bad).find("links[0].points[3].y"), std::string::npos);
-  bad = armAt({0, 0, 0});
+  bad = makeArmAt({0, 0, 0});
   bad.links[3].value = 0.5;
   EXPECT_NE(refused(bad).find("links[3].value"), std::string::npos);
-  bad = armAt({0, 0, 0});
+  bad = makeArmAt({0, 0, 0});
   bad.parts.resize(kMaxParts + 1, bad.parts[0]);
   EXPECT_NE(refused(bad).find("parts"), std::string::npos);
-  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", joints({std::nan("")}), 0}));
-  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", joints({1.0}, 0), 0}));
-  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", joints({1.0}, 21), 0}));
-  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", joints({}), 0}));
-  run.order("arm", armAt({0, 0, 0}));
-  run.order("arm", joints({3.5}));
-  run.order("arm", joints({0, 0, 0, 0, 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", makeDriveJoints({std::nan("")}), 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", makeDriveJoints({1.0}, 0), 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", makeDriveJoints({1.0}, 21), 0}));
+  EXPECT_TRUE(submitAvatarCommand(run.world, {"x", makeDriveJoints({}), 0}));
+  run.order("arm", makeArmAt({0, 0, 0}));
+  run.order("arm", makeDriveJoints({3.5}));
+  run.order("arm", makeDriveJoints({0, 0, 0, 0, 0}));
   run.order("arm", Crouch{1});
-  run.untilIdle();
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::refused), 3);
 }
 
 TEST(Chain, PartsTurnAsTheSpawnFaces) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   Spawn spawn;
   spawn.facing = 90;
-  spawn.parts = {boxPoints({0, 0, -0.1}, {1, 1, 0.1})};
+  spawn.parts = {makeBoxPoints({0, 0, -0.1}, {1, 1, 0.1})};
   run.order("box", spawn);
-  run.untilIdle();
-  const Aabb box = run.view("box").shape->box;
+  run.waitUntilIdle();
+  const Aabb box = run.getView("box").shape->box;
   EXPECT_NEAR(box.min.z(), -1, 1e-12);
   EXPECT_NEAR(box.max.z(), 0, 1e-12);
   EXPECT_NEAR(box.max.x(), 0.1, 1e-12);
@@ -278,10 +278,10 @@ TEST(Chain, PartsTurnAsTheSpawnFaces) {
 
 TEST(Chain, TheSameDrivesGiveTheSameHash) {
   const auto computeHash = [](double turn) {
-    WorldFixture run({floorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
-    run.order("arm", armAt({0, 0, 0}));
-    run.order("arm", joints({turn, 0.3, -0.4}, 3));
-    run.ticks(200);
+    WorldFixture run({makeFloorBox(), {"wall", {-5, 0, -1.2}, {5, 3, -1.1}}});
+    run.order("arm", makeArmAt({0, 0, 0}));
+    run.order("arm", makeDriveJoints({turn, 0.3, -0.4}, 3));
+    run.runTicks(200);
     return run.world.snapshot()->stateHash;
   };
   EXPECT_EQ(computeHash(1.5), computeHash(1.5));

@@ -23,56 +23,59 @@ inline void give(World& world, const TickCommands& commands) {
   for (const BodyCommand& command : commands.bodies) submitBodyCommand(world, command);
 }
 
-inline bool same(const Vec3& a, const Vec3& b) {
+inline bool areSame(const Vec3& a, const Vec3& b) {
   return a == b;
 }
-inline bool same(const collision::SeparationResult& a, const collision::SeparationResult& b) {
+inline bool areSame(const collision::SeparationResult& a, const collision::SeparationResult& b) {
   return a.verdict == b.verdict && a.certificate == b.certificate && a.distance == b.distance &&
-         a.errorBound == b.errorBound && same(a.pointA, b.pointA) && same(a.pointB, b.pointB) &&
-         same(a.normal, b.normal) && a.featureA == b.featureA && a.featureB == b.featureB;
+         a.errorBound == b.errorBound && areSame(a.pointA, b.pointA) &&
+         areSame(a.pointB, b.pointB) && areSame(a.normal, b.normal) && a.featureA == b.featureA &&
+         a.featureB == b.featureB;
 }
-inline bool same(const ContactEvent& a, const ContactEvent& b) {
+inline bool areSame(const ContactEvent& a, const ContactEvent& b) {
   return a.tick == b.tick && a.kind == b.kind && a.reason == b.reason && a.phase == b.phase &&
-         a.a == b.a && a.b == b.b && same(a.separation, b.separation);
+         a.a == b.a && a.b == b.b && areSame(a.separation, b.separation);
 }
-inline bool same(const Notice& a, const Notice& b) {
+inline bool areSame(const Notice& a, const Notice& b) {
   return a.kind == b.kind && a.avatar == b.avatar && a.id == b.id && a.tag == b.tag &&
-         same(a.position, b.position) && a.obstacle == b.obstacle && a.text == b.text;
+         areSame(a.position, b.position) && a.obstacle == b.obstacle && a.text == b.text;
 }
-inline bool same(const AvatarSnapshot& a, const AvatarSnapshot& b) {
+inline bool areSame(const AvatarSnapshot& a, const AvatarSnapshot& b) {
   bool joints = a.joints.size() == b.joints.size();
   for (std::size_t i = 0; joints && i < a.joints.size(); ++i)
     joints =
         a.joints[i].value == b.joints[i].value && a.joints[i].blockedBy == b.joints[i].blockedBy;
-  return joints && a.id == b.id && a.name == b.name && same(a.footPosition, b.footPosition) &&
-         same(a.viewDirection, b.viewDirection) && a.eyeHeight == b.eyeHeight &&
+  return joints && a.id == b.id && a.name == b.name && areSame(a.footPosition, b.footPosition) &&
+         areSame(a.viewDirection, b.viewDirection) && a.eyeHeight == b.eyeHeight &&
          a.grounded == b.grounded && a.flying == b.flying && a.groundEntity == b.groundEntity &&
-         a.height == b.height && same(a.move.requestedDisplacement, b.move.requestedDisplacement) &&
-         same(a.move.actualDisplacement, b.move.actualDisplacement) &&
-         a.move.blockedBy == b.move.blockedBy && same(a.move.separation, b.move.separation) &&
+         a.height == b.height &&
+         areSame(a.move.requestedDisplacement, b.move.requestedDisplacement) &&
+         areSame(a.move.actualDisplacement, b.move.actualDisplacement) &&
+         a.move.blockedBy == b.move.blockedBy && areSame(a.move.separation, b.move.separation) &&
          a.lastStoppedTick == b.lastStoppedTick;
 }
-inline bool same(const BodySnapshot& a, const BodySnapshot& b) {
-  return a.id == b.id && a.index == b.index && same(a.pose.translation, b.pose.translation) &&
+inline bool areSame(const BodySnapshot& a, const BodySnapshot& b) {
+  return a.id == b.id && a.index == b.index && areSame(a.pose.translation, b.pose.translation) &&
          a.pose.rotation.coeffs() == b.pose.rotation.coeffs() && a.displaced == b.displaced &&
-         a.jointPosition == b.jointPosition && same(a.velocity, b.velocity) &&
-         same(a.angularVelocity, b.angularVelocity) && a.velocityDeviation == b.velocityDeviation &&
-         a.moving == b.moving && a.blockedBy == b.blockedBy;
+         a.jointPosition == b.jointPosition && areSame(a.velocity, b.velocity) &&
+         areSame(a.angularVelocity, b.angularVelocity) &&
+         a.velocityDeviation == b.velocityDeviation && a.moving == b.moving &&
+         a.blockedBy == b.blockedBy;
 }
 template <class List>
-bool sameLists(const List& a, const List& b) {
+bool areSameLists(const List& a, const List& b) {
   bool all = a.size() == b.size();
-  for (std::size_t i = 0; all && i < a.size(); ++i) all = same(a[i], b[i]);
+  for (std::size_t i = 0; all && i < a.size(); ++i) all = areSame(a[i], b[i]);
   return all;
 }
 
 /// The first difference between two tick reports; "" if they are equal.
-inline std::string difference(const TickReport& a, const TickReport& b) {
+inline std::string findDifference(const TickReport& a, const TickReport& b) {
   if (a.snapshot->stateHash != b.snapshot->stateHash) return "state hash";
-  if (!sameLists(a.contacts, b.contacts)) return "contacts";
-  if (!sameLists(a.notices, b.notices)) return "notices";
-  if (!sameLists(a.snapshot->avatars, b.snapshot->avatars)) return "avatars";
-  if (!sameLists(*a.snapshot->bodies, *b.snapshot->bodies)) return "bodies";
+  if (!areSameLists(a.contacts, b.contacts)) return "contacts";
+  if (!areSameLists(a.notices, b.notices)) return "notices";
+  if (!areSameLists(a.snapshot->avatars, b.snapshot->avatars)) return "avatars";
+  if (!areSameLists(*a.snapshot->bodies, *b.snapshot->bodies)) return "bodies";
   if (a.pairs != b.pairs) return "pairs";
   if (a.narrowQueries != b.narrowQueries) return "narrow queries";
   if (a.rationalQueries != b.rationalQueries) return "rational queries";
@@ -106,7 +109,7 @@ inline void compareCopies(const std::shared_ptr<const Scene>& scene, const World
       copies.push_back({t, restoreWorld(scene, bytes)});
       ASSERT_EQ(makeCheckpoint(copies.back().world), bytes) << "tick " << t;
       ASSERT_EQ(copies.back().world.snapshot()->stateHash, world.snapshot()->stateHash);
-      ASSERT_TRUE(sameLists(*copies.back().world.snapshot()->bodies, *world.snapshot()->bodies));
+      ASSERT_TRUE(areSameLists(*copies.back().world.snapshot()->bodies, *world.snapshot()->bodies));
       for (Copy& copy : copies)
         if (now != commands.end() && &copy != &copies.back()) give(copy.world, now->second);
       if (!waiting && now != commands.end())
@@ -119,7 +122,7 @@ inline void compareCopies(const std::shared_ptr<const Scene>& scene, const World
     if (!copies.empty()) events += report.contacts.size();
     for (Copy& copy : copies) {
       const TickReport other = tickWorld(copy.world);
-      ASSERT_EQ(difference(report, other), "")
+      ASSERT_EQ(findDifference(report, other), "")
           << "tick " << t + 1 << ", copied at tick " << copy.from;
     }
     std::erase_if(copies, [&](const Copy& copy) { return t + 1 >= copy.from + duration; });

@@ -13,11 +13,11 @@
 namespace enfilade::scene {
 namespace {
 
-using testing::boxMesh;
+using testing::buildBoxMesh;
 using testing::buildMeshShape;
-using testing::insideOut;
+using testing::turnInsideOut;
 
-Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
+Eigen::Affine3d makeRandomPlacement(std::mt19937& random, bool mirror) {
   std::uniform_real_distribution<double> number(-1, 1);
   Eigen::Affine3d placed = Eigen::Affine3d::Identity();
   for (int row = 0; row < 3; ++row) {
@@ -29,9 +29,9 @@ Eigen::Affine3d randomPlacement(std::mt19937& random, bool mirror) {
 
 TEST(CollisionGeometry, AHullHoldsEveryCornerOfItsSurfaceHoweverItIsPlaced) {
   std::mt19937 random(5);
-  const Shape shape = buildMeshShape(boxMesh({0, 0, 0}, {0.3, 2, 5}));
+  const Shape shape = buildMeshShape(buildBoxMesh({0, 0, 0}, {0.3, 2, 5}));
   for (int i = 0; i < 100; ++i) {
-    const Eigen::Affine3d placed = randomPlacement(random, i % 2 == 1);
+    const Eigen::Affine3d placed = makeRandomPlacement(random, i % 2 == 1);
     const CollisionGeometry parts = buildCollisionGeometry(shape, placed);
     ASSERT_EQ(parts.localHulls.size(), 1u);
     EXPECT_TRUE(parts.localTriangles.triangles().empty());
@@ -52,7 +52,7 @@ TEST(CollisionGeometry, QueriesEqualBruteForce) {
   Mesh mesh;
   for (int i = 0; i < 40; ++i) {  // every fourth lacks its last triangle and is therefore open
     const double x = number(random), y = number(random), z = number(random);
-    Mesh box = boxMesh({x, y, z}, {x + 1, y + 2, z + 1});
+    Mesh box = buildBoxMesh({x, y, z}, {x + 1, y + 2, z + 1});
     if (i % 4 == 0) box.indices.resize(33);
     const auto first = static_cast<std::uint32_t>(mesh.positions.size());
     mesh.positions.insert(mesh.positions.end(), box.positions.begin(), box.positions.end());
@@ -83,12 +83,12 @@ TEST(CollisionGeometry, QueriesEqualBruteForce) {
 
 TEST(CollisionGeometry, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
   std::mt19937 random(7);
-  const Mesh mesh = boxMesh({0, 0, 0}, {0.3, 2, 5});
+  const Mesh mesh = buildBoxMesh({0, 0, 0}, {0.3, 2, 5});
   Mesh open = mesh;
   open.indices.resize(33);
   const Shape shape = buildMeshShape(mesh), sheets = buildMeshShape(open);
   for (int i = 0; i < 100; ++i) {
-    Eigen::Affine3d placed = randomPlacement(random, false);
+    Eigen::Affine3d placed = makeRandomPlacement(random, false);
     placed.linear() *= 0.1;
     placed.translation() *= i % 4 ? 1000 : 1;
     std::vector<Vec3> expected, found;
@@ -110,9 +110,9 @@ TEST(CollisionGeometry, FarPartsAreStoredNearTheirOriginAndAreWhereTheyWere) {
 
 TEST(CollisionGeometry, InsideOutWallsAreSolidAndInsideOutRoomsAreRooms) {
   const Eigen::Affine3d as = Eigen::Affine3d::Identity();
-  const Shape wall = buildMeshShape(insideOut(boxMesh({0, 0, 0}, {5, 3, 0.2})));
+  const Shape wall = buildMeshShape(turnInsideOut(buildBoxMesh({0, 0, 0}, {5, 3, 0.2})));
   EXPECT_EQ(buildCollisionGeometry(wall, as).localHulls.size(), 1u);
-  const Shape room = buildMeshShape(insideOut(boxMesh({0, 0, 0}, {5, 3, 4})));
+  const Shape room = buildMeshShape(turnInsideOut(buildBoxMesh({0, 0, 0}, {5, 3, 4})));
   EXPECT_EQ(buildCollisionGeometry(room, as).localHulls.size(), 0u);
   EXPECT_EQ(buildCollisionGeometry(room, as).localTriangles.triangles().size(), 12u);
   EXPECT_EQ(buildCollisionGeometry(room, Eigen::Affine3d(Eigen::Scaling(0.05))).localHulls.size(),
@@ -120,7 +120,7 @@ TEST(CollisionGeometry, InsideOutWallsAreSolidAndInsideOutRoomsAreRooms) {
 }
 
 /// The error of spawning an avatar at `at`; "" if it may enter there.
-std::string refusalAt(const std::shared_ptr<const Scene>& scene, const Vec3& at) {
+std::string findRefusalAt(const std::shared_ptr<const Scene>& scene, const Vec3& at) {
   World world(scene);
   submitAvatarCommand(world, {"ann", Spawn{at}, 0});
   const TickReport report = tickWorld(world);
@@ -132,8 +132,8 @@ std::string refusalAt(const std::shared_ptr<const Scene>& scene, const Vec3& at)
 
 TEST(CollisionGeometry, AvatarsNeverEnterSolids) {
   // A convex block, a dented one, a mirrored one, and a vault with a room in it.
-  Model model = testing::boxModel({testing::floorBox(), {"block", {2, 0, 2}, {6, 4, 6}}});
-  Mesh dented = boxMesh({-6, 0, 2}, {-2, 4, 6});
+  Model model = testing::makeBoxModel({testing::makeFloorBox(), {"block", {2, 0, 2}, {6, 4, 6}}});
+  Mesh dented = buildBoxMesh({-6, 0, 2}, {-2, 4, 6});
   dented.indices.erase(dented.indices.begin() + 18, dented.indices.begin() + 24);
   dented.positions.emplace_back(-4.0f, 3.5f, 4.0f);
   for (const auto& [a, b] : {std::pair{2, 6}, {6, 7}, {7, 3}, {3, 2}})
@@ -141,19 +141,20 @@ TEST(CollisionGeometry, AvatarsNeverEnterSolids) {
   model.meshes.push_back(dented);
   model.objects.push_back({"dented", "", {2}, Eigen::Affine3d::Identity()});
   model.objects.push_back({"mirrored", "", {2}, Eigen::Affine3d(Eigen::Scaling(1.0, 1.0, -1.0))});
-  Mesh vault = boxMesh({2, 0, -8}, {8, 4, -2});
-  const Mesh room = insideOut(boxMesh({2.5, 0.5, -7.5}, {7.5, 3.5, -2.5}));
+  Mesh vault = buildBoxMesh({2, 0, -8}, {8, 4, -2});
+  const Mesh room = turnInsideOut(buildBoxMesh({2.5, 0.5, -7.5}, {7.5, 3.5, -2.5}));
   for (const std::uint32_t i : room.indices) vault.indices.push_back(8 + i);
   vault.positions.insert(vault.positions.end(), room.positions.begin(), room.positions.end());
   model.meshes.push_back(vault);
   model.objects.push_back({"vault", "", {3}, Eigen::Affine3d::Identity()});
   const auto scene = std::make_shared<const Scene>(std::move(model));
 
-  EXPECT_EQ(refusalAt(scene, {0, 0, 0}), "");
-  EXPECT_NE(refusalAt(scene, {4, 0.5, 4}).find("inside the solid block"), std::string::npos);
-  EXPECT_NE(refusalAt(scene, {-4, 0.5, 4}).find("inside the solid dented"), std::string::npos);
-  EXPECT_NE(refusalAt(scene, {-4, 0.5, -4}).find("inside the solid mirrored"), std::string::npos);
-  EXPECT_EQ(refusalAt(scene, {5, 0.5, -5}), "");
+  EXPECT_EQ(findRefusalAt(scene, {0, 0, 0}), "");
+  EXPECT_NE(findRefusalAt(scene, {4, 0.5, 4}).find("inside the solid block"), std::string::npos);
+  EXPECT_NE(findRefusalAt(scene, {-4, 0.5, 4}).find("inside the solid dented"), std::string::npos);
+  EXPECT_NE(findRefusalAt(scene, {-4, 0.5, -4}).find("inside the solid mirrored"),
+            std::string::npos);
+  EXPECT_EQ(findRefusalAt(scene, {5, 0.5, -5}), "");
 }
 
 }  // namespace

@@ -88,7 +88,7 @@ namespace enfilade::scene {
 namespace {
 
 /// Bytes of all meshes, each counted once however many objects share it.
-std::size_t uniqueBytes(const Model& model) {
+std::size_t countUniqueBytes(const Model& model) {
   std::size_t bytes = 0;
   for (const Mesh& mesh : model.meshes)
     bytes += mesh.positions.size() * sizeof(mesh.positions[0]) +
@@ -97,7 +97,7 @@ std::size_t uniqueBytes(const Model& model) {
 }
 
 /// A bumpy globe of about 2 * rings^2 triangles.
-Mesh globe(std::uint32_t rings) {
+Mesh makeGlobe(std::uint32_t rings) {
   Mesh mesh;
   for (std::uint32_t i = 0; i <= rings; ++i)
     for (std::uint32_t k = 0; k <= rings; ++k) {
@@ -116,12 +116,12 @@ Mesh globe(std::uint32_t rings) {
 }
 
 /// Each globe is placed `copies` times.
-Model globes(int meshes, std::uint32_t rings, int copies) {
+Model makeGlobes(int meshes, std::uint32_t rings, int copies) {
   Model model;
   model.source = "globes";
   model.materials.emplace_back();
   for (int m = 0; m < meshes; ++m) {
-    model.meshes.push_back(globe(rings + static_cast<std::uint32_t>(m)));
+    model.meshes.push_back(makeGlobe(rings + static_cast<std::uint32_t>(m)));
     for (int c = 0; c < copies; ++c) {
       Object object;
       object.path = "globe" + std::to_string(m) + "/" + std::to_string(c);
@@ -134,7 +134,7 @@ Model globes(int meshes, std::uint32_t rings, int copies) {
 }
 
 /// The bundled building with its doors and lift as bodies.
-Model buildingWithBodies() {
+Model makeBuildingWithBodies() {
   std::vector<assets::MovingPart> parts;
   Model model = assets::makeBuilding({}, &parts);
   for (const assets::MovingPart& part : parts) {
@@ -157,7 +157,7 @@ struct Cost {
   std::size_t world = 0;   ///< before any avatar comes near
   std::size_t shapes = 0;  ///< after the shapes of all objects were built
   std::size_t parts = 0;   ///< after the parts of all objects were built
-  std::size_t beforeParts() const { return scene + world + shapes; }
+  std::size_t sumBeforeParts() const { return scene + world + shapes; }
 };
 Cost measureCost(Model model, bool withParts = false) {
   const auto objects = static_cast<std::uint32_t>(model.objects.size());
@@ -180,30 +180,30 @@ Cost measureCost(Model model, bool withParts = false) {
 }
 
 TEST(CollisionMemory, OfTheBundledBuildingIsAtMostTwiceItsMeshesBeforeThePartsAreUsed) {
-  Model model = buildingWithBodies();
+  Model model = makeBuildingWithBodies();
   EXPECT_GT(model.bodies.size(), 10u);
-  const std::size_t unique = uniqueBytes(model);
+  const std::size_t unique = countUniqueBytes(model);
   const Cost cost = measureCost(std::move(model));
-  EXPECT_GT(cost.beforeParts(), unique / 4) << "the allocation is counted";
-  EXPECT_LE(cost.beforeParts(), 2 * unique);
+  EXPECT_GT(cost.sumBeforeParts(), unique / 4) << "the allocation is counted";
+  EXPECT_LE(cost.sumBeforeParts(), 2 * unique);
 }
 
 TEST(CollisionMemory, OfLargeMeshesIsAtMostTwiceTheseUntilThePartsAreUsed) {
-  Model model = globes(6, 60, 1);
-  const std::size_t unique = uniqueBytes(model);
+  Model model = makeGlobes(6, 60, 1);
+  const std::size_t unique = countUniqueBytes(model);
   const Cost cost = measureCost(std::move(model), true);
   EXPECT_LE(cost.scene + cost.world, unique / 100) << "nothing is copied before its first use";
-  EXPECT_LE(cost.beforeParts(), 2 * unique);
-  EXPECT_GT(cost.beforeParts() + cost.parts, 2 * unique) << "excess memory is detected";
+  EXPECT_LE(cost.sumBeforeParts(), 2 * unique);
+  EXPECT_GT(cost.sumBeforeParts() + cost.parts, 2 * unique) << "excess memory is detected";
 }
 
 TEST(CollisionMemory, OfAMeshThatStandsFourHundredTimesIsThatOfOneAndAFewNumbersEach) {
-  Model once = globes(6, 60, 1), often = globes(6, 60, 400);
-  const std::size_t unique = uniqueBytes(often);
+  Model once = makeGlobes(6, 60, 1), often = makeGlobes(6, 60, 400);
+  const std::size_t unique = countUniqueBytes(often);
   const std::size_t more = often.objects.size() - once.objects.size();
   const Cost one = measureCost(std::move(once)), many = measureCost(std::move(often));
-  EXPECT_LE(many.beforeParts(), 2 * unique);
-  EXPECT_LE(many.beforeParts() - one.beforeParts(), 256 * more);
+  EXPECT_LE(many.sumBeforeParts(), 2 * unique);
+  EXPECT_LE(many.sumBeforeParts() - one.sumBeforeParts(), 256 * more);
   EXPECT_LE(many.shapes, one.shapes + 4096);
 }
 

@@ -14,7 +14,7 @@ namespace {
 constexpr double kNever = std::numeric_limits<double>::infinity();
 
 /// All solid entities except dynamic bodies, without the further objects of bodies.
-std::vector<EntityId> boundedEntities(const World& world) {
+std::vector<EntityId> listBoundedEntities(const World& world) {
   std::vector<EntityId> entities;
   for (const std::uint32_t object : world.scene().solidObjects()) entities.push_back(object + 1);
   for (const BodySnapshot& body : *world.snapshot()->bodies)
@@ -24,7 +24,7 @@ std::vector<EntityId> boundedEntities(const World& world) {
 }
 
 /// The time that a horizon proves for an entity; nothing is proved for touching ones.
-double provedTime(const ContactHorizon& horizon, EntityId entity) {
+double findProvedTime(const ContactHorizon& horizon, EntityId entity) {
   if (std::ranges::binary_search(horizon.touching, entity)) return 0;
   for (const ContactHorizon::Approach& approach : horizon.approaches)
     if (approach.entity == entity || approach.entity == 0) return approach.notBefore;
@@ -39,8 +39,8 @@ class Checker {
 
   explicit Checker(const World& world, const ContactHorizons::Options& options = {})
       : world_(world),
-        index_(sharedScene(world)),
-        horizons(sharedScene(world), world.settings(), options) {
+        index_(shareScene(world)),
+        horizons(shareScene(world), world.settings(), options) {
     horizons.select(std::nullopt);
   }
 
@@ -50,7 +50,7 @@ class Checker {
     const double now = world_.snapshot()->time;
     for (const ContactEvent& event : report.contacts)
       if (event.kind == ContactEvent::Kind::begin) check({event.a, event.b}, now, "event");
-    const std::vector<EntityId> entities = boundedEntities(world_);
+    const std::vector<EntityId> entities = listBoundedEntities(world_);
     for (const AvatarSnapshot& avatar : world_.snapshot()->avatars) {
       const std::set<EntityId> inContact = findContacts(avatar.id);
       for (const EntityId other : entities)
@@ -58,7 +58,7 @@ class Checker {
     }
   }
 
-  ContactHorizons& all() { return horizons; }
+  ContactHorizons& getHorizons() { return horizons; }
   int claims = 0;     ///< of a pair in a tick, beyond the next tick
   int farClaims = 0;  ///< of them, those that are five ticks ahead or more
   int contacts = 0;   ///< begins of contacts of pairs with an earlier claim
@@ -98,12 +98,12 @@ class Checker {
       lasting += wasListed ? 1 : 0;
       EXPECT_TRUE(isListed || !wasListed) << "a contact that lasts, tick " << now;
       if (at != horizons.horizons().end() && !isListed) {
-        EXPECT_LE(provedTime(at->second, other), now) << "a contact that is not listed";
+        EXPECT_LE(findProvedTime(at->second, other), now) << "a contact that is not listed";
       }
       return;
     }
     if (at == horizons.horizons().end()) return;
-    const double proved = provedTime(at->second, other);
+    const double proved = findProvedTime(at->second, other);
     if (!(proved > now)) return;
     const double tick = world_.settings().tickDuration;
     claims += proved > now + tick ? 1 : 0;
@@ -132,12 +132,12 @@ TEST(ContactHorizon, InABusyRoomNoContactBeginsBeforeItsHorizon) {
     EXPECT_GT(checker.claims, 5'000) << seed;
     EXPECT_GT(checker.farClaims, 1'000) << seed;
     EXPECT_GT(checker.contacts, 5) << seed;
-    EXPECT_EQ(checker.all().statistics().postponed, 0u);
+    EXPECT_EQ(checker.getHorizons().statistics().postponed, 0u);
   }
 }
 
 /// A hall with a grid of columns, furniture, doors and two lifts.
-Model hall(int side) {
+Model makeHallOfColumns(int side) {
   const double half = 3.0 * side;
   std::vector<NamedBox> boxes{{"floor", {-half - 1, -0.2, -half - 1}, {half + 1, 0, half + 1}},
                               {"west", {-half - 1, 0, -half}, {-half, 3, half}},
@@ -153,16 +153,16 @@ Model hall(int side) {
   const auto first = static_cast<std::uint32_t>(boxes.size());
   boxes.push_back({"leaf", {0.02, 0.01, 0}, {0.08, 2.1, 0.95}});
   boxes.push_back({"car", {-half + 1, 0.01, -half + 1}, {-half + 2.5, 0.1, -half + 2.5}});
-  Model model = boxModel(boxes);
-  BodySpec door = bodySpec("door", BodyKind::hinged, {first});
+  Model model = makeBoxModel(boxes);
+  BodySpec door = makeBodySpec("door", BodyKind::hinged, {first});
   door.low = -1.5, door.high = 1.5, door.anchor = {0.05, 0, 0};
-  BodySpec lift = bodySpec("lift", BodyKind::lift, {first + 1});
+  BodySpec lift = makeBodySpec("lift", BodyKind::lift, {first + 1});
   lift.high = 2, lift.stops = {0, 2}, lift.speed = 1;
   model.bodies = {door, lift};
   return model;
 }
 
-WorldSettings walkingSettings() {
+WorldSettings makeWalkingSettings() {
   WorldSettings settings;
   settings.maxSpeed = 2;
   settings.stepHeight = 0.1;
@@ -172,14 +172,15 @@ WorldSettings walkingSettings() {
 /// Two crowds that walk through each other.
 struct TwoCrowds {
   explicit TwoCrowds(int perCrowd, std::uint32_t seed = 7)
-      : random(seed), run(std::make_shared<const Scene>(hall(8)), walkingSettings()) {
+      : random(seed),
+        run(std::make_shared<const Scene>(makeHallOfColumns(8)), makeWalkingSettings()) {
     for (int i = 0; i < perCrowd; ++i) {
       const double z = 2.0 * (i / 2) - perCrowd, x = 9 + 1.3 * (i % 2);
       run.order("w" + std::to_string(i), Spawn{Vec3(-x, 0.001, z)});
       run.order("e" + std::to_string(i), Spawn{Vec3(x, 0.001, z + 0.2)});
     }
     count = perCrowd;
-    run.ticks(10);
+    run.runTicks(10);
   }
   void turn() {
     const auto aside = [&] { return std::uniform_real_distribution(-0.6, 0.6)(random); };
@@ -205,7 +206,7 @@ TEST(ContactHorizon, TwoCrowdsMeetNoEarlierAndFewPairsAreExamined) {
     checker.checkTick(crowds.run.step());
   }
   EXPECT_GT(checker.contacts, 20);
-  const auto& counts = checker.all().statistics();
+  const auto& counts = checker.getHorizons().statistics();
   EXPECT_EQ(counts.postponed, 0u);
   EXPECT_LT(20 * counts.examinations, static_cast<std::uint64_t>(checker.pairs));
   EXPECT_GT(checker.farClaims, 100'000);
@@ -218,8 +219,8 @@ TEST(ContactHorizon, FewerPairsAreExaminedThanThoseNearTheAvatars) {
   ContactHorizons::Options everything;
   everything.examineAll = true;
   everything.maxWork = 100'000'000;
-  ContactHorizons lazy(sharedScene(crowds.run.world), crowds.run.world.settings()),
-      eager(sharedScene(crowds.run.world), crowds.run.world.settings(), everything);
+  ContactHorizons lazy(shareScene(crowds.run.world), crowds.run.world.settings()),
+      eager(shareScene(crowds.run.world), crowds.run.world.settings(), everything);
   for (ContactHorizons* one : {&lazy, &eager}) one->select(std::nullopt);
   for (int i = 0; i < 300; ++i) {
     if (i % 120 == 0) crowds.turn();
@@ -234,8 +235,8 @@ TEST(ContactHorizon, FewerPairsAreExaminedThanThoseNearTheAvatars) {
 TEST(ContactHorizon, IsInTheFutureWhereTheWayIsClear) {
   TwoCrowds crowds(4);
   World& world = crowds.run.world;
-  EntityIndex index(sharedScene(world));
-  ContactHorizons horizons(sharedScene(world), world.settings());
+  EntityIndex index(shareScene(world));
+  ContactHorizons horizons(shareScene(world), world.settings());
   horizons.select(std::nullopt);
   int clear = 0;
   for (int i = 0; i < 200; ++i) {
@@ -264,14 +265,14 @@ TEST(ContactHorizon, WithoutEnoughWorkItIsEarlierAndNeverWrong) {
     if (i % 120 == 0) crowds.turn();
     checker.checkTick(crowds.run.step());
   }
-  EXPECT_GT(checker.all().statistics().postponed, 100u);
+  EXPECT_GT(checker.getHorizons().statistics().postponed, 100u);
   EXPECT_GT(checker.claims, 1'000);
   EXPECT_GE(checker.contacts, 5);
   EXPECT_GT(checker.lasting, 1'000);
 }
 
 /// Without steps and jumps an avatar's bound is twice the speed limit.
-WorldSettings flatSettings(double maxSpeed) {
+WorldSettings makeFlatSettings(double maxSpeed) {
   WorldSettings settings;
   settings.maxSpeed = maxSpeed;
   settings.stepHeight = 0;
@@ -281,17 +282,17 @@ WorldSettings flatSettings(double maxSpeed) {
 }
 
 TEST(ContactHorizon, AtTheSpeedLimitAHorizonIsHalfOfTheTrueTime) {
-  WorldFixture run({floorBox(), {"wall", {5, 0.001, -4}, {5.2, 3, 4}}}, flatSettings(4));
+  WorldFixture run({makeFloorBox(), {"wall", {5, 0.001, -4}, {5.2, 3, 4}}}, makeFlatSettings(4));
   run.order("ann", Spawn{Vec3(-6, 0.001, 0)});
   run.order("bob", Spawn{Vec3(0, 0.001, 0)});
-  run.ticks(20);
+  run.runTicks(20);
   Checker checker(run.world);
   run.order("ann", Drive{{4, 0, 0}});
   run.order("bob", Drive{{-4, 0, 0}});
   checker.checkTick(run.step());
-  const EntityId ann = run.view("ann").id, bob = run.view("bob").id;
+  const EntityId ann = run.getView("ann").id, bob = run.getView("bob").id;
   const double start = run.world.snapshot()->time;
-  const ContactHorizon& first = checker.all().horizons().at(ann);
+  const ContactHorizon& first = checker.getHorizons().horizons().at(ann);
   ASSERT_EQ(first.approaches[0].entity, bob);
   const double proved = first.notBefore() - start;
   while (!run.open.contains({ann, bob}) && run.world.snapshot()->time < start + 5)
@@ -302,47 +303,47 @@ TEST(ContactHorizon, AtTheSpeedLimitAHorizonIsHalfOfTheTrueTime) {
 }
 
 TEST(ContactHorizon, ABodyPushesAnAvatarFasterThanItsSpeedLimit) {
-  Model model = boxModel(
-      {floorBox(), {"ram", {-3, 0.01, -1}, {-2, 2, 1}}, {"wall", {2, 0.001, -4}, {2.2, 3, 4}}});
-  BodySpec ram = bodySpec("ram", BodyKind::sliding, {1});
+  Model model = makeBoxModel(
+      {makeFloorBox(), {"ram", {-3, 0.01, -1}, {-2, 2, 1}}, {"wall", {2, 0.001, -4}, {2.2, 3, 4}}});
+  BodySpec ram = makeBodySpec("ram", BodyKind::sliding, {1});
   ram.axis = {1, 0, 0};
   ram.high = 3.6;
   ram.speed = 5;
   model.bodies = {ram};
-  BodyFixture t(std::move(model), flatSettings(0.5));
+  BodyFixture t(std::move(model), makeFlatSettings(0.5));
   t.order("ann", Spawn{Vec3(0, 0.001, 0)});
-  t.ticks(20);
+  t.runTicks(20);
   Checker checker(t.world);
   t.submit({"ram", BodyCommand::Action::moveTo, 3.6, 0, {}});
   for (int i = 0; i < 120; ++i) checker.checkTick(t.step());
-  EXPECT_GT(t.feet("ann").x(), 1.4) << "it was pushed";
+  EXPECT_GT(t.getFeet("ann").x(), 1.4) << "it was pushed";
   EXPECT_GT(checker.farClaims, 5);
   EXPECT_EQ(checker.contacts, 2) << "of the ram and of the wall";
 }
 
 TEST(ContactHorizon, AnAvatarThatStandsUpWasExpectedTo) {
-  WorldSettings settings = flatSettings(1);
+  WorldSettings settings = makeFlatSettings(1);
   settings.contactOffset = 0.5e-3;
-  WorldFixture run({floorBox(), {"beam", {-1, 1.7513, -1}, {1, 2, 1}}}, settings);
+  WorldFixture run({makeFloorBox(), {"beam", {-1, 1.7513, -1}, {1, 2, 1}}}, settings);
   run.order("ann", Spawn{Vec3(-3, 0.001, 0)});
   run.order("ann", Crouch{0.9});
-  run.order("ann", to(0, 0, 1));
-  run.ticks(240);
-  ASSERT_LT(run.view("ann").height, 1);
+  run.order("ann", makeWalkTo(0, 0, 1));
+  run.runTicks(240);
+  ASSERT_LT(run.getView("ann").height, 1);
   Checker checker(run.world);
   for (int i = 0; i < 10; ++i) checker.checkTick(run.step());
   run.order("ann", Crouch{});
   for (int i = 0; i < 10; ++i) checker.checkTick(run.step());
-  EXPECT_TRUE(run.touched("beam"));
+  EXPECT_TRUE(run.hasTouched("beam"));
 }
 
 TEST(ContactHorizon, ADistantAvatarIsOneSimpleQuotient) {
-  WorldFixture run({{"floor", {-50, -0.2, -50}, {50, 0, 50}}}, walkingSettings());
+  WorldFixture run({{"floor", {-50, -0.2, -50}, {50, 0, 50}}}, makeWalkingSettings());
   run.order("ann", Spawn{Vec3(0, 0.001, 0)});
   run.order("bob", Spawn{Vec3(5.6, 0.001, 0)});
-  run.ticks(20);
-  ContactHorizons horizons(sharedScene(run.world), run.world.settings());
-  const EntityId ann = run.view("ann").id, bob = run.view("bob").id;
+  run.runTicks(20);
+  ContactHorizons horizons(shareScene(run.world), run.world.settings());
+  const EntityId ann = run.getView("ann").id, bob = run.getView("bob").id;
   horizons.select(std::set{ann});
   horizons.update(run.world.snapshot());
   ASSERT_EQ(horizons.horizons().size(), 1u);
@@ -351,16 +352,16 @@ TEST(ContactHorizon, ADistantAvatarIsOneSimpleQuotient) {
   EXPECT_EQ(horizon.unbounded.entity, 0u);
   ASSERT_FALSE(horizon.approaches.empty());
   EXPECT_EQ(horizon.approaches[0].entity, bob);
-  const double speed = 2 * computeAvatarSpeedLimit(run.view("ann"), run.world.settings());
+  const double speed = 2 * computeAvatarSpeedLimit(run.getView("ann"), run.world.settings());
   EXPECT_NEAR(horizon.notBefore() - run.world.snapshot()->time, (5 - 0.001) / speed, 0.01);
 }
 
 TEST(ContactHorizon, NewAvatarsAreIncludedAndLeftOnesAreNot) {
-  WorldFixture run({floorBox()}, walkingSettings());
+  WorldFixture run({makeFloorBox()}, makeWalkingSettings());
   run.order("ann", Spawn{Vec3(0, 0.001, 0)});
-  run.ticks(20);
-  ContactHorizons horizons(sharedScene(run.world), run.world.settings());
-  const EntityId ann = run.view("ann").id;
+  run.runTicks(20);
+  ContactHorizons horizons(shareScene(run.world), run.world.settings());
+  const EntityId ann = run.getView("ann").id;
   horizons.select(std::set{ann});  // without the new one
   horizons.update(run.world.snapshot());
   run.step();
@@ -371,7 +372,7 @@ TEST(ContactHorizon, NewAvatarsAreIncludedAndLeftOnesAreNot) {
   run.step();
   horizons.update(run.world.snapshot());
   ASSERT_FALSE(horizons.horizons().at(ann).approaches.empty());
-  EXPECT_EQ(horizons.horizons().at(ann).approaches[0].entity, run.view("bob").id);
+  EXPECT_EQ(horizons.horizons().at(ann).approaches[0].entity, run.getView("bob").id);
   EXPECT_EQ(horizons.horizons().at(ann).changedTick, run.world.snapshot()->tick);
   run.order("bob", Leave{});
   run.step();
@@ -382,11 +383,11 @@ TEST(ContactHorizon, NewAvatarsAreIncludedAndLeftOnesAreNot) {
 }
 
 TEST(ContactHorizon, RestingAvatarsCostNoExamination) {
-  WorldFixture run({floorBox(), {"wall", {1, 0.01, -2}, {1.2, 3, 2}}}, walkingSettings());
+  WorldFixture run({makeFloorBox(), {"wall", {1, 0.01, -2}, {1.2, 3, 2}}}, makeWalkingSettings());
   run.order("ann", Spawn{Vec3(0, 0.001, 0)});
   run.order("bob", Spawn{Vec3(0, 0.001, 0.7)});
-  run.ticks(30);
-  ContactHorizons horizons(sharedScene(run.world), run.world.settings());
+  run.runTicks(30);
+  ContactHorizons horizons(shareScene(run.world), run.world.settings());
   horizons.select(std::nullopt);
   std::uint64_t first = 0;
   for (int i = 0; i < 130; ++i) {
@@ -401,14 +402,15 @@ TEST(ContactHorizon, RestingAvatarsCostNoExamination) {
 }
 
 TEST(ContactHorizon, NamesTheNearestDynamicBodyAndProvesNothingOfIt) {
-  Model model = boxModel({floorBox(),
-                          {"near", {2, 0.001, -0.5}, {3, 1, 0.5}},
-                          {"far", {-6, 0.001, -0.5}, {-5, 1, 0.5}}});
-  model.bodies = {bodySpec("near", BodyKind::rigid, {1}), bodySpec("far", BodyKind::rigid, {2})};
-  BodyFixture t(std::move(model), walkingSettings());
+  Model model = makeBoxModel({makeFloorBox(),
+                              {"near", {2, 0.001, -0.5}, {3, 1, 0.5}},
+                              {"far", {-6, 0.001, -0.5}, {-5, 1, 0.5}}});
+  model.bodies = {makeBodySpec("near", BodyKind::rigid, {1}),
+                  makeBodySpec("far", BodyKind::rigid, {2})};
+  BodyFixture t(std::move(model), makeWalkingSettings());
   t.order("ann", Spawn{Vec3(0, 0.001, 0)});
-  t.ticks(20);
-  ContactHorizons horizons(sharedScene(t.world), t.world.settings());
+  t.runTicks(20);
+  ContactHorizons horizons(shareScene(t.world), t.world.settings());
   horizons.select(std::nullopt);
   horizons.update(t.world.snapshot());
   ASSERT_EQ(horizons.horizons().size(), 1u);
@@ -422,14 +424,14 @@ TEST(ContactHorizon, NamesTheNearestDynamicBodyAndProvesNothingOfIt) {
 TEST(ContactHorizon, StartsOverAfterAGapOfTicksAndForOtherAvatars) {
   TwoCrowds crowds(3);
   World& world = crowds.run.world;
-  ContactHorizons horizons(sharedScene(world), world.settings());
+  ContactHorizons horizons(shareScene(world), world.settings());
   horizons.select(std::nullopt);
   horizons.update(world.snapshot());
   EXPECT_GE(horizons.horizons().size(), 4u);
   crowds.turn();
-  crowds.run.ticks(200);
+  crowds.run.runTicks(200);
   horizons.update(world.snapshot());
-  ContactHorizons fresh(sharedScene(world), world.settings());
+  ContactHorizons fresh(shareScene(world), world.settings());
   fresh.select(std::nullopt);
   fresh.update(world.snapshot());
   for (const auto& [id, horizon] : fresh.horizons()) {

@@ -14,7 +14,7 @@ namespace {
 
 using namespace testing;
 
-std::vector<NamedBox> corridor(double width, double length) {
+std::vector<NamedBox> makeCorridorBoxes(double width, double length) {
   return {{"floor", {-length, -0.2, -5}, {length, 0, 5}},
           {"left", {-length, 0, -0.5 * width - 0.1}, {length, 3, -0.5 * width}},
           {"right", {-length, 0, 0.5 * width}, {length, 3, 0.5 * width + 0.1}},
@@ -24,18 +24,18 @@ std::vector<NamedBox> corridor(double width, double length) {
 
 TEST(Crowd, TwoAvatarsThatMeetHeadOnStandBitExactlyStill) {
   for (const double aside : {0.0, 0.05, 0.2, 0.5}) {
-    WorldFixture run(corridor(1.0, 10));
+    WorldFixture run(makeCorridorBoxes(1.0, 10));
     run.order("ann", Spawn{{-2, 0, -0.1}});
     run.order("bob", Spawn{{2, 0, -0.1 + (aside > 0.19 ? 0.19 : aside)}});
-    run.untilIdle();
+    run.waitUntilIdle();
     run.order("ann", Drive{{1.3, 0, 0.1 * aside}});
     run.order("bob", Drive{{-1.4, 0, 0.2 * aside}});
-    run.ticks(400);
-    const Vec3 ann = run.feet("ann"), bob = run.feet("bob");
+    run.runTicks(400);
+    const Vec3 ann = run.getFeet("ann"), bob = run.getFeet("bob");
     for (int i = 0; i < 100; ++i) {
       run.step();
-      ASSERT_EQ(run.feet("ann"), ann) << "aside " << aside << ", tick " << i;
-      ASSERT_EQ(run.feet("bob"), bob) << "aside " << aside << ", tick " << i;
+      ASSERT_EQ(run.getFeet("ann"), ann) << "aside " << aside << ", tick " << i;
+      ASSERT_EQ(run.getFeet("bob"), bob) << "aside " << aside << ", tick " << i;
     }
     EXPECT_LT(bob.x() - ann.x(), 0.65) << aside;
     EXPECT_EQ(run.worstPenetration, 0);
@@ -44,22 +44,22 @@ TEST(Crowd, TwoAvatarsThatMeetHeadOnStandBitExactlyStill) {
 
 TEST(Crowd, AvatarDrivenIntoCornerStands) {
   for (const double angle : {0.1, 0.5, 0.9}) {
-    WorldFixture run(corridor(1.0, 10));
+    WorldFixture run(makeCorridorBoxes(1.0, 10));
     run.order("ann", Spawn{{9, 0, 0}});
-    run.untilIdle();
+    run.waitUntilIdle();
     run.order("ann", Drive{{1 - angle, 0, angle}});
-    run.ticks(900);
-    const Vec3 feet = run.feet("ann");
+    run.runTicks(900);
+    const Vec3 feet = run.getFeet("ann");
     for (int i = 0; i < 100; ++i) {
       run.step();
-      ASSERT_EQ(run.feet("ann"), feet) << angle << ", tick " << i;
+      ASSERT_EQ(run.getFeet("ann"), feet) << angle << ", tick " << i;
     }
     EXPECT_GT(feet.x(), 9.6);
   }
 }
 
 TEST(Crowd, TwoHundredAvatarsInACorridorNeverPenetrateOrEscape) {
-  WorldFixture run(corridor(4, 30));
+  WorldFixture run(makeCorridorBoxes(4, 30));
   for (int i = 0; i < 200; ++i) {
     const double x = -24.5 + 1.0 * (i / 4), z = -1.5 + 1.0 * (i % 4);
     run.order("a" + std::to_string(i), Spawn{{x, 0, z}});
@@ -88,14 +88,14 @@ TEST(Crowd, AvatarDrivenIntoTooNarrowGapStands) {
                       {"left", {2, 0, -6}, {2.05, 3, -0.5 * gap}},
                       {"right", {2, 0, 0.5 * gap}, {2.05, 3, 6}}});
     run.order("ann", Spawn{{0, 0, 0.003 * i}});
-    run.untilIdle();
+    run.waitUntilIdle();
     run.order("ann", Drive{{1.3, 0, 0.1 * turn}});
-    run.ticks(1200);
-    const Vec3 feet = run.feet("ann");
+    run.runTicks(1200);
+    const Vec3 feet = run.getFeet("ann");
     EXPECT_LT(feet.x(), 2.2);
     for (int tick = 0; tick < 30; ++tick) {
       run.step();
-      ASSERT_EQ(run.feet("ann"), feet) << gap << ", tick " << tick;
+      ASSERT_EQ(run.getFeet("ann"), feet) << gap << ", tick " << tick;
     }
   }
 }
@@ -111,14 +111,14 @@ struct Hall {
       : run({{"floor", {-20, -0.2, -12}, {40, 0, 12}},
              {"left", {0, 0, -12}, {0.2, 3, -0.6}},
              {"right", {0, 0, 0.6}, {0.2, 3, 12}}}) {
-    for (int i = 0; i < avatars; ++i) run.order(name(i), Spawn{start(i)});
+    for (int i = 0; i < avatars; ++i) run.order(makeName(i), Spawn{start(i)});
     run.step();
     EXPECT_EQ(run.count(Notice::Kind::spawned), avatars);
   }
 
-  static std::string name(int i) { return "a" + std::to_string(i); }
+  static std::string makeName(int i) { return "a" + std::to_string(i); }
   static Vec3 start(int i) { return {-1.5 - 0.8 * (i / 20), 0, -8 + 0.8 * (i % 20)}; }
-  static Vec3 goal(int i) { return {12, 0, -9 + 1.2 * (i % 16)}; }
+  static Vec3 computeGoal(int i) { return {12, 0, -9 + 1.2 * (i % 16)}; }
 
   /// Avatars that arrive leave; none is sent again.
   void walkAll(int avatars, const std::function<std::vector<Vec3>(int)>& waypoints) {
@@ -126,8 +126,8 @@ struct Hall {
       Walk walk;
       walk.waypoints = waypoints(i);
       walk.speed = 1.3;
-      run.order(name(i), walk);
-      run.order(name(i), Leave{});
+      run.order(makeName(i), walk);
+      run.order(makeName(i), Leave{});
     }
     std::size_t seen = run.notices.size();
     std::map<EntityId, Vec3> last;
@@ -152,7 +152,7 @@ struct Hall {
 TEST(Crowd, TwoHundredAvatarsLeaveByOneDoorAndNobodyIsStuck) {
   Hall hall(200);
   hall.walkAll(200, [](int i) {
-    return std::vector<Vec3>{{-0.4, 0, 0}, {2, 0, 0}, Hall::goal(i)};
+    return std::vector<Vec3>{{-0.4, 0, 0}, {2, 0, 0}, Hall::computeGoal(i)};
   });
   EXPECT_EQ(hall.arrived.size(), 200u);
   EXPECT_EQ(hall.blocked, 0);
@@ -167,8 +167,8 @@ TEST(Crowd, AvatarsOnShortestPathsLeaveByOneDoorAndNobodyIsStuck) {
     Hall hall(avatars);
     hall.walkAll(avatars, [](int i) -> std::vector<Vec3> {
       if (Hall::start(i).z() < 0)
-        return {{-0.35, 0, -0.5}, {-0.15, 0, -0.25}, {0.4, 0, -0.25}, Hall::goal(i)};
-      return {{-0.3, 0, 0.45}, {-0.05, 0, 0.25}, {0.4, 0, 0.3}, Hall::goal(i)};
+        return {{-0.35, 0, -0.5}, {-0.15, 0, -0.25}, {0.4, 0, -0.25}, Hall::computeGoal(i)};
+      return {{-0.3, 0, 0.45}, {-0.05, 0, 0.25}, {0.4, 0, 0.3}, Hall::computeGoal(i)};
     });
     EXPECT_EQ(hall.arrived.size(), static_cast<std::size_t>(avatars));
     EXPECT_EQ(hall.blocked, 0);
@@ -180,7 +180,7 @@ TEST(Crowd, AvatarsOnShortestPathsLeaveByOneDoorAndNobodyIsStuck) {
 /// All avatars press towards one end, each also a little sideways, until they stop.
 TEST(Crowd, AvatarBlockedInACrowdDoesNotJitter) {
   constexpr int kThrong = 120;
-  WorldFixture run(corridor(4, 30));
+  WorldFixture run(makeCorridorBoxes(4, 30));
   for (int i = 0; i < kThrong; ++i) {
     const double x = 13.5 + 0.66 * (i / 5), z = -1.5 + 0.75 * (i % 5);
     run.order("a" + std::to_string(i), Spawn{{x, 0, z}});
@@ -189,7 +189,7 @@ TEST(Crowd, AvatarBlockedInACrowdDoesNotJitter) {
   ASSERT_EQ(run.count(Notice::Kind::spawned), kThrong);
   for (int i = 0; i < kThrong; ++i)
     run.order("a" + std::to_string(i), Drive{{1.3, 0, 0.1 * (i % 7 - 3)}});
-  run.ticks(420);
+  run.runTicks(420);
   const auto feetOfAll = [&] {
     std::vector<Vec3> feet;
     for (const AvatarSnapshot& a : run.world.snapshot()->avatars) feet.push_back(a.footPosition);

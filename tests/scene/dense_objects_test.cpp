@@ -29,21 +29,21 @@ Spawn makeSpawn(int i, const Vec3& position) {
   spawn.position = position;
   spawn.flying = i % 4 == 3;
   if (i % 4 == 1)
-    spawn.parts = {boxPoints({-0.2, 0, -0.3}, {0.2, 0.9, 0.3}),
-                   boxPoints({-0.1, 0.9, -0.1}, {0.1, 1.2, 0.1})};
+    spawn.parts = {makeBoxPoints({-0.2, 0, -0.3}, {0.2, 0.9, 0.3}),
+                   makeBoxPoints({-0.1, 0.9, -0.1}, {0.1, 1.2, 0.1})};
   if (i % 4 == 2)
     spawn.links = {{-1,
                     {LinkJoint::Kind::revolute, {0, 1.2, 0}, {0, 1, 0}, -3, 3},
-                    boxPoints({0, 0, -0.05}, {0.8, 0.1, 0.05}),
+                    makeBoxPoints({0, 0, -0.05}, {0.8, 0.1, 0.05}),
                     0}};
   return spawn;
 }
 
-Vec3 somewhere(const Scene& scene, Seeded& random) {
+Vec3 drawPlace(const Scene& scene, Seeded& random) {
   const Aabb& bounds = scene.bounds();
-  return {random.uniform(bounds.min.x(), bounds.max.x()),
-          random.uniform(bounds.min.y(), bounds.min.y() + 0.8 * bounds.size().y()),
-          random.uniform(bounds.min.z(), bounds.max.z())};
+  return {random.drawUniform(bounds.min.x(), bounds.max.x()),
+          random.drawUniform(bounds.min.y(), bounds.min.y() + 0.8 * bounds.size().y()),
+          random.drawUniform(bounds.min.z(), bounds.max.z())};
 }
 
 /// Commands of one tick: spawns of those that have no place yet, and new directions.
@@ -51,13 +51,14 @@ TickCommands makeCommands(const Scene& scene, int avatars, int tick, Seeded& ran
   TickCommands commands;
   for (int i = 0; i < avatars; ++i) {
     if (tick < 60)
-      commands.avatars.push_back({makeName(i), makeSpawn(i, somewhere(scene, random)), 0});
+      commands.avatars.push_back({makeName(i), makeSpawn(i, drawPlace(scene, random)), 0});
     if (tick % 20 != i % 20) continue;
-    const double speed = random.uniform(0.5, 4);
+    const double speed = random.drawUniform(0.5, 4);
     commands.avatars.push_back(
-        {makeName(i), Drive{speed * randomVelocity(random, i % 4 == 3).normalized()}, 0});
+        {makeName(i), Drive{speed * makeRandomVelocity(random, i % 4 == 3).normalized()}, 0});
     if (i % 4 == 2)
-      commands.avatars.push_back({makeName(i), DriveJoints{{random.uniform(-3, 3)}, 2, true}, 0});
+      commands.avatars.push_back(
+          {makeName(i), DriveJoints{{random.drawUniform(-3, 3)}, 2, true}, 0});
     if (i % 4 == 0) commands.avatars.push_back({makeName(i), Jump{0.4, {}}, 0});
   }
   return commands;
@@ -79,7 +80,7 @@ TEST_P(DenseObjects, ContactsAreThoseOfBruteForceAndNothingPenetrates) {
     ASSERT_EQ(compared.different, 0u) << "tick " << tick;
     contacts += compared.expected;
     if (tick % 50 == 0) {
-      ASSERT_EQ(penetrations(run.world), 0) << "tick " << tick;
+      ASSERT_EQ(countPenetrations(run.world), 0) << "tick " << tick;
     }
   }
   EXPECT_EQ(run.worstPenetration, 0);
@@ -99,11 +100,11 @@ TEST_P(DenseObjects, ACopyFromACheckpointIsBitEqual) {
   compareCopies(scene, watchful, commands, kUntil, {0, 61, 90, 110}, 250);
 }
 
-INSTANTIATE_TEST_SUITE_P(In, DenseObjects, ::testing::ValuesIn(tests::denseScenes()),
+INSTANTIATE_TEST_SUITE_P(In, DenseObjects, ::testing::ValuesIn(tests::listDenseScenes()),
                          [](const auto& dense) { return std::string(dense.param.name); });
 
 /// A flat floor of 2 * steps * steps triangles.
-Model fineFloor(int steps) {
+Model makeFineFloor(int steps) {
   Mesh mesh;
   for (int i = 0; i <= steps; ++i)
     for (int k = 0; k <= steps; ++k)
@@ -123,9 +124,9 @@ Model fineFloor(int steps) {
 
 TEST(DenseObjects, AWalkOnAFineFloorAsksAsLittleAsOnACoarseOne) {
   for (const int steps : {10, 300}) {
-    WorldFixture run(std::make_shared<const Scene>(fineFloor(steps)));
+    WorldFixture run(std::make_shared<const Scene>(makeFineFloor(steps)));
     run.order("ann", Spawn{Vec3(2, 0.1, 5)});
-    run.ticks(30);
+    run.runTicks(30);
     run.order("ann", Drive{{1.5, 0, 0.3}});
     std::uint64_t queries = 0;
     for (int i = 0; i < 120; ++i) {
@@ -134,40 +135,40 @@ TEST(DenseObjects, AWalkOnAFineFloorAsksAsLittleAsOnACoarseOne) {
       EXPECT_EQ(report.avatarWork.at(0).narrowQueries, report.narrowQueries);
       EXPECT_GT(report.partsLookedAt, 0u);
     }
-    EXPECT_GT(run.feet("ann").x(), 4.9);
+    EXPECT_GT(run.getFeet("ann").x(), 4.9);
     EXPECT_LT(queries / 120, 15u) << steps << " steps";
   }
 }
 
 TEST(DenseObjects, PartsLookedAtAreThoseOfTheAvatarThatIsNearThem) {
-  Model model = boxModel({floorBox()});
-  model.meshes.push_back(fineFloor(60).meshes.front());
+  Model model = makeBoxModel({makeFloorBox()});
+  model.meshes.push_back(makeFineFloor(60).meshes.front());
   Eigen::Affine3d upright(Eigen::Translation3d(4, 0, -5));  // a wall at x = 4
   upright.rotate(Eigen::AngleAxisd(0.5 * std::numbers::pi, Vec3::UnitZ()));
   model.objects.push_back({"fine wall", "", {1}, upright});
   WorldFixture run(std::make_shared<const Scene>(std::move(model)));
   run.order("ann", Spawn{Vec3(3.5, 0.1, 0)});
   run.order("ben", Spawn{Vec3(-6, 0.1, 0)});
-  run.ticks(30);
+  run.runTicks(30);
   for (const char* name : {"ann", "ben"}) run.order(name, Drive{{1.5, 0, 0.3}});
-  run.ticks(30);
-  EXPECT_TRUE(run.touched("fine wall"));
+  run.runTicks(30);
+  EXPECT_TRUE(run.hasTouched("fine wall"));
   for (int i = 0; i < 60; ++i) {
     const TickReport report = run.step();
     ASSERT_EQ(report.avatarWork.size(), 2u);
     const AvatarWork &near = report.avatarWork[0], &far = report.avatarWork[1];
-    ASSERT_EQ(near.id, run.view("ann").id);
-    ASSERT_EQ(far.id, run.view("ben").id);
+    ASSERT_EQ(near.id, run.getView("ann").id);
+    ASSERT_EQ(far.id, run.getView("ben").id);
     EXPECT_GT(far.partsLookedAt, 0u) << "of the floor, tick " << i;
     EXPECT_GT(near.partsLookedAt, far.partsLookedAt) << "tick " << i;
     EXPECT_EQ(near.partsLookedAt + far.partsLookedAt, report.partsLookedAt) << "tick " << i;
-    EXPECT_EQ(near.footPosition, run.feet("ann"));
+    EXPECT_EQ(near.footPosition, run.getFeet("ann"));
   }
 }
 
 TEST(DenseObjects, GeometryIsBuiltBeforeAnAvatarGetsThere) {
-  Model model = fineFloor(2);
-  model.meshes.push_back(fineFloor(20).meshes.front());
+  Model model = makeFineFloor(2);
+  model.meshes.push_back(makeFineFloor(20).meshes.front());
   model.objects.push_back({"far floor", "", {1}, Eigen::Affine3d(Eigen::Translation3d(12, 0, 0))});
   const auto scene = std::make_shared<const Scene>(std::move(model));
   WorldFixture run(scene);

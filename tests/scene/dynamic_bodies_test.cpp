@@ -13,18 +13,18 @@ using namespace testing;
 using Event = ContactEvent::Kind;
 
 /// A floor, and free boxes.
-Model loose(const std::vector<NamedBox>& boxes, const std::vector<NamedBox>& still = {}) {
-  std::vector<NamedBox> all{floorBox()};
+Model makeLooseModel(const std::vector<NamedBox>& boxes, const std::vector<NamedBox>& still = {}) {
+  std::vector<NamedBox> all{makeFloorBox()};
   all.insert(all.end(), still.begin(), still.end());
   const auto first = static_cast<std::uint32_t>(all.size());
   all.insert(all.end(), boxes.begin(), boxes.end());
-  Model model = boxModel(all);
+  Model model = makeBoxModel(all);
   for (std::uint32_t i = 0; i < boxes.size(); ++i)
-    model.bodies.push_back(bodySpec(boxes[i].path, BodyKind::rigid, {first + i}));
+    model.bodies.push_back(makeBodySpec(boxes[i].path, BodyKind::rigid, {first + i}));
   return model;
 }
 
-bool penetrate(const collision::PlacedConvex& a, const collision::PlacedConvex& b) {
+bool arePenetrating(const collision::PlacedConvex& a, const collision::PlacedConvex& b) {
   collision::FeatureCache cache;
   return collision::computeSeparation(a, b, cache).verdict == collision::Verdict::penetrating;
 }
@@ -32,13 +32,14 @@ bool penetrate(const collision::PlacedConvex& a, const collision::PlacedConvex& 
 /// Whether the body penetrates a triangle of a static object, by the exact verdict.
 bool isIn(const World& world, const Body& body, std::uint32_t object) {
   for (const collision::Triangle& t : collectSolidTriangles(world.data().scene->model(), object))
-    if (penetrate(makePlacedPart(body, 0), {std::span<const Vec3>(t), Vec3::Zero()})) return true;
+    if (arePenetrating(makePlacedPart(body, 0), {std::span<const Vec3>(t), Vec3::Zero()}))
+      return true;
   return false;
 }
 
 /// Whether any dynamic body penetrates a triangle or another body, kinematic or dynamic, by the
 /// exact verdict.
-bool anyBodyPenetrates(const World& world) {
+bool isAnyBodyPenetrating(const World& world) {
   const WorldData& state = world.data();
   for (std::size_t i = 0; i < state.bodies.size(); ++i) {
     const Body& body = state.bodies[i];
@@ -46,16 +47,16 @@ bool anyBodyPenetrates(const World& world) {
     for (const std::uint32_t object : state.scene->solidObjects())
       if (isIn(world, body, object)) return true;
     for (std::size_t k = 0; k < state.bodies.size(); ++k)
-      if (k != i && penetrate(makePlacedPart(body, 0), makePlacedPart(state.bodies[k], 0)))
+      if (k != i && arePenetrating(makePlacedPart(body, 0), makePlacedPart(state.bodies[k], 0)))
         return true;
   }
   return false;
 }
 
 TEST(DynamicBodies, ABoxFallsOntoTheFloorRestsThereAndCostsNothingAsleep) {
-  BodyFixture t(loose({{"box", {0, 1, 0}, {0.4, 1.4, 0.4}}}));
-  t.ticks(150);
-  const Body& box = t.body("box");
+  BodyFixture t(makeLooseModel({{"box", {0, 1, 0}, {0.4, 1.4, 0.4}}}));
+  t.runTicks(150);
+  const Body& box = t.getBody("box");
   EXPECT_TRUE(box.asleep);
   EXPECT_NEAR(box.position.y(), 0.2, 0.5e-3);
   EXPECT_GT(box.position.y(), 0.2);
@@ -63,19 +64,19 @@ TEST(DynamicBodies, ABoxFallsOntoTheFloorRestsThereAndCostsNothingAsleep) {
   const TickReport report = t.step();
   EXPECT_TRUE(report.idle);
   EXPECT_EQ(report.narrowQueries, 0u);
-  t.ticks(100);
-  EXPECT_EQ(t.body("box").position, rest);
+  t.runTicks(100);
+  EXPECT_EQ(t.getBody("box").position, rest);
 }
 
 TEST(DynamicBodies, ABoxThatRestsKeepsItsContactHoweverFarNearMissesAreLookedFor) {
   for (const double nearMiss : {0.0, 0.05, 0.3, 3.0}) {
     WorldSettings settings;
     settings.nearMissDistance = nearMiss;
-    BodyFixture t(loose({{"box", {-0.2, 0.7, -0.2}, {0.2, 1.1, 0.2}}}), settings);
-    t.untilIdle();
-    t.ticks(10);
-    EXPECT_TRUE(t.body("box").asleep);
-    EXPECT_FALSE(t.body("box").moved) << nearMiss;
+    BodyFixture t(makeLooseModel({{"box", {-0.2, 0.7, -0.2}, {0.2, 1.1, 0.2}}}), settings);
+    t.waitUntilIdle();
+    t.runTicks(10);
+    EXPECT_TRUE(t.getBody("box").asleep);
+    EXPECT_FALSE(t.getBody("box").moved) << nearMiss;
     EXPECT_EQ(t.countEvents(Event::begin, "box", "floor"), 1) << nearMiss;
     EXPECT_EQ(t.countEvents(Event::end, "box", "floor"), 0) << nearMiss;
   }
@@ -87,13 +88,13 @@ TEST(DynamicBodies, ATowerStaysAndSleepsWithoutPenetration) {
     const double low = 0.001 + 0.301 * i;
     tower.push_back({"b" + std::to_string(i), {0, low, 0}, {0.3, low + 0.3, 0.3}});
   }
-  BodyFixture t(loose(tower));
+  BodyFixture t(makeLooseModel(tower));
   for (int i = 0; i < 240; ++i) {
     t.step();
-    ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
+    ASSERT_FALSE(isAnyBodyPenetrating(t.world)) << i;
   }
   for (int i = 0; i < 5; ++i) {
-    const Body& box = t.body("b" + std::to_string(i));
+    const Body& box = t.getBody("b" + std::to_string(i));
     EXPECT_TRUE(box.asleep) << i;
     EXPECT_NEAR(box.position.x(), 0.15, 2e-3) << i;
   }
@@ -101,19 +102,19 @@ TEST(DynamicBodies, ATowerStaysAndSleepsWithoutPenetration) {
 
 TEST(DynamicBodies, AHeavyFallingBoxDoesNotPressAnAvatarIntoTheWall) {
   for (const double speed : {5.0, 50.0, 500.0}) {
-    Model model = loose({{"crate", {-0.4, 3, -0.4}, {0.7, 4, 0.6}}},
-                        {{"wall", {0.31, 0, -3}, {0.5, 2.9, 3}}});
+    Model model = makeLooseModel({{"crate", {-0.4, 3, -0.4}, {0.7, 4, 0.6}}},
+                                 {{"wall", {0.31, 0, -3}, {0.5, 2.9, 3}}});
     model.bodies[0].mass = 5000;
     BodyFixture t(std::move(model));
     t.order("ann", Spawn{.position = {0, 0.001, 0}});
-    t.ticks(2);
+    t.runTicks(2);
     auto& stage = t.world.data().dynamicBodies;
     stage.physicsWorld.bodies[0].motion.velocity = {0.3 * speed, -speed, 0};
     double low = 3.5;
     for (int i = 0; i < 120; ++i) {
       t.step();
-      ASSERT_EQ(whoPenetrates(t.world), "") << speed << " tick " << i;
-      low = std::min(low, t.body("crate").position.y());
+      ASSERT_EQ(namePenetratingPairs(t.world), "") << speed << " tick " << i;
+      low = std::min(low, t.getBody("crate").position.y());
     }
     EXPECT_LT(low, 3.45) << speed << ": it never came down onto the wall";
   }
@@ -121,7 +122,7 @@ TEST(DynamicBodies, AHeavyFallingBoxDoesNotPressAnAvatarIntoTheWall) {
 
 TEST(DynamicBodies, AnAvatarPushesALightBoxAlongAndNotAHeavyOne) {
   for (const bool heavy : {false, true}) {
-    Model model = loose({{"box", {1, 0.0005, -0.3}, {1.6, 0.6, 0.3}}});
+    Model model = makeLooseModel({{"box", {1, 0.0005, -0.3}, {1.6, 0.6, 0.3}}});
     model.bodies[0].mass = heavy ? 2000 : 20;
     BodyFixture t(std::move(model));
     t.order("ann", Spawn{.position = {0, 0.001, 0}});
@@ -129,9 +130,9 @@ TEST(DynamicBodies, AnAvatarPushesALightBoxAlongAndNotAHeavyOne) {
     t.order("ann", Drive{{1, 0, 0}});
     for (int i = 0; i < 180; ++i) {
       t.step();
-      ASSERT_EQ(whoPenetrates(t.world), "") << i;
+      ASSERT_EQ(namePenetratingPairs(t.world), "") << i;
     }
-    const double moved = t.body("box").position.x() - 1.3;
+    const double moved = t.getBody("box").position.x() - 1.3;
     if (heavy) {
       EXPECT_LT(std::abs(moved), 1e-3);
     } else {
@@ -149,7 +150,7 @@ TEST(DynamicBodies, EachBounceIsReportedAtItsPlace) {
   for (int i = 1; i < 6; ++i)
     boxes.push_back(
         {"b" + std::to_string(i), {2.0 * i, 0.7 * i, 0}, {2.0 * i + 0.3, 0.7 * i + 0.3, 0.3}});
-  Model model = loose(boxes);
+  Model model = makeLooseModel(boxes);
   for (BodySpec& body : model.bodies) body.restitution = 0.9, body.friction = 0;
   BodyFixture t(std::move(model));
   t.order("ann", Spawn{.position = {0, 0.001, 0}});
@@ -170,7 +171,7 @@ TEST(DynamicBodies, EachBounceIsReportedAtItsPlace) {
       }
     }
     for (const NamedBox& box : boxes) {
-      const double speed = t.body(box.path).velocity.y();
+      const double speed = t.getBody(box.path).velocity.y();
       const bool bounced = std::exchange(speeds[box.path], speed) < -0.5 && speed > 0.5;
       if (!bounced) continue;
       ++bounces;
@@ -182,16 +183,16 @@ TEST(DynamicBodies, EachBounceIsReportedAtItsPlace) {
 
 /// The first event of a cube that falls corner first onto a plate: the order of `a` and `b`, and
 /// the features of both.
-ContactEvent cornerOnPlate(std::optional<BodyKind> plateIs, std::uint32_t cube) {
+ContactEvent dropCornerOnPlate(std::optional<BodyKind> plateIs, std::uint32_t cube) {
   const NamedBox plate{"plate", {-1, 0.1, -2}, {2, 0.2, 1}};
   const NamedBox fallen{"cube", {-0.1, -0.1, -0.1}, {0.1, 0.1, 0.1}};
-  Model model = boxModel(cube == 1 ? std::vector{floorBox(), fallen, plate}
-                                   : std::vector{floorBox(), plate, fallen});
+  Model model = makeBoxModel(cube == 1 ? std::vector{makeFloorBox(), fallen, plate}
+                                       : std::vector{makeFloorBox(), plate, fallen});
   const Quat turn = Quat::FromTwoVectors(Vec3(1, 1, 1), Vec3::UnitY());
   model.objects[cube].worldFromMesh = Eigen::Translation3d(0, 0.6, 0) * turn;
-  model.bodies = {bodySpec("cube", BodyKind::rigid, {cube})};
+  model.bodies = {makeBodySpec("cube", BodyKind::rigid, {cube})};
   if (plateIs) {
-    model.bodies.push_back(bodySpec("plate", *plateIs, {3 - cube}));
+    model.bodies.push_back(makeBodySpec("plate", *plateIs, {3 - cube}));
     model.bodies.back().axis = Vec3::UnitX();
     if (*plateIs == BodyKind::sliding) model.bodies.back().high = 0.1;
   }
@@ -214,7 +215,7 @@ TEST(DynamicBodies, ACubeFallingOnItsCornerReportsTheCornerAndTheFace) {
   for (const std::uint32_t cube : {1u, 2u}) {
     for (const auto plateIs : {std::optional<BodyKind>(), std::optional(BodyKind::sliding),
                                std::optional(BodyKind::rigid)}) {
-      const ContactEvent met = cornerOnPlate(plateIs, cube);
+      const ContactEvent met = dropCornerOnPlate(plateIs, cube);
       // If both bodies are dynamic, the one with the lower id reports; otherwise the dynamic one
       // does.
       const bool cubeTells = plateIs != BodyKind::rigid || cube == 1;
@@ -227,15 +228,15 @@ TEST(DynamicBodies, ACubeFallingOnItsCornerReportsTheCornerAndTheFace) {
 
 TEST(DynamicBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
   for (const double speed : {0.5, 1.0, 1.05, 5.0}) {
-    Model model = loose({{"box", {0.5, 0.0005, 0.1}, {0.8, 0.3, 0.4}}},
-                        {{"leaf", {0, 0.01, -0.02}, {1, 2.1, 0.02}}});
-    BodySpec door = bodySpec("door", BodyKind::hinged, {1});
+    Model model = makeLooseModel({{"box", {0.5, 0.0005, 0.1}, {0.8, 0.3, 0.4}}},
+                                 {{"leaf", {0, 0.01, -0.02}, {1, 2.1, 0.02}}});
+    BodySpec door = makeBodySpec("door", BodyKind::hinged, {1});
     door.low = -1.5, door.high = 1.5, door.speed = speed;
     model.bodies.push_back(door);
     BodyFixture t(std::move(model));
-    t.ticks(120);
-    ASSERT_TRUE(t.body("box").asleep);
-    const Vec3 before = t.body("box").position;
+    t.runTicks(120);
+    ASSERT_TRUE(t.getBody("box").asleep);
+    const Vec3 before = t.getBody("box").position;
     t.submit({"door", BodyCommand::Action::moveTo, -1.2, 0, {}});
     for (int i = 0; i < 180; ++i) {
       const std::uint32_t crushed = t.step().crushedBodies;
@@ -244,21 +245,21 @@ TEST(DynamicBodies, ASleepingBoxIsWokenByADoorOfAnySpeedThatPushesIt) {
       if (speed < 2) {
         EXPECT_EQ(crushed, 0u) << speed << " tick " << i;
       }
-      ASSERT_FALSE(anyBodyPenetrates(t.world)) << speed << " tick " << i;
+      ASSERT_FALSE(isAnyBodyPenetrating(t.world)) << speed << " tick " << i;
     }
-    EXPECT_GT((t.body("box").position - before).norm(), 0.2) << speed;
+    EXPECT_GT((t.getBody("box").position - before).norm(), 0.2) << speed;
     // The box stays on the side of the leaf to which it was pushed.
-    const Body& leaf = t.body("door");
-    const Vec3 seen = leaf.rotation.transpose() * (t.body("box").position - leaf.position);
+    const Body& leaf = t.getBody("door");
+    const Vec3 seen = leaf.rotation.transpose() * (t.getBody("box").position - leaf.position);
     EXPECT_GT(seen.z(), 0.02) << speed;
   }
 }
 
 /// A shuttle that moves back and forth along `way` and presses boxes against a post.
-Model pressing(const std::vector<NamedBox>& boxes, const Vec3& way, double seconds) {
-  Model model =
-      loose(boxes, {{"post", {2, 0, -1}, {2.2, 2, 2}}, {"shuttle", {-1, 0.01, 0}, {0, 0.6, 1}}});
-  BodySpec shuttle = bodySpec("shuttle", BodyKind::path, {2});
+Model makePressingModel(const std::vector<NamedBox>& boxes, const Vec3& way, double seconds) {
+  Model model = makeLooseModel(
+      boxes, {{"post", {2, 0, -1}, {2.2, 2, 2}}, {"shuttle", {-1, 0.01, 0}, {0, 0.6, 1}}});
+  BodySpec shuttle = makeBodySpec("shuttle", BodyKind::path, {2});
   shuttle.keys = {{0, Vec3::Zero(), 0}, {seconds, way, 0}, {2 * seconds, Vec3::Zero(), 0}};
   shuttle.loops = true;
   model.bodies.push_back(shuttle);
@@ -290,30 +291,32 @@ std::uint32_t pressSixTimes(BodyFixture& t, double seconds, double astray) {
 TEST(DynamicBodies, AShuttleThatPressesABoxAgainstAPostGoesThroughItAndLeavesItThere) {
   // Travel of the shuttle in metres: a little into the box, past its middle, past the post.
   for (const double far : {1.6, 2.0, 2.3}) {
-    BodyFixture t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {far, 0, 0}, far));
+    BodyFixture t(
+        makePressingModel({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {far, 0, 0}, far));
     EXPECT_GT(pressSixTimes(t, far, 0.02), 0u) << far;
-    EXPECT_NEAR(t.body("box").position.x(), 1.75, 0.02) << far;
+    EXPECT_NEAR(t.getBody("box").position.x(), 1.75, 0.02) << far;
   }
 }
 
 TEST(DynamicBodies, AShuttleThatPressesARowOfBoxesEjectsNoBox) {
   for (const double far : {1.2, 1.6, 2.5}) {
-    BodyFixture t(pressing({{"first", {0.3, 0.0005, 0.2}, {0.7, 0.5, 0.7}},
-                            {"second", {0.9, 0.0005, 0.25}, {1.3, 0.4, 0.75}}},
-                           {far, 0, 0}, far));
+    BodyFixture t(makePressingModel({{"first", {0.3, 0.0005, 0.2}, {0.7, 0.5, 0.7}},
+                                     {"second", {0.9, 0.0005, 0.25}, {1.3, 0.4, 0.75}}},
+                                    {far, 0, 0}, far));
     EXPECT_GT(pressSixTimes(t, far, 0.1), 0u) << far;
   }
 }
 
 TEST(DynamicBodies, AnObliqueShuttleCarriesNoPenetratedBox) {
   for (const double aside : {-0.4, 0.1, 0.4}) {
-    BodyFixture t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2.2, 0, aside}, 2.2));
+    BodyFixture t(
+        makePressingModel({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2.2, 0, aside}, 2.2));
     EXPECT_GT(pressSixTimes(t, 2.2, 0.1), 0u) << aside;
   }
 }
 
 TEST(DynamicBodies, AWorldRestoredWhileABoxIsPressedContinuesIdentically) {
-  BodyFixture t(pressing({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2, 0, 0}, 2));
+  BodyFixture t(makePressingModel({{"box", {0.5, 0.0005, 0.2}, {1.0, 0.5, 0.7}}}, {2, 0, 0}, 2));
   while (t.world.snapshot()->tick < 115) tickWorld(t.world);
   World again = restoreWorld(t.world.data().scene, makeCheckpoint(t.world));
   for (int i = 0; i < 60; ++i)
@@ -327,22 +330,22 @@ TEST(DynamicBodies, AStackThatSleepsOnALiftIsLiftedAsOne) {
       const double low = 0.101 + 0.501 * i;
       stack.push_back({"b" + std::to_string(i), {0, low, 0}, {0.5, low + 0.5, 0.5}});
     }
-    Model model = loose(stack, {{"lift", {-1, 0, -1}, {1, 0.1, 1}}});
-    BodySpec lift = bodySpec("lift", BodyKind::lift, {1});
+    Model model = makeLooseModel(stack, {{"lift", {-1, 0, -1}, {1, 0.1, 1}}});
+    BodySpec lift = makeBodySpec("lift", BodyKind::lift, {1});
     lift.stops = {0, 2}, lift.high = 2;
     model.bodies.push_back(lift);
     BodyFixture t(std::move(model));
-    t.ticks(240);
-    ASSERT_TRUE(t.body("b0").asleep);
+    t.runTicks(240);
+    ASSERT_TRUE(t.getBody("b0").asleep);
     t.submit({"lift", BodyCommand::Action::moveTo, 2, 0, {}});
-    t.ticks(240);  // checks for penetration after each tick
+    t.runTicks(240);  // checks for penetration after each tick
     for (int i = 0; i < boxes; ++i)
-      EXPECT_NEAR(t.body("b" + std::to_string(i)).position.y(), 2.35 + 0.5 * i, 0.01) << boxes;
+      EXPECT_NEAR(t.getBody("b" + std::to_string(i)).position.y(), 2.35 + 0.5 * i, 0.01) << boxes;
   }
 }
 
 /// An avatar on a stack of crates on a lift that rises by two metres.
-BodyFixture onCratesOnALift(int crates, const std::vector<NamedBox>& still = {}) {
+BodyFixture standOnCratesOnALift(int crates, const std::vector<NamedBox>& still = {}) {
   std::vector<NamedBox> stack;
   for (int i = 0; i < crates; ++i) {
     const double low = 0.101 + 0.501 * i;
@@ -350,35 +353,35 @@ BodyFixture onCratesOnALift(int crates, const std::vector<NamedBox>& still = {})
   }
   std::vector<NamedBox> others{{"lift", {-1, 0, -1}, {1, 0.1, 1}}};
   others.insert(others.end(), still.begin(), still.end());
-  Model model = loose(stack, others);
-  BodySpec lift = bodySpec("lift", BodyKind::lift, {1});
+  Model model = makeLooseModel(stack, others);
+  BodySpec lift = makeBodySpec("lift", BodyKind::lift, {1});
   lift.stops = {0, 2}, lift.high = 2, lift.speed = 1.5;
   model.bodies.push_back(lift);
   BodyFixture t(std::move(model));
   t.order("ann", Spawn{.position = {0, 0.102 + 0.501 * crates, 0}});
-  t.ticks(200);
+  t.runTicks(200);
   t.submit({"lift", BodyCommand::Action::moveTo, 2, 0, {}});
   return t;
 }
 
 TEST(DynamicBodies, AvatarOnCratesOnALiftIsLifted) {
   for (const int crates : {1, 3}) {
-    BodyFixture t = onCratesOnALift(crates);
-    const double above = t.feet("ann").y() - t.body("b0").position.y();
+    BodyFixture t = standOnCratesOnALift(crates);
+    const double above = t.getFeet("ann").y() - t.getBody("b0").position.y();
     for (int i = 0; i < 240; ++i) {
       t.step();
-      ASSERT_EQ(whoPenetrates(t.world), "") << crates << " in tick " << i;
-      ASSERT_FALSE(anyBodyPenetrates(t.world)) << crates << " in tick " << i;
-      ASSERT_NEAR(t.feet("ann").y() - t.body("b0").position.y(), above, 0.01) << i;
+      ASSERT_EQ(namePenetratingPairs(t.world), "") << crates << " in tick " << i;
+      ASSERT_FALSE(isAnyBodyPenetrating(t.world)) << crates << " in tick " << i;
+      ASSERT_NEAR(t.getFeet("ann").y() - t.getBody("b0").position.y(), above, 0.01) << i;
     }
-    EXPECT_NEAR(t.body("lift").position.y(), 2, 0.1);
-    EXPECT_NEAR(t.body("b0").position.y(), 2.35, 0.01) << crates;
+    EXPECT_NEAR(t.getBody("lift").position.y(), 2, 0.1);
+    EXPECT_NEAR(t.getBody("b0").position.y(), 2.35, 0.01) << crates;
     t.submit({"lift", BodyCommand::Action::moveTo, 0, 0, {}});
-    t.ticks(240);
-    EXPECT_NEAR(t.body("b0").position.y(), 0.35, 0.01) << crates;
+    t.runTicks(240);
+    EXPECT_NEAR(t.getBody("b0").position.y(), 0.35, 0.01) << crates;
     EXPECT_EQ(t.world.data().findAvatarByName("ann")->groundEntity,
-              t.body("b" + std::to_string(crates - 1)).id);
-    EXPECT_EQ(whoPenetrates(t.world), "");
+              t.getBody("b" + std::to_string(crates - 1)).id);
+    EXPECT_EQ(namePenetratingPairs(t.world), "");
   }
 }
 
@@ -389,10 +392,10 @@ TEST(DynamicBodies, AvatarOnRisingCratesPenetratesNoCrate) {
                                      {"c1", {-0.49, 0.101, -1.2}, {0.5, 0.35, 1.2}},
                                      {"c2", {0.51, 0.101, -1.2}, {1.5, 0.6, 1.2}},
                                      {"bridge", {2, 0.101, -0.5}, {4, 0.3, 0.5}}};
-  Model model =
-      loose(crates, {{"lift", {-4, 0, -1.5}, {2.5, 0.1, 1.5}}, {"cart", {3, 0, -1}, {5, 0.1, 1}}});
+  Model model = makeLooseModel(
+      crates, {{"lift", {-4, 0, -1.5}, {2.5, 0.1, 1.5}}, {"cart", {3, 0, -1}, {5, 0.1, 1}}});
   for (std::uint32_t object = 1; object <= 2; ++object) {
-    BodySpec lift = bodySpec(object == 1 ? "lift" : "cart", BodyKind::lift, {object});
+    BodySpec lift = makeBodySpec(object == 1 ? "lift" : "cart", BodyKind::lift, {object});
     lift.stops = {0, 6}, lift.high = 6, lift.speed = object == 1 ? 1.5 : 1.4;
     model.bodies.push_back(lift);
   }
@@ -400,7 +403,7 @@ TEST(DynamicBodies, AvatarOnRisingCratesPenetratesNoCrate) {
   t.order("ann", Spawn{.position = {-3, 0.102, -0.5}});
   t.order("bob", Spawn{.position = {0, 0.352, 0.7}});
   t.order("cid", Spawn{.position = {3, 0.302, 0}});
-  t.ticks(60);
+  t.runTicks(60);
   t.order("ann", Drive{{1.4, 0, 0}});
   for (int i = 0; i < 5; ++i) t.order("bob", Jump{0.3, Vec3(0, 0, 0)});
   for (const char* lift : {"lift", "cart"}) t.submit({lift, BodyCommand::Action::moveTo, 6, 0, {}});
@@ -409,27 +412,27 @@ TEST(DynamicBodies, AvatarOnRisingCratesPenetratesNoCrate) {
   for (int i = 0; i < 200; ++i) {
     const TickReport report = t.step();
     ASSERT_EQ(report.crushedBodies, 0u) << i;
-    ASSERT_EQ(whoPenetrates(t.world), "") << i;
-    ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
+    ASSERT_EQ(namePenetratingPairs(t.world), "") << i;
+    ASSERT_FALSE(isAnyBodyPenetrating(t.world)) << i;
     if (again) {
       ASSERT_EQ(tickWorld(*again).snapshot->stateHash, report.snapshot->stateHash) << i;
     }
     if (i == 50) again.emplace(restoreWorld(t.world.data().scene, makeCheckpoint(t.world)));
-    highest = std::max(highest, t.feet("ann").y() - t.body("lift").position.y());
+    highest = std::max(highest, t.getFeet("ann").y() - t.getBody("lift").position.y());
   }
   EXPECT_GT(highest, 0.5) << "ann came onto the higher crate";
-  EXPECT_GT(t.body("lift").position.y(), 4);
+  EXPECT_GT(t.getBody("lift").position.y(), 4);
 }
 
 TEST(DynamicBodies, ALiftStopsIfAnAvatarOnItsCrateHasNoRoom) {
-  BodyFixture t = onCratesOnALift(1, {{"ceiling", {-1, 2.9, -1}, {1, 3, 1}}});
+  BodyFixture t = standOnCratesOnALift(1, {{"ceiling", {-1, 2.9, -1}, {1, 3, 1}}});
   for (int i = 0; i < 240; ++i) {
     t.step();
-    ASSERT_EQ(whoPenetrates(t.world), "") << i;
-    ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
+    ASSERT_EQ(namePenetratingPairs(t.world), "") << i;
+    ASSERT_FALSE(isAnyBodyPenetrating(t.world)) << i;
   }
   const double room = 2.9 - 1.75 - 0.601;  // over the crate
-  EXPECT_NEAR(t.body("b0").position.y(), 0.351 + room, 0.02);
+  EXPECT_NEAR(t.getBody("b0").position.y(), 0.351 + room, 0.02);
   EXPECT_EQ(t.countEvents(Event::blocked, "lift", "ann"), 1);
 }
 
@@ -441,65 +444,65 @@ TEST(DynamicBodies, ARowOfBoxesAtRestIsPushedAsOneByAShuttle) {
         const double x = i * (0.5 + gap);
         row.push_back({"b" + std::to_string(i), {x, 0.001, -0.25}, {x + 0.5, 0.5, 0.25}});
       }
-      Model model = loose(row, {{"shuttle", {-3, 0.05, -1}, {-2, 1, 1}}});
-      BodySpec shuttle = bodySpec("shuttle", BodyKind::path, {1});
+      Model model = makeLooseModel(row, {{"shuttle", {-3, 0.05, -1}, {-2, 1, 1}}});
+      BodySpec shuttle = makeBodySpec("shuttle", BodyKind::path, {1});
       const double begins = 1.5;
       shuttle.keys = {
           {0, Vec3::Zero(), 0}, {begins, Vec3::Zero(), 0}, {begins + 5 / speed, {5, 0, 0}, 0}};
       model.bodies.push_back(shuttle);
       BodyFixture t(std::move(model));
-      t.ticks(static_cast<int>(60 * (begins + 5 / speed)) + 2);
+      t.runTicks(static_cast<int>(60 * (begins + 5 / speed)) + 2);
       for (int i = 0; i < 3; ++i)
-        EXPECT_GT(t.body("b" + std::to_string(i)).position.x(), 3.25 + 0.5 * i)
+        EXPECT_GT(t.getBody("b" + std::to_string(i)).position.x(), 3.25 + 0.5 * i)
             << gap << " m, " << speed << " m/s";
     }
 }
 
 TEST(DynamicBodies, BodiesThatALoopingPathShakesDoNotDelayIdle) {
-  Model model =
-      loose({{"box", {-0.2, 0.5006, -0.2}, {0.2, 0.9, 0.2}}, {"far", {5, 1, 5}, {5.4, 1.4, 5.4}}},
-            {{"tray", {-1, 0.4, -1}, {1, 0.5, 1}}});
-  BodySpec tray = bodySpec("tray", BodyKind::path, {1});
+  Model model = makeLooseModel(
+      {{"box", {-0.2, 0.5006, -0.2}, {0.2, 0.9, 0.2}}, {"far", {5, 1, 5}, {5.4, 1.4, 5.4}}},
+      {{"tray", {-1, 0.4, -1}, {1, 0.5, 1}}});
+  BodySpec tray = makeBodySpec("tray", BodyKind::path, {1});
   tray.keys = {{0, Vec3::Zero(), 0}, {0.05, {0, 0.01, 0}, 0}, {0.1, Vec3::Zero(), 0}};
   tray.loops = true;
   model.bodies.push_back(tray);
   BodyFixture t(std::move(model));
   EXPECT_FALSE(t.step().idle) << "one box falls";
-  t.ticks(200);
+  t.runTicks(200);
   EXPECT_TRUE(t.step().idle);
-  EXPECT_FALSE(t.body("box").asleep);
+  EXPECT_FALSE(t.getBody("box").asleep);
   t.submit({"tray", BodyCommand::Action::stop, 0, 0, {}});
   EXPECT_FALSE(t.step().idle);
-  t.untilIdle();
-  EXPECT_TRUE(t.body("box").asleep);
+  t.waitUntilIdle();
+  EXPECT_TRUE(t.getBody("box").asleep);
 }
 
 TEST(DynamicBodies, AFastPlateCarriesASleepingBox) {
-  Model model = loose({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}},
-                      {{"plate", {0.43, 0.01, -1}, {0.48, 1, 1}}});
-  BodySpec plate = bodySpec("plate", BodyKind::sliding, {1});
+  Model model = makeLooseModel({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}},
+                               {{"plate", {0.43, 0.01, -1}, {0.48, 1, 1}}});
+  BodySpec plate = makeBodySpec("plate", BodyKind::sliding, {1});
   plate.axis = Vec3::UnitX(), plate.low = 0, plate.high = 3, plate.speed = 10;
   model.bodies.push_back(plate);
   BodyFixture t(std::move(model));
-  t.ticks(120);
-  ASSERT_TRUE(t.body("box").asleep);
+  t.runTicks(120);
+  ASSERT_TRUE(t.getBody("box").asleep);
   t.submit({"plate", BodyCommand::Action::open, 0, 0, {}});
   for (int i = 0; i < 60; ++i) {
     t.step();
-    ASSERT_FALSE(anyBodyPenetrates(t.world)) << i;
+    ASSERT_FALSE(isAnyBodyPenetrating(t.world)) << i;
   }
-  EXPECT_GT(t.body("box").position.x(), 3.48 + 0.2);
+  EXPECT_GT(t.getBody("box").position.x(), 3.48 + 0.2);
 }
 
 TEST(DynamicBodies, ABoxBetweenAnAvatarAndAWallComesToRestInContact) {
-  Model model =
-      loose({{"box", {1, 0.0005, -0.2}, {1.4, 0.4, 0.2}}}, {{"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  Model model = makeLooseModel({{"box", {1, 0.0005, -0.2}, {1.4, 0.4, 0.2}}},
+                               {{"wall", {2, 0, -3}, {2.2, 3, 3}}});
   model.bodies[0].mass = 10;
   BodyFixture t(std::move(model));
   t.order("ann", Spawn{.position = {0, 0.001, 0}});
   t.order("ann", Walk{{{3, 0, 0}}, 1.3});
-  t.untilIdle();
-  EXPECT_TRUE(t.body("box").asleep);
+  t.waitUntilIdle();
+  EXPECT_TRUE(t.getBody("box").asleep);
   ASSERT_GE(t.countEvents(Event::begin, "ann", "box"), 1);
   const auto hit = std::find_if(t.events.begin(), t.events.end(), [&](const ContactEvent& e) {
     return e.kind == Event::begin && findEntityName(t.world, e.b) == "box" &&
@@ -511,33 +514,33 @@ TEST(DynamicBodies, ABoxBetweenAnAvatarAndAWallComesToRestInContact) {
 
 TEST(DynamicBodies, ABoxThatSleepsOnSomeonesHeadFallsWhenHeGoesOrLeavesOrCrouches) {
   for (int how = 0; how < 3; ++how) {
-    Model model = loose({{"box", {-0.4, 1.76, -0.4}, {0.4, 2.0, 0.4}}});
+    Model model = makeLooseModel({{"box", {-0.4, 1.76, -0.4}, {0.4, 2.0, 0.4}}});
     BodyFixture t(std::move(model));
     t.order("ann", Spawn{.position = {0, 0.001, 0}});
-    t.untilIdle();
-    const double height = t.body("box").position.y();
-    ASSERT_TRUE(t.body("box").asleep) << how << " " << t.body("box").position.transpose();
+    t.waitUntilIdle();
+    const double height = t.getBody("box").position.y();
+    ASSERT_TRUE(t.getBody("box").asleep) << how << " " << t.getBody("box").position.transpose();
     ASSERT_GT(height, 1.7) << how;
     if (how == 0) t.order("ann", Drive{{3, 0, 0}});
     if (how == 1) t.order("ann", Leave{});
     if (how == 2) t.order("ann", Crouch{.height = 1});
     for (int i = 0; i < 90; ++i) {
       t.step();
-      ASSERT_EQ(whoPenetrates(t.world), "") << how << " tick " << i;
+      ASSERT_EQ(namePenetratingPairs(t.world), "") << how << " tick " << i;
     }
-    EXPECT_LT(t.body("box").position.y(), height - 0.5) << how;
+    EXPECT_LT(t.getBody("box").position.y(), height - 0.5) << how;
   }
 }
 
 TEST(DynamicBodies, AvatarsThatLeaveFreeTheirMemory) {
-  BodyFixture t(loose({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}}));
+  BodyFixture t(makeLooseModel({{"box", {0.5, 0.0005, -0.2}, {0.9, 0.4, 0.2}}}));
   std::size_t maxSolids = 0;
   for (int i = 0; i < 30; ++i) {
     t.order("ann", Spawn{.position = {0, 0.001, 0}});
     t.order("ann", Walk{{{0.3, 0, 0}}, 1});
-    t.ticks(20);
+    t.runTicks(20);
     t.order("ann", Leave{});
-    t.ticks(3);
+    t.runTicks(3);
     const std::size_t solids = t.world.data().dynamicBodies.physicsWorld.bodies.size();
     if (i == 0) maxSolids = solids;
     EXPECT_LE(solids, maxSolids) << i;
@@ -545,91 +548,91 @@ TEST(DynamicBodies, AvatarsThatLeaveFreeTheirMemory) {
 }
 
 TEST(DynamicBodies, ABodyThatFallsOutOfTheWorldIsReportedAndRemoved) {
-  BodyFixture t(loose({{"box", {12, 1, 0}, {12.4, 1.4, 0.4}}}));
-  t.ticks(400);
+  BodyFixture t(makeLooseModel({{"box", {12, 1, 0}, {12.4, 1.4, 0.4}}}));
+  t.runTicks(400);
   EXPECT_EQ(t.countEvents(Event::leftWorld, "box", ""), 1);
-  const Body& box = t.body("box");
+  const Body& box = t.getBody("box");
   EXPECT_TRUE(box.outOfWorld);
   const Vec3 caught = box.position;
   EXPECT_TRUE(t.step().idle);
-  EXPECT_EQ(t.body("box").position, caught);
+  EXPECT_EQ(t.getBody("box").position, caught);
 }
 
 /// A tray that returns to its start within every tick, with a box on it.
-Model shaker(double amplitude) {
-  Model model = boxModel({floorBox(),
-                          {"tray", {-0.5, 0.2, -0.5}, {0.5, 0.25, 0.5}},
-                          {"box", {-0.1, 0.2505, -0.1}, {0.1, 0.35, 0.1}}});
-  BodySpec tray = bodySpec("tray", BodyKind::path, {1});
+Model makeTrayShaker(double amplitude) {
+  Model model = makeBoxModel({makeFloorBox(),
+                              {"tray", {-0.5, 0.2, -0.5}, {0.5, 0.25, 0.5}},
+                              {"box", {-0.1, 0.2505, -0.1}, {0.1, 0.35, 0.1}}});
+  BodySpec tray = makeBodySpec("tray", BodyKind::path, {1});
   tray.loops = true;
   const std::array<double, 5> heights{0, amplitude, 0, -amplitude, 0};
   for (std::size_t i = 0; i < heights.size(); ++i)
     tray.keys.push_back({static_cast<double>(i) / 240, {0, heights[i], 0}, 0});
-  model.bodies = {tray, bodySpec("box", BodyKind::rigid, {2})};
+  model.bodies = {tray, makeBodySpec("box", BodyKind::rigid, {2})};
   return model;
 }
 
 TEST(DynamicBodies, ATrayThatShakesWithinATickThrowsItsLoad) {
-  BodyFixture still(shaker(0)), shaken(shaker(1e-3));
+  BodyFixture still(makeTrayShaker(0)), shaken(makeTrayShaker(1e-3));
   double highest = 0;
   for (int i = 0; i < 200; ++i) {
     still.step();
     shaken.step();
-    highest = std::max(highest, shaken.body("box").position.y());
-    ASSERT_EQ(shaken.body("tray").position, still.body("tray").position) << i;
-    ASSERT_FALSE(anyBodyPenetrates(shaken.world)) << i;
+    highest = std::max(highest, shaken.getBody("box").position.y());
+    ASSERT_EQ(shaken.getBody("tray").position, still.getBody("tray").position) << i;
+    ASSERT_FALSE(isAnyBodyPenetrating(shaken.world)) << i;
   }
-  EXPECT_TRUE(still.body("box").asleep);
-  EXPECT_FALSE(shaken.body("box").asleep);
-  EXPECT_GT(highest, still.body("box").position.y() + 0.5e-3);
+  EXPECT_TRUE(still.getBody("box").asleep);
+  EXPECT_FALSE(shaken.getBody("box").asleep);
+  EXPECT_GT(highest, still.getBody("box").position.y() + 0.5e-3);
 }
 
 /// A block of 1 m that moves 0.2 m along x and back within each tick, and a dynamic box.
-Model ram(const NamedBox& box) {
-  Model model = boxModel({floorBox(), {"ram", {-1, 0.1, -0.5}, {0, 1.1, 0.5}}, box});
-  BodySpec spec = bodySpec("ram", BodyKind::path, {1});
+Model makeRam(const NamedBox& box) {
+  Model model = makeBoxModel({makeFloorBox(), {"ram", {-1, 0.1, -0.5}, {0, 1.1, 0.5}}, box});
+  BodySpec spec = makeBodySpec("ram", BodyKind::path, {1});
   spec.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0.2, 0, 0}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
   spec.loops = true;
   spec.autoStart = false;
-  model.bodies = {spec, bodySpec(box.path, BodyKind::rigid, {2})};
+  model.bodies = {spec, makeBodySpec(box.path, BodyKind::rigid, {2})};
   return model;
 }
 
 TEST(DynamicBodies, ABodyThatReachesASleepingBoxWithinATickWakesIt) {
-  BodyFixture t(ram({"box", {0.1, 0, -0.2}, {0.5, 0.4, 0.2}}));
-  t.ticks(120);
-  ASSERT_TRUE(t.body("box").asleep);
+  BodyFixture t(makeRam({"box", {0.1, 0, -0.2}, {0.5, 0.4, 0.2}}));
+  t.runTicks(120);
+  ASSERT_TRUE(t.getBody("box").asleep);
   t.submit({"ram", BodyCommand::Action::run, 0, 0, {}});
-  t.ticks(30);
-  EXPECT_GT(t.body("box").position.x(), 0.4) << "0.1 m farther than it was at least";
-  EXPECT_FALSE(anyBodyPenetrates(t.world));
+  t.runTicks(30);
+  EXPECT_GT(t.getBody("box").position.x(), 0.4) << "0.1 m farther than it was at least";
+  EXPECT_FALSE(isAnyBodyPenetrating(t.world));
 }
 
 TEST(DynamicBodies, ABoxSleepsOnABlockedPathBody) {
-  Model model = ram({"box", {-0.7, 1.1, -0.2}, {-0.3, 1.5, 0.2}});
+  Model model = makeRam({"box", {-0.7, 1.1, -0.2}, {-0.3, 1.5, 0.2}});
   model.bodies[0].keys[1].offset = {0.2, 0, 0};
   model.bodies[0].keys[1].time = 1, model.bodies[0].keys[2].time = 2;
-  model.meshes.push_back(boxMesh({0.7, 0, -2}, {0.8, 3, 2}));
+  model.meshes.push_back(buildBoxMesh({0.7, 0, -2}, {0.8, 3, 2}));
   model.objects.push_back({"wall", "", {3}, Eigen::Affine3d::Identity()});
   BodyFixture t(std::move(model));
   t.order("ann", Spawn{.position = {0.35, 0.01, 0}});
-  t.ticks(60);
+  t.runTicks(60);
   t.submit({"ram", BodyCommand::Action::run, 0, 0, {}});
-  t.ticks(240);
-  EXPECT_NE(t.body("ram").blockedBy, 0u);
-  EXPECT_TRUE(t.body("box").asleep);
-  t.ticks(60);
-  EXPECT_TRUE(t.body("box").asleep);
+  t.runTicks(240);
+  EXPECT_NE(t.getBody("ram").blockedBy, 0u);
+  EXPECT_TRUE(t.getBody("box").asleep);
+  t.runTicks(60);
+  EXPECT_TRUE(t.getBody("box").asleep);
 }
 
 TEST(DynamicBodies, TwoRunsHaveOneHash) {
   const auto run = [] {
     BodyFixture t(
-        loose({{"a", {0, 1, 0}, {0.4, 1.4, 0.4}}, {"b", {0.1, 2, 0.1}, {0.5, 2.3, 0.6}}}));
+        makeLooseModel({{"a", {0, 1, 0}, {0.4, 1.4, 0.4}}, {"b", {0.1, 2, 0.1}, {0.5, 2.3, 0.6}}}));
     t.order("ann", Spawn{.position = {2, 0.001, 0}});
     t.step();
     t.order("ann", Drive{{-1, 0, 0}});
-    t.ticks(200);
+    t.runTicks(200);
     return t.world.data().hash;
   };
   EXPECT_EQ(run(), run());
@@ -648,7 +651,7 @@ TEST(DynamicBodies, EventsDoNotDependOnTheNumberOfThreads) {
     bool operator==(const Run&) const = default;
   };
   const auto run = [&](int threads) {
-    BodyFixture t(loose(boxes));
+    BodyFixture t(makeLooseModel(boxes));
     setThreadCount(t.world, threads);
     Run result;
     for (int i = 0; i < 90; ++i)

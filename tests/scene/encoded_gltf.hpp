@@ -36,13 +36,14 @@ struct Terrace {
     }
     for (unsigned z = 0; z < side; ++z) {
       for (unsigned x = 0; x < side; ++x) {
-        const std::uint32_t a = at(x, z), b = at(x + 1, z), c = at(x, z + 1), d = at(x + 1, z + 1);
+        const std::uint32_t a = computeIndex(x, z), b = computeIndex(x + 1, z),
+                            c = computeIndex(x, z + 1), d = computeIndex(x + 1, z + 1);
         for (const std::uint32_t corner : {a, c, b, b, c, d}) indices.push_back(corner);
       }
     }
   }
 
-  static std::uint32_t at(unsigned x, unsigned z) { return z * (side + 1) + x; }
+  static std::uint32_t computeIndex(unsigned x, unsigned z) { return z * (side + 1) + x; }
 };
 
 template <class Value>
@@ -118,7 +119,7 @@ class GltfWriter {
     needsPlaceholder = true;
   }
 
-  std::string glb() const {
+  std::string toGlb() const {
     const auto word = [](std::size_t value) {
       const auto number = static_cast<std::uint32_t>(value);
       return std::string(reinterpret_cast<const char*>(&number), 4);
@@ -129,7 +130,7 @@ class GltfWriter {
     return "glTF" + word(2) + word(28 + text.size() + bytes.size()) + word(text.size()) + "JSON" +
            text + word(bytes.size()) + std::string("BIN\0", 4) + bytes;
   }
-  std::string gltf(const std::string& uri) const {
+  std::string toGltf(const std::string& uri) const {
     return makeJson(Json{{"byteLength", binary.size()}, {"uri", uri}}).dump();
   }
 
@@ -194,7 +195,7 @@ inline std::string packDraco(const Points& positions, const std::vector<std::uin
 // ---- the terrace, encoded
 // ------------------------------------------------------------------------
 
-inline GltfWriter plainTerrace() {
+inline GltfWriter makePlainTerrace() {
   const Terrace terrace;
   GltfWriter file;
   const unsigned positions = file.addPoints(terrace.positions);
@@ -203,7 +204,7 @@ inline GltfWriter plainTerrace() {
 }
 
 /// Positions of 16 bits, whose step of a quarter metre the node scales.
-inline GltfWriter quantizedTerrace(bool normalised) {
+inline GltfWriter makeQuantizedTerrace(bool normalised) {
   const Terrace terrace;
   std::vector<std::int16_t> steps;
   for (const auto& p : terrace.positions) {
@@ -227,10 +228,10 @@ struct MeshoptOptions {
   unsigned version = 0;  ///< of the vertex codec
 };
 
-inline GltfWriter meshoptTerrace(const MeshoptOptions& options) {
+inline GltfWriter makeMeshoptTerrace(const MeshoptOptions& options) {
   const Terrace terrace;
   const std::size_t count = terrace.positions.size();
-  GltfWriter file = plainTerrace();
+  GltfWriter file = makePlainTerrace();
   std::string vertices = toBytes(terrace.positions);
   if (options.exponential)
     meshopt_encodeFilterExp(vertices.data(), count, 12, 20, terrace.positions[0].data());
@@ -247,7 +248,7 @@ inline GltfWriter meshoptTerrace(const MeshoptOptions& options) {
   return file;
 }
 
-inline GltfWriter dracoTerrace(int bits, bool sequential) {
+inline GltfWriter makeDracoTerrace(int bits, bool sequential) {
   const Terrace terrace;
   GltfWriter file;
   const unsigned view =
@@ -261,7 +262,7 @@ inline GltfWriter dracoTerrace(int bits, bool sequential) {
 }
 
 /// Every other position is sparse; without a base, all of them, upon zeros.
-inline GltfWriter sparseTerrace(bool base) {
+inline GltfWriter makeSparseTerrace(bool base) {
   const Terrace terrace;
   Points dense = terrace.positions, values;
   std::vector<std::uint16_t> places;
@@ -285,13 +286,13 @@ inline GltfWriter sparseTerrace(bool base) {
 }
 
 /// One strip, whose rows repeated corners join.
-inline GltfWriter stripTerrace() {
+inline GltfWriter makeStripTerrace() {
   const Terrace terrace;
   std::vector<std::uint32_t> strip;
   for (unsigned z = 0; z < Terrace::side; ++z) {
-    if (z > 0) strip.insert(strip.end(), {strip.back(), Terrace::at(0, z)});
+    if (z > 0) strip.insert(strip.end(), {strip.back(), Terrace::computeIndex(0, z)});
     for (unsigned x = 0; x <= Terrace::side; ++x)
-      strip.insert(strip.end(), {Terrace::at(x, z), Terrace::at(x, z + 1)});
+      strip.insert(strip.end(), {Terrace::computeIndex(x, z), Terrace::computeIndex(x, z + 1)});
   }
   GltfWriter file;
   const unsigned positions = file.addPoints(terrace.positions);
@@ -300,7 +301,7 @@ inline GltfWriter stripTerrace() {
 }
 
 /// A fan of two triangles for each quad.
-inline GltfWriter fanTerrace() {
+inline GltfWriter makeFanTerrace() {
   const Terrace terrace;
   GltfWriter file;
   const unsigned positions = file.addPoints(terrace.positions);
@@ -308,16 +309,17 @@ inline GltfWriter fanTerrace() {
     for (unsigned x = 0; x < Terrace::side; ++x)
       file.addPrimitive(
           positions,
-          static_cast<int>(file.addIndices({Terrace::at(x + 1, z), Terrace::at(x, z),
-                                            Terrace::at(x, z + 1), Terrace::at(x + 1, z + 1)})),
+          static_cast<int>(file.addIndices(
+              {Terrace::computeIndex(x + 1, z), Terrace::computeIndex(x, z),
+               Terrace::computeIndex(x, z + 1), Terrace::computeIndex(x + 1, z + 1)})),
           6);
   }
   return file;
 }
 
 /// The terrace three times, turned and scaled, as instances of one node.
-inline GltfWriter instancedTerrace(bool required) {
-  GltfWriter file = plainTerrace();
+inline GltfWriter makeInstancedTerrace(bool required) {
+  GltfWriter file = makePlainTerrace();
   const unsigned moves = file.addPoints({{0, 0, 0}, {20, 1, 0}, {40, 2, 0}});
   const unsigned scales = file.addPoints({{1, 1, 1}, {2, 2, 2}, {1, 3, 1}});
   // A quarter turn about Y for the second, normalised integers.
@@ -332,8 +334,8 @@ inline GltfWriter instancedTerrace(bool required) {
 
 /// Skinned to two joints, without inverse bind matrices, and with a morph target that
 /// doubles it.
-inline GltfWriter posedTerrace() {
-  GltfWriter file = plainTerrace();
+inline GltfWriter makePosedTerrace() {
+  GltfWriter file = makePlainTerrace();
   const std::size_t vertices = Terrace().positions.size();
   std::vector<std::uint8_t> joints, weights;
   for (std::size_t v = 0; v < vertices; ++v) {

@@ -17,7 +17,7 @@ namespace {
 
 using testing::kQuarter;
 using tests::BoxMesh;
-using tests::gltf;
+using tests::makeGltfFile;
 using tests::TemporaryFolder;
 
 /// Imports a glTF file of one-metre boxes with these nodes, all of them roots. `more`: further
@@ -25,7 +25,7 @@ using tests::TemporaryFolder;
 Model importNodes(const std::string& roots, const std::string& nodes,
                   const std::string& more = "") {
   const TemporaryFolder folder;
-  std::string text = gltf(BoxMesh({1, 1, 1}), roots, nodes);
+  std::string text = makeGltfFile(BoxMesh({1, 1, 1}), roots, nodes);
   text.insert(1, more);
   return importModel(folder.write("hall.gltf", text));
 }
@@ -125,24 +125,24 @@ TEST(Extras, OfOthersAreNotOurs) {
 
 // ---- the physics extension ----------------------------------------------------------------------
 
-std::string physics(const std::string& members) {
+std::string makePhysics(const std::string& members) {
   return R"("extensions":{"KHR_physics_rigid_bodies":{)" + members + "}}";
 }
 
-std::string document(const std::string& members, const std::string& shapes = "") {
+std::string makeDocument(const std::string& members, const std::string& shapes = "") {
   return R"("extensions":{"KHR_implicit_shapes":{"shapes":[)" + shapes +
          R"(]},"KHR_physics_rigid_bodies":{)" + members + "}},";
 }
 
 TEST(Physics, ADynamicNodeIsAFreeBodyOfItsMassVelocityAndMaterial) {
-  const Model model =
-      importNodes("0",
-                  R"({"name":"crate","mesh":0,"translation":[0,5,0],)" +
-                      physics(R"("motion":{"mass":7,"linearVelocity":[1,0,0]},)"
-                              R"("collider":{"geometry":{"node":0},"physicsMaterial":0})") +
-                      "}",
-                  document(R"("physicsMaterials":[{"staticFriction":0.9,"dynamicFriction":0.25,)"
-                           R"("restitution":0.5}])"));
+  const Model model = importNodes(
+      "0",
+      R"({"name":"crate","mesh":0,"translation":[0,5,0],)" +
+          makePhysics(R"("motion":{"mass":7,"linearVelocity":[1,0,0]},)"
+                      R"("collider":{"geometry":{"node":0},"physicsMaterial":0})") +
+          "}",
+      makeDocument(R"("physicsMaterials":[{"staticFriction":0.9,"dynamicFriction":0.25,)"
+                   R"("restitution":0.5}])"));
   ASSERT_EQ(model.bodies.size(), 1u);
   const BodySpec& crate = model.bodies[0];
   EXPECT_EQ(crate.source, BodySource::khr);
@@ -151,19 +151,19 @@ TEST(Physics, ADynamicNodeIsAFreeBodyOfItsMassVelocityAndMaterial) {
   EXPECT_EQ(crate.friction, 0.25);
   EXPECT_EQ(crate.restitution, 0.5);
   EXPECT_EQ(countDiagnostics(model, "unsupported_physics"), 0u)
-      << diagnosticText(model, "unsupported_physics");
+      << findDiagnosticText(model, "unsupported_physics");
   testing::BodyFixture run(Model{model});
-  run.ticks(6);
-  EXPECT_NEAR(run.body("crate").velocity.x(), 1, 1e-9) << "keeps its initial velocity";
-  EXPECT_LT(run.body("crate").velocity.y(), 0);
+  run.runTicks(6);
+  EXPECT_NEAR(run.getBody("crate").velocity.x(), 1, 1e-9) << "keeps its initial velocity";
+  EXPECT_LT(run.getBody("crate").velocity.y(), 0);
 }
 
 TEST(Physics, ACollisionShapeIsSolidAndItsVisualMeshIsNot) {
   const Model model =
       importNodes("0",
                   R"({"name":"ball","mesh":0,)" +
-                      physics(R"("motion":{},"collider":{"geometry":{"shape":0}})") + "}",
-                  document("", R"({"type":"sphere","sphere":{"radius":2}})"));
+                      makePhysics(R"("motion":{},"collider":{"geometry":{"shape":0}})") + "}",
+                  makeDocument("", R"({"type":"sphere","sphere":{"radius":2}})"));
   ASSERT_EQ(model.objects.size(), 2u);
   EXPECT_EQ(model.objects[0].usage, Object::Usage::visualOnly);
   EXPECT_EQ(model.objects[1].usage, Object::Usage::collisionOnly);
@@ -181,15 +181,16 @@ TEST(Physics, ACollisionShapeIsSolidAndItsVisualMeshIsNot) {
 
 TEST(Physics, EachImplicitShapeIsConvexAndHasItsSize) {
   const std::string nodes =
-      R"({"name":"box","mesh":0,)" + physics(R"("collider":{"geometry":{"shape":0}})") +
-      R"(},{"name":"capsule","mesh":0,)" + physics(R"("collider":{"geometry":{"shape":1}})") +
-      R"(},{"name":"cylinder","mesh":0,)" + physics(R"("collider":{"geometry":{"shape":2}})") + "}";
+      R"({"name":"box","mesh":0,)" + makePhysics(R"("collider":{"geometry":{"shape":0}})") +
+      R"(},{"name":"capsule","mesh":0,)" + makePhysics(R"("collider":{"geometry":{"shape":1}})") +
+      R"(},{"name":"cylinder","mesh":0,)" + makePhysics(R"("collider":{"geometry":{"shape":2}})") +
+      "}";
   const Model model = importNodes(
       "0,1,2", nodes,
-      document("",
-               R"({"type":"box","box":{"size":[1,2,3]}},)"
-               R"({"type":"capsule","capsule":{"height":2,"radiusTop":0.5,"radiusBottom":0.5}},)"
-               R"({"type":"cylinder","cylinder":{"height":2,"radiusTop":1,"radiusBottom":0.5}})"));
+      makeDocument(
+          "", R"({"type":"box","box":{"size":[1,2,3]}},)"
+              R"({"type":"capsule","capsule":{"height":2,"radiusTop":0.5,"radiusBottom":0.5}},)"
+              R"({"type":"cylinder","cylinder":{"height":2,"radiusTop":1,"radiusBottom":0.5}})"));
   ASSERT_EQ(model.objects.size(), 6u);
   EXPECT_TRUE(model.bodies.empty()) << "colliders without motion are static";
   const Scene scene{Model(model)};
@@ -209,16 +210,16 @@ TEST(Physics, EachImplicitShapeIsConvexAndHasItsSize) {
 }
 
 /// A door whose joint sits on its own node 1, connected to the frame's node 2.
-Model hinged(const std::string& limits, bool fromFrame = false) {
+Model importHinged(const std::string& limits, bool fromFrame = false) {
   const std::string joint = R"("joint":{"joint":0,"connectedNode":)";
-  const std::string onDoor = fromFrame ? "" : physics(joint + "2}") + ",";
-  const std::string onFrame = fromFrame ? physics(joint + "1}") + "," : "";
+  const std::string onDoor = fromFrame ? "" : makePhysics(joint + "2}") + ",";
+  const std::string onFrame = fromFrame ? makePhysics(joint + "1}") + "," : "";
   return importNodes("0,2",
                      R"({"name":"door","mesh":0,"children":[1],)" +
-                         physics(R"("motion":{"mass":20})") + R"(},{)" + onDoor +
+                         makePhysics(R"("motion":{"mass":20})") + R"(},{)" + onDoor +
                          R"("name":"hinge","translation":[0,1,0]},)" + R"({)" + onFrame +
                          R"("name":"frame","translation":[0,1,0]})",
-                     document(R"("physicsJoints":[{"limits":[)" + limits + "]}]"));
+                     makeDocument(R"("physicsJoints":[{"limits":[)" + limits + "]}]"));
 }
 
 const std::string kAtPoint = R"({"linearAxes":[0,1,2],"max":0})";
@@ -226,8 +227,8 @@ const std::string kAtPoint = R"({"linearAxes":[0,1,2],"max":0})";
 TEST(Physics, AJointWithOneAngleLeftIsAHinge) {
   const std::string limits =
       kAtPoint + R"(,{"angularAxes":[0,2],"max":0},{"angularAxes":[1],"min":-0.5,"max":1})";
-  const Model model = hinged(limits);
-  ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "unsupported_physics");
+  const Model model = importHinged(limits);
+  ASSERT_EQ(model.bodies.size(), 1u) << findDiagnosticText(model, "unsupported_physics");
   EXPECT_EQ(model.bodies[0].kind, BodyKind::hinged);
   EXPECT_EQ(model.bodies[0].axis, Vec3(0, 1, 0));
   EXPECT_EQ(model.bodies[0].anchor, Vec3(0, 1, 0));
@@ -235,36 +236,37 @@ TEST(Physics, AJointWithOneAngleLeftIsAHinge) {
   EXPECT_EQ(model.bodies[0].low, -1);
   EXPECT_EQ(model.bodies[0].high, 0.5);
   EXPECT_EQ(model.bodies[0].openedBy, OpenedBy::touch);
-  const Model other = hinged(limits, true);
+  const Model other = importHinged(limits, true);
   ASSERT_EQ(other.bodies.size(), 1u);
   EXPECT_EQ(other.bodies[0].low, -0.5);
   EXPECT_EQ(other.bodies[0].high, 1);
 }
 
 TEST(Physics, AJointWithOneDistanceLeftIsASlider) {
-  const Model model = hinged(R"({"linearAxes":[1,2],"max":0},{"linearAxes":[0],"min":0,"max":2},)"
-                             R"({"angularAxes":[0,1,2],"max":0})",
-                             true);
-  ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "unsupported_physics");
+  const Model model =
+      importHinged(R"({"linearAxes":[1,2],"max":0},{"linearAxes":[0],"min":0,"max":2},)"
+                   R"({"angularAxes":[0,1,2],"max":0})",
+                   true);
+  ASSERT_EQ(model.bodies.size(), 1u) << findDiagnosticText(model, "unsupported_physics");
   EXPECT_EQ(model.bodies[0].kind, BodyKind::sliding);
   EXPECT_EQ(model.bodies[0].axis, Vec3(1, 0, 0));
   EXPECT_EQ(model.bodies[0].high, 2);
 }
 
 TEST(Physics, UnsupportedPartsAreReportedAndTheRestLoads) {
-  const Model ball = hinged(kAtPoint);  // all angles free
+  const Model ball = importHinged(kAtPoint);  // all angles free
   EXPECT_EQ(findBody(ball, "door").kind, BodyKind::rigid);
-  EXPECT_NE(diagnosticText(ball, "unsupported_physics").find("node 'door/hinge'"),
+  EXPECT_NE(findDiagnosticText(ball, "unsupported_physics").find("node 'door/hinge'"),
             std::string::npos)
-      << diagnosticText(ball, "unsupported_physics");
+      << findDiagnosticText(ball, "unsupported_physics");
   const Model kinematic = importNodes(
-      "0", R"({"name":"a","mesh":0,)" + physics(R"("motion":{"isKinematic":true})") + "}");
+      "0", R"({"name":"a","mesh":0,)" + makePhysics(R"("motion":{"isKinematic":true})") + "}");
   EXPECT_TRUE(kinematic.bodies.empty());
   EXPECT_EQ(countDiagnostics(kinematic, "unsupported_physics"), 1u);
   const Model senseless = importNodes(
       "0",
       R"({"name":"a","mesh":0,)" +
-          physics(
+          makePhysics(
               R"("motion":{"mass":-3,"centerOfMass":[0,1,0]},"collider":{"geometry":{"shape":7},)"
               R"("physicsMaterial":"steel"},"joint":{"joint":[],"connectedNode":-1})") +
           "}");
@@ -277,8 +279,8 @@ TEST(Physics, ATriggerIsNeitherSolidNorDrawn) {
   const Model model =
       importNodes("0,1",
                   R"({"name":"floor","mesh":0},{"name":"exit","translation":[5,0,0],)" +
-                      physics(R"("trigger":{"geometry":{"shape":0}})") + "}",
-                  document("", R"({"type":"box","box":{"size":[2,2,2]}})"));
+                      makePhysics(R"("trigger":{"geometry":{"shape":0}})") + "}",
+                  makeDocument("", R"({"type":"box","box":{"size":[2,2,2]}})"));
   ASSERT_EQ(model.bodies.size(), 1u);
   EXPECT_EQ(model.bodies[0].kind, BodyKind::trigger);
   const Scene scene{Model(model)};
@@ -292,11 +294,12 @@ TEST(Sources, TheHigherOneHasTheSayAndTheLowerOneAddsTheRest) {
   const TemporaryFolder folder;
   const auto file = folder.write(
       "hall.gltf",
-      gltf(BoxMesh({1, 1, 1}), "0,1,2,3",
-           R"({"name":"a","mesh":0,"extras":{"walk_kind":"rigid","walk_mass":1},)" +
-               physics(R"("motion":{"mass":2})") +
-               R"(},{"name":"b-rigid","mesh":0,"extras":{"walk_kind":"rigid","walk_mass":3}},)" +
-               R"({"name":"c-rigid","mesh":0},{"name":"d-rigid","mesh":0})"));
+      makeGltfFile(
+          BoxMesh({1, 1, 1}), "0,1,2,3",
+          R"({"name":"a","mesh":0,"extras":{"walk_kind":"rigid","walk_mass":1},)" +
+              makePhysics(R"("motion":{"mass":2})") +
+              R"(},{"name":"b-rigid","mesh":0,"extras":{"walk_kind":"rigid","walk_mass":3}},)" +
+              R"({"name":"c-rigid","mesh":0},{"name":"d-rigid","mesh":0})"));
   folder.write(
       "hall.walk.json",
       R"({"walk":1,"bodies":[{"name":"mine","kind":"rigid","objects":["c-rigid"],"mass":9}],)"
@@ -361,9 +364,9 @@ TEST(Names, AShapeWithoutAnObjectIsReportedAndStaysSolid) {
 
 TEST(Names, AShapeFollowsTheBodyOfItsObject) {
   const TemporaryFolder folder;
-  const auto file =
-      folder.write("hall.gltf", gltf(BoxMesh({1, 1, 1}), "0,1",
-                                     R"({"name":"chair","mesh":0},{"name":"UCX_chair","mesh":0})"));
+  const auto file = folder.write(
+      "hall.gltf", makeGltfFile(BoxMesh({1, 1, 1}), "0,1",
+                                R"({"name":"chair","mesh":0},{"name":"UCX_chair","mesh":0})"));
   folder.write("hall.walk.json",
                R"({"walk":1,"bodies":[{"name":"c","kind":"rigid","objects":["chair"]}]})");
   Model model = importModel(file);

@@ -17,7 +17,7 @@ namespace {
 
 using Json = nlohmann::json;
 
-std::string base64(const std::string& bytes) {
+std::string toBase64(const std::string& bytes) {
   static const char* letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
   for (std::size_t i = 0; i < bytes.size(); i += 3) {
@@ -42,7 +42,7 @@ class GltfFile {
       "animations":[{"samplers":[],"channels":[]}]})");
   }
 
-  Json& json() { return json_; }
+  Json& getJson() { return json_; }
 
   std::size_t add(const std::vector<float>& values, const char* type, std::size_t count) {
     std::string bytes(values.size() * 4, '\0');
@@ -69,10 +69,10 @@ class GltfFile {
   }
 
   GltfCameraPath sample(double fps, const std::string& name = "") const {
-    const auto file = tests::ownFile("camera.gltf");
+    const auto file = tests::makeOwnFile("camera.gltf");
     Json whole = json_;
     whole["buffers"] = {{{"byteLength", bytes_.size()},
-                         {"uri", "data:application/octet-stream;base64," + base64(bytes_)}}};
+                         {"uri", "data:application/octet-stream;base64," + toBase64(bytes_)}}};
     std::ofstream(file) << whole.dump();
     return sampleGltfCamera(file, name, fps);
   }
@@ -132,9 +132,9 @@ TEST(GltfCamera, CubicSplinesFollowTheirTangents) {
 
 TEST(GltfCamera, TheNamedCameraIsUsedOtherwiseTheAnimatedOne) {
   GltfFile file;
-  file.json()["nodes"].push_back({{"name", "still"}, {"camera", 0}});
-  std::swap(file.json()["nodes"][1]["name"], file.json()["nodes"][2]["name"]);
-  file.json()["scenes"][0]["nodes"].push_back(2);
+  file.getJson()["nodes"].push_back({{"name", "still"}, {"camera", 0}});
+  std::swap(file.getJson()["nodes"][1]["name"], file.getJson()["nodes"][2]["name"]);
+  file.getJson()["scenes"][0]["nodes"].push_back(2);
   file.animate(2, "translation", "LINEAR", {0, 1}, {0, 0, 0, 1, 0, 0});
   EXPECT_EQ(file.sample(1).name, "cam");
   EXPECT_EQ(file.sample(1, "still").poses.size(), 1U);
@@ -148,16 +148,16 @@ TEST(GltfCamera, TheNamedCameraIsUsedOtherwiseTheAnimatedOne) {
 
 TEST(GltfCamera, BrokenFilesAreErrors) {
   GltfFile none;
-  none.json()["nodes"][1].erase("camera");
+  none.getJson()["nodes"][1].erase("camera");
   EXPECT_THROW(none.sample(1), ImportError);
   GltfFile ring;
-  ring.json()["nodes"][1]["children"] = {0};
+  ring.getJson()["nodes"][1]["children"] = {0};
   EXPECT_THROW(ring.sample(1), ImportError);
   GltfFile flat;
-  flat.json()["nodes"][1]["scale"] = {0, 0, 0};
+  flat.getJson()["nodes"][1]["scale"] = {0, 0, 0};
   EXPECT_THROW(flat.sample(1), ImportError);
   GltfFile orthographic;
-  orthographic.json()["cameras"][0] = {{"type", "orthographic"}};
+  orthographic.getJson()["cameras"][0] = {{"type", "orthographic"}};
   EXPECT_THROW(orthographic.sample(1), ImportError);
   GltfFile shortOne;
   shortOne.animate(1, "translation", "LINEAR", {0, 1}, {0, 0, 0});
@@ -167,23 +167,23 @@ TEST(GltfCamera, BrokenFilesAreErrors) {
   EXPECT_THROW(back.sample(1), ImportError);
   GltfFile beyond;
   beyond.animate(1, "translation", "LINEAR", {0, 1}, {0, 0, 0, 1, 1, 1});
-  beyond.json()["accessors"][1]["count"] = 3;
+  beyond.getJson()["accessors"][1]["count"] = 3;
   EXPECT_THROW(beyond.sample(1), ImportError);
-  beyond.json()["accessors"][1]["count"] = std::uint64_t{1} << 62U;
+  beyond.getJson()["accessors"][1]["count"] = std::uint64_t{1} << 62U;
   EXPECT_THROW(beyond.sample(1), ImportError);
-  beyond.json()["accessors"][1]["count"] = 2;
-  beyond.json()["bufferViews"][1]["byteOffset"] = 1000;
+  beyond.getJson()["accessors"][1]["count"] = 2;
+  beyond.getJson()["bufferViews"][1]["byteOffset"] = 1000;
   EXPECT_THROW(beyond.sample(1), ImportError);
 }
 
 TEST(GltfCamera, SparseKeysReplaceTheirBase) {
   GltfFile file;
   file.animate(1, "translation", "LINEAR", {0, 1}, {0, 0, 0, 9, 9, 9});
-  const std::size_t keys = file.json()["accessors"].size() - 1;
+  const std::size_t keys = file.getJson()["accessors"].size() - 1;
   file.add({std::bit_cast<float>(1u)}, "SCALAR", 1);  // the second key
   file.add({4, 5, 6}, "VEC3", 1);
-  const std::size_t views = file.json()["bufferViews"].size();
-  file.json()["accessors"][keys]["sparse"] = {
+  const std::size_t views = file.getJson()["bufferViews"].size();
+  file.getJson()["accessors"][keys]["sparse"] = {
       {"count", 1},
       {"indices", {{"bufferView", views - 2}, {"componentType", 5125}}},
       {"values", {{"bufferView", views - 1}}}};
@@ -196,7 +196,7 @@ TEST(GltfCamera, AbsurdStridesAndRatesAreErrors) {
   GltfFile file;
   file.animate(1, "translation", "LINEAR", {0, 1}, {0, 0, 0, 1, 1, 1});
   EXPECT_THROW(file.sample(1e300), ImportError);
-  file.json()["bufferViews"][1]["byteStride"] = std::uint64_t{1} << 31U;
+  file.getJson()["bufferViews"][1]["byteStride"] = std::uint64_t{1} << 31U;
   EXPECT_THROW(file.sample(1), ImportError);
 }
 

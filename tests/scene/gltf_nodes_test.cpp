@@ -15,10 +15,10 @@ using tests::TemporaryFolder;
 
 Model importNodes(const std::string& nodes) {
   const TemporaryFolder folder;
-  return importModel(folder.write("a.gltf", tests::gltf(BoxMesh({1, 2, 3}), "0", nodes)));
+  return importModel(folder.write("a.gltf", tests::makeGltfFile(BoxMesh({1, 2, 3}), "0", nodes)));
 }
 
-Model modelWith(const std::string& transform) {
+Model importBoxWith(const std::string& transform) {
   return importNodes(R"({"name":"box","mesh":0,)" + transform + "}");
 }
 
@@ -37,11 +37,12 @@ TEST(GltfNodes, ARotationOfThreeDigitsNeitherScalesNorHidesWhatIsBelowIt) {
 }
 
 TEST(GltfNodes, ARotationOfAnotherLengthIsNormalisedAndReported) {
-  const Model model = modelWith(R"("rotation":[0,2,0,2])");
+  const Model model = importBoxWith(R"("rotation":[0,2,0,2])");
   expectSize(model, {3, 2, 1}, 1e-9);
   EXPECT_EQ(countDiagnostics(model, "rescaled_rotation"), 1u);
-  EXPECT_EQ(diagnosticText(model, "rescaled_rotation").find("nodes[0] 'box': of length 2.8"), 0u)
-      << diagnosticText(model, "rescaled_rotation");
+  EXPECT_EQ(findDiagnosticText(model, "rescaled_rotation").find("nodes[0] 'box': of length 2.8"),
+            0u)
+      << findDiagnosticText(model, "rescaled_rotation");
 }
 
 TEST(GltfNodes, WhatGltfDoesNotAllowInATransformIsIgnoredAndReported) {
@@ -53,12 +54,12 @@ TEST(GltfNodes, WhatGltfDoesNotAllowInATransformIsIgnoredAndReported) {
         R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"translation":[9,0,0])",
         R"("rotation":[0,1,0,0],"matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1])",
         R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,0,0,0,1],"scale":[2,2,2])"}) {
-    const Model model = modelWith(transform);
+    const Model model = importBoxWith(transform);
     EXPECT_EQ(countDiagnostics(model, "broken_transform_dropped"), 1u) << transform;
-    EXPECT_EQ(diagnosticText(model, "broken_transform_dropped").find("nodes[0] 'box': "), 0u);
+    EXPECT_EQ(findDiagnosticText(model, "broken_transform_dropped").find("nodes[0] 'box': "), 0u);
     expectSize(model, {1, 2, 3}, 1e-9);
   }
-  const Model whole = modelWith(R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,5,6,7,1])");
+  const Model whole = importBoxWith(R"("matrix":[1,0,0,0,0,1,0,0,0,0,1,0,5,6,7,1])");
   EXPECT_EQ(countDiagnostics(whole, "broken_transform_dropped"), 0u);
 }
 
@@ -66,7 +67,7 @@ TEST(GltfNodes, AChildThatIsNoIndexIsReportedWithItsParent) {
   const Model model =
       importNodes(R"({"name":"box","mesh":0,"children":[1.0,"1"]},{"name":"lost","mesh":0})");
   EXPECT_EQ(countDiagnostics(model, "missing_node"), 2u);
-  EXPECT_EQ(diagnosticText(model, "missing_node"), "nodes[0] 'box': node is not an index");
+  EXPECT_EQ(findDiagnosticText(model, "missing_node"), "nodes[0] 'box': node is not an index");
   EXPECT_EQ(model.objects.size(), 1u);
 }
 
@@ -75,7 +76,8 @@ TEST(GltfNodes, ChildrenThatAreNoListAreReported) {
     const std::string parent = std::string(R"({"name":"box","mesh":0,"children":)") + children;
     const Model model = importNodes(parent + R"(},{"name":"lost","mesh":0})");
     EXPECT_EQ(countDiagnostics(model, "missing_node"), 1u) << children;
-    EXPECT_EQ(diagnosticText(model, "missing_node"), "nodes[0] 'box': \"children\" is not a list");
+    EXPECT_EQ(findDiagnosticText(model, "missing_node"),
+              "nodes[0] 'box': \"children\" is not a list");
     EXPECT_EQ(model.objects.size(), 1u);
   }
 }
@@ -104,28 +106,28 @@ TEST(GltfNodes, ACycleOutsideTheSceneIsNotRead) {
 // ---- keys twice in one object -------------------------------------------------------------------
 
 TEST(GltfNodes, AKeyTwiceInOneObjectIsReportedWithItsPathAndTheLastCounts) {
-  const Model model = modelWith(R"("translation":[1,0,0],"translation":[5,0,0])");
+  const Model model = importBoxWith(R"("translation":[1,0,0],"translation":[5,0,0])");
   EXPECT_EQ(countDiagnostics(model, "duplicate_key"), 1u);
-  EXPECT_EQ(diagnosticText(model, "duplicate_key"), "nodes[0].translation");
+  EXPECT_EQ(findDiagnosticText(model, "duplicate_key"), "nodes[0].translation");
   EXPECT_NEAR(model.objects.at(0).worldFromMesh.translation().x() + model.offset.x(), 5, 1e-12);
-  const Model deep = modelWith(
+  const Model deep = importBoxWith(
       R"("extras":{"a":[1,[2],{"b":2},{"c":{"d":1,"e":[{"d":1},{"d":2}],"d":2,"d":3}}]})");
   EXPECT_EQ(countDiagnostics(deep, "duplicate_key"), 2u);
-  EXPECT_EQ(diagnosticText(deep, "duplicate_key"), "nodes[0].extras.a[3].c.d");
+  EXPECT_EQ(findDiagnosticText(deep, "duplicate_key"), "nodes[0].extras.a[3].c.d");
   // Two objects of many keys, of which the first has some twice.
   std::string many;
   for (int i = 0; i < 40; ++i) many += "\"k" + std::to_string(i) + "\":1,";
   const Model wide =
-      modelWith(R"("extras":{"a":[{)" + many + R"("k39":2,"k3":2},{)" + many + R"("k40":1}]})");
+      importBoxWith(R"("extras":{"a":[{)" + many + R"("k39":2,"k3":2},{)" + many + R"("k40":1}]})");
   EXPECT_EQ(countDiagnostics(wide, "duplicate_key"), 2u);
-  EXPECT_EQ(diagnosticText(wide, "duplicate_key"), "nodes[0].extras.a[0].k39");
+  EXPECT_EQ(findDiagnosticText(wide, "duplicate_key"), "nodes[0].extras.a[0].k39");
 }
 
 TEST(GltfNodes, ASectionTwiceIsReadFromTheLast) {
   const TemporaryFolder folder;
   for (const char* first : {R"("meshes":[{"primitives":[{"attributes":{"POSITION":1}}]}],)",
                             R"("accessors":[],)", R"("nodes":[{"mesh":0,"scale":[7,7,7]}],)"}) {
-    std::string text = tests::gltf(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
+    std::string text = tests::makeGltfFile(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
     const Model model = importModel(folder.write("a.gltf", text.insert(1, first)));
     EXPECT_EQ(countDiagnostics(model, "duplicate_key"), 1u) << first;
     expectSize(model, {1, 2, 3}, 1e-9);
@@ -143,13 +145,14 @@ TEST(GltfNodes, TheSameKeyInSeveralObjectsIsNoDuplicate) {
 
 TEST(GltfNodes, ANodeWithTwoParentsIsReportedOnceAndStandsBelowEach) {
   const TemporaryFolder folder;
-  const Model model = importModel(folder.write("a.gltf", tests::gltf(BoxMesh({1, 2, 3}), "0,1",
-                                                                     R"({"name":"a","children":[2]},
+  const Model model =
+      importModel(folder.write("a.gltf", tests::makeGltfFile(BoxMesh({1, 2, 3}), "0,1",
+                                                             R"({"name":"a","children":[2]},
                                {"name":"b","translation":[5,0,0],"children":[2]},
                                {"name":"shared","children":[3]},{"name":"box","mesh":0})")));
   EXPECT_EQ(model.objects.size(), 2u);
   EXPECT_EQ(countDiagnostics(model, "shared_node"), 1u);
-  EXPECT_EQ(diagnosticText(model, "shared_node"), "nodes[2] 'shared' is listed several times");
+  EXPECT_EQ(findDiagnosticText(model, "shared_node"), "nodes[2] 'shared' is listed several times");
 }
 
 TEST(GltfNodes, AReferenceToNothingCostsItselfAlone) {
@@ -167,20 +170,21 @@ TEST(GltfNodes, AReferenceToNothingCostsItselfAlone) {
            {"0,9", R"("mesh":0)", "missing_node", "scenes[0]: node 9 does not exist"}}) {
     const std::string nodes =
         R"({"name":"a","mesh":0},{"name":"b",)" + std::string(row.members) + "}";
-    const Model model =
-        importModel(folder.write("a.gltf", tests::gltf(BoxMesh({1, 2, 3}), row.scene, nodes)));
+    const Model model = importModel(
+        folder.write("a.gltf", tests::makeGltfFile(BoxMesh({1, 2, 3}), row.scene, nodes)));
     EXPECT_EQ(countDiagnostics(model, row.kind), 1u) << row.members;
-    EXPECT_EQ(diagnosticText(model, row.kind), row.text);
+    EXPECT_EQ(findDiagnosticText(model, row.kind), row.text);
     expectSize(model, {1, 2, 3}, 1e-9);
   }
 }
 
 TEST(GltfNodes, ASkinThatDoesNotExistDoesNotRefuseAFileThatHasSkins) {
   const TemporaryFolder folder;
-  std::string text = tests::gltf(BoxMesh({1, 2, 3}), "0", R"({"name":"box","mesh":0,"skin":1})");
+  std::string text =
+      tests::makeGltfFile(BoxMesh({1, 2, 3}), "0", R"({"name":"box","mesh":0,"skin":1})");
   const Model model =
       importModel(folder.write("a.gltf", text.insert(1, R"("skins":[{"joints":[0]}],)")));
-  EXPECT_EQ(diagnosticText(model, "skin_ignored"), "nodes[0] 'box': skin 1 does not exist");
+  EXPECT_EQ(findDiagnosticText(model, "skin_ignored"), "nodes[0] 'box': skin 1 does not exist");
   expectSize(model, {1, 2, 3}, 1e-9);
 }
 

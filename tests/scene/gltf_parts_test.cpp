@@ -28,7 +28,7 @@ constexpr std::size_t kTriangles = 2 * tests::Terrace::side * tests::Terrace::si
 /// Three scenes of a node each: "day" with "terrace", an unnamed one with "second", "0" with
 /// "third".
 GltfWriter makeThreeScenes() {
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   file.json["scenes"][0]["name"] = "day";
   for (const char* name : {"second", "third"}) {
     file.json["scenes"].push_back({{"nodes", {file.json["nodes"].size()}}});
@@ -41,7 +41,7 @@ GltfWriter makeThreeScenes() {
 
 TEST(GltfScenes, TheDefaultIsReadAndTheOthersAreListed) {
   const TemporaryFolder folder;
-  const Model model = importModel(folder.write("a.glb", makeThreeScenes().glb()));
+  const Model model = importModel(folder.write("a.glb", makeThreeScenes().toGlb()));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].path, "second");
   EXPECT_EQ(countDiagnostics(model, "other_scenes"), 2u);
@@ -54,14 +54,14 @@ TEST(GltfScenes, WithoutOneAllRootNodesAreRead) {
   GltfWriter file = makeThreeScenes();
   file.json["nodes"][0]["children"] = {2};
   for (const char* member : {"scenes", "scene"}) file.json.erase(member);
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   ASSERT_EQ(model.objects.size(), 3u);
   EXPECT_EQ(countDiagnostics(model, "no_scene"), 1u);
 }
 
 TEST(GltfScenes, OneIsChosenByNameOrNumber) {
   const TemporaryFolder folder;
-  const auto file = folder.write("a.glb", makeThreeScenes().glb());
+  const auto file = folder.write("a.glb", makeThreeScenes().toGlb());
   for (const auto& [choice, path] : {std::pair{"day", "terrace"}, std::pair{"1", "second"},
                                      std::pair{"2", "third"}, std::pair{"0", "third"}}) {
     ImportOptions options;
@@ -77,7 +77,7 @@ TEST(GltfScenes, AnUnknownOneIsAnErrorThatListsThem) {
   const TemporaryFolder folder;
   ImportOptions options;
   options.gltfScene = "night";
-  const std::string text = catchFailure(folder.write("a.glb", makeThreeScenes().glb()), options);
+  const std::string text = catchFailure(folder.write("a.glb", makeThreeScenes().toGlb()), options);
   EXPECT_NE(text.find("no scene 'night'; its scenes are 0 'day', 1, 2 '0'"), std::string::npos)
       << text;
   const std::string obj =
@@ -91,7 +91,7 @@ TEST(GltfMeshFile, EachNodeHasTheMeshThatItNames) {
   // Meshes in descending order, children before and after their parents, one mesh twice, one
   // primitive more in each, and one that no node names.
   constexpr std::size_t kMeshes = 5;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   const Json primitive = file.json["meshes"][0]["primitives"][0];
   file.json["meshes"] = Json::array();
   for (std::size_t m = 0; m < kMeshes; ++m)
@@ -105,7 +105,7 @@ TEST(GltfMeshFile, EachNodeHasTheMeshThatItNames) {
   const TemporaryFolder folder;
   for (const bool isRewritten : {false, true}) {
     if (isRewritten) file.json["nodes"][1]["camera"] = 9;
-    const Model model = importModel(folder.write("a.glb", file.glb()));
+    const Model model = importModel(folder.write("a.glb", file.toGlb()));
     std::map<std::string, std::size_t> primitives;
     for (const Object& object : model.objects) primitives[object.path] = object.meshes.size();
     EXPECT_EQ(primitives, (std::map<std::string, std::size_t>{
@@ -116,7 +116,7 @@ TEST(GltfMeshFile, EachNodeHasTheMeshThatItNames) {
 
 TEST(GltfMeshFile, TheBinaryChunkMayFollowAnyJsonOrBeMissing) {
   const TemporaryFolder folder;
-  const std::string glb = tests::glb(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
+  const std::string glb = tests::makeGlbFile(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
   std::uint32_t size = 0;
   std::memcpy(&size, glb.data() + 12, sizeof size);
   const auto withJson = [&](const std::string& json, const std::string& rest) {
@@ -132,7 +132,7 @@ TEST(GltfMeshFile, TheBinaryChunkMayFollowAnyJsonOrBeMissing) {
                                        rest + std::string(64, 'x'))));
     EXPECT_EQ(Scene(Model(model)).bounds().size(), Vec3(1, 2, 3)) << blanks;
   }
-  const std::string embedded = tests::gltf(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
+  const std::string embedded = tests::makeGltfFile(BoxMesh({1, 2, 3}), "0", tests::kOneNode);
   const Model model = importModel(folder.write("b.glb", withJson(embedded, "")));
   EXPECT_EQ(Scene(Model(model)).bounds().size(), Vec3(1, 2, 3));
 }
@@ -141,7 +141,7 @@ TEST(GltfMeshFile, TheBinaryChunkMayFollowAnyJsonOrBeMissing) {
 
 /// Two terraces; the second one's positions extend beyond the file.
 GltfWriter makeHalfBroken(bool stated) {
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   file.json["meshes"].push_back(file.json["meshes"][0]);
   file.json["accessors"].push_back(file.json["accessors"][0]);
   Json& accessor = file.json["accessors"].back();
@@ -157,12 +157,12 @@ GltfWriter makeHalfBroken(bool stated) {
 
 TEST(GltfMeshes, OneThatCannotBeReadIsASolidBoxOfItsStatedExtent) {
   const TemporaryFolder folder;
-  const Model model = importModel(folder.write("a.glb", makeHalfBroken(true).glb()));
+  const Model model = importModel(folder.write("a.glb", makeHalfBroken(true).toGlb()));
   ASSERT_EQ(model.objects.size(), 2u);
   EXPECT_EQ(model.meshes.at(model.objects[0].meshes.at(0)).triangleCount(), kTriangles);
   EXPECT_EQ(model.objects[1].path, "broken");
   EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u);
-  EXPECT_EQ(diagnosticText(model, "solid_mesh").find("meshes[1].primitives[0]"), 0u);
+  EXPECT_EQ(findDiagnosticText(model, "solid_mesh").find("meshes[1].primitives[0]"), 0u);
   const Scene scene{Model(model)};
   EXPECT_EQ(scene.objectBoxes()[1].min, Vec3(20, 0, 0));
   EXPECT_EQ(scene.objectBoxes()[1].max, Vec3(27, 2, 7));
@@ -171,7 +171,7 @@ TEST(GltfMeshes, OneThatCannotBeReadIsASolidBoxOfItsStatedExtent) {
 
 TEST(GltfMeshes, OneWithoutAnExtentIsMissingAndReported) {
   const TemporaryFolder folder;
-  const Model model = importModel(folder.write("a.glb", makeHalfBroken(false).glb()));
+  const Model model = importModel(folder.write("a.glb", makeHalfBroken(false).toGlb()));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(countDiagnostics(model, "missing_mesh"), 1u);
   EXPECT_EQ(findDiagnosticKind({"missing_mesh", 1, ""}).severity, Severity::error);
@@ -182,7 +182,7 @@ TEST(GltfMeshes, IfNoneCanBeReadTheFileIsRefused) {
   GltfWriter file = makeHalfBroken(true);
   file.json["scenes"][0]["nodes"] = {1};
   file.json["meshes"][0]["primitives"] = file.json["meshes"][1]["primitives"];
-  const std::string text = catchFailure(folder.write("a.glb", file.glb()));
+  const std::string text = catchFailure(folder.write("a.glb", file.toGlb()));
   EXPECT_NE(text.find("a.glb"), std::string::npos) << text;
   EXPECT_NE(text.find("extends beyond its buffer view"), std::string::npos) << text;
 }
@@ -256,11 +256,11 @@ TEST(GltfMeshes, WhatGltfDoesNotAllowIsNotReadInSilence) {
          changeView(file, accessor, "byteStride", 4);
        })}};
   for (const auto& [fault, file] : files) {
-    const Model model = importModel(folder.write("a.glb", file.glb()));
+    const Model model = importModel(folder.write("a.glb", file.toGlb()));
     EXPECT_EQ(model.objects.size(), 2u) << fault;
     EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u) << fault;
-    EXPECT_NE(diagnosticText(model, "solid_mesh").find(fault), std::string::npos)
-        << diagnosticText(model, "solid_mesh");
+    EXPECT_NE(findDiagnosticText(model, "solid_mesh").find(fault), std::string::npos)
+        << findDiagnosticText(model, "solid_mesh");
   }
 }
 
@@ -268,19 +268,19 @@ TEST(GltfMeshes, OneWithoutPrimitivesIsMissingAndReported) {
   const TemporaryFolder folder;
   GltfWriter file = makeHalfBroken(true);
   file.json["meshes"][1]["primitives"] = Json::array();
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   EXPECT_EQ(model.objects.size(), 1u);
-  EXPECT_EQ(diagnosticText(model, "missing_mesh"), "meshes[1] has no primitives");
+  EXPECT_EQ(findDiagnosticText(model, "missing_mesh"), "meshes[1] has no primitives");
 }
 
 TEST(GltfMeshes, OneWithAMaterialThatDoesNotExistIsReadWithoutIt) {
   const TemporaryFolder folder;
   const GltfWriter file =
       makeDamaged([](auto&, Json&, Json& primitive) { primitive["material"] = 9; });
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   ASSERT_EQ(model.objects.size(), 2u);
   EXPECT_EQ(model.meshes.at(model.objects[1].meshes.at(0)).triangleCount(), kTriangles);
-  EXPECT_EQ(diagnosticText(model, "missing_material"), "meshes[1].primitives[0]");
+  EXPECT_EQ(findDiagnosticText(model, "missing_material"), "meshes[1].primitives[0]");
 }
 
 TEST(GltfMeshes, OneOfABufferThatIsCutOffIsNotReadBeyondIt) {
@@ -289,7 +289,7 @@ TEST(GltfMeshes, OneOfABufferThatIsCutOffIsNotReadBeyondIt) {
   file.json["accessors"].back()["byteOffset"] = 0;
   const std::size_t size = file.binary.size();
   changeView(file, file.json["accessors"].back(), "byteOffset", size);
-  std::string glb = file.glb();
+  std::string glb = file.toGlb();
   const std::string stated = "\"byteLength\":" + std::to_string(size) + "}";
   const std::size_t at = glb.find(stated);
   ASSERT_NE(at, std::string::npos);
@@ -311,7 +311,7 @@ TEST(GltfMeshes, AnIncompleteLastTriangleIsLeftOutAndReported) {
       whole.json["accessors"].back()["count"] = 5;
       primitive["indices"] = whole.json["accessors"].size() - 1;
     });
-    const Model model = importModel(folder.write("a.glb", file.glb()));
+    const Model model = importModel(folder.write("a.glb", file.toGlb()));
     ASSERT_EQ(model.objects.size(), 2u);
     EXPECT_EQ(model.meshes.at(model.objects[1].meshes.at(0)).triangleCount(), 1u);
     EXPECT_EQ(countDiagnostics(model, "broken_triangle_dropped"), 1u);
@@ -321,18 +321,18 @@ TEST(GltfMeshes, AnIncompleteLastTriangleIsLeftOutAndReported) {
 
 TEST(GltfMeshes, WithoutATriangleTheProblemsAreNamed) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   const float none = std::numeric_limits<float>::quiet_NaN();
   for (std::size_t at = 0; at < tests::Terrace().positions.size() * 12; at += sizeof none)
     std::memcpy(file.binary.data() + at, &none, sizeof none);
-  const std::string broken = catchFailure(folder.write("a.glb", file.glb()));
+  const std::string broken = catchFailure(folder.write("a.glb", file.toGlb()));
   EXPECT_NE(broken.find("contains no usable triangles: " + std::to_string(kTriangles) +
                         " broken_triangle_dropped ("),
             std::string::npos)
       << broken;
-  GltfWriter other = tests::plainTerrace();
+  GltfWriter other = tests::makePlainTerrace();
   other.json["nodes"][0]["mesh"] = 7;
-  const std::string missing = catchFailure(folder.write("b.glb", other.glb()));
+  const std::string missing = catchFailure(folder.write("b.glb", other.toGlb()));
   EXPECT_NE(missing.find("contains no usable triangles: 1 missing_mesh (nodes[0] 'terrace': mesh 7 "
                          "does not exist)"),
             std::string::npos)
@@ -341,10 +341,10 @@ TEST(GltfMeshes, WithoutATriangleTheProblemsAreNamed) {
 
 TEST(GltfMeshes, OneVertexThatIsNoNumberCostsItsOwnTrianglesAlone) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   const float none = std::numeric_limits<float>::quiet_NaN();
-  std::memcpy(file.binary.data() + 12 * tests::Terrace::at(3, 3), &none, sizeof none);
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  std::memcpy(file.binary.data() + 12 * tests::Terrace::computeIndex(3, 3), &none, sizeof none);
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   EXPECT_EQ(countDiagnostics(model, "broken_triangle_dropped"), 6u);
   EXPECT_EQ(model.meshes.at(model.objects.at(0).meshes.at(0)).triangleCount(), kTriangles - 6);
 }

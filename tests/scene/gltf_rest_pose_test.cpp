@@ -52,7 +52,7 @@ unsigned addMatrices(GltfWriter& file, const std::vector<Affine3d>& matrices) {
 }
 
 /// Share of the second joint at a vertex: 0, 0.25 or 1.
-double secondShare(std::size_t vertex) {
+double getSecondShare(std::size_t vertex) {
   return vertex % 3 == 0 ? 0 : vertex % 3 == 1 ? 0.25 : 1;
 }
 
@@ -62,7 +62,7 @@ void bindToJoints(GltfWriter& file, const std::vector<Affine3d>& inverseBinds) {
   std::vector<float> weights;
   for (std::size_t v = 0; v < kVertices; ++v) {
     joints.insert(joints.end(), {1, 0, 0, 0});
-    const auto second = static_cast<float>(secondShare(v));
+    const auto second = static_cast<float>(getSecondShare(v));
     weights.insert(weights.end(), {second, 1 - second, 0, 0});
   }
   Json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
@@ -86,18 +86,18 @@ void bindToJoints(GltfWriter& file, const std::vector<Affine3d>& inverseBinds) {
 Vec3 blend(const std::vector<Affine3d>& inverseBinds, const Vec3& p, std::size_t vertex) {
   const Affine3d hip(Eigen::Translation3d(0, 5, 0));
   const Affine3d knee = hip * Eigen::Translation3d(0, 0, 2) * Eigen::Quaterniond(0.8, 0, 0, 0.6);
-  const double second = secondShare(vertex);
+  const double second = getSecondShare(vertex);
   return (1 - second) * (hip * inverseBinds[0] * p) + second * (knee * inverseBinds[1] * p);
 }
 
 TEST(GltfRestPose, ASkinPutsVerticesWhereTheJointsAre) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   const std::vector<Affine3d> inverseBinds{
       Affine3d(Eigen::Translation3d(0, -1, 0)),
       Eigen::Translation3d(0.5, 0, 0) * Affine3d(Eigen::Scaling(0.5))};
   bindToJoints(file, inverseBinds);
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].path.substr(model.objects[0].path.rfind('/') + 1), "terrace");
   EXPECT_TRUE(model.diagnostics.empty());
@@ -107,9 +107,9 @@ TEST(GltfRestPose, ASkinPutsVerticesWhereTheJointsAre) {
 
 TEST(GltfRestPose, WithoutInverseBindMatricesTheyAreIdentities) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   bindToJoints(file, {});
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   const std::vector<Affine3d> identities(2, Affine3d::Identity());
   expectMoved(model, model.objects.at(0),
               [&](const Vec3& p, std::size_t v) { return blend(identities, p, v); });
@@ -117,11 +117,11 @@ TEST(GltfRestPose, WithoutInverseBindMatricesTheyAreIdentities) {
 
 TEST(GltfRestPose, AMeshThatOtherNodesUseUnskinnedStaysThere) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   bindToJoints(file, {});
   file.json["nodes"].push_back({{"name", "plain"}, {"mesh", 0}});
   file.json["scenes"][0]["nodes"].push_back(3);
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   ASSERT_EQ(model.objects.size(), 2u);
   expectMoved(model, model.objects[1], [](const Vec3& p, std::size_t) { return p; });
   EXPECT_TRUE(model.diagnostics.empty());
@@ -130,10 +130,10 @@ TEST(GltfRestPose, AMeshThatOtherNodesUseUnskinnedStaysThere) {
 TEST(GltfRestPose, InvalidSkinsAreErrorsInWords) {
   const TemporaryFolder folder;
   const auto catchDamage = [&](const std::function<void(GltfWriter&)>& damage) {
-    GltfWriter file = tests::plainTerrace();
+    GltfWriter file = tests::makePlainTerrace();
     bindToJoints(file, {Affine3d::Identity(), Affine3d::Identity()});
     damage(file);
-    return catchFailure(folder.write("a.glb", file.glb()));
+    return catchFailure(folder.write("a.glb", file.toGlb()));
   };
   const auto expect = [](const std::string& text, const char* part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
@@ -166,14 +166,14 @@ void addTargets(GltfWriter& file) {
 
 TEST(GltfRestPose, MorphTargetsHaveTheWeightsOfTheMeshOrOfTheNode) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   addTargets(file);
-  const Model neutral = importModel(folder.write("neutral.glb", file.glb()));
+  const Model neutral = importModel(folder.write("neutral.glb", file.toGlb()));
   expectMoved(neutral, neutral.objects.at(0), [](const Vec3& p, std::size_t) { return p; });
   file.json["meshes"][0]["weights"] = {0.5, 0};
   file.json["nodes"].push_back({{"name", "own"}, {"mesh", 0}, {"weights", {0, -0.25}}});
   file.json["scenes"][0]["nodes"] = {0, 1};
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   ASSERT_EQ(model.objects.size(), 2u);
   expectMoved(model, model.objects[0],
               [](const Vec3& p, std::size_t) { return Vec3(p + Vec3(0, 1, 0)); });
@@ -192,11 +192,11 @@ void addInstances(GltfWriter& file) {
 
 TEST(GltfRestPose, InstancesAreCopiesOfTheMorphedMesh) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   addTargets(file);
   file.json["nodes"][0]["weights"] = {0.5, 0};
   addInstances(file);
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   ASSERT_EQ(model.objects.size(), 2u);
   for (std::size_t i = 0; i < 2; ++i)
     expectMoved(model, model.objects[i], [&](const Vec3& p, std::size_t) {
@@ -207,10 +207,10 @@ TEST(GltfRestPose, InstancesAreCopiesOfTheMorphedMesh) {
 
 TEST(GltfRestPose, InstancesAreCopiesOfTheSkinnedMesh) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   bindToJoints(file, {});
   addInstances(file);
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   ASSERT_EQ(model.objects.size(), 2u);
   const std::vector<Affine3d> identities(2, Affine3d::Identity());
   for (std::size_t i = 0; i < 2; ++i)
@@ -222,12 +222,12 @@ TEST(GltfRestPose, InstancesAreCopiesOfTheSkinnedMesh) {
 
 TEST(GltfRestPose, AMorphTargetOfAnotherLengthIsAnError) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   addTargets(file);
   const unsigned single = file.addPoints({{1, 1, 1}});
   file.json["meshes"][0]["primitives"][0]["targets"][1]["POSITION"] = single;
   file.json["meshes"][0]["weights"] = {0, 1};
-  const std::string text = catchFailure(folder.write("a.glb", file.glb()));
+  const std::string text = catchFailure(folder.write("a.glb", file.toGlb()));
   EXPECT_NE(text.find("morph target 1 has another number of vertices"), std::string::npos) << text;
 }
 
@@ -245,7 +245,7 @@ void breakAttribute(GltfWriter& file, const std::string& attribute) {
 
 /// The terrace bound to joints, and next to it an unbound one that keeps the file readable.
 GltfWriter makeBoundTerrace() {
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   bindToJoints(file, {});
   file.json["accessors"][0]["min"] = {0, 0, 0};
   file.json["accessors"][0]["max"] = {7, 2, 7};
@@ -258,7 +258,7 @@ GltfWriter makeBoundTerrace() {
 }
 
 /// The box of the object "terrace".
-Aabb boxOfTerrace(const Model& model) {
+Aabb computeBoxOfTerrace(const Model& model) {
   Aabb box;
   for (const Object& object : model.objects) {
     if (!object.path.ends_with("terrace")) continue;
@@ -276,17 +276,17 @@ TEST(GltfRestPose, TheBoxOfAMeshThatCannotBeReadIsPosedByTheJointsThatMoveIt) {
   const TemporaryFolder folder;
   GltfWriter file = makeBoundTerrace();
   breakAttribute(file, "POSITION");
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u);
-  EXPECT_EQ(diagnosticText(model, "solid_mesh").find("not posed"), std::string::npos);
+  EXPECT_EQ(findDiagnosticText(model, "solid_mesh").find("not posed"), std::string::npos);
   // The hip raises the box of 7 x 2 x 7 m by 5 m; the knee turns it, too, with a cosine of 0.28.
-  expectBox(boxOfTerrace(model), Vec3(-0.96 * 2, 5, 0), Vec3(7, 5 + 0.96 * 7 + 0.28 * 2, 9));
+  expectBox(computeBoxOfTerrace(model), Vec3(-0.96 * 2, 5, 0), Vec3(7, 5 + 0.96 * 7 + 0.28 * 2, 9));
   Json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
   std::vector<float> weights;  // of the hip alone
   for (std::size_t v = 0; v < kVertices; ++v) weights.insert(weights.end(), {0, 1, 0, 0});
   attributes["WEIGHTS_0"] = file.addAccessor(
       static_cast<int>(file.addView(tests::toBytes(weights))), 5126, kVertices, "VEC4");
-  expectBox(boxOfTerrace(importModel(folder.write("hip.glb", file.glb()))), Vec3(0, 5, 0),
+  expectBox(computeBoxOfTerrace(importModel(folder.write("hip.glb", file.toGlb()))), Vec3(0, 5, 0),
             Vec3(7, 7, 7));
 }
 
@@ -294,12 +294,13 @@ TEST(GltfRestPose, WithoutReadableJointsTheBoxStaysAndTheReportSaysSo) {
   const TemporaryFolder folder;
   GltfWriter file = makeBoundTerrace();
   breakAttribute(file, "JOINTS_0");
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   EXPECT_EQ(countDiagnostics(model, "solid_mesh"), 1u);
-  EXPECT_NE(diagnosticText(model, "solid_mesh").find("not posed by its skin"), std::string::npos)
-      << diagnosticText(model, "solid_mesh");
+  EXPECT_NE(findDiagnosticText(model, "solid_mesh").find("not posed by its skin"),
+            std::string::npos)
+      << findDiagnosticText(model, "solid_mesh");
   // In the frame of its node, which doubles it and moves it by 100 m.
-  expectBox(boxOfTerrace(model), Vec3(100, 0, 0), Vec3(114, 4, 14));
+  expectBox(computeBoxOfTerrace(model), Vec3(100, 0, 0), Vec3(114, 4, 14));
 }
 
 TEST(GltfRestPose, TheBoxOfAMeshThatCannotBeReadIsMorphed) {
@@ -309,26 +310,28 @@ TEST(GltfRestPose, TheBoxOfAMeshThatCannotBeReadIsMorphed) {
   file.json["nodes"][0]["weights"] = {0.5, -0.25};
   addTargets(file);
   breakAttribute(file, "POSITION");
-  const Model without = importModel(folder.write("without.glb", file.glb()));
-  EXPECT_NE(diagnosticText(without, "solid_mesh").find("without morph targets"), std::string::npos);
+  const Model without = importModel(folder.write("without.glb", file.toGlb()));
+  EXPECT_NE(findDiagnosticText(without, "solid_mesh").find("without morph targets"),
+            std::string::npos);
   for (const auto& [target, offset] : {std::pair{0, Json{0, 2, 0}}, std::pair{1, Json{4, 0, 0}}}) {
     const Json& targets = file.json["meshes"][0]["primitives"][0]["targets"];
     Json& accessor = file.json["accessors"][targets[target]["POSITION"].get<std::size_t>()];
     accessor["min"] = accessor["max"] = offset;
   }
-  const Model model = importModel(folder.write("a.glb", file.glb()));
-  EXPECT_EQ(diagnosticText(model, "solid_mesh").find("without morph targets"), std::string::npos);
-  expectBox(boxOfTerrace(model), Vec3(-1, 1, 0), Vec3(6, 3, 7));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
+  EXPECT_EQ(findDiagnosticText(model, "solid_mesh").find("without morph targets"),
+            std::string::npos);
+  expectBox(computeBoxOfTerrace(model), Vec3(-1, 1, 0), Vec3(6, 3, 7));
 }
 
 TEST(GltfRestPose, AMeshThatNoNodeUsesIsNoBrokenTriangle) {
   const TemporaryFolder folder;
-  GltfWriter file = tests::plainTerrace();
+  GltfWriter file = tests::makePlainTerrace();
   file.json["meshes"].push_back(Json(file.json["meshes"][0]));
-  const Model unused = importModel(folder.write("unused.glb", file.glb()));
+  const Model unused = importModel(folder.write("unused.glb", file.toGlb()));
   EXPECT_TRUE(unused.diagnostics.empty());
   file.json["nodes"].push_back({{"name", "stray"}, {"mesh", 1}});
-  const Model stray = importModel(folder.write("stray.glb", file.glb()));
+  const Model stray = importModel(folder.write("stray.glb", file.toGlb()));
   EXPECT_TRUE(stray.diagnostics.empty());
 }
 

@@ -19,12 +19,13 @@ namespace enfilade::scene::testing {
 namespace {
 
 /// A wall of 4 m at x = 2, between z = -2 and z = 2, on a floor.
-Model wallModel() {
-  return boxModel({{"floor", {-3, -0.2, -5}, {7, 0, 5}}, {"wall", {1.9, 0, -2}, {2.1, 2.5, 2}}});
+Model makeWallModel() {
+  return makeBoxModel(
+      {{"floor", {-3, -0.2, -5}, {7, 0, 5}}, {"wall", {1.9, 0, -2}, {2.1, 2.5, 2}}});
 }
 
 TEST(GridSearch, AWayAroundAWallIsPulledTight) {
-  const World world(std::make_shared<const Scene>(wallModel()));
+  const World world(std::make_shared<const Scene>(makeWallModel()));
   Walker walker(world.data(), {});
   const Vec3 from(0, 0, 0), to(4, 0, 0);
   GridSearch search{0.12, 3, 100'000};
@@ -46,7 +47,7 @@ TEST(GridSearch, AWayAroundAWallIsPulledTight) {
 }
 
 TEST(GridSearch, TheClosestWantedPlaceIsFound) {
-  const World world(std::make_shared<const Scene>(wallModel()));
+  const World world(std::make_shared<const Scene>(makeWallModel()));
   Walker walker(world.data(), {});
   GridSearch search{0.1, 2, 10'000};
   const auto path = findGridPathOut(
@@ -61,7 +62,7 @@ TEST(GridSearch, TheClosestWantedPlaceIsFound) {
 }
 
 TEST(GridSearch, APathOutLeadsTowardsAPointAndOverOpenPlacesAlone) {
-  const World world(std::make_shared<const Scene>(wallModel()));
+  const World world(std::make_shared<const Scene>(makeWallModel()));
   Walker walker(world.data(), {});
   const auto isAside = [](const Vec3& at) { return std::abs(at.z()) > 1.45; };
   for (const double side : {-1.0, 1.0}) {
@@ -81,8 +82,8 @@ TEST(GridSearch, APathOutLeadsTowardsAPointAndOverOpenPlacesAlone) {
 /// The bed is low enough to step onto it, between x = 2 and x = 4.
 constexpr double kBedHeight = 0.25;
 
-Model bedModel(double minZ) {
-  return boxModel(
+Model makeBedModel(double minZ) {
+  return makeBoxModel(
       {{"floor", {-3, -0.2, -5}, {15, 0, 5}}, {"bed", {2, 0, minZ}, {4, kBedHeight, 5}}});
 }
 
@@ -97,7 +98,7 @@ FeetTravel walkAlong(Walker& walker, const std::vector<Vec3>& places) {
 }
 
 TEST(LevelDetours, TheEdgeOfALowObjectIsWalkedAround) {
-  const World world(std::make_shared<const Scene>(bedModel(0.2)));
+  const World world(std::make_shared<const Scene>(makeBedModel(0.2)));
   Walker walker(world.data(), {});
   const Vec3 from(0, 0, 0), to(6, 0, 0);
   std::vector<Vec3> places{from, to};
@@ -118,9 +119,9 @@ TEST(LevelDetours, TheEdgeOfALowObjectIsWalkedAround) {
 }
 
 TEST(LevelDetours, EachBumpOfALegIsWalkedAround) {
-  Model model = boxModel({{"floor", {-3, -0.2, -5}, {15, 0, 5}},
-                          {"bed", {2, 0, 0.2}, {4, kBedHeight, 5}},
-                          {"other", {7, 0, -5}, {9, kBedHeight, -0.2}}});
+  Model model = makeBoxModel({{"floor", {-3, -0.2, -5}, {15, 0, 5}},
+                              {"bed", {2, 0, 0.2}, {4, kBedHeight, 5}},
+                              {"other", {7, 0, -5}, {9, kBedHeight, -0.2}}});
   const World world(std::make_shared<const Scene>(std::move(model)));
   Walker walker(world.data(), {});
   std::vector<Vec3> places{{0, 0, 0}, {12, 0, 0}};
@@ -136,7 +137,7 @@ TEST(LevelDetours, AnObjectIsWalkedOverIfTheWayAroundItIsLonger) {
   const Vec3 from(0, 0, 0), to(6, 0, 0);
   // The prism is 0.3 m wide to each side, so the way around leads over z = minZ - 0.3.
   for (const double minZ : {-1.5, -0.95, 0.0}) {
-    const World world(std::make_shared<const Scene>(bedModel(minZ)));
+    const World world(std::make_shared<const Scene>(makeBedModel(minZ)));
     Walker walker(world.data(), {});
     std::vector<Vec3> places{from, to};
     const double over = walkAlong(walker, places).length;
@@ -152,7 +153,7 @@ TEST(LevelDetours, AnObjectIsWalkedOverIfTheWayAroundItIsLonger) {
 }
 
 TEST(GridSearch, AShortcutOverALowObjectIsNotTakenIfTheFeetMoveFarther) {
-  const World world(std::make_shared<const Scene>(bedModel(0.2)));
+  const World world(std::make_shared<const Scene>(makeBedModel(0.2)));
   Walker walker(world.data(), {});
   const std::vector<Vec3> around{{0, 0, 0}, {2, 0, -0.15}, {4, 0, -0.15}, {6, 0, 0}};
   const std::vector<Vec3> places = shortenPath(walker, around, Shortcuts::all);
@@ -167,7 +168,7 @@ TEST(GridSearch, CornersAreCut) {
     const double x = 2 + 0.4 * std::cos(0.785398 * i), z = 0.4 * std::sin(0.785398 * i);
     boxes.push_back({"pillar/" + std::to_string(i), {x - 0.1, 0, z - 0.1}, {x + 0.1, 2, z + 0.1}});
   }
-  const World world(boxScene(boxes));
+  const World world(makeBoxScene(boxes));
   Walker walker(world.data(), {});
   std::vector<Vec3> places{{0, 0, 0}, {2, 0, -1}, {4, 0, 0}};
   pullTight(walker, places);
@@ -182,9 +183,9 @@ TEST(GridSearch, CornersAreCut) {
 
 TEST(DoorSwing, TouchesWhatTheDoorMeetsAtAnyAngle) {
   constexpr double kQuarter = 1.5707963267948966;
-  Model model = boxModel(
+  Model model = makeBoxModel(
       {{"floor", {0, -0.2, -3}, {12, 0, 3}}, {"leaf", {5.98, 0.01, -0.49}, {6.02, 2, 0.49}}});
-  BodySpec door = bodySpec("door", BodyKind::hinged, {1});
+  BodySpec door = makeBodySpec("door", BodyKind::hinged, {1});
   door.anchor = {6, 0, -0.49};
   door.high = kQuarter;
   model.bodies.push_back(door);

@@ -12,7 +12,7 @@ namespace enfilade::tests {
 
 inline constexpr char kOneNode[] = R"({"mesh":0,"name":"box"})";
 
-inline std::string base64(const std::string& bytes) {
+inline std::string encodeBase64(const std::string& bytes) {
   static constexpr char kDigits[] =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
@@ -44,7 +44,7 @@ struct BoxMesh {
   }
 
   /// Positions, then indices.
-  std::string bytes() const {
+  std::string toBytes() const {
     std::string text(positions.size() * 12 + indices.size() * 2, '\0');
     std::memcpy(text.data(), positions.data(), positions.size() * 12);
     std::memcpy(text.data() + positions.size() * 12, indices.data(), indices.size() * 2);
@@ -54,8 +54,9 @@ struct BoxMesh {
 
 /// glTF JSON with one mesh 0 of material 0. `scene`: the root nodes, as "0,1"; `nodes`: JSON
 /// objects; `material`: its members; `buffer`: the buffer's members except byteLength.
-inline std::string gltfJson(const BoxMesh& mesh, const std::string& scene, const std::string& nodes,
-                            const std::string& material, const std::string& buffer) {
+inline std::string makeGltfJson(const BoxMesh& mesh, const std::string& scene,
+                                const std::string& nodes, const std::string& material,
+                                const std::string& buffer) {
   const std::string count = std::to_string(mesh.positions.size());
   const std::string vertexBytes = std::to_string(mesh.positions.size() * 12);
   const std::string indexCount = std::to_string(mesh.indices.size());
@@ -68,27 +69,29 @@ inline std::string gltfJson(const BoxMesh& mesh, const std::string& scene, const
          R"({"bufferView":1,"componentType":5123,"count":)" + indexCount +
          R"(,"type":"SCALAR"}],"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":)" +
          vertexBytes + R"(},{"buffer":0,"byteOffset":)" + vertexBytes + R"(,"byteLength":)" +
-         indexBytes + R"(}],"buffers":[{"byteLength":)" + std::to_string(mesh.bytes().size()) +
+         indexBytes + R"(}],"buffers":[{"byteLength":)" + std::to_string(mesh.toBytes().size()) +
          buffer + "}]}";
 }
 
-inline std::string gltf(const BoxMesh& mesh, const std::string& scene, const std::string& nodes,
-                        const std::string& material = R"("name":"paint")") {
-  return gltfJson(
+inline std::string makeGltfFile(const BoxMesh& mesh, const std::string& scene,
+                                const std::string& nodes,
+                                const std::string& material = R"("name":"paint")") {
+  return makeGltfJson(
       mesh, scene, nodes, material,
-      R"(,"uri":"data:application/octet-stream;base64,)" + base64(mesh.bytes()) + R"(")");
+      R"(,"uri":"data:application/octet-stream;base64,)" + encodeBase64(mesh.toBytes()) + R"(")");
 }
 
 /// The same as a GLB file.
-inline std::string glb(const BoxMesh& mesh, const std::string& scene, const std::string& nodes) {
+inline std::string makeGlbFile(const BoxMesh& mesh, const std::string& scene,
+                               const std::string& nodes) {
   const auto word = [](std::size_t value) {
     std::string text(4, '\0');
     for (std::size_t i = 0; i < 4; ++i) text[i] = static_cast<char>(value >> (8 * i) & 255);
     return text;
   };
-  std::string json = gltfJson(mesh, scene, nodes, R"("name":"paint")", "");
+  std::string json = makeGltfJson(mesh, scene, nodes, R"("name":"paint")", "");
   json.resize((json.size() + 3) / 4 * 4, ' ');
-  std::string binary = mesh.bytes();
+  std::string binary = mesh.toBytes();
   binary.resize((binary.size() + 3) / 4 * 4, '\0');
   return "glTF" + word(2) + word(12 + 8 + json.size() + 8 + binary.size()) + word(json.size()) +
          "JSON" + json + word(binary.size()) + std::string("BIN\0", 4) + binary;

@@ -33,18 +33,18 @@ struct DoorPart {
 };
 
 /// A jamb on each side and a head, of 5 x 10 cm.
-std::vector<DoorPart> frameParts(double width) {
+std::vector<DoorPart> makeFrameParts(double width) {
   return {{{0, 0, 0}, {0.05, 0.1, 2.1}},
           {{width - 0.05, 0, 0}, {width, 0.1, 2.1}},
           {{0.05, 0, 2.05}, {width - 0.05, 0.1, 2.1}}};
 }
 
 /// A floor, and a door at (2, 0, 3) that opens towards the scene's -z: IFC's y.
-Model doorModel(const std::string& operation, const std::vector<DoorPart>& parts,
-                double width = 1) {
-  Model model = boxModel({floorBox()});
+Model makeIfcDoorModel(const std::string& operation, const std::vector<DoorPart>& parts,
+                       double width = 1) {
+  Model model = makeBoxModel({makeFloorBox()});
   Mesh mesh;
-  for (const DoorPart& part : parts) join(mesh, boxMesh(part.min, part.max));
+  for (const DoorPart& part : parts) join(mesh, buildBoxMesh(part.min, part.max));
   model.meshes.push_back(std::move(mesh));
   Object door;
   door.path = "house/door";
@@ -62,61 +62,62 @@ Model doorModel(const std::string& operation, const std::vector<DoorPart>& parts
   return model;
 }
 
-std::vector<DoorPart> withLeaf(double width, std::vector<DoorPart> leaves) {
-  std::vector<DoorPart> parts = frameParts(width);
+std::vector<DoorPart> makeDoorParts(double width, std::vector<DoorPart> leaves) {
+  std::vector<DoorPart> parts = makeFrameParts(width);
   parts.insert(parts.end(), leaves.begin(), leaves.end());
   return parts;
 }
 
-std::vector<DoorPart> singleDoor() {
-  return withLeaf(1, {{{0.06, 0.02, 0.01}, {0.94, 0.06, 2.04}}});
+std::vector<DoorPart> makeSingleDoor() {
+  return makeDoorParts(1, {{{0.06, 0.02, 0.01}, {0.94, 0.06, 2.04}}});
 }
 
-std::vector<DoorPart> doubleDoor() {
-  return withLeaf(
+std::vector<DoorPart> makeDoubleDoor() {
+  return makeDoorParts(
       2, {{{0.06, 0.02, 0.01}, {0.99, 0.06, 2.04}}, {{1.01, 0.02, 0.01}, {1.94, 0.06, 2.04}}});
 }
 
-Model found(Model model, IfcDoors doors = IfcDoors::movable) {
+Model collectDoors(Model model, IfcDoors doors = IfcDoors::movable) {
   collectBodies(model, "no such folder/door.ifc", doors);
   return model;
 }
 
 /// The position in the open state of a body point given in the closed state.
-Vec3 whenOpen(const Model& model, const std::string& name, const Vec3& point) {
+Vec3 computeOpenPosition(const Model& model, const std::string& name, const Vec3& point) {
   BodyFixture run{Model(model)};
   run.submit({name, BodyCommand::Action::open, 0, 0, {}});
-  run.untilIdle();
-  const Body& body = run.body(name);
+  run.waitUntilIdle();
+  const Body& body = run.getBody(name);
   return body.rotation * (point - body.shape->origin) + body.position;
 }
 
 TEST(IfcDoors, LeftHasItsHingesAtTheLowEndAndOpensTowardsY) {
-  const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()));
-  ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "still_doors");
+  const Model model = collectDoors(makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor()));
+  ASSERT_EQ(model.bodies.size(), 1u) << findDiagnosticText(model, "still_doors");
   const BodySpec& door = model.bodies[0];
   EXPECT_EQ(door.name, "house/door");
   EXPECT_EQ(door.source, BodySource::ifc);
   EXPECT_EQ(door.objects, std::vector<std::uint32_t>{1});
   EXPECT_EQ(door.openedBy, OpenedBy::touch);
   EXPECT_NEAR(door.anchor.x(), 2.06, 1e-6);
-  const Vec3 tip = whenOpen(model, "house/door", {2.94, 1, 2.94});  // at its far edge, y = 0.06
+  const Vec3 tip =
+      computeOpenPosition(model, "house/door", {2.94, 1, 2.94});  // at its far edge, y = 0.06
   EXPECT_NEAR(tip.x(), 2.06, 1e-6);
   EXPECT_NEAR(tip.z(), 2.94 - 0.88, 1e-6) << "towards -z, IFC's y";
   EXPECT_EQ(countDiagnostics(model, "guessed_doors"), 0u);
 }
 
 TEST(IfcDoors, RightHasItsHingesAtTheHighEndAndOpensTowardsY) {
-  const Model model = found(doorModel("SINGLE_SWING_RIGHT", singleDoor()));
-  ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "still_doors");
+  const Model model = collectDoors(makeIfcDoorModel("SINGLE_SWING_RIGHT", makeSingleDoor()));
+  ASSERT_EQ(model.bodies.size(), 1u) << findDiagnosticText(model, "still_doors");
   EXPECT_NEAR(model.bodies[0].anchor.x(), 2.94, 1e-6);
-  const Vec3 tip = whenOpen(model, "house/door", {2.06, 1, 2.94});
+  const Vec3 tip = computeOpenPosition(model, "house/door", {2.06, 1, 2.94});
   EXPECT_NEAR(tip.x(), 2.94, 1e-6);
   EXPECT_NEAR(tip.z(), 2.94 - 0.88, 1e-6);
 }
 
 TEST(IfcDoors, OnlyTheLeafMovesAndTheFrameStands) {
-  const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()));
+  const Model model = collectDoors(makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor()));
   ASSERT_EQ(model.objects.size(), 3u);
   EXPECT_EQ(model.objects[2].path, "house/door/frame");
   EXPECT_EQ(model.objects[2].partOf, 1u);
@@ -129,47 +130,48 @@ TEST(IfcDoors, OnlyTheLeafMovesAndTheFrameStands) {
 }
 
 TEST(IfcDoors, TwoLeavesOpenApart) {
-  const Model swing = found(doorModel("DOUBLE_DOOR_SINGLE_SWING", doubleDoor(), 2));
-  ASSERT_EQ(swing.bodies.size(), 2u) << diagnosticText(swing, "still_doors");
+  const Model swing =
+      collectDoors(makeIfcDoorModel("DOUBLE_DOOR_SINGLE_SWING", makeDoubleDoor(), 2));
+  ASSERT_EQ(swing.bodies.size(), 2u) << findDiagnosticText(swing, "still_doors");
   EXPECT_EQ(swing.bodies[1].name, "house/door/leaf2");
   EXPECT_NEAR(swing.bodies[0].anchor.x(), 2.06, 1e-6);
   EXPECT_NEAR(swing.bodies[1].anchor.x(), 3.94, 1e-6);
-  EXPECT_LT(whenOpen(swing, "house/door", {2.99, 1, 2.94}).z(), 2.1);
-  EXPECT_LT(whenOpen(swing, "house/door/leaf2", {3.01, 1, 2.94}).z(), 2.1);
-  const Model slide = found(doorModel("DOUBLE_DOOR_SLIDING", doubleDoor(), 2));
+  EXPECT_LT(computeOpenPosition(swing, "house/door", {2.99, 1, 2.94}).z(), 2.1);
+  EXPECT_LT(computeOpenPosition(swing, "house/door/leaf2", {3.01, 1, 2.94}).z(), 2.1);
+  const Model slide = collectDoors(makeIfcDoorModel("DOUBLE_DOOR_SLIDING", makeDoubleDoor(), 2));
   ASSERT_EQ(slide.bodies.size(), 2u);
-  EXPECT_NEAR(whenOpen(slide, "house/door", {2.99, 1, 2.95}).x(), 2.06, 1e-6);
-  EXPECT_NEAR(whenOpen(slide, "house/door/leaf2", {3.01, 1, 2.95}).x(), 3.94, 1e-6);
+  EXPECT_NEAR(computeOpenPosition(slide, "house/door", {2.99, 1, 2.95}).x(), 2.06, 1e-6);
+  EXPECT_NEAR(computeOpenPosition(slide, "house/door/leaf2", {3.01, 1, 2.95}).x(), 3.94, 1e-6);
 }
 
 TEST(IfcDoors, SlidingDoorsSlideTheirWidth) {
-  const Model left = found(doorModel("SLIDING_TO_LEFT", singleDoor()));
+  const Model left = collectDoors(makeIfcDoorModel("SLIDING_TO_LEFT", makeSingleDoor()));
   ASSERT_EQ(left.bodies.size(), 1u);
-  EXPECT_NEAR(whenOpen(left, "house/door", {2.94, 1, 2.95}).x(), 2.06, 1e-6);
-  const Model right = found(doorModel("SLIDING_TO_RIGHT", singleDoor()));
-  EXPECT_NEAR(whenOpen(right, "house/door", {2.06, 1, 2.95}).x(), 2.94, 1e-6);
+  EXPECT_NEAR(computeOpenPosition(left, "house/door", {2.94, 1, 2.95}).x(), 2.06, 1e-6);
+  const Model right = collectDoors(makeIfcDoorModel("SLIDING_TO_RIGHT", makeSingleDoor()));
+  EXPECT_NEAR(computeOpenPosition(right, "house/door", {2.06, 1, 2.95}).x(), 2.94, 1e-6);
 }
 
 TEST(IfcDoors, AHandleLocatesTheHingesAndTheGuessIsReported) {
-  auto parts = singleDoor();
+  auto parts = makeSingleDoor();
   parts.push_back({{0.1, -0.04, 1}, {0.22, 0.0, 1.03}});  // the handle, at the low end
-  const Model model = found(doorModel("NOTDEFINED", parts));
-  ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "still_doors");
+  const Model model = collectDoors(makeIfcDoorModel("NOTDEFINED", parts));
+  ASSERT_EQ(model.bodies.size(), 1u) << findDiagnosticText(model, "still_doors");
   EXPECT_NEAR(model.bodies[0].anchor.x(), 2.94, 1e-6);
   EXPECT_EQ(model.bodies[0].low, -kQuarter);
   EXPECT_EQ(model.bodies[0].high, kQuarter);
   EXPECT_EQ(collectSolidTriangles(model, 1).size(), 24u) << "the handle moves with the leaf";
   EXPECT_EQ(countDiagnostics(model, "guessed_doors"), 1u);
-  EXPECT_NE(
-      diagnosticText(model, "guessed_doors").find("house/door: NOTDEFINED; hinged at the right"),
-      std::string::npos)
-      << diagnosticText(model, "guessed_doors");
+  EXPECT_NE(findDiagnosticText(model, "guessed_doors")
+                .find("house/door: NOTDEFINED; hinged at the right"),
+            std::string::npos)
+      << findDiagnosticText(model, "guessed_doors");
 }
 
 TEST(IfcDoors, APaneBelongsToTheLeafThatHoldsIt) {
   // Two stiles and two rails as one surface form a ring; four boxes that share faces form one
   // solid.
-  Model model = doorModel("SINGLE_SWING_LEFT", {});
+  Model model = makeIfcDoorModel("SINGLE_SWING_LEFT", {});
   Mesh& mesh = model.meshes[1];
   const auto ring = [&](double x0, double x1, double z0, double z1, double rail) {
     // The ring is one surface: inner and outer rectangle, front and back.
@@ -191,39 +193,41 @@ TEST(IfcDoors, APaneBelongsToTheLeafThatHoldsIt) {
   };
   ring(0, 1, 0, 2.1, 0.05);           // the frame
   ring(0.06, 0.94, 0.06, 2.04, 0.1);  // the leaf
-  join(mesh, boxMesh({0.17, 0.035, 0.17}, {0.83, 0.045, 1.93}));
-  const Model split = found(model);
-  ASSERT_EQ(split.bodies.size(), 1u) << diagnosticText(split, "still_doors");
+  join(mesh, buildBoxMesh({0.17, 0.035, 0.17}, {0.83, 0.045, 1.93}));
+  const Model split = collectDoors(model);
+  ASSERT_EQ(split.bodies.size(), 1u) << findDiagnosticText(split, "still_doors");
   EXPECT_EQ(collectSolidTriangles(split, 1).size(), 44u) << "the ring's 32 and the pane's 12";
   EXPECT_NEAR(split.bodies[0].anchor.x(), 2.06, 1e-6);
 }
 
 TEST(IfcDoors, UndecidableDoorsStayStaticAndAreReported) {
   const auto still = [](const Model& given) {
-    const Model model = found(given);
+    const Model model = collectDoors(given);
     EXPECT_TRUE(model.bodies.empty());
     EXPECT_EQ(model.objects.size(), given.objects.size());
     EXPECT_EQ(model.meshes.size(), given.meshes.size());
-    return diagnosticText(model, "still_doors");
+    return findDiagnosticText(model, "still_doors");
   };
   const auto has = [](const std::string& text, const char* part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
-  has(still(doorModel("SINGLE_SWING_LEFT", frameParts(1))), "no surface fills its middle");
-  has(still(doorModel("REVOLVING", singleDoor())), "REVOLVING");
-  has(still(doorModel("SINGLE_SWING_LEFT", doubleDoor(), 2)), "does not match 2 leaves");
-  has(still(doorModel("SINGLE_SWING_LEFT", {{{0, 0, 0}, {1, 0.5, 2.1}}})), "too thick");
-  Model lying = doorModel("SINGLE_SWING_LEFT", singleDoor());
+  has(still(makeIfcDoorModel("SINGLE_SWING_LEFT", makeFrameParts(1))),
+      "no surface fills its middle");
+  has(still(makeIfcDoorModel("REVOLVING", makeSingleDoor())), "REVOLVING");
+  has(still(makeIfcDoorModel("SINGLE_SWING_LEFT", makeDoubleDoor(), 2)), "does not match 2 leaves");
+  has(still(makeIfcDoorModel("SINGLE_SWING_LEFT", {{{0, 0, 0}, {1, 0.5, 2.1}}})), "too thick");
+  Model lying = makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor());
   lying.objects[1].worldFromPlacement = std::make_shared<Eigen::Affine3d>(
       Eigen::Translation3d(lying.objects[1].worldFromPlacement->translation()));
   has(still(lying), "upright");
-  Model nowhere = doorModel("SINGLE_SWING_LEFT", singleDoor());
+  Model nowhere = makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor());
   nowhere.objects[1].worldFromPlacement.reset();
   has(still(nowhere), "placement is not known");
 }
 
 TEST(IfcDoors, AllStandWhereTheUserSaysSoAndIdsStayTheSame) {
-  const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()), IfcDoors::fixed);
+  const Model model =
+      collectDoors(makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor()), IfcDoors::fixed);
   EXPECT_TRUE(model.bodies.empty());
   EXPECT_EQ(model.objects.size(), 3u);
 }
@@ -238,15 +242,16 @@ Aabb computeBox(const Model& model, std::size_t object) {
 }
 
 TEST(IfcDoors, OpenOnesAreStaticWithTheirLeavesWhereTheBodyWouldOpenThem) {
-  const Model moving = found(doorModel("SINGLE_SWING_LEFT", singleDoor()));
-  const Model open = found(doorModel("SINGLE_SWING_LEFT", singleDoor()), IfcDoors::open);
+  const Model moving = collectDoors(makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor()));
+  const Model open =
+      collectDoors(makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor()), IfcDoors::open);
   EXPECT_TRUE(open.bodies.empty());
   EXPECT_EQ(open.objects.size(), moving.objects.size());
   const std::uint32_t leaf = moving.bodies[0].objects[0];
   Aabb expected;
   const Aabb closed = computeBox(moving, leaf);
   for (int corner = 0; corner < 8; ++corner)
-    expected.include(whenOpen(
+    expected.include(computeOpenPosition(
         moving, moving.bodies[0].name,
         {corner & 1 ? closed.max.x() : closed.min.x(), corner & 2 ? closed.max.y() : closed.min.y(),
          corner & 4 ? closed.max.z() : closed.min.z()}));
@@ -256,10 +261,11 @@ TEST(IfcDoors, OpenOnesAreStaticWithTheirLeavesWhereTheBodyWouldOpenThem) {
 }
 
 TEST(IfcDoors, WithoutLeavesOnlyTheFramesStand) {
-  const Model model = found(doorModel("SINGLE_SWING_LEFT", singleDoor()), IfcDoors::absent);
+  const Model model =
+      collectDoors(makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor()), IfcDoors::absent);
   EXPECT_TRUE(model.bodies.empty());
   const std::uint32_t leaf =
-      found(doorModel("SINGLE_SWING_LEFT", singleDoor())).bodies[0].objects[0];
+      collectDoors(makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor())).bodies[0].objects[0];
   EXPECT_TRUE(model.objects[leaf].meshes.empty());
   EXPECT_EQ(model.objects.size(), 3u) << "ids stay the same";
   const auto frame = std::find_if(model.objects.begin(), model.objects.end(),
@@ -273,58 +279,58 @@ TEST(IfcDoors, ASidecarSaysBetterOfTheLeafAlone) {
   folder.write("door.walk.json",
                R"({"walk":1,"bodies":[{"name":"mine","kind":"hinged","anchor":[2.94,0,2.95],)"
                R"("objects":["0123456789012345678901"]}]})");
-  Model model = doorModel("SINGLE_SWING_LEFT", singleDoor());
-  collectBodies(model, folder.path() / "door.ifc");
+  Model model = makeIfcDoorModel("SINGLE_SWING_LEFT", makeSingleDoor());
+  collectBodies(model, folder.getPath() / "door.ifc");
   ASSERT_EQ(model.bodies.size(), 1u);
   EXPECT_EQ(model.bodies[0].source, BodySource::sidecar);
   EXPECT_EQ(model.bodies[0].objects, std::vector<std::uint32_t>{1});
 }
 
 TEST(IfcDoors, AnAvatarWalksThroughAGuessedDoorFromEitherSide) {
-  const Model model = found(
-      doorModel("NOTDEFINED", withLeaf(1.2, {{{0.06, 0.02, 0.01}, {1.14, 0.06, 2.04}}}), 1.2));
-  ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "still_doors");
+  const Model model = collectDoors(makeIfcDoorModel(
+      "NOTDEFINED", makeDoorParts(1.2, {{{0.06, 0.02, 0.01}, {1.14, 0.06, 2.04}}}), 1.2));
+  ASSERT_EQ(model.bodies.size(), 1u) << findDiagnosticText(model, "still_doors");
   for (const double side : {1.0, -1.0}) {
     BodyFixture run{Model(model)};
     run.order("ann", Spawn{{2.65, 0.001, 2.95 + 1.5 * side}, 0, 0.3, 1.75});
     run.order("ann", Walk{{{2.65, 0, 2.95 - 1.5 * side}}, 1});
-    run.ticks(600);
-    EXPECT_LT(side * (run.feet("ann").z() - 2.95), -1.4) << run.feet("ann").transpose();
-    EXPECT_EQ(whoPenetrates(run.world), "");
+    run.runTicks(600);
+    EXPECT_LT(side * (run.getFeet("ann").z() - 2.95), -1.4) << run.getFeet("ann").transpose();
+    EXPECT_EQ(namePenetratingPairs(run.world), "");
   }
 }
 
 TEST(IfcDoors, AnAvatarWalksThroughADoorThatOpensOneWayFromEitherSide) {
   for (const char* operation : {"SINGLE_SWING_LEFT", "SINGLE_SWING_RIGHT"}) {
-    const Model model =
-        found(doorModel(operation, withLeaf(1.2, {{{0.06, 0.02, 0.01}, {1.14, 0.06, 2.04}}}), 1.2));
-    ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "still_doors");
+    const Model model = collectDoors(makeIfcDoorModel(
+        operation, makeDoorParts(1.2, {{{0.06, 0.02, 0.01}, {1.14, 0.06, 2.04}}}), 1.2));
+    ASSERT_EQ(model.bodies.size(), 1u) << findDiagnosticText(model, "still_doors");
     for (const double side : {1.0, -1.0}) {
       SCOPED_TRACE(std::string(operation) + (side > 0 ? ", pushed open" : ", pulled open"));
       BodyFixture run{Model(model)};
       run.order("ann", Spawn{{2.6, 0.001, 2.95 + 1.5 * side}, 0, 0.3, 1.75});
       run.order("ann", Walk{{{2.6, 0, 2.95 - 1.5 * side}}, 1});
-      run.ticks(900);
-      EXPECT_LT(side * (run.feet("ann").z() - 2.95), -1.4) << run.feet("ann").transpose();
-      EXPECT_EQ(whoPenetrates(run.world), "");
+      run.runTicks(900);
+      EXPECT_LT(side * (run.getFeet("ann").z() - 2.95), -1.4) << run.getFeet("ann").transpose();
+      EXPECT_EQ(namePenetratingPairs(run.world), "");
     }
   }
 }
 
 // ---- files --------------------------------------------------------------------------------------
 
-Model imported(const std::filesystem::path& file, IfcReader reader) {
-  Model model = importModel(file, tests::by(reader));
+Model importWithBodies(const std::filesystem::path& file, IfcReader reader) {
+  Model model = importModel(file, tests::makeReaderOptions(reader));
   collectBodies(model, file);
   return model;
 }
 
 TEST(IfcDoors, OfAFileOpenTowardsItsY) {
   const TemporaryFolder folder;
-  const auto file = folder.write("house.ifc", IfcHouse().text());
-  for (const IfcReader reader : tests::readersHere()) {
-    const Model model = imported(file, reader);
-    ASSERT_EQ(model.bodies.size(), 1u) << diagnosticText(model, "still_doors");
+  const auto file = folder.write("house.ifc", IfcHouse().makeText());
+  for (const IfcReader reader : tests::listReadersHere()) {
+    const Model model = importWithBodies(file, reader);
+    ASSERT_EQ(model.bodies.size(), 1u) << findDiagnosticText(model, "still_doors");
     // A slab of 0.9 x 0.05 m from (1.5, 0.1) in the file; the file's y is the scene's -z.
     EXPECT_LT((model.bodies[0].anchor - Vec3(1.5, 0, -0.15)).norm(), 1e-5)
         << model.bodies[0].anchor.transpose();
@@ -334,40 +340,43 @@ TEST(IfcDoors, OfAFileOpenTowardsItsY) {
 }
 
 /// Two storeys 3 m apart, and a cabin of 1.5 x 1.5 x 2.4 m at (10, 10) on the lower one.
-std::string houseWithLift(double cabin, const std::string& slab) {
+std::string makeHouseWithLift(double cabin, const std::string& slab) {
   IfcHouse house;
   house.more =
-      house.placement(500, "#15", 10, 10, 0) + house.box(510, 1.5, 1.5, cabin) +
+      house.makePlacement(500, "#15", 10, 10, 0) + house.makeBox(510, 1.5, 1.5, cabin) +
       "#520=IFCTRANSPORTELEMENT('000000000000000000Lift',$,'Lift',$,$,#502,#515,$,"
       ".ELEVATOR.);\n" +
-      house.placement(530, "#15", 0, 0, 3) +
+      house.makePlacement(530, "#15", 0, 0, 3) +
       "#540=IFCBUILDINGSTOREY('000000000000000Storey2',$,'Upper',$,$,#532,$,$,.ELEMENT.,"
       "3000.);\n#541=IFCRELAGGREGATES('0000000000000000000010',$,$,$,#40,(#540));\n"
       "#542=IFCRELCONTAINEDINSPATIALSTRUCTURE('0000000000000000000011',$,$,$,(#520),#41);\n" +
-      (slab.empty() ? ""
-                    : house.placement(550, "#15", 9, 9, 2.9) + house.box(560, 4, 4, 0.1) + slab);
-  return house.text();
+      (slab.empty()
+           ? ""
+           : house.makePlacement(550, "#15", 9, 9, 2.9) + house.makeBox(560, 4, 4, 0.1) + slab);
+  return house.makeText();
 }
 
 TEST(IfcLifts, StopAtTheStoreysThatTheirShaftIsOpenTo) {
   const TemporaryFolder folder;
-  const auto open = folder.write("open.ifc", houseWithLift(2.4, ""));
+  const auto open = folder.write("open.ifc", makeHouseWithLift(2.4, ""));
   const auto closed = folder.write(
       "closed.ifc",
-      houseWithLift(2.4,
-                    "#570=IFCSLAB('000000000000000000Slab',$,'Slab',$,$,#552,#565,$,.FLOOR.);\n"));
-  const auto tall = folder.write("tall.ifc", houseWithLift(6, ""));
-  for (const IfcReader reader : tests::readersHere()) {
-    const Model lift = imported(open, reader);
-    ASSERT_EQ(lift.bodies.size(), 2u) << diagnosticText(lift, "still_lifts");
+      makeHouseWithLift(
+          2.4, "#570=IFCSLAB('000000000000000000Slab',$,'Slab',$,$,#552,#565,$,.FLOOR.);\n"));
+  const auto tall = folder.write("tall.ifc", makeHouseWithLift(6, ""));
+  for (const IfcReader reader : tests::listReadersHere()) {
+    const Model lift = importWithBodies(open, reader);
+    ASSERT_EQ(lift.bodies.size(), 2u) << findDiagnosticText(lift, "still_lifts");
     const BodySpec& body = lift.bodies[1].kind == BodyKind::lift ? lift.bodies[1] : lift.bodies[0];
     EXPECT_EQ(body.kind, BodyKind::lift);
     ASSERT_EQ(body.stops.size(), 2u);
     EXPECT_NEAR(body.stops[0], 0, 1e-9);
     EXPECT_NEAR(body.stops[1], 3, 1e-9);
-    EXPECT_NE(diagnosticText(imported(closed, reader), "still_lifts").find("no open shaft"),
-              std::string::npos);
-    EXPECT_NE(diagnosticText(imported(tall, reader), "still_lifts").find("taller than a cabin"),
+    EXPECT_NE(
+        findDiagnosticText(importWithBodies(closed, reader), "still_lifts").find("no open shaft"),
+        std::string::npos);
+    EXPECT_NE(findDiagnosticText(importWithBodies(tall, reader), "still_lifts")
+                  .find("taller than a cabin"),
               std::string::npos);
   }
 }
@@ -387,7 +396,7 @@ const Building kBuildings[] = {
 TEST(IfcDoors, HowADoorOpensIsNotGuessedWhereNoneOpens) {
   for (const IfcDoors doors :
        {IfcDoors::movable, IfcDoors::open, IfcDoors::fixed, IfcDoors::absent}) {
-    const Model model = found(doorModel("NOTDEFINED", singleDoor()), doors);
+    const Model model = collectDoors(makeIfcDoorModel("NOTDEFINED", makeSingleDoor()), doors);
     const bool opens = doors == IfcDoors::movable || doors == IfcDoors::open;
     EXPECT_EQ(countDiagnostics(model, "guessed_doors"), opens ? 1u : 0u) << toString(doors);
   }
@@ -398,16 +407,16 @@ TEST(IfcDoors, OfRealBuildingsBecomeBodiesOrAreReported) {
   ENFILADE_NEED_WEB_IFC();
   for (const Building& building : kBuildings) {
     SCOPED_TRACE(building.file);
-    const Model model = imported(*shared / "scenes" / building.file, IfcReader::webIfc);
+    const Model model = importWithBodies(*shared / "scenes" / building.file, IfcReader::webIfc);
     const auto doors = std::count_if(
         model.objects.begin(), model.objects.end(),
         [](const Object& object) { return object.ifcClass == "IfcDoor" && !object.partOf; });
     EXPECT_EQ(static_cast<std::size_t>(doors), building.doors);
     EXPECT_EQ(model.bodies.size(), building.leaves);
     EXPECT_EQ(countDiagnostics(model, "guessed_doors"), building.guessed)
-        << diagnosticText(model, "guessed_doors");
+        << findDiagnosticText(model, "guessed_doors");
     EXPECT_EQ(countDiagnostics(model, "still_doors"), building.still)
-        << diagnosticText(model, "still_doors");
+        << findDiagnosticText(model, "still_doors");
     EXPECT_NO_THROW(Scene{Model(model)});
   }
 }
@@ -416,17 +425,17 @@ TEST(IfcDoors, AnAvatarWalksThroughARealDoorFromEitherSide) {
   ENFILADE_NEED_SHARED(shared);
   ENFILADE_NEED_WEB_IFC();
   const auto file = *shared / "scenes/fzk-haus/AC14-FZK-Haus.ifc";
-  const Model model = imported(file, IfcReader::webIfc);
+  const Model model = importWithBodies(file, IfcReader::webIfc);
   for (const double side : {1.0, -1.0}) {
     BodyFixture run{Model(model)};
     const std::string name = "Projekt/Gelände/AC14-FZK-Haus/0. Erdgeschoss/Innentuer-2";
-    const Aabb leaf = run.body(name).boxes.whole;
+    const Aabb leaf = run.getBody(name).boxes.whole;
     const Vec3 ahead(0, 0, 0.9 * side), middle(leaf.centre().x(), leaf.min.y(), leaf.centre().z());
     run.order("ann", Spawn{middle + ahead + Vec3(0, 0.01, 0), 0, 0.3, 1.75});
     run.order("ann", Walk{{middle - ahead}, 1});
-    run.ticks(900);
-    EXPECT_GT(side * (middle.z() - run.feet("ann").z()), 0.85) << run.feet("ann").transpose();
-    EXPECT_NE(run.body(name).drive.jointPosition, 0);
+    run.runTicks(900);
+    EXPECT_GT(side * (middle.z() - run.getFeet("ann").z()), 0.85) << run.getFeet("ann").transpose();
+    EXPECT_NE(run.getBody(name).drive.jointPosition, 0);
   }
 }
 

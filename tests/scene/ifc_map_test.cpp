@@ -11,9 +11,9 @@
 namespace enfilade::scene {
 namespace {
 
-using tests::by;
 using tests::IfcHouse;
-using tests::readersHere;
+using tests::listReadersHere;
+using tests::makeReaderOptions;
 using tests::TemporaryFolder;
 
 // ---- the map ------------------------------------------------------------------------------------
@@ -26,16 +26,16 @@ TEST(IfcMap, OnRequestCoordinatesAreThoseOfTheMap) {
       "#600=IFCMAPCONVERSION(#20,#601,456789.,5428000.,110.,0.,1.,$);\n"
       "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
       "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-  const auto file = folder.write("house.ifc", house.text());
-  for (const IfcReader reader : readersHere()) {
-    ImportOptions options = by(reader);
+  const auto file = folder.write("house.ifc", house.makeText());
+  for (const IfcReader reader : listReadersHere()) {
+    ImportOptions options = makeReaderOptions(reader);
     options.georeference = true;
     const Model model = importModel(file, options);
     SCOPED_TRACE(model.reader);
     EXPECT_EQ(model.map, "EPSG:25832");
     // A corner of the file's (1.5, 0.1) is 0.1 m west and 1.5 m north of the origin; -z is north.
     const Vec3 door =
-        objectOfClass(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
+        findObjectOfClass(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
     EXPECT_LT((door - Vec3(456789 - 0.1, 110, -(5428000 + 1.5))).norm(), 1e-6) << door.transpose();
     EXPECT_LT(Scene(Model(model)).bounds().size().z(), 4.01);
     EXPECT_GT(Scene(Model(model)).bounds().size().z(), 3.99) << "the wall runs north";
@@ -50,12 +50,12 @@ Vec3 findOriginOnMap(const std::string& more, const std::string& schema,
   IfcHouse house;
   house.schema = schema;
   house.more = more;
-  ImportOptions options = by(readersHere().front());
+  ImportOptions options = makeReaderOptions(listReadersHere().front());
   options.georeference = true;
-  const Model model = importModel(folder.write("house.ifc", house.text()), options);
+  const Model model = importModel(folder.write("house.ifc", house.makeText()), options);
   if (crs != nullptr) *crs = model.map;
   // The door stands at (1.5, 0.1) of the file.
-  return objectOfClass(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
+  return findObjectOfClass(model, "IfcDoor").worldFromPlacement->translation() + model.offset;
 }
 
 TEST(IfcMap, AMapConversionWithAxisFactorsIsApplied) {
@@ -103,11 +103,11 @@ TEST(IfcMap, TheMapPropertySetsOfIfc2x3AreApplied) {
 TEST(IfcMap, NorthIsAsTheFileStatesItAndElseItsYAxis) {
   const TemporaryFolder folder;
   IfcHouse house;
-  const ImportOptions options = by(readersHere().front());
-  EXPECT_EQ(importModel(folder.write("house.ifc", house.text()), options).north,
+  const ImportOptions options = makeReaderOptions(listReadersHere().front());
+  EXPECT_EQ(importModel(folder.write("house.ifc", house.makeText()), options).north,
             Eigen::Vector2d(0, -1));
   // 30 degrees east of the file's y axis, so towards +x and -z of the scene.
-  std::string text = house.text();
+  std::string text = house.makeText();
   const std::string context = "1.E-05,#11,$)";
   text.replace(text.find(context), context.size(), "1.E-05,#11,#16)");
   text.insert(text.find("#20="), "#16=IFCDIRECTION((0.5,0.866025403784439));\n");
@@ -119,17 +119,19 @@ TEST(IfcMap, NorthIsAsTheFileStatesItAndElseItsYAxis) {
 TEST(IfcMap, ANorthThatCannotBeUsedIsReported) {
   const TemporaryFolder folder;
   for (const auto& [reader, north] :
-       {std::pair(readersHere().front(), "#16"), std::pair(readersHere().back(), "#16"),
-        std::pair(readersHere().front(), "#999"), std::pair(readersHere().front(), "(0.,1.)")}) {
-    std::string text = IfcHouse().text();
+       {std::pair(listReadersHere().front(), "#16"), std::pair(listReadersHere().back(), "#16"),
+        std::pair(listReadersHere().front(), "#999"),
+        std::pair(listReadersHere().front(), "(0.,1.)")}) {
+    std::string text = IfcHouse().makeText();
     const std::string context = "1.E-05,#11,$)";
     text.replace(text.find(context), context.size(), std::string("1.E-05,#11,") + north + ")");
     text.insert(text.find("#20="), "#16=IFCDIRECTION((0.,0.));\n");
-    const Model model = importModel(folder.write("broken.ifc", text), by(reader));
+    const Model model = importModel(folder.write("broken.ifc", text), makeReaderOptions(reader));
     EXPECT_FALSE(model.north) << north;
     EXPECT_EQ(countDiagnostics(model, "broken_north"), 1u) << north;
-    EXPECT_TRUE(diagnosticText(model, "broken_north").ends_with(std::string("TrueNorth ") + north))
-        << diagnosticText(model, "broken_north");
+    EXPECT_TRUE(
+        findDiagnosticText(model, "broken_north").ends_with(std::string("TrueNorth ") + north))
+        << findDiagnosticText(model, "broken_north");
   }
 }
 
@@ -139,8 +141,8 @@ TEST(IfcMap, NorthFollowsFromTheMapIfNothingElseStatesIt) {
   house.more =
       "#600=IFCMAPCONVERSION(#20,#601,456789.,5428000.,110.,0.,1.,$);\n"
       "#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,$);\n";
-  const auto file = folder.write("house.ifc", house.text());
-  ImportOptions options = by(readersHere().front());
+  const auto file = folder.write("house.ifc", house.makeText());
+  ImportOptions options = makeReaderOptions(listReadersHere().front());
   // The file's x axis points north.
   EXPECT_EQ(importModel(file, options).north, Eigen::Vector2d(1, 0));
   options.georeference = true;
@@ -153,7 +155,7 @@ TEST(IfcMap, AMapThatIsMissingIsAnErrorOnRequest) {
   const TemporaryFolder folder;
   ImportOptions options;
   options.georeference = true;
-  for (const auto& file : {folder.write("house.ifc", IfcHouse().text()),
+  for (const auto& file : {folder.write("house.ifc", IfcHouse().makeText()),
                            folder.write("cube.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")}) {
     try {
       importModel(file, options);
@@ -172,10 +174,10 @@ TEST(IfcMap, NumbersThatCannotBeUsedAreNamed) {
     house.more = "#600=IFCMAPCONVERSION(#20,#601," + numbers +
                  ");\n#601=IFCPROJECTEDCRS('EPSG:25832',$,$,$,$,$,#602);\n"
                  "#602=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
-    const auto file = folder.write("house.ifc", house.text());
-    ImportOptions options = by(IfcReader::ifcPlusPlus);
+    const auto file = folder.write("house.ifc", house.makeText());
+    ImportOptions options = makeReaderOptions(IfcReader::ifcPlusPlus);
     const Model model = importModel(file, options);
-    EXPECT_EQ(diagnosticText(model, "broken_map"), "IfcMapConversion: " + fault);
+    EXPECT_EQ(findDiagnosticText(model, "broken_map"), "IfcMapConversion: " + fault);
     EXPECT_EQ(countDiagnostics(model, "map_place"), 0u);
     options.georeference = true;
     const std::string text = catchFailure(file, options);
@@ -197,7 +199,7 @@ TEST(IfcMap, AMapOfAnotherScaleIsRefusedOnRequest) {
   ImportOptions options;
   options.georeference = true;
   try {
-    importModel(folder.write("house.ifc", house.text()), options);
+    importModel(folder.write("house.ifc", house.makeText()), options);
     ADD_FAILURE() << "a map forty times as large was applied";
   } catch (const ImportError& error) {
     EXPECT_NE(std::string(error.what()).find("IfcMapConversion scales by 40"), std::string::npos)

@@ -19,7 +19,7 @@ const IfcProduct& findProduct(const IfcMetadata& facts, const std::string& ifcCl
 }
 
 IfcMetadata readFacts(const IfcHouse& house) {
-  return readIfcMetadata(StepFile(house.text()));
+  return readIfcMetadata(StepFile(house.makeText()));
 }
 
 TEST(IfcMetadata, ProductsHaveClassNamePlaceAndRole) {
@@ -82,7 +82,7 @@ TEST(IfcMetadata, DoorsSayHowTheyOpenInEitherVersion) {
   typed.more =
       "#500=IFCDOORTYPE('000000000000000000DTyp',$,$,$,$,$,$,$,$,.DOOR.,.REVOLVING.,$,$);\n"
       "#501=IFCRELDEFINESBYTYPE('0000000000000000000009',$,$,$,(#320),#500);\n";
-  std::string text = typed.text();
+  std::string text = typed.makeText();
   text.replace(text.find(operation), operation.size(), "$");
   EXPECT_EQ(findProduct(readIfcMetadata(StepFile(text)), "IfcDoor").operation, "REVOLVING");
 }

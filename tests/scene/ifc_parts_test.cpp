@@ -39,13 +39,13 @@ TEST(IfcParts, AProductIsInOnePartWithAllThatItsShapeNeeds) {
   std::string points = "#600=IFCCARTESIANPOINTLIST3D((";  // larger than the gap that is read, too
   for (int i = 0; i < 1000; ++i) points += "(0.,0.,0.),";
   house.more = points + "(1.,0.,0.)));\n";
-  house.more += house.placement(500, "#15", 1, 1, 0) + house.box(510, 1, 1, 0.5) +
+  house.more += house.makePlacement(500, "#15", 1, 1, 0) + house.makeBox(510, 1, 1, 0.5) +
                 "#601=IFCTRIANGULATEDFACESET(#600,$,.F.,((1,2,3)),$);\n"
                 "#602=IFCSHAPEREPRESENTATION(#20,'Body','Tessellation',(#601));\n"
                 "#603=IFCPRODUCTDEFINITIONSHAPE($,$,(#602));\n"
                 "#604=IFCFURNISHINGELEMENT('0000000000000000000604',$,'Rug',$,$,#502,#603,$);\n"
                 "#605=IFCSTYLEDITEM(#601,(#606),$);\n#606=IFCPRESENTATIONSTYLEASSIGNMENT(($));\n";
-  const StepFile file(house.text());
+  const StepFile file(house.makeText());
   const std::vector<std::uint32_t> products = listBodies(file);
   ASSERT_EQ(products, (std::vector<std::uint32_t>{120, 320, 604}));
   const std::vector<IfcFilePart> parts = divideIfc(file, products, 2);
@@ -77,7 +77,7 @@ TEST(IfcParts, WhatOthersNeedIsInAllParts) {
             "#610=IFCOPENINGELEMENT('0000000000000000000610',$,'Hole',$,$,#15,#603,$,$);\n"),
         std::string("#610=IFCCONNECTIONSURFACEGEOMETRY(#601,$);\n")}) {
     house.more = rug + more;
-    const StepFile file(house.text());
+    const StepFile file(house.makeText());
     const std::vector<IfcFilePart> parts = divideIfc(file, listBodies(file), 2);
     for (const IfcFilePart& part : parts) {
       const StepFile read(joinRanges(file, part));
@@ -95,7 +95,7 @@ TEST(IfcParts, WhatOthersNeedIsInAllParts) {
                   "3=IFCFURNISHINGELEMENT('0000000000000000000" + n + "3',$,'Mat',$,$,#15,#" + n +
                   "2,$);\n";
   }
-  const StepFile file(house.text());
+  const StepFile file(house.makeText());
   const std::vector<IfcFilePart> parts = divideIfc(file, listBodies(file), 2);
   std::set<std::size_t> homes;
   for (std::size_t i = 0; i < parts.size(); ++i)

@@ -13,7 +13,7 @@
 namespace enfilade::scene {
 namespace {
 
-using tests::by;
+using tests::makeReaderOptions;
 using tests::TemporaryFolder;
 
 /// A wall of 4 x 0.3 x 3 m with an opening and a door in it, a slab of triangles, and a room.
@@ -273,9 +273,9 @@ TEST(IfcXml, GivesTheModelOfTheSameStepFile) {
   const TemporaryFolder folder;
   const auto step = folder.write("a.ifc", kStep);
   const auto plain = folder.write("a.ifcXML", makeXml());
-  const auto zipped = folder.write("a.ifczip", tests::storedZip({{"house.ifcxml", makeXml()}}));
+  const auto zipped = folder.write("a.ifczip", tests::makeStoredZip({{"house.ifcxml", makeXml()}}));
   for (const IfcReader reader : {IfcReader::webIfc, IfcReader::ifcPlusPlus}) {
-    const Model expected = importModel(step, by(reader));
+    const Model expected = importModel(step, makeReaderOptions(reader));
     ASSERT_EQ(expected.objects.size(), 3u);
     ASSERT_EQ(expected.storeys.size(), 1u);
     ASSERT_EQ(expected.spaces.size(), 1u);
@@ -283,7 +283,7 @@ TEST(IfcXml, GivesTheModelOfTheSameStepFile) {
         << expected.objects[0].path;
     for (const auto& file : {plain, zipped}) {
       SCOPED_TRACE(file.string() + " by " + expected.reader);
-      const Model model = importModel(file, by(reader));
+      const Model model = importModel(file, makeReaderOptions(reader));
       expectSame(model, expected);
       EXPECT_EQ(countXmlProblems(model), 0u);
       EXPECT_EQ(model.reader, expected.reader);
@@ -295,7 +295,7 @@ TEST(IfcXml, InUtf16GivesTheSameModel) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
   std::string text("\xff\xfe", 2);
-  for (const char c : replaced(replaced(makeXml(), "utf-8", "utf-16"), "ä", "\xe4")) {
+  for (const char c : replaceFirst(replaceFirst(makeXml(), "utf-8", "utf-16"), "ä", "\xe4")) {
     text += c;
     text += '\0';
   }
@@ -306,12 +306,12 @@ TEST(IfcXml, InUtf16GivesTheSameModel) {
 TEST(IfcXml, ElementsThatTheSchemaLacksAreReportedAndTheRestIsRead) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
-  const std::string text = replaced(
-      replaced(makeXml("<IfcStrange id=\"s\"/>\n"), "Tag=\"7\"", "Tag=\"7\" Colour=\"red\""),
+  const std::string text = replaceFirst(
+      replaceFirst(makeXml("<IfcStrange id=\"s\"/>\n"), "Tag=\"7\"", "Tag=\"7\" Colour=\"red\""),
       "<HasOpenings ", "<Colour><Red>1</Red></Colour><HasOpenings ");
   const Model model = importModel(folder.write("a.ifcxml", text));
   EXPECT_EQ(countDiagnostics(model, "xml_not_read"), 3u);
-  const std::string example = diagnosticText(model, "xml_not_read");
+  const std::string example = findDiagnosticText(model, "xml_not_read");
   EXPECT_TRUE(example.starts_with("line ")) << example;
   EXPECT_NE(example.find("attribute 'Colour' of IfcWall"), std::string::npos) << example;
   expectSame(model, importModel(folder.write("a.ifc", kStep)));
@@ -320,21 +320,24 @@ TEST(IfcXml, ElementsThatTheSchemaLacksAreReportedAndTheRestIsRead) {
 TEST(IfcXml, AReferenceToAMissingIdIsReportedAndLeftOut) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
-  const std::string text = replaced(makeXml(), "<IfcDoor ref=\"door\"", "<IfcDoor ref=\"gone\"");
+  const std::string text =
+      replaceFirst(makeXml(), "<IfcDoor ref=\"door\"", "<IfcDoor ref=\"gone\"");
   const Model model = importModel(folder.write("a.ifcxml", text));
   EXPECT_EQ(countDiagnostics(model, "xml_reference_missing"), 1u);
-  EXPECT_NE(diagnosticText(model, "xml_reference_missing").find("id 'gone'"), std::string::npos);
+  EXPECT_NE(findDiagnosticText(model, "xml_reference_missing").find("id 'gone'"),
+            std::string::npos);
   EXPECT_EQ(model.objects.size(), 3u);
 }
 
 TEST(IfcXml, AReferenceToAnotherClassIsReportedAndLeftOut) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
-  const std::string text = replaced(makeXml(), "<IfcRelContainedInSpatialStructure ref=\"content\"",
-                                    "<IfcRelContainedInSpatialStructure ref=\"zero\"");
+  const std::string text =
+      replaceFirst(makeXml(), "<IfcRelContainedInSpatialStructure ref=\"content\"",
+                   "<IfcRelContainedInSpatialStructure ref=\"zero\"");
   const Model model = importModel(folder.write("a.ifcxml", text));
   EXPECT_EQ(countDiagnostics(model, "xml_not_read"), 1u);
-  EXPECT_NE(diagnosticText(model, "xml_not_read")
+  EXPECT_NE(findDiagnosticText(model, "xml_not_read")
                 .find("IfcCartesianPoint in place of IfcRelContainedInSpatialStructure"),
             std::string::npos);
   EXPECT_EQ(model.objects.size(), 3u);
@@ -343,13 +346,13 @@ TEST(IfcXml, AReferenceToAnotherClassIsReportedAndLeftOut) {
 TEST(IfcXml, AChoiceMayBeAReferenceWithoutAType) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
-  const std::string text =
-      replaced(makeXml("<IfcAxis2Placement3D id=\"corner2\"><Location Coordinates=\"1500 0 0\"/>"
-                       "</IfcAxis2Placement3D>\n"),
-               R"(<RelativePlacement><IfcAxis2Placement3D>
+  const std::string text = replaceFirst(
+      makeXml("<IfcAxis2Placement3D id=\"corner2\"><Location Coordinates=\"1500 0 0\"/>"
+              "</IfcAxis2Placement3D>\n"),
+      R"(<RelativePlacement><IfcAxis2Placement3D>
      <Location Coordinates="1.5e3 0 0"/>
     </IfcAxis2Placement3D></RelativePlacement>)",
-               "<RelativePlacement ref=\"corner2\" xsi:nil=\"true\"/>");
+      "<RelativePlacement ref=\"corner2\" xsi:nil=\"true\"/>");
   const Model model = importModel(folder.write("a.ifcxml", text));
   expectSame(model, importModel(folder.write("a.ifc", kStep)));
   EXPECT_EQ(countXmlProblems(model), 0u);
@@ -373,7 +376,7 @@ TEST(IfcXml, HostileNumbersAndCyclesLoadOrAreErrorsInWords) {
   };
   int loaded = 0;
   for (const auto& [from, to] : changes) {
-    const auto file = folder.write("a.ifcxml", replaced(makeXml(), from, to));
+    const auto file = folder.write("a.ifcxml", replaceFirst(makeXml(), from, to));
     const std::string message = catchFailure(file);
     loaded += message.empty() ? 1 : 0;
     for (const char* fault : {"crashed", "hung", "timed out", "invalid data", "exited"})
@@ -385,12 +388,12 @@ TEST(IfcXml, HostileNumbersAndCyclesLoadOrAreErrorsInWords) {
 TEST(IfcXml, AValueThatIsNotOfItsTypeIsReported) {
   ENFILADE_NEED_WEB_IFC();
   const TemporaryFolder folder;
-  std::string text = replaced(makeXml(), "Elevation=\"0\"", "Elevation=\"0,5\"");
-  text = replaced(text, "PredefinedType=\"floor\"", "PredefinedType=\"constructor\"");
-  text = replaced(text, "<IfcBoolean-wrapper>true", "<IfcBoolean-wrapper>constructor");
+  std::string text = replaceFirst(makeXml(), "Elevation=\"0\"", "Elevation=\"0,5\"");
+  text = replaceFirst(text, "PredefinedType=\"floor\"", "PredefinedType=\"constructor\"");
+  text = replaceFirst(text, "<IfcBoolean-wrapper>true", "<IfcBoolean-wrapper>constructor");
   const Model model = importModel(folder.write("a.ifcxml", text));
   EXPECT_EQ(countDiagnostics(model, "xml_value_ignored"), 3u);
-  EXPECT_NE(diagnosticText(model, "xml_value_ignored").find("Elevation=\"0,5\""),
+  EXPECT_NE(findDiagnosticText(model, "xml_value_ignored").find("Elevation=\"0,5\""),
             std::string::npos);
 }
 
@@ -418,8 +421,8 @@ TEST(IfcXml, ADocumentThatCannotBeReadIsRefusedWithLineAndRemedy) {
        "</ex:iso_10303_28>",
        {":1: ISO 10303-28, the ifcXML of IFC2x3, is not read"}},
       {"between",
-       replaced(makeXml(), "xmlns:ifc=\"http://www.buildingsmart-tech.org/ifcXML/IFC4/Add2",
-                "xmlns:ifc=\"http://www.buildingsmart-tech.org/ifcXML/IFC4x1/FINAL"),
+       replaceFirst(makeXml(), "xmlns:ifc=\"http://www.buildingsmart-tech.org/ifcXML/IFC4/Add2",
+                    "xmlns:ifc=\"http://www.buildingsmart-tech.org/ifcXML/IFC4x1/FINAL"),
        {"ifcXML of", "IFC4x1/FINAL"}},
       {"other", "<html xmlns='http://www.w3.org/1999/xhtml'/>", {"not an ifcXML file", "'html'"}},
       {"deep", deep, {":1006: its elements are nested more than 1000 deep"}},
@@ -436,7 +439,7 @@ TEST(IfcXml, ADocumentThatCannotBeReadIsRefusedWithLineAndRemedy) {
 
 TEST(IfcXml, WithoutNodePackagesIsRefusedWithTheRemedy) {
   const TemporaryFolder folder;
-  setenv("ENFILADE_WEB_IFC", folder.path().c_str(), 1);
+  setenv("ENFILADE_WEB_IFC", folder.getPath().c_str(), 1);
   const std::string message = catchFailure(folder.write("a.ifcxml", makeXml()));
   unsetenv("ENFILADE_WEB_IFC");
   for (const char* part : {"a.ifcxml: IFC in XML is not read: web-ifc is not in ", "run npm ci",

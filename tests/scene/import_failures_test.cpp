@@ -34,16 +34,16 @@ void expectNoChildren() {
 
 TEST(ImportFailures, MissingFileFolderAndEmptyFileAreReported) {
   const TemporaryFolder folder;
-  const auto missing = folder.path() / "missing.glb";
+  const auto missing = folder.getPath() / "missing.glb";
   EXPECT_TRUE(contains(catchFailure(missing), missing.string() + ": no such file"));
-  EXPECT_TRUE(contains(catchFailure(folder.path()), "is a folder"));
+  EXPECT_TRUE(contains(catchFailure(folder.getPath()), "is a folder"));
   EXPECT_TRUE(contains(catchFailure(folder.write("empty.obj", "")), "empty.obj: is empty"));
 }
 
 TEST(ImportFailures, AMissingReaderModuleIsReported) {
   const TemporaryFolder folder;
   const auto file = folder.write("box.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
-  const auto missing = folder.path() / "missing.so";
+  const auto missing = folder.getPath() / "missing.so";
   setenv("ENFILADE_ASSIMP", missing.c_str(), 1);
   const std::string text = catchFailure(file);
   unsetenv("ENFILADE_ASSIMP");
@@ -63,7 +63,7 @@ TEST(ImportFailures, AnUnknownExtensionListsTheKnownOnes) {
 
 TEST(ImportFailures, AGlbCutOffAnywhereIsAnError) {
   const TemporaryFolder folder;
-  const std::string whole = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
+  const std::string whole = tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode);
   ASSERT_EQ(catchFailure(folder.write("whole.glb", whole)), "");
   for (std::size_t size = 1; size < whole.size(); size += 97) {
     const std::string text = catchFailure(folder.write("cut.glb", whole.substr(0, size)));
@@ -73,7 +73,7 @@ TEST(ImportFailures, AGlbCutOffAnywhereIsAnError) {
 
 TEST(ImportFailures, AGlbWithNoiseInItNeverHurtsTheCaller) {
   const TemporaryFolder folder;
-  const std::string whole = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
+  const std::string whole = tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode);
   std::size_t refused = 0;
   for (std::size_t at = 0; at < whole.size(); at += 61) {
     std::string noisy = whole;
@@ -86,7 +86,7 @@ TEST(ImportFailures, AGlbWithNoiseInItNeverHurtsTheCaller) {
 
 TEST(ImportFailures, TruncatedAndMislabelledTextFilesAreErrors) {
   const TemporaryFolder folder;
-  const std::string gltf = tests::gltf(BoxMesh({1, 1, 1}), "0", kOneNode);
+  const std::string gltf = tests::makeGltfFile(BoxMesh({1, 1, 1}), "0", kOneNode);
   EXPECT_TRUE(contains(catchFailure(folder.write("cut.gltf", gltf.substr(0, 300))), "cut.gltf"));
   EXPECT_TRUE(contains(catchFailure(folder.write("x.dae", "<COLLADA><asset>")), "x.dae"));
   EXPECT_TRUE(contains(catchFailure(folder.write("x.ifc", "ISO-10303-21;\nDATA;\n")), "cut off"));
@@ -97,7 +97,7 @@ TEST(ImportFailures, TruncatedAndMislabelledTextFilesAreErrors) {
 
 TEST(ImportFailures, AChildThatHangsIsKilledWhenTheTimeIsOver) {
   const TemporaryFolder folder;
-  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const auto file = folder.write("box.glb", tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode));
   const Fault fault("hang");
   ImportOptions options;
   options.timeLimit = 0.3;
@@ -108,7 +108,7 @@ TEST(ImportFailures, AChildThatHangsIsKilledWhenTheTimeIsOver) {
 
 TEST(ImportFailures, ACrashNamesTheFileTheStageAndARemedy) {
   const TemporaryFolder folder;
-  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const auto file = folder.write("box.glb", tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode));
   const Fault fault("crash");
   const std::string text = catchFailure(file);
   EXPECT_TRUE(contains(text, "box.glb")) << text;
@@ -120,7 +120,7 @@ TEST(ImportFailures, ACrashNamesTheFileTheStageAndARemedy) {
 
 TEST(ImportFailures, AChildThatAnswersNothingOrNoiseIsAnError) {
   const TemporaryFolder folder;
-  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const auto file = folder.write("box.glb", tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode));
   {
     const Fault fault("exit");
     EXPECT_TRUE(contains(catchFailure(file), "ended without an answer"));
@@ -139,7 +139,7 @@ TEST(ImportFailures, AChildThatAnswersNothingOrNoiseIsAnError) {
 
 TEST(ImportFailures, AnExceptionFromProgressLeavesNoChild) {
   const TemporaryFolder folder;
-  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const auto file = folder.write("box.glb", tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode));
   const auto interrupt = [](const std::string&, double) { throw std::runtime_error("enough"); };
   EXPECT_THROW(importModel(file, {}, interrupt), std::runtime_error);
   expectNoChildren();
@@ -147,7 +147,7 @@ TEST(ImportFailures, AnExceptionFromProgressLeavesNoChild) {
 
 TEST(ImportFailures, OptionsOutOfRangeAreRefused) {
   const TemporaryFolder folder;
-  const auto file = folder.write("box.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const auto file = folder.write("box.glb", tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode));
   ImportOptions options;
   options.metresPerUnit = -1;
   EXPECT_TRUE(contains(catchFailure(file, options), "metres per unit"));

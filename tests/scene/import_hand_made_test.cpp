@@ -13,8 +13,8 @@ namespace enfilade::scene {
 namespace {
 
 using tests::BoxMesh;
-using tests::gltf;
 using tests::kOneNode;
+using tests::makeGltfFile;
 using tests::TemporaryFolder;
 
 void expectBounds(const Scene& scene, const Vec3& min, const Vec3& max, double tolerance = 1e-6) {
@@ -35,9 +35,10 @@ TEST(ImportHandMade, GltfBoxHasItsSizePathAndMaterial) {
   const TemporaryFolder folder;
   const auto file = folder.write(
       "box.gltf",
-      gltf(BoxMesh({1, 2, 3}), "0", kOneNode,
-           R"("name":"glass","alphaMode":"BLEND","doubleSided":true,)"
-           R"("pbrMetallicRoughness":{"baseColorFactor":[0.25,0.5,1,0.5],"metallicFactor":0})"));
+      makeGltfFile(
+          BoxMesh({1, 2, 3}), "0", kOneNode,
+          R"("name":"glass","alphaMode":"BLEND","doubleSided":true,)"
+          R"("pbrMetallicRoughness":{"baseColorFactor":[0.25,0.5,1,0.5],"metallicFactor":0})"));
   const Model model = importModel(file);
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].path, "box");
@@ -55,10 +56,11 @@ TEST(ImportHandMade, TransformsAreChainedInDoublesAndTheOffsetComesOff) {
   // The parent is a million metres away and its child 0.125 m further; float spacing there is 1/16
   // m.
   const auto file = folder.write(
-      "far.gltf", gltf(BoxMesh({1, 1, 1}), "0",
-                       R"({"name":"site","translation":[1000000,0,-2000000],"children":[1]},)"
-                       R"({"name":"a","translation":[0.0078125,0,0],"children":[2]},)"
-                       R"({"name":"b","translation":[0.001953125,0.25,0],"mesh":0})"));
+      "far.gltf",
+      makeGltfFile(BoxMesh({1, 1, 1}), "0",
+                   R"({"name":"site","translation":[1000000,0,-2000000],"children":[1]},)"
+                   R"({"name":"a","translation":[0.0078125,0,0],"children":[2]},)"
+                   R"({"name":"b","translation":[0.001953125,0.25,0],"mesh":0})"));
   const Model model = importModel(file);
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].path, "site/a/b");
@@ -76,8 +78,8 @@ TEST(ImportHandMade, TranslationsThatFloatsCannotHoldAreReadWhole) {
   const std::string nodes = R"({"mesh":0,"translation":[459123.4,112.6,-5428310.7]},)"
                             R"({"mesh":0,"translation":[459125.53,112.6,-5428309.31]})";
   const BoxMesh mesh({1, 1, 1});
-  for (const auto& file : {folder.write("map.gltf", gltf(mesh, "0,1", nodes)),
-                           folder.write("map.glb", tests::glb(mesh, "0,1", nodes))}) {
+  for (const auto& file : {folder.write("map.gltf", makeGltfFile(mesh, "0,1", nodes)),
+                           folder.write("map.glb", tests::makeGlbFile(mesh, "0,1", nodes))}) {
     const Model model = importModel(file);
     ASSERT_EQ(model.objects.size(), 2u);
     const Vec3 apart =
@@ -110,9 +112,10 @@ TEST(ImportHandMade, AnObjectThreeHundredKilometresOffIsLeftOutAndReported) {
   const TemporaryFolder folder;
   const auto file = folder.write(
       "stray.gltf",
-      gltf(BoxMesh({1, 1, 1}), "0,1,2,3",
-           R"({"mesh":0},{"mesh":0,"translation":[2,0,0]},{"mesh":0,"translation":[0,0,3]},)"
-           R"({"mesh":0,"name":"stray","translation":[300000,0,0]})"));
+      makeGltfFile(
+          BoxMesh({1, 1, 1}), "0,1,2,3",
+          R"({"mesh":0},{"mesh":0,"translation":[2,0,0]},{"mesh":0,"translation":[0,0,3]},)"
+          R"({"mesh":0,"name":"stray","translation":[300000,0,0]})"));
   const Model model = importModel(file);
   EXPECT_EQ(model.objects.size(), 3u);
   EXPECT_EQ(countDiagnostics(model, "far_object_dropped"), 1u);
@@ -124,21 +127,21 @@ TEST(ImportHandMade, TwoSitesFarApartAreBothKept) {
   const TemporaryFolder folder;
   const auto file = folder.write(
       "sites.gltf",
-      gltf(BoxMesh({1, 1, 1}), "0,1", R"({"mesh":0},{"mesh":0,"translation":[5000,0,0]})"));
+      makeGltfFile(BoxMesh({1, 1, 1}), "0,1", R"({"mesh":0},{"mesh":0,"translation":[5000,0,0]})"));
   EXPECT_EQ(importModel(file).objects.size(), 2u);
 }
 
 TEST(ImportHandMade, NoOffsetWithinAKilometre) {
   const TemporaryFolder folder;
   const auto file = folder.write(
-      "near.gltf", gltf(BoxMesh({1, 1, 1}), "0", R"({"mesh":0,"translation":[900,0,0]})"));
+      "near.gltf", makeGltfFile(BoxMesh({1, 1, 1}), "0", R"({"mesh":0,"translation":[900,0,0]})"));
   EXPECT_TRUE(importModel(file).offset.isZero(0));
 }
 
 TEST(ImportHandMade, VerticesFarFromTheirOriginAreRecentred) {
   const TemporaryFolder folder;
-  const auto file =
-      folder.write("far.gltf", gltf(BoxMesh({4, 4, 4}, {400000, 100, -500000}), "0", kOneNode));
+  const auto file = folder.write(
+      "far.gltf", makeGltfFile(BoxMesh({4, 4, 4}, {400000, 100, -500000}), "0", kOneNode));
   const Model model = importModel(file);
   EXPECT_GT(model.offset.norm(), 600000);
   for (const auto& p : model.meshes[0].positions) EXPECT_LT(p.norm(), 10);
@@ -148,10 +151,10 @@ TEST(ImportHandMade, VerticesFarFromTheirOriginAreRecentred) {
 
 TEST(ImportHandMade, AStrayObjectFarAwayDoesNotMoveTheScene) {
   const TemporaryFolder folder;
-  const auto file =
-      folder.write("stray.gltf", gltf(BoxMesh({1, 1, 1}), "0,1,2",
-                                      R"({"mesh":0},{"mesh":0,"translation":[2,0,0]},)"
-                                      R"({"mesh":0,"name":"stray","translation":[1e9,0,0]})"));
+  const auto file = folder.write(
+      "stray.gltf", makeGltfFile(BoxMesh({1, 1, 1}), "0,1,2",
+                                 R"({"mesh":0},{"mesh":0,"translation":[2,0,0]},)"
+                                 R"({"mesh":0,"name":"stray","translation":[1e9,0,0]})"));
   const Model model = importModel(file);
   EXPECT_TRUE(model.offset.isZero(0));
   EXPECT_EQ(model.objects.size(), 2u);
@@ -161,8 +164,8 @@ TEST(ImportHandMade, AStrayObjectFarAwayDoesNotMoveTheScene) {
 TEST(ImportHandMade, MirroredNodesAreKeptAsTheyAreAndCounted) {
   const TemporaryFolder folder;
   const auto file = folder.write(
-      "mirror.gltf", gltf(BoxMesh({1, 2, 3}), "0,1",
-                          R"({"mesh":0},{"mesh":0,"scale":[-1,1,1],"name":"mirrored"})"));
+      "mirror.gltf", makeGltfFile(BoxMesh({1, 2, 3}), "0,1",
+                                  R"({"mesh":0},{"mesh":0,"scale":[-1,1,1],"name":"mirrored"})"));
   const Model model = importModel(file);
   EXPECT_EQ(countDiagnostics(model, "mirrored_object"), 1u);
   EXPECT_LT(model.objects[1].worldFromMesh.linear().determinant(), 0);
@@ -172,10 +175,11 @@ TEST(ImportHandMade, MirroredNodesAreKeptAsTheyAreAndCounted) {
 TEST(ImportHandMade, RepeatedUnnamedAndSlashedNamesGiveUniquePaths) {
   const TemporaryFolder folder;
   const auto file = folder.write(
-      "names.gltf", gltf(BoxMesh({1, 1, 1}), "0",
-                         R"({"name":"house","children":[1,2,3,4,5,6]},{"mesh":0,"name":"door"},)"
-                         R"({"mesh":0,"name":"door"},{"mesh":0,"name":"door#2"},{"mesh":0},)"
-                         R"({"mesh":0,"name":"a/b"},{"mesh":0,"name":"100%"})"));
+      "names.gltf",
+      makeGltfFile(BoxMesh({1, 1, 1}), "0",
+                   R"({"name":"house","children":[1,2,3,4,5,6]},{"mesh":0,"name":"door"},)"
+                   R"({"mesh":0,"name":"door"},{"mesh":0,"name":"door#2"},{"mesh":0},)"
+                   R"({"mesh":0,"name":"a/b"},{"mesh":0,"name":"100%"})"));
   EXPECT_EQ(getPaths(importModel(file)),
             (std::vector<std::string>{"house/door", "house/door#2", "house/door#2#2", "house/node",
                                       "house/a%2Fb", "house/100%25"}));
@@ -183,7 +187,7 @@ TEST(ImportHandMade, RepeatedUnnamedAndSlashedNamesGiveUniquePaths) {
 
 TEST(ImportHandMade, UnitAndUpOfTheUserWin) {
   const TemporaryFolder folder;
-  const auto file = folder.write("box.gltf", gltf(BoxMesh({1, 2, 3}), "0", kOneNode));
+  const auto file = folder.write("box.gltf", makeGltfFile(BoxMesh({1, 2, 3}), "0", kOneNode));
   ImportOptions options;
   options.metresPerUnit = 0.5;
   options.up = UpAxis::z;
@@ -210,7 +214,7 @@ TEST(ImportHandMade, ObjIsInMetresByDefault) {
   expectBounds(Scene{Model(small)}, {0, 0, 0}, {0.001, 0.002, 0.003}, 1e-9);
 }
 
-std::string colladaBox(const std::string& asset) {
+std::string makeColladaBox(const std::string& asset) {
   return R"(<?xml version="1.0"?><COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1"><asset>)" +
          asset +
          R"(</asset><library_geometries><geometry id="g"><mesh><source id="p">)"
@@ -228,7 +232,7 @@ std::string colladaBox(const std::string& asset) {
 TEST(ImportHandMade, ColladaUnitAndUpAreAppliedOnceOrReplaced) {
   const TemporaryFolder folder;
   const auto file = folder.write(
-      "tip.dae", colladaBox(R"(<unit name="inch" meter="0.0254"/><up_axis>Z_UP</up_axis>)"));
+      "tip.dae", makeColladaBox(R"(<unit name="inch" meter="0.0254"/><up_axis>Z_UP</up_axis>)"));
   const Model model = importModel(file);
   EXPECT_EQ(model.metresPerUnit, 0.0254);
   EXPECT_EQ(model.upAxis, UpAxis::z);
@@ -238,7 +242,7 @@ TEST(ImportHandMade, ColladaUnitAndUpAreAppliedOnceOrReplaced) {
   options.metresPerUnit = 1;
   options.up = UpAxis::y;
   expectBounds(Scene(importModel(file, options)), {10, 20, 30}, {11, 22, 33}, 1e-5);
-  const auto xUp = folder.write("x.dae", colladaBox("<up_axis>X_UP</up_axis>"));
+  const auto xUp = folder.write("x.dae", makeColladaBox("<up_axis>X_UP</up_axis>"));
   const Model turned = importModel(xUp);
   EXPECT_EQ(countDiagnostics(turned, "no_unit"), 1u);
   expectBounds(Scene{Model(turned)}, {-22, 10, 30}, {-20, 11, 33}, 1e-5);
@@ -249,7 +253,7 @@ TEST(ImportHandMade, ATriangleWithANanVertexIsDroppedAndReported) {
   BoxMesh mesh({1, 1, 1});
   mesh.positions.push_back({std::numeric_limits<float>::quiet_NaN(), 0, 0});
   mesh.indices.insert(mesh.indices.end(), {0, 1, 8});
-  const Model model = importModel(folder.write("nan.gltf", gltf(mesh, "0", kOneNode)));
+  const Model model = importModel(folder.write("nan.gltf", makeGltfFile(mesh, "0", kOneNode)));
   EXPECT_EQ(countDiagnostics(model, "broken_triangle_dropped"), 1u);
   EXPECT_EQ(model.meshes[0].indices.size(), 36u);
   expectBounds(Scene{Model(model)}, {0, 0, 0}, {1, 1, 1});
@@ -260,7 +264,7 @@ TEST(ImportHandMade, DegenerateTrianglesAreKeptForTheEyeAndSkippedForTouch) {
   BoxMesh mesh({1, 1, 1});
   mesh.positions.push_back({9, 0, 0});
   mesh.indices.insert(mesh.indices.end(), {0, 1, 8});  // collinear corners
-  const Model model = importModel(folder.write("flat.gltf", gltf(mesh, "0", kOneNode)));
+  const Model model = importModel(folder.write("flat.gltf", makeGltfFile(mesh, "0", kOneNode)));
   EXPECT_EQ(countDiagnostics(model, "degenerate_triangle"), 1u);
   const Scene scene{Model(model)};
   EXPECT_EQ(scene.shape(0).triangles.size(), 12u);
@@ -280,7 +284,7 @@ TEST(ImportHandMade, AMissingTextureIsAProblemAndNoError) {
 
 TEST(ImportHandMade, ProgressNamesStagesInOrder) {
   const TemporaryFolder folder;
-  const auto file = folder.write("box.gltf", gltf(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const auto file = folder.write("box.gltf", makeGltfFile(BoxMesh({1, 1, 1}), "0", kOneNode));
   std::vector<std::string> stages;
   importModel(file, {}, [&](const std::string& stage, double fraction) {
     EXPECT_GE(fraction, 0);

@@ -20,14 +20,14 @@ inline std::size_t countDiagnostics(const Model& model, const std::string& kind)
 }
 
 /// "" without a diagnostic of this kind.
-inline std::string diagnosticText(const Model& model, const std::string& kind) {
+inline std::string findDiagnosticText(const Model& model, const std::string& kind) {
   for (const Diagnostic& problem : model.diagnostics)
     if (problem.kind == kind) return problem.example;
   return "";
 }
 
 /// The first object of an IFC class. Throws std::runtime_error without one.
-inline const Object& objectOfClass(const Model& model, const std::string& ifcClass) {
+inline const Object& findObjectOfClass(const Model& model, const std::string& ifcClass) {
   for (const Object& object : model.objects)
     if (object.ifcClass == ifcClass) return object;
   throw std::runtime_error("no " + ifcClass);
@@ -40,7 +40,7 @@ inline void expectSize(const Model& model, const Vec3& size, double tolerance) {
 }
 
 /// `text` with `from` replaced by `to` at its first place; it must be in it.
-inline std::string replaced(std::string text, const std::string& from, const std::string& to) {
+inline std::string replaceFirst(std::string text, const std::string& from, const std::string& to) {
   const std::size_t at = text.find(from);
   EXPECT_NE(at, std::string::npos) << from << " is not in the text";
   return at == std::string::npos ? text : text.replace(at, from.size(), to);

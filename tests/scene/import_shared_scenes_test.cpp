@@ -169,7 +169,7 @@ Model importShared(const std::filesystem::path& file, IfcReader reader, double g
   return importModel(file, options);
 }
 
-std::size_t placedTriangles(const Model& model) {
+std::size_t countPlacedTriangles(const Model& model) {
   std::size_t triangles = 0;
   for (const Object& object : model.objects) {
     for (const std::uint32_t mesh : object.meshes) {
@@ -194,8 +194,8 @@ TEST_P(ImportSharedScene, GivesItsObjectsTrianglesAndTrueExtents) {
   // The solid modelling of ifcplusplus varies with addresses if address randomisation stays on.
   const double spare =
       expected.reader == kPlus ? 0.02 * static_cast<double>(expected.triangles) : 0;
-  EXPECT_NEAR(static_cast<double>(placedTriangles(model)), static_cast<double>(expected.triangles),
-              spare);
+  EXPECT_NEAR(static_cast<double>(countPlacedTriangles(model)),
+              static_cast<double>(expected.triangles), spare);
   EXPECT_NEAR(model.metresPerUnit, expected.metresPerUnit, 1e-6);
   EXPECT_EQ(model.upAxis, expected.up);
   std::set<std::string> paths;

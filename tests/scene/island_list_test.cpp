@@ -14,7 +14,7 @@ namespace enfilade::scene::testing {
 namespace {
 
 TEST(Islands, ARoofIsFoundAndNoPlacesAreDrawnOnIt) {
-  Navigation navigation(boxScene(roofedRooms(0.5)), {}, {});
+  Navigation navigation(makeBoxScene(makeRoofedRooms(0.5)), {}, {});
   const std::vector<Island> islands = navigation.islands();
   ASSERT_EQ(islands.size(), 3u);
   EXPECT_TRUE(islands[0].isRoof);
@@ -37,20 +37,20 @@ TEST(Islands, ARoofIsFoundAndNoPlacesAreDrawnOnIt) {
 }
 
 TEST(Islands, TheGroundIsNoRoofAndAloneARoofIsDrawn) {
-  auto boxes = roofedRooms(1);
+  auto boxes = makeRoofedRooms(1);
   boxes.push_back({"ground", {-10, -0.4, -10}, {20, -0.2, 10}});
   boxes.push_back({"terrace", {14, -0.2, -5}, {19, 2, 5}});  // nothing below it
-  Navigation house(boxScene(boxes), {}, {});
+  Navigation house(makeBoxScene(boxes), {}, {});
   for (const Island& island : house.islands())
     EXPECT_EQ(island.isRoof, island.place.y() > 3) << island.place.transpose();
-  Navigation plate(boxScene({{"plate", {0, 0, 0}, {0.9, 0.2, 0.9}}}), {}, {.radius = 0.1});
+  Navigation plate(makeBoxScene({{"plate", {0, 0, 0}, {0.9, 0.2, 0.9}}}), {}, {.radius = 0.1});
   ASSERT_EQ(plate.islands().size(), 1u);
   EXPECT_LT(plate.islands()[0].area, 1);
   EXPECT_TRUE(plate.islands()[0].isDrawn) << "there is no other";
 }
 
 TEST(Islands, TheInsideOfASolidDoesNotCount) {
-  Navigation navigation(boxScene({floorBox(), {"block", {-9, 0, -9}, {9, 3, 0}}}), {}, {});
+  Navigation navigation(makeBoxScene({makeFloorBox(), {"block", {-9, 0, -9}, {9, 3, 0}}}), {}, {});
   const NavigationReport report = navigation.report();
   ASSERT_EQ(report.islandAreas.size(), 2u) << "the floor, and the top of the block";
   EXPECT_NEAR(report.area, report.islandAreas[0] + report.islandAreas[1], 1e-9);
@@ -65,7 +65,7 @@ TEST(Islands, TheInsideOfASolidDoesNotCount) {
 }
 
 TEST(Islands, NeighboursAreFoundAcrossTheGap) {
-  Navigation navigation(boxScene(roofedRooms(0.58)), {}, {});
+  Navigation navigation(makeBoxScene(makeRoofedRooms(0.58)), {}, {});
   const auto neighbours = navigation.findIslandNeighbours(2);
   ASSERT_EQ(neighbours.size(), 1u) << "the roof is too high";
   EXPECT_EQ(neighbours[0].number, 1u);
@@ -76,7 +76,7 @@ TEST(Islands, NeighboursAreFoundAcrossTheGap) {
 }
 
 TEST(Islands, AStoreyAsAGoalIsOnTheIslandOfTheStart) {
-  Model model = boxModel(roofedRooms(0.5));
+  Model model = makeBoxModel(makeRoofedRooms(0.5));
   model.storeys.push_back({"Ground", "", 0});
   const auto scene = std::make_shared<const Scene>(std::move(model));
   Navigation navigation(scene, {}, {});
@@ -92,7 +92,7 @@ TEST(Islands, AStoreyAsAGoalIsOnTheIslandOfTheStart) {
 }
 
 TEST(Islands, OfRoomsWithOneNameTheOneOnTheIslandOfTheStartIsMeant) {
-  Model model = boxModel(roofedRooms(0.5));
+  Model model = makeBoxModel(makeRoofedRooms(0.5));
   for (const double x : {2.0, 8.0}) {
     Space room;
     room.name = "Bath";
@@ -118,8 +118,8 @@ TEST(Islands, OfRoomsWithOneNameTheOneOnTheIslandOfTheStartIsMeant) {
 }
 
 TEST(Islands, ABodyIsAPlaceWhereItStandsNow) {
-  Model model = boxModel({floorBox(), {"crates/mesh7", {-9, 0, -0.5}, {-8, 1, 0.5}}});
-  BodySpec crate = bodySpec("yard/crate", BodyKind::sliding, {1});
+  Model model = makeBoxModel({makeFloorBox(), {"crates/mesh7", {-9, 0, -0.5}, {-8, 1, 0.5}}});
+  BodySpec crate = makeBodySpec("yard/crate", BodyKind::sliding, {1});
   crate.axis = Vec3::UnitX();
   crate.high = 14;
   model.bodies.push_back(crate);

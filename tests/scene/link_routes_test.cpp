@@ -11,18 +11,18 @@ namespace {
 constexpr double kGallery = 1.5;  // metres, height
 
 /// A floor, and above a part of it a gallery that only a jump leaves, with a railing on its sides.
-std::vector<NamedBox> gallery() {
+std::vector<NamedBox> makeGallery() {
   return {{"floor", {0, -0.2, -3}, {12, 0, 3}},
           {"gallery", {0, 0, -3}, {4, kGallery, 3}},
           {"rail", {3.9, kGallery, -3}, {4, kGallery + 1, 1.5}}};
 }
 
 /// A shaft between two floors with a lift that is open towards +x.
-Model towerModel() {
-  Model model = boxModel({{"ground", {4, -0.2, -3}, {10, 0, 3}},
-                          {"upper", {4.01, 2.8, -3}, {10, 3, 3}},
-                          {"platform", {2, -0.1, -1}, {4, 0, 1}}});
-  BodySpec lift = bodySpec("lift", BodyKind::lift, {2});
+Model makeTowerModel() {
+  Model model = makeBoxModel({{"ground", {4, -0.2, -3}, {10, 0, 3}},
+                              {"upper", {4.01, 2.8, -3}, {10, 3, 3}},
+                              {"platform", {2, -0.1, -1}, {4, 0, 1}}});
+  BodySpec lift = makeBodySpec("lift", BodyKind::lift, {2});
   lift.axis = Vec3::UnitY();
   lift.low = 0;
   lift.high = 3;
@@ -32,12 +32,12 @@ Model towerModel() {
   return model;
 }
 
-Model doorModel(std::optional<double> autoClose, BodyKind kind = BodyKind::hinged) {
-  Model model = boxModel({{"floor", {0, -0.2, -3}, {12, 0, 3}},
-                          {"wall/left", {5.9, 0, -3}, {6.1, 2.5, -0.5}},
-                          {"wall/right", {5.9, 0, 0.5}, {6.1, 2.5, 3}},
-                          {"leaf", {5.98, 0.01, -0.49}, {6.02, 2, 0.49}}});
-  BodySpec door = bodySpec("door", kind, {3});
+Model makeDoorModel(std::optional<double> autoClose, BodyKind kind = BodyKind::hinged) {
+  Model model = makeBoxModel({{"floor", {0, -0.2, -3}, {12, 0, 3}},
+                              {"wall/left", {5.9, 0, -3}, {6.1, 2.5, -0.5}},
+                              {"wall/right", {5.9, 0, 0.5}, {6.1, 2.5, 3}},
+                              {"leaf", {5.98, 0.01, -0.49}, {6.02, 2, 0.49}}});
+  BodySpec door = makeBodySpec("door", kind, {3});
   door.anchor = {6, 0, -0.49};
   if (kind == BodyKind::sliding) door.axis = Vec3::UnitZ();
   door.low = 0;
@@ -88,7 +88,7 @@ void expectWalkTakesItsTime(const Model& model, const NavigationPath& path,
 }
 
 TEST(LinkRoutes, ADropJoinsAGalleryWithTheFloorBelow) {
-  const auto scene = boxScene(gallery());
+  const auto scene = makeBoxScene(makeGallery());
   Navigation navigation(scene, {}, {});
   const Vec3 from(1, kGallery + 0.1, -2), to(10, 0.1, -2);
   EXPECT_FALSE(navigation.findPath(from, to).found());
@@ -111,17 +111,17 @@ TEST(LinkRoutes, ADropJoinsAGalleryWithTheFloorBelow) {
   EXPECT_GT(path.legs[1].seconds, path.legs[1].length / 1.4 - 1e-9);
   EXPECT_FALSE(navigation.findPath(to, from, {2, false}).found());  // not up
 
-  expectWalkTakesItsTime(boxModel(gallery()), path);
+  expectWalkTakesItsTime(makeBoxModel(makeGallery()), path);
 }
 
 TEST(LinkRoutes, AJumpIsChosenOverALongerWay) {
-  auto boxes = gallery();
+  auto boxes = makeGallery();
   for (int step = 0; step < 6; ++step)  // a stair at the far side, towards -z
     boxes.push_back({"stair/" + std::to_string(step),
                      {0, 0, -3.4 - 0.4 * step},
                      {1.5, kGallery - 0.25 * (step + 1), -3 - 0.4 * step}});
   boxes.push_back({"yard", {0, -0.2, -8}, {12, 0, -3}});
-  const auto scene = boxScene(boxes);
+  const auto scene = makeBoxScene(boxes);
   Navigation navigation(scene, {}, {});
   const Vec3 from(3, kGallery + 0.1, 2), to(6, 0.1, 2);
   const NavigationPath walked = navigation.findPath(from, to);
@@ -134,7 +134,7 @@ TEST(LinkRoutes, AJumpIsChosenOverALongerWay) {
 }
 
 TEST(LinkRoutes, ALiftIsCalledAndRidden) {
-  const auto scene = std::make_shared<const Scene>(towerModel());
+  const auto scene = std::make_shared<const Scene>(makeTowerModel());
   Navigation navigation(scene, {}, {});
   const Vec3 from(9, 0.1, 2), to(9, 3.1, -2);
   EXPECT_FALSE(navigation.findPath(from, to).found());
@@ -147,17 +147,17 @@ TEST(LinkRoutes, ALiftIsCalledAndRidden) {
     EXPECT_EQ(ride.length, 0);
     EXPECT_EQ(ride.fromLevel, start.y() < 1 ? 0u : 1u);
     EXPECT_NEAR(ride.seconds, start.y() < 1 ? 3 : 6, 0.1);  // it has to come up first
-    expectWalkTakesItsTime(towerModel(), path, "lift");
+    expectWalkTakesItsTime(makeTowerModel(), path, "lift");
   }
 }
 
 TEST(LinkRoutes, ALiftThatWouldCarryItsPassengerAgainstSomethingIsNotRidden) {
   for (const double overlap : {-0.02, 0.02}) {  // metres, of a beam and the passenger's path
-    Model model = boxModel({{"ground", {4, -0.2, -3}, {10, 0, 3}},
-                            {"upper", {4.01, 2.8, -3}, {10, 3, 3}},
-                            {"platform", {2, -0.1, -1}, {4, 0, 1}},
-                            {"beam", {1, 2.2, -3}, {2.7 + overlap, 2.4, 3}}});
-    model.bodies = towerModel().bodies;
+    Model model = makeBoxModel({{"ground", {4, -0.2, -3}, {10, 0, 3}},
+                                {"upper", {4.01, 2.8, -3}, {10, 3, 3}},
+                                {"platform", {2, -0.1, -1}, {4, 0, 1}},
+                                {"beam", {1, 2.2, -3}, {2.7 + overlap, 2.4, 3}}});
+    model.bodies = makeTowerModel().bodies;
     const auto scene = std::make_shared<const Scene>(std::move(model));
     Navigation navigation(scene, {}, {});  // the passenger stands in the middle, 0.3 m wide
     const NavigationPath path = navigation.findPath({9, 0.1, 2}, {9, 3.1, -2}, {0, true});
@@ -167,11 +167,11 @@ TEST(LinkRoutes, ALiftThatWouldCarryItsPassengerAgainstSomethingIsNotRidden) {
 
 TEST(LinkRoutes, AWalkAfterTheRideDoesNotCrossWhereTheLiftWas) {
   // The only path from the exit to the goal leads over the platform when it is below.
-  Model model = boxModel({{"ground", {4.01, -0.2, -3}, {10, 0, 3}},
-                          {"island", {-2, -0.2, -1}, {1.99, 0, 1}},
-                          {"upper", {4.05, 2.8, -3}, {10, 3, 3}},
-                          {"platform", {2, -0.1, -1}, {4, 0.002, 1}}});
-  BodySpec lift = towerModel().bodies.front();
+  Model model = makeBoxModel({{"ground", {4.01, -0.2, -3}, {10, 0, 3}},
+                              {"island", {-2, -0.2, -1}, {1.99, 0, 1}},
+                              {"upper", {4.05, 2.8, -3}, {10, 3, 3}},
+                              {"platform", {2, -0.1, -1}, {4, 0.002, 1}}});
+  BodySpec lift = makeTowerModel().bodies.front();
   lift.objects = {3};
   model.bodies.push_back(lift);
   const auto scene = std::make_shared<const Scene>(std::move(model));
@@ -184,35 +184,35 @@ TEST(LinkRoutes, AWalkAfterTheRideDoesNotCrossWhereTheLiftWas) {
 
 TEST(WalkBodies, ADoorIsOpenedWhenTheAvatarComesToIt) {
   for (const BodyKind kind : {BodyKind::hinged, BodyKind::sliding}) {
-    BodyFixture fixture(doorModel({}, kind));
+    BodyFixture fixture(makeDoorModel({}, kind));
     fixture.order("ann", spawnAt({0.5, 0, 0}));
     fixture.order("ann", Walk{{{11, 0, 0}}, 1.4, {"door"}});
-    fixture.ticks(10);
-    EXPECT_EQ(fixture.body("door").drive.jointPosition, 0) << "it is far away";
+    fixture.runTicks(10);
+    EXPECT_EQ(fixture.getBody("door").drive.jointPosition, 0) << "it is far away";
     const Notice end = runToNotice(fixture);
     EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
   }
 }
 
 TEST(WalkBodies, ADoorThatClosesBeforeTheAvatarIsThroughIsOpenedAgain) {
-  BodyFixture fixture(doorModel(0.1));
+  BodyFixture fixture(makeDoorModel(0.1));
   fixture.submit({"door", BodyCommand::Action::open, 0, 0, std::nullopt});
   fixture.order("ann", spawnAt({1, 0, 0}));
   fixture.order("ann", Walk{{{11, 0, 0}}, 0.7, {"door"}});
   const Notice end = runToNotice(fixture);
   EXPECT_EQ(end.kind, Notice::Kind::arrived) << end.text;
-  fixture.ticks(3 * 60);
-  EXPECT_EQ(fixture.body("door").drive.jointPosition, 0) << "no avatar holds it any more";
+  fixture.runTicks(3 * 60);
+  EXPECT_EQ(fixture.getBody("door").drive.jointPosition, 0) << "no avatar holds it any more";
 }
 
 TEST(WalkBodies, ADoorThatIsShutInFrontOfTheAvatarIsOpenedAgain) {
-  BodyFixture fixture(doorModel({}));
+  BodyFixture fixture(makeDoorModel({}));
   fixture.order("ann", spawnAt({1, 0, 0}));
   fixture.order("ann", Walk{{{11, 0, 0}}, 1.4, {"door"}});
   Notice end;
   bool isShut = false;
   for (int tick = 0; tick < 60 * 60 && end.kind != Notice::Kind::arrived; ++tick) {
-    if (!isShut && fixture.body("door").drive.jointPosition == kQuarter) {
+    if (!isShut && fixture.getBody("door").drive.jointPosition == kQuarter) {
       fixture.submit({"door", BodyCommand::Action::close, 0, 0, std::nullopt});
       isShut = true;
     }
@@ -223,23 +223,23 @@ TEST(WalkBodies, ADoorThatIsShutInFrontOfTheAvatarIsOpenedAgain) {
 }
 
 TEST(WalkBodies, ADoorThatIsClosedAgainAndAgainBlocksTheWalk) {
-  BodyFixture fixture(doorModel({}));
+  BodyFixture fixture(makeDoorModel({}));
   fixture.order("ann", spawnAt({1, 0, 0}));
   fixture.order("ann", Walk{{{11, 0, 0}}, 1.4, {"door"}});
   Notice end;
   for (int tick = 0; tick < 60 * 60 && end.kind != Notice::Kind::blocked; ++tick) {
-    if (fixture.body("door").drive.jointPosition > 0.3)
+    if (fixture.getBody("door").drive.jointPosition > 0.3)
       fixture.submit({"door", BodyCommand::Action::close, 0, 0, std::nullopt});
     for (const Notice& notice : fixture.step().notices) end = notice;
   }
   ASSERT_EQ(end.kind, Notice::Kind::blocked);
-  EXPECT_EQ(end.obstacle, fixture.body("door").id);
+  EXPECT_EQ(end.obstacle, fixture.getBody("door").id);
   EXPECT_NE(end.text.find("3 commands"), std::string::npos) << end.text;
-  EXPECT_LT(fixture.feet("ann").x(), 6);
+  EXPECT_LT(fixture.getFeet("ann").x(), 6);
 }
 
 TEST(WalkBodies, UnknownDoorsAndStopsAreRefused) {
-  BodyFixture fixture(towerModel());
+  BodyFixture fixture(makeTowerModel());
   const auto refuse = [&](Walk walk) {
     walk.waypoints = {{5, 0, 0}};
     return submitAvatarCommand(fixture.world, {"ann", walk, 0}).value_or("accepted");
@@ -254,7 +254,7 @@ TEST(WalkBodies, UnknownDoorsAndStopsAreRefused) {
 }
 
 TEST(Doors, ThoseOnAPathAreFoundOpenOrClosed) {
-  const auto scene = std::make_shared<const Scene>(doorModel({}));
+  const auto scene = std::make_shared<const Scene>(makeDoorModel({}));
   const auto open = makeSnapshotWithOpenDoors(scene, {});
   EntityIndex index(scene);
   const std::vector<Vec3> points{{1, 0, 0}, {4, 0, 0}, {8, 0, 0}, {11, 0, 0}};
@@ -286,12 +286,12 @@ TEST(Doors, LeavesOnOneLineOpenTogether) {
 
 TEST(Doors, OfOneLineAreListedAsTheyAreMet) {
   // The second leaf of the model stands 2 m before the first one.
-  Model model = doorModel({});
-  const Model other = boxModel({{"gate", {3.98, 0.01, -2.9}, {4.02, 2, 2.9}}});
+  Model model = makeDoorModel({});
+  const Model other = makeBoxModel({{"gate", {3.98, 0.01, -2.9}, {4.02, 2, 2.9}}});
   model.meshes.push_back(other.meshes[0]);
   model.objects.push_back(other.objects[0]);
   model.objects.back().meshes = {static_cast<std::uint32_t>(model.meshes.size() - 1)};
-  BodySpec gate = bodySpec("gate", BodyKind::sliding, {4});
+  BodySpec gate = makeBodySpec("gate", BodyKind::sliding, {4});
   gate.axis = Vec3::UnitY();
   gate.high = 2.1;
   model.bodies.push_back(gate);
@@ -307,7 +307,7 @@ TEST(Doors, OfOneLineAreListedAsTheyAreMet) {
 
 TEST(Doors, ADoorAjarIsWhereItStands) {
   // It has opened by a quarter turn less than half: its closed pose is met before its leaf.
-  Model model = doorModel({});
+  Model model = makeDoorModel({});
   const auto scene = std::make_shared<const Scene>(std::move(model));
   World world(scene);
   submitBodyCommand(world, {"door", BodyCommand::Action::open, 0, 0, std::nullopt});

@@ -21,15 +21,15 @@ using tests::BoxMesh;
 using tests::kOneNode;
 using tests::TemporaryFolder;
 
-std::string boxGltf() {
-  return tests::gltf(BoxMesh({1, 2, 3}), "0", kOneNode);
+std::string makeBoxGltf() {
+  return tests::makeGltfFile(BoxMesh({1, 2, 3}), "0", kOneNode);
 }
 
 // ---- files that fail ----------------------------------------------------------------------------
 
 /// `levels` nodes, each with the next one as its child `times` times, and the mesh below the last.
 /// All but the last have `name`.
-std::string nestedNodes(int levels, int times = 1, const std::string& name = "") {
+std::string makeNestedNodes(int levels, int times = 1, const std::string& name = "") {
   std::string nodes;
   for (int i = 0; i < levels; ++i) {
     const std::string next = std::to_string(i + 1);
@@ -40,8 +40,8 @@ std::string nestedNodes(int levels, int times = 1, const std::string& name = "")
   return nodes + R"({"mesh":0})";
 }
 
-std::string nestedGltf(int levels, int times, const BoxMesh& mesh = BoxMesh({1, 1, 1})) {
-  return tests::gltf(mesh, "0", nestedNodes(levels, times));
+std::string makeNestedGltf(int levels, int times, const BoxMesh& mesh = BoxMesh({1, 1, 1})) {
+  return tests::makeGltfFile(mesh, "0", makeNestedNodes(levels, times));
 }
 
 struct Damage {
@@ -55,9 +55,9 @@ void PrintTo(const Damage& spoilt, std::ostream* to) {
   *to << spoilt.name;
 }
 
-std::vector<Damage> damagedFiles() {
-  const std::string box = boxGltf();
-  const std::string glb = tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode);
+std::vector<Damage> makeDamagedFiles() {
+  const std::string box = makeBoxGltf();
+  const std::string glb = tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode);
   BoxMesh dense({1, 1, 1});
   const std::vector<std::uint16_t> once = dense.indices;
   for (int i = 0; i < 1400; ++i)
@@ -67,79 +67,83 @@ std::vector<Damage> damagedFiles() {
   return {
       {"BufferViewBeyondItsBuffer",
        "a.gltf",
-       replaced(box, R"("byteOffset":0,"byteLength":96)", R"("byteOffset":0,"byteLength":96000)"),
+       replaceFirst(box, R"("byteOffset":0,"byteLength":96)",
+                    R"("byteOffset":0,"byteLength":96000)"),
        {"bufferViews[0]"}},
       {"BufferViewThatIsNotThere",
        "a.gltf",
-       replaced(box, R"("bufferView":0)", R"("bufferView":17)"),
+       replaceFirst(box, R"("bufferView":0)", R"("bufferView":17)"),
        {"bufferView"}},
-      {"HugeCount", "a.gltf", replaced(box, R"("count":8)", R"("count":4000000000)"), {}},
-      {"NegativeCount", "a.gltf", replaced(box, R"("count":8)", R"("count":-8)"), {}},
+      {"HugeCount", "a.gltf", replaceFirst(box, R"("count":8)", R"("count":4000000000)"), {}},
+      {"NegativeCount", "a.gltf", replaceFirst(box, R"("count":8)", R"("count":-8)"), {}},
       {"MissingBuffer",
        "a.gltf",
-       replaced(box, R"("uri":"data)", R"("uri":"nowhere.bin","x":"data)"),
+       replaceFirst(box, R"("uri":"data)", R"("uri":"nowhere.bin","x":"data)"),
        {"nowhere.bin"}},
       {"NoTriangles",
        "a.gltf",
-       replaced(box, R"("material":0})", R"("material":0,"mode":1})"),
+       replaceFirst(box, R"("material":0})", R"("material":0,"mode":1})"),
        {"triangle"}},
       {"UnsupportedExtension",
        "a.gltf",
-       replaced(box, R"({"asset")",
-                R"({"extensionsRequired":["ACME_bent_meshes"],)"
-                R"("extensionsUsed":["ACME_bent_meshes"],"asset")"),
+       replaceFirst(box, R"({"asset")",
+                    R"({"extensionsRequired":["ACME_bent_meshes"],)"
+                    R"("extensionsUsed":["ACME_bent_meshes"],"asset")"),
        {"ACME_bent_meshes"}},
       {"NodesInACycle",
        "a.gltf",
-       tests::gltf(BoxMesh({1, 1, 1}), "0",
-                   R"({"children":[1],"mesh":0},{"children":[0],"mesh":0})"),
+       tests::makeGltfFile(BoxMesh({1, 1, 1}), "0",
+                           R"({"children":[1],"mesh":0},{"children":[0],"mesh":0})"),
        {"nodes[0] stands below itself"}},
       {"NodeThatIsItsOwnChild",
        "a.gltf",
-       tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"name":"a","children":[0],"mesh":0})"),
+       tests::makeGltfFile(BoxMesh({1, 1, 1}), "0", R"({"name":"a","children":[0],"mesh":0})"),
        {"nodes[0] 'a' stands below itself"}},
       {"CycleBelowASharedNode",
        "a.gltf",
-       tests::gltf(
+       tests::makeGltfFile(
            BoxMesh({1, 1, 1}), "0,1",
            R"({"children":[2]},{"children":[2]},{"children":[3]},{"children":[2],"mesh":0})"),
        {"nodes[2] stands below itself"}},
       {"CycleInAFileThatIsRewritten",
        "a.gltf",
-       tests::gltf(BoxMesh({1, 1, 1}), "0",
-                   R"({"children":[1],"mesh":7},{"children":[0],"mesh":0,"skin":3})"),
+       tests::makeGltfFile(BoxMesh({1, 1, 1}), "0",
+                           R"({"children":[1],"mesh":7},{"children":[0],"mesh":0,"skin":3})"),
        {"nodes[0] stands below itself"}},
       {"NodesThatAreNoList",
        "a.gltf",
-       replaced(replaced(box, R"("nodes":[{)", R"("nodes":{"a":{)"), "}],\"materials\"",
-                "}},\"materials\""),
+       replaceFirst(replaceFirst(box, R"("nodes":[{)", R"("nodes":{"a":{)"), "}],\"materials\"",
+                    "}},\"materials\""),
        {"its JSON has no list of nodes"}},
       {"NodesThatAreANumber",
        "a.gltf",
-       replaced(box, R"("nodes":[{)", R"("nodes":3,"extras":[{)"),
+       replaceFirst(box, R"("nodes":[{)", R"("nodes":3,"extras":[{)"),
        {"its JSON has no list of nodes"}},
       {"NodeThatIsANumber",
        "a.gltf",
-       tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"children":[1],"mesh":0},5)"),
+       tests::makeGltfFile(BoxMesh({1, 1, 1}), "0", R"({"children":[1],"mesh":0},5)"),
        {"nodes[1] is not an object"}},
-      {"MeshThatIsNotThere", "a.gltf", tests::gltf(BoxMesh({1, 1, 1}), "0", R"({"mesh":3})"), {}},
-      {"TooDeep", "a.gltf", nestedGltf(3000, 1), {"2000 levels", "flatter tree"}},
-      {"FarTooDeep", "a.gltf", nestedGltf(20'000, 1), {"2000 levels", "flatter tree"}},
+      {"MeshThatIsNotThere",
+       "a.gltf",
+       tests::makeGltfFile(BoxMesh({1, 1, 1}), "0", R"({"mesh":3})"),
+       {}},
+      {"TooDeep", "a.gltf", makeNestedGltf(3000, 1), {"2000 levels", "flatter tree"}},
+      {"FarTooDeep", "a.gltf", makeNestedGltf(20'000, 1), {"2000 levels", "flatter tree"}},
       {"LongCycle",
        "a.gltf",
-       replaced(nestedGltf(20'000, 1), R"({"mesh":0})", R"({"mesh":0,"children":[7]})"),
+       replaceFirst(makeNestedGltf(20'000, 1), R"({"mesh":0})", R"({"mesh":0,"children":[7]})"),
        {"2000 levels", "flatter tree"}},
       {"NodesListedTwiceOnEachLevel",
        "a.gltf",
-       nestedGltf(40, 2),
+       makeNestedGltf(40, 2),
        {"such as nodes[19]", "1000000 copied nodes", "list each node once"}},
       {"NodesListedTwiceAboveManyTriangles",
        "a.gltf",
-       nestedGltf(18, 2, dense),
+       makeNestedGltf(18, 2, dense),
        {"such as nodes[18]", "4000000000 copied triangles"}},
       {"NodesListedTwiceWithLongNames",
        "a.gltf",
-       tests::gltf(BoxMesh({1, 1, 1}), "0", nestedNodes(15, 2, std::string(900, 'n'))),
+       tests::makeGltfFile(BoxMesh({1, 1, 1}), "0", makeNestedNodes(15, 2, std::string(900, 'n'))),
        {"500000000 bytes of copied paths"}},
       {"GlbCalledGltf", "a.gltf", glb, {"rename it to .glb"}},
       {"GltfCalledGlb", "a.glb", box, {"rename", ".gltf"}},
@@ -150,15 +154,15 @@ std::vector<Damage> damagedFiles() {
       {"JsonInUtf16", "a.gltf", std::string("\xff\xfe{\0", 4), {"its JSON is damaged (byte 1)"}},
       {"JsonWithNan",
        "a.gltf",
-       replaced(box, R"("count":8)", R"("count":NaN)"),
+       replaceFirst(box, R"("count":8)", R"("count":NaN)"),
        {"its JSON is damaged (byte "}},
       {"JsonWithAHugeNumber",
        "a.gltf",
-       replaced(box, R"("count":8)", R"("count":1e400)"),
+       replaceFirst(box, R"("count":8)", R"("count":1e400)"),
        {"its JSON has a number that is too large"}},
       {"VersionThatIsANumber",
        "a.gltf",
-       replaced(box, R"("version":"2.0")", R"("version":2.0)"),
+       replaceFirst(box, R"("version":"2.0")", R"("version":2.0)"),
        {"its JSON states no glTF version"}},
       {"JsonOfAList", "a.gltf", "[1]", {"its JSON is not an object"}},
       {"JsonLengthOfAGlbThatLies",
@@ -167,13 +171,13 @@ std::vector<Damage> damagedFiles() {
        {"announces 4294967280 bytes of JSON", "copy or export it again"}},
       {"RequiredExtensionsThatAreNoList",
        "a.gltf",
-       replaced(box, R"({"asset")", R"({"extensionsRequired":"FOO","asset")"),
+       replaceFirst(box, R"({"asset")", R"({"extensionsRequired":"FOO","asset")"),
        {"extensionsRequired is not a list of names"}},
       {"BinaryCalledText", "a.obj", glb, {}},
       {"LengthOfAGlbThatLies",
        "a.glb",
-       replaced(glb, std::string("glTF\2\0\0\0", 8),
-                std::string("glTF\2\0\0\0\xff\xff\xff\x7f", 12)),
+       replaceFirst(glb, std::string("glTF\2\0\0\0", 8),
+                    std::string("glTF\2\0\0\0\xff\xff\xff\x7f", 12)),
        {}},
       {"PointsOnly", "a.obj", "v 0 0 0\nv 1 0 0\np 1 2\n", {"triangle"}},
       {"FacesOfNothing", "a.obj", "o a\nf 1 2 3\n", {}},
@@ -202,7 +206,7 @@ TEST_P(DamagedFile, FailsWithItsNameTheStageAndARemedy) {
   EXPECT_LT(error.size(), 600u) << error;
 }
 
-INSTANTIATE_TEST_SUITE_P(TextTable, DamagedFile, ::testing::ValuesIn(damagedFiles()),
+INSTANTIATE_TEST_SUITE_P(TextTable, DamagedFile, ::testing::ValuesIn(makeDamagedFiles()),
                          [](const auto& row) { return std::string(row.param.name); });
 
 // ---- files that load ----------------------------------------------------------------------------
@@ -228,42 +232,45 @@ TEST(MalformedFiles, AnObjWithCrlfNegativeIndicesPolygonsAndNoMaterialsLoads) {
 TEST(MalformedFiles, APathWithSpacesUmlautsAndAQuoteIsAPathAsAnyOther) {
   const TemporaryFolder folder;
   const std::string inner = "Häuser & 'Räume' 世界 #1";
-  fs::create_directories(folder.path() / inner);
+  fs::create_directories(folder.getPath() / inner);
   const BoxMesh mesh({1, 2, 3});
-  const std::string text = tests::gltfJson(mesh, "0", R"({"mesh":0,"name":"Tür"})", R"("name":"p")",
-                                           R"(,"uri":"daten%20und%20mehr.bin")");
-  folder.write(inner + "/daten und mehr.bin", mesh.bytes());
+  const std::string text =
+      tests::makeGltfJson(mesh, "0", R"({"mesh":0,"name":"Tür"})", R"("name":"p")",
+                          R"(,"uri":"daten%20und%20mehr.bin")");
+  folder.write(inner + "/daten und mehr.bin", mesh.toBytes());
   const auto file = folder.write(inner + "/Stück 1.gltf", text);
   const Model model = importModel(file);
   EXPECT_EQ(model.objects.at(0).path, "Tür");
   EXPECT_EQ(model.source, file.string());
   expectSize(model, {1, 2, 3}, 1e-6);
-  const auto ifc = folder.write(inner + "/Plan.ifc", tests::IfcHouse().text());
+  const auto ifc = folder.write(inner + "/Plan.ifc", tests::IfcHouse().makeText());
   EXPECT_EQ(importModel(ifc).objects.size(), 2u);
   EXPECT_NE(catchFailure(folder.write(inner + "/leer.glb", "")).find(inner), std::string::npos);
 }
 
 TEST(MalformedFiles, ASymbolicLinkIsFollowed) {
   const TemporaryFolder folder;
-  folder.write("box.glb", tests::glb(BoxMesh({1, 2, 3}), "0", kOneNode));
-  fs::create_symlink("box.glb", folder.path() / "link.glb");
-  fs::create_symlink("nothing.glb", folder.path() / "dangling.glb");
-  fs::create_symlink("circle.glb", folder.path() / "circle.glb");
-  fs::create_symlink(".", folder.path() / "folder.glb");
-  expectSize(importModel(folder.path() / "link.glb"), {1, 2, 3}, 1e-6);
-  EXPECT_NE(catchFailure(folder.path() / "dangling.glb").find("no such file"), std::string::npos);
-  EXPECT_NE(catchFailure(folder.path() / "circle.glb").find("circle.glb: "), std::string::npos);
-  EXPECT_NE(catchFailure(folder.path() / "folder.glb").find("is a folder"), std::string::npos);
+  folder.write("box.glb", tests::makeGlbFile(BoxMesh({1, 2, 3}), "0", kOneNode));
+  fs::create_symlink("box.glb", folder.getPath() / "link.glb");
+  fs::create_symlink("nothing.glb", folder.getPath() / "dangling.glb");
+  fs::create_symlink("circle.glb", folder.getPath() / "circle.glb");
+  fs::create_symlink(".", folder.getPath() / "folder.glb");
+  expectSize(importModel(folder.getPath() / "link.glb"), {1, 2, 3}, 1e-6);
+  EXPECT_NE(catchFailure(folder.getPath() / "dangling.glb").find("no such file"),
+            std::string::npos);
+  EXPECT_NE(catchFailure(folder.getPath() / "circle.glb").find("circle.glb: "), std::string::npos);
+  EXPECT_NE(catchFailure(folder.getPath() / "folder.glb").find("is a folder"), std::string::npos);
 }
 
 TEST(MalformedFiles, AnUnreadableFileIsReportedAsSuch) {
   const TemporaryFolder folder;
-  const auto locked = folder.write("locked.glb", tests::glb(BoxMesh({1, 1, 1}), "0", kOneNode));
+  const auto locked =
+      folder.write("locked.glb", tests::makeGlbFile(BoxMesh({1, 1, 1}), "0", kOneNode));
   fs::permissions(locked, fs::perms::none);
-  fs::create_directories(folder.path() / "closed");
+  fs::create_directories(folder.getPath() / "closed");
   const auto below = folder.write("closed/box.glb", "x");
   fs::permissions(below.parent_path(), fs::perms::none);
-  const auto pipe = folder.path() / "pipe.glb";
+  const auto pipe = folder.getPath() / "pipe.glb";
   ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
   EXPECT_NE(catchFailure(pipe).find("pipe.glb: is not a regular file"), std::string::npos);
   // Root may read all files, so this runs as another user in a child process.
@@ -282,12 +289,13 @@ TEST(MalformedFiles, AnUnreadableFileIsReportedAsSuch) {
 
 TEST(MalformedFiles, AGltfNameInAnotherEncodingThanUtf8IsMendedAndReported) {
   const TemporaryFolder folder;
-  const std::string text = replaced(boxGltf(), R"("name":"box")", "\"name\":\"T\xFCr\"");
+  const std::string text = replaceFirst(makeBoxGltf(), R"("name":"box")", "\"name\":\"T\xFCr\"");
   const Model model = importModel(folder.write("a.gltf", text));
   EXPECT_EQ(model.objects.at(0).path, "T\u00FCr");
-  const std::string euro = replaced(boxGltf(), R"("name":"box")", "\"name\":\"5\x80\x81\"");
+  const std::string euro = replaceFirst(makeBoxGltf(), R"("name":"box")", "\"name\":\"5\x80\x81\"");
   EXPECT_EQ(importModel(folder.write("b.gltf", euro)).objects.at(0).path, "5\u20AC\uFFFD");
-  const std::string control = replaced(boxGltf(), R"("name":"box")", "\"name\":\"a\u009Bb\"");
+  const std::string control =
+      replaceFirst(makeBoxGltf(), R"("name":"box")", "\"name\":\"a\u009Bb\"");
   EXPECT_EQ(importModel(folder.write("c.gltf", control)).objects.at(0).path, "a%C2%9Bb");
   EXPECT_EQ(countDiagnostics(model, "mended_text"), 1u);
   expectSize(model, {1, 2, 3}, 1e-6);
@@ -295,9 +303,9 @@ TEST(MalformedFiles, AGltfNameInAnotherEncodingThanUtf8IsMendedAndReported) {
 
 TEST(MalformedFiles, AnExtensionInCapitalsIsOne) {
   const TemporaryFolder folder;
-  const std::string glb = tests::glb(BoxMesh({1, 2, 3}), "0", kOneNode);
+  const std::string glb = tests::makeGlbFile(BoxMesh({1, 2, 3}), "0", kOneNode);
   expectSize(importModel(folder.write("BOX.GLB", glb)), {1, 2, 3}, 1e-6);
-  expectSize(importModel(folder.write("box.GlTf", boxGltf())), {1, 2, 3}, 1e-6);
+  expectSize(importModel(folder.write("box.GlTf", makeBoxGltf())), {1, 2, 3}, 1e-6);
 }
 
 TEST(MalformedFiles, FifteenHundredNestedNodesAreOneObject) {
@@ -307,21 +315,22 @@ TEST(MalformedFiles, FifteenHundredNestedNodesAreOneObject) {
     nodes += R"(,{"translation":[0,0.001,0],"children":[)" + std::to_string(i + 1) + "]}";
   nodes += R"(,{"mesh":0})";
   const Model model =
-      importModel(folder.write("deep.gltf", tests::gltf(BoxMesh({1, 1, 1}), "0", nodes)));
+      importModel(folder.write("deep.gltf", tests::makeGltfFile(BoxMesh({1, 1, 1}), "0", nodes)));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_NEAR(model.objects[0].worldFromMesh.translation().y(), 1.499, 1e-6);
 }
 
 TEST(MalformedFiles, NodesListedTwiceOnSixteenLevelsAreCopies) {
   const TemporaryFolder folder;
-  const auto file = folder.write("copies.gltf", nestedGltf(16, 2));
+  const auto file = folder.write("copies.gltf", makeNestedGltf(16, 2));
   EXPECT_EQ(importModel(file).objects.size(), 65536u);
 }
 
 TEST(MalformedFiles, NodesListedTwiceInAnotherSceneAreNotCounted) {
   const TemporaryFolder folder;
-  const std::string text = tests::gltf(BoxMesh({1, 1, 1}), "40", nestedNodes(40, 2));
-  const std::string other = replaced(text, R"({"nodes":[40]})", R"({"nodes":[40]},{"nodes":[0]})");
+  const std::string text = tests::makeGltfFile(BoxMesh({1, 1, 1}), "40", makeNestedNodes(40, 2));
+  const std::string other =
+      replaceFirst(text, R"({"nodes":[40]})", R"({"nodes":[40]},{"nodes":[0]})");
   const Model model = importModel(folder.write("a.gltf", other));
   EXPECT_EQ(model.objects.size(), 1u);
 }
@@ -329,12 +338,13 @@ TEST(MalformedFiles, NodesListedTwiceInAnotherSceneAreNotCounted) {
 TEST(MalformedFiles, AZeroScaleOrNonFiniteNodeKeepsTheOthers) {
   const TemporaryFolder folder;
   const Model flat = importModel(folder.write(
-      "flat.gltf", tests::gltf(BoxMesh({1, 2, 3}), "0,1",
-                               R"({"mesh":0},{"mesh":0,"name":"nothing","scale":[0,0,0]})")));
+      "flat.gltf",
+      tests::makeGltfFile(BoxMesh({1, 2, 3}), "0,1",
+                          R"({"mesh":0},{"mesh":0,"name":"nothing","scale":[0,0,0]})")));
   expectSize(flat, {1, 2, 3}, 1e-6);
   const std::string text =
-      tests::gltf(BoxMesh({1, 2, 3}), "0,1",
-                  R"({"mesh":0},{"mesh":0,"name":"wild","translation":[1e300,0,0]})");
+      tests::makeGltfFile(BoxMesh({1, 2, 3}), "0,1",
+                          R"({"mesh":0},{"mesh":0,"name":"wild","translation":[1e300,0,0]})");
   const Model wild = importModel(folder.write("wild.gltf", text));
   EXPECT_EQ(wild.objects.size(), 1u);
   expectSize(wild, {1, 2, 3}, 1e-6);
@@ -344,7 +354,7 @@ TEST(MalformedFiles, IndicesOfVerticesThatAreNotThereLeaveTheirTrianglesOut) {
   const TemporaryFolder folder;
   BoxMesh mesh({1, 2, 3});
   mesh.indices.insert(mesh.indices.end(), {0, 1, 60000, 7, 65535, 2});
-  const Model model = importModel(folder.write("a.gltf", tests::gltf(mesh, "0", kOneNode)));
+  const Model model = importModel(folder.write("a.gltf", tests::makeGltfFile(mesh, "0", kOneNode)));
   expectSize(model, {1, 2, 3}, 1e-6);
   EXPECT_EQ(model.meshes.at(0).indices.size(), 36u);
   std::size_t reported = 0;
@@ -361,7 +371,7 @@ TEST(MalformedFiles, IfcInFeetFarFromTheOriginIsInMetresAndNearIt) {
       "#32=IFCMEASUREWITHUNIT(IFCRATIOMEASURE(0.3048),#34);\n"
       "#33=IFCDIMENSIONALEXPONENTS(1,0,0,0,0,0,0);\n#34=IFCSIUNIT(*,.LENGTHUNIT.,$,.METRE.);\n";
   house.offset = "1506310.,17809418.,369.";
-  const Model model = importModel(folder.write("feet.ifc", house.text()));
+  const Model model = importModel(folder.write("feet.ifc", house.makeText()));
   EXPECT_NEAR(model.metresPerUnit, 0.3048, 1e-9);
   EXPECT_NEAR(model.offset.x(), 1506310 * 0.3048, 10);
   EXPECT_NEAR(model.offset.z(), -17809418 * 0.3048, 10);

@@ -8,7 +8,7 @@ namespace enfilade::scene {
 namespace {
 
 TEST(MassProperties, OfABoxAreTheTextbooks) {
-  const MassProperties box = computeHullMass(boxHull({1, 2, 3}), 10);
+  const MassProperties box = computeHullMass(makeBoxHull({1, 2, 3}), 10);
   EXPECT_NEAR(box.mass, 10 * 48, 1e-10);
   EXPECT_LT(box.centre.norm(), 1e-13);
   const double twelfth = box.mass / 12;
@@ -27,7 +27,7 @@ TEST(MassProperties, OfATetrahedronAreTheTextbooks) {
 }
 
 TEST(MassProperties, OfABallComeNearTheSpheresFromBelow) {
-  const MassProperties ball = computeHullMass(ballHull(0.5, 12), 1);
+  const MassProperties ball = computeHullMass(makeBallHull(0.5, 12), 1);
   const double sphere = 4.0 / 3 * 3.14159265358979 * 0.125;
   EXPECT_LT(ball.mass, sphere);
   EXPECT_GT(ball.mass, 0.98 * sphere);
@@ -35,7 +35,7 @@ TEST(MassProperties, OfABallComeNearTheSpheresFromBelow) {
 }
 
 TEST(MassProperties, FarFromTheOriginNothingIsLost) {
-  collision::Hull far = boxHull({0.5, 0.5, 0.5});
+  collision::Hull far = makeBoxHull({0.5, 0.5, 0.5});
   for (Vec3& v : far.vertices) v += Vec3(1e6, -1e6, 1e6);
   const MassProperties box = computeHullMass(far, 1);
   EXPECT_NEAR(box.mass, 1, 1e-9);
@@ -46,13 +46,13 @@ TEST(MassProperties, TwoHalvesAreTheWhole) {
   const std::vector<MassProperties> halves = [] {
     std::vector<MassProperties> both;
     for (const double side : {-1.0, 1.0}) {
-      collision::Hull half = boxHull({0.5, 1, 1});
+      collision::Hull half = makeBoxHull({0.5, 1, 1});
       for (Vec3& v : half.vertices) v.x() += 0.5 * side;
       both.push_back(computeHullMass(half, 7));
     }
     return both;
   }();
-  const MassProperties whole = computeHullMass(boxHull({1, 1, 1}), 7),
+  const MassProperties whole = computeHullMass(makeBoxHull({1, 1, 1}), 7),
                        sum = combineMassProperties(halves);
   EXPECT_NEAR(sum.mass, whole.mass, 1e-12);
   EXPECT_LT((sum.inertia - whole.inertia).norm(), 1e-12);
@@ -61,11 +61,11 @@ TEST(MassProperties, TwoHalvesAreTheWhole) {
 TEST(MassProperties, AShapeWithoutVolumeIsRefused) {
   const std::vector<Vec3> sheet{{0, 0, 0}, {1, 0, 0}, {1, 0, 1}, {0, 0, 1}};
   EXPECT_THROW(computeHullMass(collision::buildHull(sheet), 1), std::invalid_argument);
-  collision::Hull insideOut = boxHull({1, 1, 1});
+  collision::Hull insideOut = makeBoxHull({1, 1, 1});
   for (auto& face : insideOut.faces) std::reverse(face.begin(), face.end());
   EXPECT_THROW(computeHullMass(insideOut, 1), std::invalid_argument);
-  EXPECT_THROW(computeHullMass(boxHull({1, 1, 1}), 0), std::invalid_argument);
-  EXPECT_THROW(computeHullMass(boxHull({1, 1, 1}), std::nan("")), std::invalid_argument);
+  EXPECT_THROW(computeHullMass(makeBoxHull({1, 1, 1}), 0), std::invalid_argument);
+  EXPECT_THROW(computeHullMass(makeBoxHull({1, 1, 1}), std::nan("")), std::invalid_argument);
 }
 
 }  // namespace

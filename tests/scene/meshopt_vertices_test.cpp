@@ -24,7 +24,7 @@ std::string makeElements(std::size_t count, std::size_t stride, unsigned seed) {
 }
 
 /// "" or the decoder's error.
-std::string failureOfStream(const std::string& stream, std::size_t count, std::size_t stride) {
+std::string findFailureOfStream(const std::string& stream, std::size_t count, std::size_t stride) {
   std::string bytes;
   return decodeMeshoptVertices(stream, count, stride, bytes);
 }
@@ -97,19 +97,19 @@ TEST(MeshoptVertices, AStreamOfMeshoptimizerDecodesToItsElements) {
 TEST(MeshoptVertices, AStreamOfAnotherLengthOrVersionOrModeIsAnError) {
   const std::string stream = decodeHex(kStreamOfMeshoptimizer);
   for (std::size_t size = 0; size < stream.size(); ++size)
-    EXPECT_NE(failureOfStream(stream.substr(0, size), 20, 12), "") << size;
+    EXPECT_NE(findFailureOfStream(stream.substr(0, size), 20, 12), "") << size;
   std::string longer = stream;
   longer.insert(stream.size() - 24, 3, '\0');
-  EXPECT_EQ(failureOfStream(longer, 20, 12), "its compressed data has 3 bytes too many");
+  EXPECT_EQ(findFailureOfStream(longer, 20, 12), "its compressed data has 3 bytes too many");
   for (const char channel : {'\x03', '\x10', '\x21', '\xff'}) {
     std::string unknown = stream;
     unknown.back() = channel;
-    EXPECT_NE(failureOfStream(unknown, 20, 12).find("unknown mode"), std::string::npos);
+    EXPECT_NE(findFailureOfStream(unknown, 20, 12).find("unknown mode"), std::string::npos);
   }
   std::string newer = stream;
   newer[0] = '\xa2';
-  EXPECT_NE(failureOfStream(newer, 20, 12).find("compressed by version 2"), std::string::npos);
-  EXPECT_EQ(failureOfStream("\xe1" + stream.substr(1), 20, 12),
+  EXPECT_NE(findFailureOfStream(newer, 20, 12).find("compressed by version 2"), std::string::npos);
+  EXPECT_EQ(findFailureOfStream("\xe1" + stream.substr(1), 20, 12),
             "its compressed data is not of the vertex codec");
 }
 

@@ -27,17 +27,17 @@ class CachedModel : public ::testing::Test {
  protected:
   void SetUp() override {
     const BoxMesh box({1, 2, 3});
-    file_ = folder_.write("box.gltf",
-                          tests::gltfJson(box, "0", R"({"name":"box","mesh":0})",
-                                          R"("pbrMetallicRoughness":{})", R"(,"uri":"box.bin")"));
-    folder_.write("box.bin", box.bytes());
+    file_ = folder_.write(
+        "box.gltf", tests::makeGltfJson(box, "0", R"({"name":"box","mesh":0})",
+                                        R"("pbrMetallicRoughness":{})", R"(,"uri":"box.bin")"));
+    folder_.write("box.bin", box.toBytes());
   }
 
   LoadedModel load(const ImportOptions& options = {}) const {
     return loadModel(file_, options, cache_);
   }
 
-  std::vector<fs::path> entries() const {
+  std::vector<fs::path> getEntries() const {
     std::vector<fs::path> found;
     for (const auto& entry : fs::directory_iterator(cache_->folder)) found.push_back(entry.path());
     return found;
@@ -45,7 +45,7 @@ class CachedModel : public ::testing::Test {
 
   TemporaryFolder folder_;
   fs::path file_;
-  std::optional<ModelCache> cache_ = ModelCache{folder_.path() / "cache"};
+  std::optional<ModelCache> cache_ = ModelCache{folder_.getPath() / "cache"};
 };
 
 void overwrite(const fs::path& file, const std::string& content) {
@@ -58,17 +58,17 @@ TEST_F(CachedModel, TheSecondLoadIsTheSameModelWithoutAnImport) {
   EXPECT_TRUE(second.fromCache);
   EXPECT_EQ(serializeModel(second.model), serializeModel(first.model));
   EXPECT_EQ(second.importSeconds, first.importSeconds);
-  EXPECT_EQ(entries().size(), 1u);
+  EXPECT_EQ(getEntries().size(), 1u);
   EXPECT_TRUE(first.notes.empty() && second.notes.empty());
   EXPECT_FALSE(loadModel(file_, {}, std::nullopt).fromCache);
 }
 
 TEST_F(CachedModel, AFileOfTheSameContentElsewhereIsTheSame) {
   load();
-  fs::create_directories(folder_.path() / "moved");
+  fs::create_directories(folder_.getPath() / "moved");
   for (const char* name : {"box.gltf", "box.bin"})
-    fs::copy_file(folder_.path() / name, folder_.path() / "moved" / name);
-  file_ = folder_.path() / "moved/box.gltf";
+    fs::copy_file(folder_.getPath() / name, folder_.getPath() / "moved" / name);
+  file_ = folder_.getPath() / "moved/box.gltf";
   const LoadedModel moved = load();
   EXPECT_TRUE(moved.fromCache);
   EXPECT_EQ(moved.model.source, file_.string());
@@ -106,7 +106,7 @@ TEST_F(CachedModel, AModelWithoutItsRequiredAppearanceIsNotFoundByALoadThatRefus
 
 TEST_F(CachedModel, AChangeOfADependencyIsNoticed) {
   load();
-  overwrite(folder_.path() / "box.bin", BoxMesh({4, 2, 3}).bytes());
+  overwrite(folder_.getPath() / "box.bin", BoxMesh({4, 2, 3}).toBytes());
   const LoadedModel changed = load();
   EXPECT_FALSE(changed.fromCache);
   EXPECT_EQ(changed.model.meshes[0].positions[1].x(), 4);
@@ -136,7 +136,7 @@ TEST_F(CachedModel, APictureThatWasMissingAndCameIsSeen) {
 
 TEST_F(CachedModel, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
   const std::vector<std::byte> expected = serializeModel(load().model);
-  const fs::path entry = entries().at(0);
+  const fs::path entry = getEntries().at(0);
   const std::string whole = readContent(entry);
   std::mt19937 random(1);
   for (int i = 0; i < 12; ++i) {
@@ -159,28 +159,28 @@ TEST_F(CachedModel, AnEntryWithAnyBitFlippedOrCutShortIsImportedAgain) {
 
 TEST_F(CachedModel, AnEntryUnderAWrongNameIsNotUsed) {
   load();
-  const fs::path entry = entries().at(0);
+  const fs::path entry = getEntries().at(0);
   const std::string box = readContent(entry);
-  overwrite(folder_.path() / "box.gltf", readContent(file_) + " ");
+  overwrite(folder_.getPath() / "box.gltf", readContent(file_) + " ");
   load();
-  for (const fs::path& other : entries()) overwrite(other, box);
+  for (const fs::path& other : getEntries()) overwrite(other, box);
   EXPECT_FALSE(load().fromCache);
 }
 
 TEST_F(CachedModel, TheLeastRecentlyReadEntryIsEvictedFirst) {
   load();
-  const std::uintmax_t bytes = fs::file_size(entries().at(0));
+  const std::uintmax_t bytes = fs::file_size(getEntries().at(0));
   cache_->maxBytes = 3 * bytes + bytes / 2;
   const std::string text = readContent(file_);
   const auto old = fs::file_time_type::clock::now() - std::chrono::hours(48);
-  fs::last_write_time(entries().at(0), old);
+  fs::last_write_time(getEntries().at(0), old);
   for (int i = 1; i <= 2; ++i) {
     overwrite(file_, text + std::string(i, ' '));
     load();
   }
   overwrite(file_, text);
   EXPECT_TRUE(load().fromCache) << "which makes it the most recently used";
-  for (const fs::path& entry : entries()) {
+  for (const fs::path& entry : getEntries()) {
     if (fs::last_write_time(entry) > old + std::chrono::hours(1)) continue;
     FAIL() << "not reported as read:" << entry;
   }
@@ -188,7 +188,7 @@ TEST_F(CachedModel, TheLeastRecentlyReadEntryIsEvictedFirst) {
   ASSERT_TRUE(load().fromCache);
   overwrite(file_, text + "    ");
   load();
-  EXPECT_EQ(entries().size(), 3u);
+  EXPECT_EQ(getEntries().size(), 3u);
   cache_->maxBytes = bytes / 2;
   overwrite(file_, text + "      ");
   const LoadedModel large = load();
@@ -209,7 +209,7 @@ TEST_F(CachedModel, WithoutAFolderToWriteToItWorksAndSaysSo) {
 TEST_F(CachedModel, AFailedImportIsAnErrorWithoutAnEntry) {
   file_ = folder_.write("broken.gltf", "{");
   EXPECT_THROW(load(), ImportError);
-  EXPECT_THROW(loadModel(folder_.path() / "none.gltf", {}, cache_), ImportError);
+  EXPECT_THROW(loadModel(folder_.getPath() / "none.gltf", {}, cache_), ImportError);
   EXPECT_FALSE(fs::exists(cache_->folder));
 }
 
@@ -233,10 +233,10 @@ TEST(ModelCacheFolder, FollowsTheEnvironment) {
 }
 
 TEST(DeduplicateMeshes, EqualMeshesAreStoredOnceAndUnusedOnesGo) {
-  Model model = testing::boxModel({{"a", {0, 0, 0}, {1, 1, 1}},
-                                   {"b", {0, 0, 0}, {1, 1, 1}},
-                                   {"c", {0, 0, 0}, {1, 1, 2}},
-                                   {"d", {0, 0, 0}, {1, 1, 1}}});
+  Model model = testing::makeBoxModel({{"a", {0, 0, 0}, {1, 1, 1}},
+                                       {"b", {0, 0, 0}, {1, 1, 1}},
+                                       {"c", {0, 0, 0}, {1, 1, 2}},
+                                       {"d", {0, 0, 0}, {1, 1, 1}}});
   model.meshes[1].name = "another name";
   model.meshes.push_back(model.meshes[0]);  // a mesh without users
   model.materials.resize(2);
@@ -250,7 +250,7 @@ TEST(DeduplicateMeshes, EqualMeshesAreStoredOnceAndUnusedOnesGo) {
 }
 
 TEST(DeduplicateMeshes, TheSceneStaysTheSame) {
-  Model model = testing::boxModel(
+  Model model = testing::makeBoxModel(
       {{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {0, 0, 0}, {1, 1, 1}}, {"c", {0, 0, 0}, {2, 1, 1}}});
   const std::uint64_t hash = Scene(model).hash();
   deduplicateMeshes(model);

@@ -8,7 +8,7 @@
 namespace enfilade::scene {
 namespace {
 
-Model smallModel() {
+Model makeSmallModel() {
   Model model;
   model.source = "small.glb";
   model.reader = "assimp";
@@ -57,15 +57,16 @@ Model smallModel() {
 }
 
 TEST(ModelStream, RoundTripKeepsEveryByte) {
-  const std::vector<std::byte> bytes = serializeModel(smallModel());
+  const std::vector<std::byte> bytes = serializeModel(makeSmallModel());
   const Model back = deserializeModel(bytes);
   EXPECT_EQ(serializeModel(back), bytes);
   EXPECT_EQ(back.objects[0].path, "house/door#2");
-  EXPECT_EQ(back.objects[0].worldFromMesh.matrix(), smallModel().objects[0].worldFromMesh.matrix());
-  EXPECT_EQ(back.meshes[1].positions, smallModel().meshes[1].positions);
-  EXPECT_EQ(back.textures[0].rgba, smallModel().textures[0].rgba);
+  EXPECT_EQ(back.objects[0].worldFromMesh.matrix(),
+            makeSmallModel().objects[0].worldFromMesh.matrix());
+  EXPECT_EQ(back.meshes[1].positions, makeSmallModel().meshes[1].positions);
+  EXPECT_EQ(back.textures[0].rgba, makeSmallModel().textures[0].rgba);
   EXPECT_EQ(back.materials[1].alpha, Material::Alpha::blend);
-  EXPECT_EQ(back.offset, smallModel().offset);
+  EXPECT_EQ(back.offset, makeSmallModel().offset);
   EXPECT_EQ(back.reader, "assimp");
   EXPECT_EQ(back.objects[0].ifcClass, "IfcDoor");
   EXPECT_EQ(back.objects[0].operationType, "SINGLE_SWING_LEFT");
@@ -73,29 +74,29 @@ TEST(ModelStream, RoundTripKeepsEveryByte) {
   ASSERT_TRUE(back.objects[0].worldFromPlacement);
   EXPECT_EQ(back.objects[0].worldFromPlacement->translation(), Vec3(4, 5, 6));
   EXPECT_EQ(back.diagnostics[0].count, 3u);
-  EXPECT_EQ(back.dependencies, smallModel().dependencies);
+  EXPECT_EQ(back.dependencies, makeSmallModel().dependencies);
   EXPECT_EQ(back.objects[0].storey, 1u);
   EXPECT_EQ(back.storeys[1].elevation, 0.25);
   EXPECT_EQ(back.spaces[0].longName, "Kitchen");
   EXPECT_EQ(back.spaces[0].box.max, Vec3(3, 2.75, 4));
-  EXPECT_EQ(back.spaces[0].surface, smallModel().spaces[0].surface);
+  EXPECT_EQ(back.spaces[0].surface, makeSmallModel().spaces[0].surface);
   EXPECT_TRUE(back.spaces[1].box.empty());
   EXPECT_EQ(back.map, "EPSG:25832");
   EXPECT_EQ(back.north, Eigen::Vector2d(0.6, -0.8));
   EXPECT_EQ(back.fileScenes, (std::vector<std::string>{"day", "night"}));
   EXPECT_EQ(back.fileScene, 1u);
-  EXPECT_EQ(back.meshes[0].colours, smallModel().meshes[0].colours);
-  EXPECT_EQ(back.objects[0].attributes, smallModel().objects[0].attributes);
+  EXPECT_EQ(back.meshes[0].colours, makeSmallModel().meshes[0].colours);
+  EXPECT_EQ(back.objects[0].attributes, makeSmallModel().objects[0].attributes);
 }
 
 TEST(ModelStream, ColoursThatAreNotOnePerVertexAreRefused) {
-  Model model = smallModel();
+  Model model = makeSmallModel();
   model.meshes[0].colours.pop_back();
   EXPECT_THROW(deserializeModel(serializeModel(model)), ModelStreamError);
 }
 
 TEST(ModelStream, ASpaceWhoseSurfaceIsCutOffOrOutsideItsBoxIsRefused) {
-  Model model = smallModel();
+  Model model = makeSmallModel();
   model.spaces[0].surface[1].x() = 3.5;
   EXPECT_THROW(deserializeModel(serializeModel(model)), ModelStreamError);
   model.spaces[0].surface = {{0, 1, 0}};
@@ -103,13 +104,13 @@ TEST(ModelStream, ASpaceWhoseSurfaceIsCutOffOrOutsideItsBoxIsRefused) {
 }
 
 TEST(ModelStream, AStoreyThatIsMissingIsRefused) {
-  Model model = smallModel();
+  Model model = makeSmallModel();
   model.storeys.pop_back();
   EXPECT_THROW(deserializeModel(serializeModel(model)), ModelStreamError);
 }
 
 TEST(ModelStream, EveryShorterStreamIsRefused) {
-  const std::vector<std::byte> bytes = serializeModel(smallModel());
+  const std::vector<std::byte> bytes = serializeModel(makeSmallModel());
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     std::vector<std::byte> cut(bytes.begin(), bytes.begin() + static_cast<std::ptrdiff_t>(size));
     EXPECT_THROW(deserializeModel(cut), ModelStreamError) << size;
@@ -124,7 +125,7 @@ TEST(ModelStream, EveryShorterStreamIsRefused) {
 TEST(ModelStream, ManyObjectsAreReadOrRefusedWhereverTheStreamEnds) {
   constexpr std::size_t kObjects = 60'000;
   static_assert(kObjects * sizeof(Object) > 16 << 20);  // from here on two threads read
-  Model model = smallModel();
+  Model model = makeSmallModel();
   const Object first = model.objects[0];
   while (model.objects.size() < kObjects) {
     Object& object = model.objects.emplace_back(first);
@@ -148,7 +149,7 @@ TEST(ModelStream, ManyObjectsAreReadOrRefusedWhereverTheStreamEnds) {
 }
 
 TEST(ModelStream, AnotherVersionIsRefusedByItsNumber) {
-  std::vector<std::byte> bytes = serializeModel(smallModel());
+  std::vector<std::byte> bytes = serializeModel(makeSmallModel());
   bytes[4] = std::byte{99};
   try {
     deserializeModel(bytes);
@@ -174,7 +175,7 @@ void expectSafe(const Model& model) {
 }
 
 TEST(ModelStream, CorruptedStreamsAreRefusedOrHarmless) {
-  const std::vector<std::byte> bytes = serializeModel(smallModel());
+  const std::vector<std::byte> bytes = serializeModel(makeSmallModel());
   std::mt19937 random(20240607);
   const auto below = [&](std::size_t n) { return random() % n; };
   std::size_t refused = 0;

@@ -22,7 +22,7 @@ namespace {
 constexpr double kWall = 2.5;  // metres, height
 
 /// A floor of 8 x 6 m with a wall at x = 4 that has a gap around z = 0.
-std::vector<NamedBox> twoRooms(double gap) {
+std::vector<NamedBox> makeTwoRooms(double gap) {
   return {{"floor", {0, -0.2, -3}, {8, 0, 3}},
           {"wall/left", {3.9, 0, -3}, {4.1, kWall, -0.5 * gap}},
           {"wall/right", {3.9, 0, 0.5 * gap}, {4.1, kWall, 3}}};
@@ -55,7 +55,7 @@ int getCell(const NavigationMap& map, double x, double z) {
 }
 
 TEST(Navigation, APathThroughANarrowDoorIsWalked) {
-  const auto scene = boxScene(twoRooms(0.62));
+  const auto scene = makeBoxScene(makeTwoRooms(0.62));
   Navigation navigation(scene, {}, {});
   const NavigationPath path = navigation.findPath({1, 0.1, 2}, {7, 0.1, -2});
   ASSERT_TRUE(path.found()) << path.reason;
@@ -80,7 +80,7 @@ TEST(Navigation, TheWidthOnStairsIsMeasuredAboveTheSteps) {
                               {"post/right", {9, 1, 2.5}, {9.1, 3, 4}}};
   for (int i = 0; i < 5; ++i)
     boxes.push_back({"stair", {4 + 0.3 * i, -0.2, 0}, {4.3 + 0.3 * i, 0.2 * (i + 1), 4}});
-  Navigation navigation(boxScene(boxes), {}, {});
+  Navigation navigation(makeBoxScene(boxes), {}, {});
   const NavigationPath path = navigation.findPath({1, 0, 2}, {11, 1, 2});
   ASSERT_TRUE(path.found()) << path.reason;
   const auto narrowest = navigation.findNarrowest(path.points);
@@ -91,7 +91,7 @@ TEST(Navigation, TheWidthOnStairsIsMeasuredAboveTheSteps) {
 }
 
 TEST(Navigation, ADoorThatIsTooNarrowIsNamedWithItsWidth) {
-  Navigation navigation(boxScene(twoRooms(0.58)), {}, {});
+  Navigation navigation(makeBoxScene(makeTwoRooms(0.58)), {}, {});
   const NavigationPath path = navigation.findPath({1, 0.1, 2}, {7, 0.1, -2});
   EXPECT_FALSE(path.found());
   ASSERT_TRUE(path.obstruction);
@@ -105,7 +105,7 @@ TEST(Navigation, ADoorThatIsTooNarrowIsNamedWithItsWidth) {
 TEST(Navigation, AThinnerAgentFitsThroughTheSameDoor) {
   NavigationAgent thin;
   thin.radius = 0.25;
-  Navigation navigation(boxScene(twoRooms(0.58)), {}, thin);
+  Navigation navigation(makeBoxScene(makeTwoRooms(0.58)), {}, thin);
   EXPECT_TRUE(navigation.findPath({1, 0.1, 2}, {7, 0.1, -2}).found());
 }
 
@@ -115,7 +115,7 @@ TEST(Navigation, StairsAreClimbedAndALedgeIsNot) {
     boxes.push_back(
         {"stair/" + std::to_string(step), {4 + 0.28 * step, 0, -1}, {9, 0.18 * (step + 1), 1}});
   boxes.push_back({"plinth", {9.5, 0, -1}, {11.5, 0.8, 1}});
-  const auto scene = boxScene(boxes);
+  const auto scene = makeBoxScene(boxes);
   Navigation navigation(scene, {}, {});
   const NavigationPath path = navigation.findPath({1, 0.1, 0}, {8, 1.5, 0});
   ASSERT_TRUE(path.found()) << path.reason;
@@ -137,7 +137,7 @@ TEST(Navigation, AGalleryIsNotReachedByAWalkBelowIt) {
   for (int step = 0; step < 10; ++step)
     boxes.push_back(
         {"stair/" + std::to_string(step), {4 + 0.3 * step, 0, -0.2}, {7, 0.25 * (step + 1), 0.2}});
-  Navigation navigation(boxScene(boxes), {}, {});
+  Navigation navigation(makeBoxScene(boxes), {}, {});
   const NavigationPath path = navigation.findPath({1, 0.1, -2.5}, {10, 2.6, -2.5});
   EXPECT_FALSE(path.found()) << path.points.back().transpose();
   EXPECT_NE(path.reason, "");
@@ -145,7 +145,7 @@ TEST(Navigation, AGalleryIsNotReachedByAWalkBelowIt) {
 
 /// A roof of two slopes of 27 degrees: its polygons span the ridge.
 TEST(Navigation, TheRidgeOfARoofHasTheHeightOfTheRoof) {
-  Model model = boxModel({{"ground", {-20, -0.2, -20}, {20, 0, 20}}});
+  Model model = makeBoxModel({{"ground", {-20, -0.2, -20}, {20, 0, 20}}});
   Mesh roof;
   for (const Vec3& corner : {Vec3(-6, 2, -6), Vec3(6, 2, -6), Vec3(-6, 5, 0), Vec3(6, 5, 0),
                              Vec3(-6, 2, 6), Vec3(6, 2, 6)})
@@ -175,7 +175,7 @@ TEST(Navigation, TheRidgeOfARoofHasTheHeightOfTheRoof) {
 }
 
 TEST(Navigation, RefusesAStartInsideAWallAndAGoalInTheAir) {
-  Navigation navigation(boxScene(twoRooms(1)), {}, {});
+  Navigation navigation(makeBoxScene(makeTwoRooms(1)), {}, {});
   EXPECT_NE(navigation.findPath({4, 0.1, 2}, {7, 0.1, 0}).reason.find("at the start"),
             std::string::npos);
   EXPECT_NE(navigation.findPath({1, 0.1, 2}, {7, 2, 0}).reason.find("at the goal"),
@@ -183,7 +183,7 @@ TEST(Navigation, RefusesAStartInsideAWallAndAGoalInTheAir) {
 }
 
 TEST(Navigation, RandomPlacesStandAndRepeatWithTheSeed) {
-  const auto scene = boxScene(twoRooms(0.5));
+  const auto scene = makeBoxScene(makeTwoRooms(0.5));
   Navigation navigation(scene, {}, {});
   std::mt19937_64 one(7), two(7);
   int left = 0;
@@ -213,7 +213,7 @@ TEST(Navigation, RandomPlacesStandAndRepeatWithTheSeed) {
 }
 
 TEST(Navigation, FindsRoomsStoreysAndObjectsByName) {
-  Model model = boxModel(twoRooms(1));
+  Model model = makeBoxModel(makeTwoRooms(1));
   model.storeys.push_back({"Ground", "guid-storey", 0});
   Space room;
   room.name = "A1";
@@ -235,7 +235,7 @@ TEST(Navigation, FindsRoomsStoreysAndObjectsByName) {
 }
 
 TEST(Navigation, TheObjectBelowTheFeetIsFoundOnTheIslandOfTheStart) {
-  const auto scene = std::make_shared<const Scene>(boxModel(twoRooms(0.3)));  // too narrow
+  const auto scene = std::make_shared<const Scene>(makeBoxModel(makeTwoRooms(0.3)));  // too narrow
   Navigation navigation(scene, {}, {});
   const auto named = findNamedPlaces(*scene, "object:floor", 1.3);
   for (const Vec3& start : {Vec3(1, 0, 0), Vec3(7, 0, 0), Vec3(5, 0, 2), Vec3(3, 0, -2)}) {
@@ -247,7 +247,7 @@ TEST(Navigation, TheObjectBelowTheFeetIsFoundOnTheIslandOfTheStart) {
 
 TEST(Navigation, ARoomShapedLikeAnLIsFoundInItsSolid) {
   // The L lies along two sides of the left room; its notch contains the box's centre.
-  Model model = boxModel(twoRooms(1));
+  Model model = makeBoxModel(makeTwoRooms(1));
   Space room = tests::makePrism(
       {{1.2, -1.8}, {1.2, 2.8}, {0.2, 2.8}, {0.2, -2.8}, {3.7, -2.8}, {3.7, -1.8}}, 2.4);
   room.name = "L";
@@ -269,7 +269,7 @@ TEST(Navigation, ARoomShapedLikeAnLIsFoundInItsSolid) {
 }
 
 TEST(Navigation, AStepEndsAtAWallOrSlidesAlongIt) {
-  Navigation navigation(boxScene(twoRooms(1)), {}, {});
+  Navigation navigation(makeBoxScene(makeTwoRooms(1)), {}, {});
   const auto stopped = navigation.tryStep({2, 0.1, 1.5}, {5, 0.1, 2.5}, false);
   const auto slid = navigation.tryStep({2, 0.1, 1.5}, {5, 0.1, 2.5}, true);
   ASSERT_TRUE(stopped && slid);
@@ -284,7 +284,7 @@ TEST(Navigation, AStepEndsAtAWallOrSlidesAlongIt) {
 }
 
 TEST(Navigation, TheClosestObstacleIsNamedAndTheFloorIsNone) {
-  Navigation navigation(boxScene(twoRooms(1)), {}, {});
+  Navigation navigation(makeBoxScene(makeTwoRooms(1)), {}, {});
   const auto near = navigation.findObstacle({3, 0.1, 2}, 2);
   ASSERT_TRUE(near);
   EXPECT_NEAR(near->distance, 0.9, 2e-3);
@@ -296,7 +296,7 @@ TEST(Navigation, TheClosestObstacleIsNamedAndTheFloorIsNone) {
 }
 
 TEST(Navigation, AMapShowsTheRoomsAndTheWallBetween) {
-  Navigation navigation(boxScene(twoRooms(0.5)), {}, {});
+  Navigation navigation(makeBoxScene(makeTwoRooms(0.5)), {}, {});
   const NavigationMap map = navigation.drawMap(0.1, 0);
   ASSERT_EQ(map.cells.size(), std::size_t{map.width} * map.height);
   EXPECT_EQ(getCell(map, 2.05, 0.05), 1);
@@ -314,7 +314,7 @@ TEST(Navigation, AMapIsASliceOfStairs) {
   for (int step = 0; step < 8; ++step)
     boxes.push_back(
         {"stair/" + std::to_string(step), {4 + 0.28 * step, 0, -1}, {9, 0.18 * (step + 1), 1}});
-  Navigation navigation(boxScene(boxes), {}, {});
+  Navigation navigation(makeBoxScene(boxes), {}, {});
   const auto heights = [&](double height, double tolerance) {
     const NavigationMap map = navigation.drawMap(0.05, height, tolerance);
     Aabb found;  // of places on the middle of the stairs
@@ -339,9 +339,9 @@ TEST(Navigation, AMapIsASliceOfStairs) {
 }
 
 TEST(Navigation, APlaceOnATableWithoutMeshHasNoIsland) {
-  Navigation navigation(
-      boxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}}, {"table", {3.8, 0, -0.2}, {4.2, 0.7, 0.2}}}),
-      {}, {});
+  Navigation navigation(makeBoxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}},
+                                      {"table", {3.8, 0, -0.2}, {4.2, 0.7, 0.2}}}),
+                        {}, {});
   const auto floor = navigation.findIsland({2, 0, 0});
   ASSERT_TRUE(floor);
   const auto edge = navigation.snap({4.15, 0.75, 0.15}, 0.2);
@@ -355,10 +355,10 @@ TEST(Navigation, APlaceOnATableWithoutMeshHasNoIsland) {
 }
 
 TEST(Navigation, AClosedDoorIsNamedAndAnOpenOneIsPassed) {
-  auto boxes = twoRooms(1);
+  auto boxes = makeTwoRooms(1);
   boxes.push_back({"leaf", {3.98, 0.01, -0.49}, {4.02, 2, 0.49}});
-  Model model = boxModel(boxes);
-  BodySpec door = bodySpec("door", BodyKind::hinged, {3});
+  Model model = makeBoxModel(boxes);
+  BodySpec door = makeBodySpec("door", BodyKind::hinged, {3});
   door.anchor = {4, 0, -0.49};
   door.low = 0;
   door.high = kQuarter;
@@ -423,7 +423,7 @@ class FloodFill {
 
 TEST(Navigation, IslandsAgreeWithThePathsThroughANarrowGap) {
   for (const double gap : {0.8, 0.7, 0.66, 0.64, 0.62, 0.595, 0.55}) {
-    Navigation navigation(boxScene(twoRooms(gap)), {}, {});
+    Navigation navigation(makeBoxScene(makeTwoRooms(gap)), {}, {});
     const Vec3 left(2, 0, 0), right(6, 0, 0);
     const bool found = navigation.findPath(left, right).found();
     EXPECT_EQ(found, gap > 0.6) << gap;
@@ -435,10 +435,10 @@ TEST(Navigation, IslandsAgreeWithThePathsThroughANarrowGap) {
 
 /// A moved body may close a gap, or free it: what was found out about a gap is forgotten.
 TEST(Navigation, IslandsPartWhereABodyClosesTheGap) {
-  std::vector<NamedBox> boxes = twoRooms(0.62);
+  std::vector<NamedBox> boxes = makeTwoRooms(0.62);
   boxes.push_back({"gate", {3.95, 3, -0.3}, {4.05, 5, 0.3}});
-  Model model = boxModel(boxes);
-  BodySpec gate = bodySpec("gate", BodyKind::lift, {3});
+  Model model = makeBoxModel(boxes);
+  BodySpec gate = makeBodySpec("gate", BodyKind::lift, {3});
   gate.stops = {-2.99, 0};
   gate.low = -2.99;
   model.bodies.push_back(gate);
@@ -459,7 +459,7 @@ TEST(Navigation, IslandsPartWhereABodyClosesTheGap) {
 }
 
 TEST(Navigation, TheClosestPlaceOnAnIsland) {
-  Navigation navigation(boxScene(twoRooms(0.5)), {}, {});
+  Navigation navigation(makeBoxScene(makeTwoRooms(0.5)), {}, {});
   const Vec3 left(3, 0, 0);
   const auto own = navigation.findIsland(left), other = navigation.findIsland({5, 0, 0});
   ASSERT_TRUE(own && other && own != other);
@@ -474,9 +474,9 @@ TEST(Navigation, TheClosestPlaceOnAnIsland) {
 }
 
 TEST(Navigation, APlaceOnATableLeadsToTheFloorThatIsDrawn) {
-  Navigation navigation(
-      boxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}}, {"table", {3.5, 0, -0.4}, {4.5, 0.75, 0.4}}}),
-      {}, {});
+  Navigation navigation(makeBoxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}},
+                                      {"table", {3.5, 0, -0.4}, {4.5, 0.75, 0.4}}}),
+                        {}, {});
   const Vec3 above(4, 1, 0.1);
   EXPECT_GT(navigation.snap(above, 2)->y(), 0.7);
   const auto floor = navigation.snapTo(above, {Vec3(2, 4, 2), std::nullopt, true});
@@ -490,9 +490,9 @@ TEST(Navigation, APlaceOnATableLeadsToTheFloorThatIsDrawn) {
 }
 
 TEST(Navigation, ARoomByNameIsItsFloorAndNoTable) {
-  Navigation navigation(
-      boxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}}, {"table", {3.5, 0, -0.4}, {4.5, 0.75, 0.4}}}),
-      {}, {});
+  Navigation navigation(makeBoxScene({{"floor", {0, -0.2, -3}, {8, 0, 3}},
+                                      {"table", {3.5, 0, -0.4}, {4.5, 0.75, 0.4}}}),
+                        {}, {});
   NamedPlace room;
   room.box = {{0, 0, -3}, {8, 2.5, 3}};
   room.middle = {4, 1.2, 0};
@@ -522,7 +522,7 @@ TEST(Navigation, ReachabilityAgreesWithAFloodFillOfExactPlaces) {
                        {x, 0, z},
                        {x + draw(0.1, 0.9), draw(0.5, 2), z + draw(0.1, 0.9)}});
     }
-    const auto scene = boxScene(boxes);
+    const auto scene = makeBoxScene(boxes);
     Navigation navigation(scene, {}, {});
     World world(scene);
     const auto findOnFloor = [&] {  // not on top of a wall or a box
@@ -590,7 +590,7 @@ TEST(Walker, ASteepStairIsDescendedWhereverTheTicksBegin) {
     const double x = kRun * k, y = kTop - kRise * (k + 1);
     boxes.push_back({"tread" + std::to_string(k), {x, y - kRise - 0.1, -1}, {x + kTread, y, 1}});
   }
-  const auto scene = boxScene(boxes);
+  const auto scene = makeBoxScene(boxes);
   World world(scene);
   for (int i = 0; i < 60; ++i) {
     Walker walker(world.data(), {});
@@ -603,7 +603,7 @@ TEST(Walker, ASlowWalkClimbsAStairToo) {
   std::vector<NamedBox> boxes{{"floor", {-2, -0.2, -1}, {0, 0, 1}}};
   for (int k = 1; k <= 3; ++k)
     boxes.push_back({"tread" + std::to_string(k), {0.3 * (k - 1), 0, -1}, {2, 0.15 * k, 1}});
-  const auto scene = boxScene(boxes);
+  const auto scene = makeBoxScene(boxes);
   World world(scene);
   NavigationAgent slow;
   slow.speed = 0.05;  // less than a millimetre in a tick
@@ -617,7 +617,7 @@ TEST(Walker, ASlowWalkClimbsAStairToo) {
 
 TEST(Walker, AFloorThatEndsAboveAStepsHeightIsNotWalkedDown) {
   for (const double drop : {0.28, 0.4, 1.0}) {
-    const auto scene = boxScene(
+    const auto scene = makeBoxScene(
         {{"above", {-3, -0.2, -1}, {0, 0, 1}}, {"below", {-3, -drop - 0.2, -1}, {3, -drop, 1}}});
     World world(scene);
     Walker walker(world.data(), {});
@@ -630,7 +630,7 @@ TEST(Walker, AFloorThatEndsAboveAStepsHeightIsNotWalkedDown) {
 
 TEST(Walker, AFaceThatIsTooSteepToStandOnIsNotWalkedDown) {
   Model model =
-      boxModel({{"above", {-3, 1.8, -1}, {0, 2, 1}}, {"below", {-3, -0.2, -1}, {5, 0, 1}}});
+      makeBoxModel({{"above", {-3, 1.8, -1}, {0, 2, 1}}, {"below", {-3, -0.2, -1}, {5, 0, 1}}});
   Mesh face;  // 2 m down on 1.6 m: 51 degrees; an avatar slides down with its floor close below
   for (const Vec3& corner : {Vec3(0, 2, -1), Vec3(0, 2, 1), Vec3(1.6, 0, 1), Vec3(1.6, 0, -1)})
     face.positions.push_back(corner.cast<float>());
@@ -646,7 +646,7 @@ TEST(Walker, AFaceThatIsTooSteepToStandOnIsNotWalkedDown) {
 
 TEST(Walker, ALongStepOfTheProofPassesNothingThatStopsAWalk) {
   // A pyramid that is in the way of the feet, and not of who stands a step higher.
-  Model model = boxModel({{"floor", {0, -0.2, -3}, {8, 0, 3}}});
+  Model model = makeBoxModel({{"floor", {0, -0.2, -3}, {8, 0, 3}}});
   Mesh pyramid;
   for (const Vec3& corner : {Vec3(3.6, 0, -0.4), Vec3(4.4, 0, -0.4), Vec3(4.4, 0, 0.4),
                              Vec3(3.6, 0, 0.4), Vec3(4, 1, 0)})
@@ -683,9 +683,9 @@ TEST(Walker, ALongStepOfTheProofPassesNothingThatStopsAWalk) {
 }
 
 TEST(FloorFaces, ALineAcrossTilesStaysEvenUpToAHole) {
-  const auto scene = boxScene({{"a", {0, -0.2, 0}, {2, 0, 1}},
-                               {"b", {2, -0.2, 0}, {3, 0, 1}},
-                               {"c", {3.5, -0.2, 0}, {5, 0, 1}}});
+  const auto scene = makeBoxScene({{"a", {0, -0.2, 0}, {2, 0, 1}},
+                                   {"b", {2, -0.2, 0}, {3, 0, 1}},
+                                   {"c", {3.5, -0.2, 0}, {5, 0, 1}}});
   World world(scene);
   const ObstacleSet obstacles = collectObstaclesInBox(world.data(), scene->bounds(), 0);
   const auto faces = collectFloorFaces(obstacles, scene->bounds());

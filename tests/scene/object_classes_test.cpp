@@ -8,19 +8,19 @@
 namespace enfilade::scene {
 namespace {
 
-using testing::boxModel;
+using testing::makeBoxModel;
 
-Model sixBoxes() {
+Model makeSixBoxes() {
   std::vector<testing::NamedBox> boxes;
   for (const char* name : {"bed/frame", "bed/pillow", "door/leaf", "door/frame", "wall", "lamp"}) {
     const double x = 2.0 * static_cast<double>(boxes.size());
     boxes.push_back({name, {x, 0, 0}, {x + 1, 1, 1}});
   }
-  return boxModel(boxes);
+  return makeBoxModel(boxes);
 }
 
 TEST(ObjectClasses, ComeFromIfcThenFromTheSidecarAndPartsHaveThoseOfTheirWhole) {
-  Model model = sixBoxes();
+  Model model = makeSixBoxes();
   model.objects[2].ifcClass = "IfcDoor";
   model.objects[3].partOf = 2;
   model.objects[4].ifcClass = "IfcWall";
@@ -35,7 +35,7 @@ TEST(ObjectClasses, ComeFromIfcThenFromTheSidecarAndPartsHaveThoseOfTheirWhole) 
 }
 
 TEST(ObjectClasses, ThingsAreBodiesProductsPartsAndTheSidecarsGroups) {
-  Model model = sixBoxes();
+  Model model = makeSixBoxes();
   model.objects[3].partOf = 2;
   model.objects[4].globalId = model.objects[5].globalId = "0abc";
   applySidecar(model, R"({"walk":1,"things":[["bed/pillow","bed/frame"]]})", "s");
@@ -49,10 +49,10 @@ TEST(ObjectClasses, ThingsAreBodiesProductsPartsAndTheSidecarsGroups) {
 }
 
 /// A model of boxes; each box has the material of its number.
-Model boxesOfMaterials(const std::vector<std::pair<const char*, std::uint32_t>>& boxes) {
+Model makeBoxesOfMaterials(const std::vector<std::pair<const char*, std::uint32_t>>& boxes) {
   std::vector<testing::NamedBox> named;
   for (const auto& [name, material] : boxes) named.push_back({name, {0, 0, 0}, {1, 1, 1}});
-  Model model = boxModel(named);
+  Model model = makeBoxModel(named);
   for (std::size_t i = 0; i < boxes.size(); ++i)
     model.meshes[model.objects[i].meshes.front()].material = boxes[i].second;
   return model;
@@ -60,7 +60,7 @@ Model boxesOfMaterials(const std::vector<std::pair<const char*, std::uint32_t>>&
 
 TEST(ObjectClasses, NodesOfAMeshThatAFileSplitsByMaterialAreOneThing) {
   const auto things = [](const std::vector<std::pair<const char*, std::uint32_t>>& boxes) {
-    return computeObjectClasses(boxesOfMaterials(boxes)).things;
+    return computeObjectClasses(makeBoxesOfMaterials(boxes)).things;
   };
   using Things = std::vector<std::uint32_t>;
   EXPECT_EQ(things({{"house/bed_node/bed_0", 0},
@@ -79,7 +79,7 @@ TEST(ObjectClasses, NodesOfAMeshThatAFileSplitsByMaterialAreOneThing) {
 }
 
 TEST(ObjectClasses, PartsOfASplitMeshAreItsThingAndTheSidecarComesFirst) {
-  Model model = boxesOfMaterials({{"bed/bed_0", 0}, {"bed/bed_1", 1}, {"shape", 2}});
+  Model model = makeBoxesOfMaterials({{"bed/bed_0", 0}, {"bed/bed_1", 1}, {"shape", 2}});
   model.objects[2].partOf = 1;
   EXPECT_EQ(computeObjectClasses(model).things, (std::vector<std::uint32_t>{1, 1, 1}));
   model.objects[0].thing = model.objects[1].thing = 1;
@@ -89,21 +89,21 @@ TEST(ObjectClasses, PartsOfASplitMeshAreItsThingAndTheSidecarComesFirst) {
 TEST(ObjectClasses, AListOrABodyThatNamesAPrimitiveTakesItOutOfItsSplitMesh) {
   using Things = std::vector<std::uint32_t>;
   const auto things = [](const std::string& listed) {
-    Model model = boxesOfMaterials({{"bed/bed_0", 0}, {"bed/bed_1", 1}, {"lamp", 2}});
+    Model model = makeBoxesOfMaterials({{"bed/bed_0", 0}, {"bed/bed_1", 1}, {"lamp", 2}});
     applySidecar(model, R"({"walk":1,"things":[)" + listed + "]}", "s");
     return computeObjectClasses(model).things;
   };
   EXPECT_EQ(things(R"(["bed/bed_0"])"), (Things{1, 2, 3}));
   EXPECT_EQ(things(R"(["bed/bed_0","lamp"])"), (Things{1, 2, 1}));
   EXPECT_EQ(things(R"(["lamp","bed/bed_1"])"), (Things{1, 2, 2}));
-  Model model = boxesOfMaterials({{"bed/bed_0", 0}, {"bed/bed_1", 1}, {"lamp", 2}});
+  Model model = makeBoxesOfMaterials({{"bed/bed_0", 0}, {"bed/bed_1", 1}, {"lamp", 2}});
   model.bodies = {BodySpec{}};
   model.bodies[0].objects = {2, 0};
   EXPECT_EQ(computeObjectClasses(model).things, (Things{3, 2, 3}));
 }
 
 TEST(ObjectClasses, ASidecarsMistakesAreNamed) {
-  Model model = sixBoxes();
+  Model model = makeSixBoxes();
   const auto refused = [&](const char* text) -> std::string {
     try {
       applySidecar(model, text, "room.walk.json");

@@ -35,7 +35,7 @@ TEST(NavigationMesh, TheNearestPointIsWithinTheExtent) {
 }
 
 /// Two rooms with a thin wall in between, of which a far part has a gap of this width.
-std::vector<NamedBox> roomsWithFarGap(double gap, double at = 21) {
+std::vector<NamedBox> makeRoomsWithFarGap(double gap, double at = 21) {
   return {{"floor", {0, -0.2, 0}, {8, 0, 24}},
           {"wall/near", {3.95, 0, 0}, {4.05, 2.5, 20}},
           {"wall/thick", {3.8, 0, 20}, {4.2, 2.5, at}},
@@ -45,7 +45,7 @@ std::vector<NamedBox> roomsWithFarGap(double gap, double at = 21) {
 /// The closest places of both rooms are anywhere along the wall; the gap is far from most of them.
 TEST(OffMeshConnections, AGapFarFromTheClosestPlacesJoinsIslands) {
   for (const double gap : {0.62, 0.59}) {
-    Navigation navigation(boxScene(roomsWithFarGap(gap)), {}, {});
+    Navigation navigation(makeBoxScene(makeRoomsWithFarGap(gap)), {}, {});
     const Vec3 left(3, 0, 2), right(5, 0, 2);
     const NavigationPath path = navigation.findPath(left, right);
     EXPECT_EQ(path.found(), gap > 0.6);
@@ -58,7 +58,7 @@ TEST(OffMeshConnections, AGapFarFromTheClosestPlacesJoinsIslands) {
 /// Grids miss some of these gaps, and voxels others.
 TEST(OffMeshConnections, AGapIsFoundWhereverItLiesOnTheGrid) {
   for (int shift = 0; shift < 12; ++shift) {
-    Navigation navigation(boxScene(roomsWithFarGap(0.62, 20.95 + 0.01 * shift)), {}, {});
+    Navigation navigation(makeBoxScene(makeRoomsWithFarGap(0.62, 20.95 + 0.01 * shift)), {}, {});
     EXPECT_EQ(navigation.islands().size(), 1u) << shift;
   }
 }
@@ -68,12 +68,12 @@ TEST(OffMeshConnections, AGapIsFoundAsideOfThePlacesThatFaceEachOther) {
   const NamedBox floor{"floor", {0, -0.2, 0}, {12, 0, 12}};
   const NavigationAgent agent;
   NavigationMesh scarce =
-      makeMesh(World(boxScene({floor, {"wall", {5.97, 0, 0}, {6.03, 2.5, 12}}})), agent);
+      makeMesh(World(makeBoxScene({floor, {"wall", {5.97, 0, 0}, {6.03, 2.5, 12}}})), agent);
   for (int shift = 0; shift < 25; ++shift) {
     const double gap = 5 + 0.04 * shift;
-    const World world(boxScene({floor,
-                                {"wall/near", {5.97, 0, 0}, {6.03, 2.5, gap}},
-                                {"wall/far", {5.97, 0, gap + 0.62}, {6.03, 2.5, 12}}}));
+    const World world(makeBoxScene({floor,
+                                    {"wall/near", {5.97, 0, 0}, {6.03, 2.5, gap}},
+                                    {"wall/far", {5.97, 0, gap + 0.62}, {6.03, 2.5, 12}}}));
     NavigationMesh ample = makeMesh(world, agent);
     Walker walker(world.data(), agent);
     const IslandList islands = collectIslands(ample, walker, world.scene().bounds());
@@ -85,10 +85,10 @@ TEST(OffMeshConnections, AGapIsFoundAsideOfThePlacesThatFaceEachOther) {
 }
 
 /// A wall of 15 cm at any angle to the grid, with a gap. Its sides face each other askew.
-std::shared_ptr<const Scene> roomWithTurnedWall(double angle, double at, double gap) {
-  Model model = boxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}},
-                          {"wall/a", {-8, 0, -0.075}, {at - gap / 2, 2.5, 0.075}},
-                          {"wall/b", {at + gap / 2, 0, -0.075}, {8, 2.5, 0.075}}});
+std::shared_ptr<const Scene> makeRoomWithTurnedWall(double angle, double at, double gap) {
+  Model model = makeBoxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}},
+                              {"wall/a", {-8, 0, -0.075}, {at - gap / 2, 2.5, 0.075}},
+                              {"wall/b", {at + gap / 2, 0, -0.075}, {8, 2.5, 0.075}}});
   for (std::size_t wall = 1; wall < 3; ++wall)
     model.objects[wall].worldFromMesh.rotate(Eigen::AngleAxisd(angle, Vec3::UnitY()));
   return std::make_shared<const Scene>(std::move(model));
@@ -99,7 +99,7 @@ TEST(OffMeshConnections, AGapInATurnedWallIsFoundIfItIsACentimetreWiderThanTheAg
     for (const double at : {-0.4, 1.31}) {
       const Vec3 side = Eigen::AngleAxisd(angle, Vec3::UnitY()) * Vec3(0, 0, 2.5);
       for (const double gap : {0.61, 0.58}) {  // across its flat sides an agent is narrower
-        Navigation navigation(roomWithTurnedWall(angle, at, gap), {}, {});
+        Navigation navigation(makeRoomWithTurnedWall(angle, at, gap), {}, {});
         EXPECT_EQ(navigation.findPath(side, -side).found(), gap > 0.6)
             << angle << " " << at << " " << gap;
       }
@@ -108,7 +108,7 @@ TEST(OffMeshConnections, AGapInATurnedWallIsFoundIfItIsACentimetreWiderThanTheAg
 }
 
 TEST(OffMeshConnections, AnAnswerDoesNotDependOnEarlierOnes) {
-  Navigation navigation(boxScene(roomsWithFarGap(0.61)), {}, {});
+  Navigation navigation(makeBoxScene(makeRoomsWithFarGap(0.61)), {}, {});
   std::mt19937 random(9);
   std::uniform_real_distribution<double> x(0.5, 3.3), z(0.5, 18);
   for (int i = 0; i < 40; ++i) {
@@ -131,7 +131,7 @@ TEST(OffMeshConnections, GapsOfEachStoreyAreTried) {
     boxes.push_back({"wall/left" + number, {3.9, y, 5}, {4.1, y + 2.5, 5.6 - 0.5 * kDoor}});
     boxes.push_back({"wall/right" + number, {3.9, y, 5.6 + 0.5 * kDoor}, {4.1, y + 2.5, 6.2}});
   }
-  Navigation navigation(boxScene(boxes), {}, {});
+  Navigation navigation(makeBoxScene(boxes), {}, {});
   for (int storey = 0; storey < 3; ++storey) {
     const double y = 4.0 * storey;
     const auto left = navigation.findIsland({1.5, y, 2}),
@@ -157,24 +157,24 @@ TEST(OffMeshConnections, AGapInAnIrregularWallIsFound) {
     };
     addWall(0, gap);
     addWall(gap + 0.62, 12);
-    Navigation navigation(boxScene(boxes), {}, {});
+    Navigation navigation(makeBoxScene(boxes), {}, {});
     EXPECT_TRUE(navigation.findPath({1.5, 0, 1}, {4.5, 0, 1}).found()) << gap;
     EXPECT_EQ(navigation.findIsland({1.5, 0, 1}), navigation.findIsland({4.5, 0, 1})) << gap;
   }
 }
 
 /// Walls that are 3 m thick, with a corridor.
-std::shared_ptr<const Scene> roomsWithCorridor(double width, double at) {
-  return boxScene({{"floor", {-1, -0.2, 0}, {11, 0, 6}},
-                   {"wall/near", {3.5, 0, 0}, {6.5, 2.5, at}},
-                   {"wall/far", {3.5, 0, at + width}, {6.5, 2.5, 6}}});
+std::shared_ptr<const Scene> makeRoomsWithCorridor(double width, double at) {
+  return makeBoxScene({{"floor", {-1, -0.2, 0}, {11, 0, 6}},
+                       {"wall/near", {3.5, 0, 0}, {6.5, 2.5, at}},
+                       {"wall/far", {3.5, 0, at + width}, {6.5, 2.5, 6}}});
 }
 
 TEST(OffMeshConnections, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
   const Vec3 left(1, 0, 3), right(9, 0, 3);
   for (const double at : {3.0, 3.017, 3.031})
     for (const double width : {0.611, 0.58, 0.62, 0.66}) {
-      Navigation navigation(roomsWithCorridor(width, at), {}, {});
+      Navigation navigation(makeRoomsWithCorridor(width, at), {}, {});
       const bool isWide = width > 0.6;
       EXPECT_EQ(navigation.findPath(left, right).found(), isWide) << width << " " << at;
       EXPECT_EQ(navigation.findIsland(left) == navigation.findIsland(right), isWide) << width;
@@ -183,19 +183,19 @@ TEST(OffMeshConnections, ACorridorIsFoundIfItIsACentimetreWiderThanTheAgent) {
 
 /// The corridor of two arms of 7 m is the only way. It is longer than the straight line by more
 /// than 3 m.
-std::shared_ptr<const Scene> roomsWithBentCorridor(double width) {
-  return boxScene({{"floor", {-4, -0.2, -4}, {11, 0, 11}},
-                   {"wall/inside", {0, 0, 0}, {7 - width, 2.5, 7}},
-                   {"wall/end", {-4, 0, 7}, {0, 2.5, 11}},
-                   {"wall/left", {-4, 0, -4}, {0, 2.5, -width}},
-                   {"wall/below", {0, 0, -4}, {7 - width, 2.5, -width}},
-                   {"wall/corner", {7 - width, 0, -4}, {7, 2.5, -width}},
-                   {"wall/right", {7, 0, -4}, {11, 2.5, 7}}});
+std::shared_ptr<const Scene> makeRoomsWithBentCorridor(double width) {
+  return makeBoxScene({{"floor", {-4, -0.2, -4}, {11, 0, 11}},
+                       {"wall/inside", {0, 0, 0}, {7 - width, 2.5, 7}},
+                       {"wall/end", {-4, 0, 7}, {0, 2.5, 11}},
+                       {"wall/left", {-4, 0, -4}, {0, 2.5, -width}},
+                       {"wall/below", {0, 0, -4}, {7 - width, 2.5, -width}},
+                       {"wall/corner", {7 - width, 0, -4}, {7, 2.5, -width}},
+                       {"wall/right", {7, 0, -4}, {11, 2.5, 7}}});
 }
 
 TEST(OffMeshConnections, ABentCorridorJoinsTheRoomsAtItsEnds) {
   const Vec3 left(-2, 0, 1.5), right(9, 0, 9);
-  Navigation navigation(roomsWithBentCorridor(0.62), {}, {});
+  Navigation navigation(makeRoomsWithBentCorridor(0.62), {}, {});
   EXPECT_TRUE(navigation.findPath(left, right).found());
   EXPECT_EQ(navigation.findIsland(left), navigation.findIsland(right));
 }
@@ -217,8 +217,9 @@ TEST(OffMeshConnections, GapsNearAMovedBodyAreTriedAgain) {
 
 /// The bytes have the meshes and the paths across all gaps that were tried.
 TEST(OffMeshConnections, ThreadsChangeNoResult) {
-  for (const auto& scene : {roomWithTurnedWall(0.35, -0.4, 0.61), boxScene(roomsWithFarGap(0.62)),
-                            roomsWithCorridor(0.62, 3), roomsWithBentCorridor(0.62)}) {
+  for (const auto& scene :
+       {makeRoomWithTurnedWall(0.35, -0.4, 0.61), makeBoxScene(makeRoomsWithFarGap(0.62)),
+        makeRoomsWithCorridor(0.62, 3), makeRoomsWithBentCorridor(0.62)}) {
     Navigation built(scene, {}, {}, nullptr, 1);
     const std::vector<std::uint8_t> bytes = built.save();
     EXPECT_EQ(Navigation(scene, {}, {}, nullptr, 3).save(), bytes);
@@ -230,7 +231,7 @@ TEST(OffMeshConnections, ThreadsChangeNoResult) {
 
 /// The tiles are the first part of the work, and the connections most of the rest.
 TEST(OffMeshConnections, TheirSearchReportsProgress) {
-  const auto scene = boxScene(roomsWithFarGap(0.61));
+  const auto scene = makeBoxScene(makeRoomsWithFarGap(0.61));
   std::vector<double> built, loaded;
   Navigation navigation(scene, {}, {}, nullptr, 2, [&](double share) { built.push_back(share); });
   EXPECT_TRUE(std::ranges::is_sorted(built));

@@ -7,7 +7,7 @@ namespace {
 
 /// Parts that touch nothing, measured between all candidate pairs.
 std::size_t countFloating(Feeder& feeder) {
-  const scene::PhysicsWorld& dynamics = feeder.dynamics();
+  const scene::PhysicsWorld& dynamics = feeder.getDynamics();
   std::vector<std::uint8_t> touches(dynamics.bodies.size(), 0);
   for (const scene::BodyPair& pair : dynamics.pairs) {
     collision::FeatureCache cache;
@@ -15,7 +15,7 @@ std::size_t countFloating(Feeder& feeder) {
         collision::computeSeparation(placePart(dynamics.bodies[pair.key.a], pair.key.partA),
                                      placePart(dynamics.bodies[pair.key.b], pair.key.partB), cache)
             .distance;
-    if (apart > 2 * feeder.settings().solver.contactOffset) continue;
+    if (apart > 2 * feeder.getSettings().solver.contactOffset) continue;
     touches[pair.key.a] = touches[pair.key.b] = 1;
   }
   std::size_t floating = 0;
@@ -28,19 +28,19 @@ TEST(PartsFeeder, WithTheDriveOffEnergyNeverGrowsAndTheWholeHeapSleepsWithinTenS
   const FeederPlan plan = planFeeder(300, 2);
   const FeederCheck check(plan);
   Feeder feeder(plan);
-  const double start = feeder.energy();
+  const double start = feeder.computeEnergy();
   double maxEnergy = start;
-  for (int i = 0; i < 600 && (i < 120 || feeder.report().awake > 0); ++i) {
+  for (int i = 0; i < 600 && (i < 120 || feeder.getReport().awake > 0); ++i) {
     feeder.tick(false);
-    maxEnergy = std::max(maxEnergy, feeder.energy());
+    maxEnergy = std::max(maxEnergy, feeder.computeEnergy());
     if (i % 20 != 0) continue;
-    const FeederFindings findings = check.evaluate(feeder.parts(), feeder.tray());
+    const FeederFindings findings = check.evaluate(feeder.getParts(), feeder.getTrayPosition());
     ASSERT_EQ(findings.penetrating, 0u) << i;
     ASSERT_EQ(findings.outside, 0u) << i;
   }
   EXPECT_LE(maxEnergy, 1.001 * start);
-  EXPECT_LT(feeder.energy(), 0.5 * start) << "the parts fell";
-  EXPECT_EQ(feeder.report().awake, 0u);
+  EXPECT_LT(feeder.computeEnergy(), 0.5 * start) << "the parts fell";
+  EXPECT_EQ(feeder.getReport().awake, 0u);
   EXPECT_EQ(countFloating(feeder), 0u);
 }
 
@@ -51,14 +51,14 @@ TEST(PartsFeeder, WithTheDriveOnAllPartsStayInsideWithinEpsilon) {
   double low = 1;
   for (int i = 0; i < 150; ++i) {
     feeder.tick(true);
-    low = std::min(low, feeder.tray().y());
-    EXPECT_EQ(feeder.report().crushed, 0u) << i;
-    const FeederFindings findings = check.evaluate(feeder.parts(), feeder.tray());
-    ASSERT_LE(findings.deepest, feeder.settings().solver.contactOffset) << i;
+    low = std::min(low, feeder.getTrayPosition().y());
+    EXPECT_EQ(feeder.getReport().crushed, 0u) << i;
+    const FeederFindings findings = check.evaluate(feeder.getParts(), feeder.getTrayPosition());
+    ASSERT_LE(findings.deepest, feeder.getSettings().solver.contactOffset) << i;
     ASSERT_EQ(findings.outside, 0u) << i;
   }
   EXPECT_LT(low, -0.9 * plan.amplitude);
-  EXPECT_EQ(feeder.report().awake, 50u) << "no part may sleep on a vibrating tray";
+  EXPECT_EQ(feeder.getReport().awake, 50u) << "no part may sleep on a vibrating tray";
 }
 
 // The closer two parts are, the less of their motion is proven. Without depenetration more and more
@@ -67,17 +67,17 @@ TEST(PartsFeeder, LeaningPartsStaySeparate) {
   const FeederPlan plan = planFeeder(120, 4);
   Feeder feeder(plan, 2);
   for (int i = 0; i < 500; ++i) feeder.tick(true);
-  const scene::PhysicsWorld& dynamics = feeder.dynamics();
+  const scene::PhysicsWorld& dynamics = feeder.getDynamics();
   int leaning = 0, close = 0;
   for (const scene::BodyPair& pair : dynamics.pairs) {
-    if (!scene::isTouching(pair, feeder.settings().solver.contactOffset)) continue;
+    if (!scene::isTouching(pair, feeder.getSettings().solver.contactOffset)) continue;
     collision::FeatureCache cache;
     const scene::PhysicsBody &a = dynamics.bodies[pair.key.a], &b = dynamics.bodies[pair.key.b];
     const double apart = collision::computeSeparation(placePart(a, pair.key.partA),
                                                       placePart(b, pair.key.partB), cache)
                              .distance;
     ++leaning;
-    close += apart < 0.02 * feeder.settings().solver.contactOffset;
+    close += apart < 0.02 * feeder.getSettings().solver.contactOffset;
   }
   EXPECT_GT(leaning, 200);
   EXPECT_LT(close, leaning / 40) << "of " << leaning;
@@ -87,11 +87,11 @@ TEST(PartsFeeder, EndsAtTheSameBitsWithAnyNumberOfThreadsAndWithoutWideRegisters
   const FeederPlan plan = planFeeder(120, 3);
   const auto run = [&](int threads, bool byAvx = true) {
     Feeder feeder(plan, threads);
-    feeder.settings().solver.useAvx = byAvx;
+    feeder.getSettings().solver.useAvx = byAvx;
     for (int i = 0; i < 40; ++i) feeder.tick(true);
-    EXPECT_GT(feeder.report().constraints, 300u) << "enough to use several threads";
+    EXPECT_GT(feeder.getReport().constraints, 300u) << "enough to use several threads";
     std::vector<double> numbers;
-    for (const PlacedPart& part : feeder.parts()) {
+    for (const PlacedPart& part : feeder.getParts()) {
       for (int k = 0; k < 3; ++k) numbers.push_back(part.position[k]);
       for (int k = 0; k < 4; ++k) numbers.push_back(part.rotation.coeffs()[k]);
     }

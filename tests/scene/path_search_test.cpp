@@ -76,7 +76,7 @@ TEST(PathFinder, PathsOverRubbleAreWalkedWithoutAStop) {
   int found = 0;
   for (unsigned seed = 18; seed < 21; ++seed) {
     const Rubble rubble = makeRubble(seed);
-    const auto scene = boxScene(rubble.boxes);
+    const auto scene = makeBoxScene(rubble.boxes);
     Navigation navigation(scene, {}, {});
     for (const auto& [from, to] :
          {std::pair(rubble.room, rubble.farEnd), std::pair(rubble.farEnd, rubble.room)}) {
@@ -92,8 +92,8 @@ TEST(PathFinder, PathsOverRubbleAreWalkedWithoutAStop) {
 class PartlyMeshed {
  public:
   PartlyMeshed(const std::vector<NamedBox>& whole, const std::vector<NamedBox>& meshed)
-      : whole_(std::make_shared<const Scene>(boxModel(whole))),
-        meshed_(std::make_shared<const Scene>(boxModel(meshed))),
+      : whole_(std::make_shared<const Scene>(makeBoxModel(whole))),
+        meshed_(std::make_shared<const Scene>(makeBoxModel(meshed))),
         grid_(makeTileGrid(whole_.scene().bounds(), agent_)) {}
 
   NavigationPath find(const Vec3& from, const Vec3& to) {

@@ -28,7 +28,7 @@ TEST(PathSteps, AStairAKerbAndAThresholdHaveTheirHeights) {
                               {"threshold", {11, 0.9, 0}, {11.1, 0.92, 4}}};
   for (int i = 0; i < 5; ++i)
     boxes.push_back({"stair", {4 + 0.3 * i, -0.2, 0}, {4.3 + 0.3 * i, 0.2 * (i + 1), 4}});
-  Navigation navigation(boxScene(boxes), {}, {});
+  Navigation navigation(makeBoxScene(boxes), {}, {});
   const NavigationPath path = navigation.findPath({1, 0, 2}, {13, 0.9, 2});
   ASSERT_TRUE(path.found()) << path.reason;
   const std::vector<PathStep> steps = navigation.findSteps(path.points);
@@ -44,7 +44,7 @@ TEST(PathSteps, AWideAgentStandsHighAboveTheFloorOfAStair) {
   std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {4, 0, 4}}};
   for (int i = 0; i < 8; ++i)
     boxes.push_back({"stair", {4 + 0.25 * i, -0.2, 0}, {12, 0.18 * (i + 1), 4}});
-  Navigation navigation(boxScene(boxes), {}, {.radius = 0.8});
+  Navigation navigation(makeBoxScene(boxes), {}, {.radius = 0.8});
   const NavigationPath path = navigation.findPath({1, 0, 2}, {9, 1.44, 2});
   ASSERT_TRUE(path.found()) << path.reason;
   expectRises(navigation.findSteps(path.points), std::vector<double>(8, 0.18));
@@ -53,7 +53,7 @@ TEST(PathSteps, AWideAgentStandsHighAboveTheFloorOfAStair) {
 /// A kerb with an inclined riser: from (6, 0) to (6 + `run`, 0.15).
 Model makeInclinedKerb(float run) {
   Model model =
-      boxModel({{"street", {0, -0.2, 0}, {6.2, 0, 4}}, {"kerb", {6, -0.2, 0}, {12, 0.15, 4}}});
+      makeBoxModel({{"street", {0, -0.2, 0}, {6.2, 0, 4}}, {"kerb", {6, -0.2, 0}, {12, 0.15, 4}}});
   for (Eigen::Vector3f& corner : model.meshes.back().positions)
     if (corner.x() < 7 && corner.y() > 0) corner.x() += run;
   return model;
@@ -87,11 +87,11 @@ TEST(PathSteps, ARiserThatIsCrossedObliquelyIsAStep) {
 }
 
 TEST(PathSteps, AGrooveBetweenTheFeetIsNoStep) {
-  Navigation navigation(boxScene({{"floor", {0, -0.2, 0}, {3, 0, 4}},
-                                  {"left", {3, -0.2, 0}, {6, 0, 1.9}},
-                                  {"right", {3, -0.2, 2.1}, {6, 0, 4}},
-                                  {"bottom", {3, -0.2, 1.9}, {6, -0.1, 2.1}},
-                                  {"behind", {6, -0.2, 0}, {9, 0, 4}}}),
+  Navigation navigation(makeBoxScene({{"floor", {0, -0.2, 0}, {3, 0, 4}},
+                                      {"left", {3, -0.2, 0}, {6, 0, 1.9}},
+                                      {"right", {3, -0.2, 2.1}, {6, 0, 4}},
+                                      {"bottom", {3, -0.2, 1.9}, {6, -0.1, 2.1}},
+                                      {"behind", {6, -0.2, 0}, {9, 0, 4}}}),
                         {}, {});
   const NavigationPath path = navigation.findPath({1, 0, 2}, {8, 0, 2});
   ASSERT_TRUE(path.found()) << path.reason;
@@ -101,10 +101,10 @@ TEST(PathSteps, AGrooveBetweenTheFeetIsNoStep) {
 
 TEST(PathSteps, AJointInARampIsNoStep) {
   const float slope = 0.25f;
-  Model model = boxModel({{"floor", {0, -0.2, 0}, {4, 0, 4}},
-                          {"ramp/a", {4, -0.2, 0}, {6, 0, 4}},
-                          {"ramp/b", {6.05, -0.2, 0}, {8, 0, 4}},
-                          {"under", {5, -0.2, 0}, {7, 0.2, 4}}});
+  Model model = makeBoxModel({{"floor", {0, -0.2, 0}, {4, 0, 4}},
+                              {"ramp/a", {4, -0.2, 0}, {6, 0, 4}},
+                              {"ramp/b", {6.05, -0.2, 0}, {8, 0, 4}},
+                              {"under", {5, -0.2, 0}, {7, 0.2, 4}}});
   for (std::size_t i = 1; i < 3; ++i)
     for (Eigen::Vector3f& corner : model.meshes[i].positions)
       corner.y() += slope * (corner.x() - 4);
@@ -119,7 +119,7 @@ TEST(PathSteps, ARampAndANarrowGapAreNoSteps) {
                               {"floor/behind", {4.1, -0.2, 0}, {8, 0, 4}},
                               {"bottom", {4, -0.2, 0}, {4.1, -0.1, 4}}};
   boxes.push_back({"ramp", {8, -0.2, 0}, {12, 0, 4}});
-  Model model = boxModel(boxes);
+  Model model = makeBoxModel(boxes);
   for (Eigen::Vector3f& corner : model.meshes.back().positions)
     corner.y() += 0.75f * (corner.x() - 8);
   Navigation navigation(std::make_shared<const Scene>(std::move(model)), {}, {});
@@ -130,7 +130,7 @@ TEST(PathSteps, ARampAndANarrowGapAreNoSteps) {
 
 TEST(PathSteps, AFallIsNoStep) {
   Navigation navigation(
-      boxScene({{"roof", {0, -0.2, 0}, {4, 1, 4}}, {"yard", {4, -0.2, 0}, {9, 0, 4}}}), {}, {});
+      makeBoxScene({{"roof", {0, -0.2, 0}, {4, 1, 4}}, {"yard", {4, -0.2, 0}, {9, 0, 4}}}), {}, {});
   const NavigationPath path = navigation.findPath({1, 1, 2}, {8, 0, 2}, {.maxDrop = 2});
   ASSERT_TRUE(path.found()) << path.reason;
   expectRises(navigation.findSteps(path.points), {});

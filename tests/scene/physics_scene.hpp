@@ -10,7 +10,7 @@
 
 namespace enfilade::scene {
 
-inline collision::Hull boxHull(const Vec3& half) {
+inline collision::Hull makeBoxHull(const Vec3& half) {
   std::vector<Vec3> corners;
   for (int i = 0; i < 8; ++i)
     corners.emplace_back((i & 1) ? half.x() : -half.x(), (i & 2) ? half.y() : -half.y(),
@@ -19,7 +19,7 @@ inline collision::Hull boxHull(const Vec3& half) {
 }
 
 /// A ball of many faces: the grid points of a cube's surface, projected onto a sphere.
-inline collision::Hull ballHull(double radius, int cuts = 6) {
+inline collision::Hull makeBallHull(double radius, int cuts = 6) {
   std::vector<Vec3> points;
   for (int i = 0; i <= cuts; ++i)
     for (int j = 0; j <= cuts; ++j)
@@ -109,7 +109,7 @@ struct RigidScene {
     return add(makeKinematicBody({&part, 1}, {rotation, at}));
   }
   /// The floor's top is at height 0.
-  std::uint32_t addFloor() { return addStill(boxHull({20, 0.5, 20}), {0, -0.5, 0}); }
+  std::uint32_t addFloor() { return addStill(makeBoxHull({20, 0.5, 20}), {0, -0.5, 0}); }
 
   std::uint32_t add(PhysicsBody solid) {
     dynamics.bodies.push_back(std::move(solid));
@@ -134,11 +134,11 @@ struct RigidScene {
     for (int i = 0; i < steps; ++i) report = stepPhysics(dynamics, settings);
     return report;
   }
-  BodyMotion& body(std::uint32_t solid) { return dynamics.bodies[solid].motion; }
-  bool asleep(std::uint32_t solid) const { return dynamics.bodies[solid].asleep; }
+  BodyMotion& getBody(std::uint32_t solid) { return dynamics.bodies[solid].motion; }
+  bool isAsleep(std::uint32_t solid) const { return dynamics.bodies[solid].asleep; }
 
   /// Energy of all dynamic bodies, J; potential energy is relative to height 0.
-  double energy() const {
+  double computeEnergy() const {
     double sum = 0;
     for (const PhysicsBody& solid : dynamics.bodies)
       if (solid.isDynamic())
@@ -147,7 +147,7 @@ struct RigidScene {
     return sum;
   }
   /// Whether any candidate pair penetrates now.
-  bool anyPenetrates() const {
+  bool isAnyPenetrating() const {
     for (const BodyPair& pair : dynamics.pairs) {
       collision::FeatureCache cache;
       const auto a = placePart(dynamics.bodies[pair.key.a], pair.key.partA);

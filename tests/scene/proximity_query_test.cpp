@@ -11,7 +11,7 @@ namespace enfilade::scene::testing {
 namespace {
 
 /// An object of random triangles in a ball: concave and not closed.
-Object strewn(Model& model, std::mt19937& random, const Vec3& middle, double spread) {
+Object strewTriangles(Model& model, std::mt19937& random, const Vec3& middle, double spread) {
   std::normal_distribution<double> coordinate(0, spread);
   const auto near = [&](const Vec3& place) {
     return Vec3(place + Vec3(coordinate(random), coordinate(random), coordinate(random)));
@@ -33,7 +33,7 @@ Object strewn(Model& model, std::mt19937& random, const Vec3& middle, double spr
 struct Still {
   explicit Still(Model model) : world(std::make_shared<const Scene>(std::move(model))) {}
   World world;
-  EntityIndex index{sharedScene(world)};
+  EntityIndex index{shareScene(world)};
   SceneAt then{index, *world.snapshot()};
 };
 
@@ -43,7 +43,8 @@ PairProximity computeState(const SceneAt& then, EntityId a, EntityId b, bool ref
 }
 
 /// Reference implementation: every part with every part.
-collision::SeparationResult bruteForce(const CollisionGeometry& a, const CollisionGeometry& b) {
+collision::SeparationResult findNearestByBruteForce(const CollisionGeometry& a,
+                                                    const CollisionGeometry& b) {
   std::optional<collision::SeparationResult> nearest;
   for (std::uint32_t i = 0; i < a.size(); ++i) {
     for (std::uint32_t k = 0; k < b.size(); ++k) {
@@ -63,16 +64,16 @@ TEST(PairProximity, TheDistanceOfStaticMeshesIsThatOfTheirNearestParts) {
   int apart = 0;
   constexpr int kPairs = 40;
   for (int i = 0; i < kPairs; ++i) {
-    Model model = boxModel({});
-    model.objects.push_back(strewn(model, random, Vec3::Zero(), 0.3));
-    model.objects.push_back(strewn(model, random, Vec3(1.2 + 0.05 * i, 0.4, 0), 0.3));
+    Model model = makeBoxModel({});
+    model.objects.push_back(strewTriangles(model, random, Vec3::Zero(), 0.3));
+    model.objects.push_back(strewTriangles(model, random, Vec3(1.2 + 0.05 * i, 0.4, 0), 0.3));
     const Still still(std::move(model));
     const PairProximity found = computeState(still.then, 1, 2),
                         back = computeState(still.then, 2, 1),
                         refined = computeState(still.then, 1, 2, true);
     const Scene& scene = still.world.scene();
     const collision::SeparationResult truth =
-        bruteForce(scene.collisionGeometry(0), scene.collisionGeometry(1));
+        findNearestByBruteForce(scene.collisionGeometry(0), scene.collisionGeometry(1));
     ASSERT_EQ(found.separation.verdict, truth.verdict);
     EXPECT_EQ(back.separation.verdict, truth.verdict);
     EXPECT_NEAR(found.separation.distance, truth.distance, 1e-12);
@@ -88,7 +89,7 @@ TEST(PairProximity, TheDistanceOfStaticMeshesIsThatOfTheirNearestParts) {
 TEST(PairProximity, LargeMeshesThatAreFarApartCostLittle) {
   // Two hilly plates of 40,000 triangles each, 3 m apart; brute force would take 1.6e9 narrow-phase
   // calls.
-  Model model = boxModel({});
+  Model model = makeBoxModel({});
   for (const double height : {0.0, 3.0}) {
     Mesh mesh;
     constexpr std::uint32_t kSide = 142;
@@ -126,7 +127,7 @@ TEST(PairProximity, LargeMeshesThatAreFarApartCostLittle) {
 }
 
 /// A closed convex mesh with `corners` vertices on a sphere of 1 m.
-Mesh ballMesh(std::mt19937& random, std::size_t corners, const Vec3& middle) {
+Mesh makeBallMesh(std::mt19937& random, std::size_t corners, const Vec3& middle) {
   std::normal_distribution<double> coordinate;
   std::vector<Vec3> points;
   while (points.size() < corners)
@@ -145,9 +146,10 @@ Mesh ballMesh(std::mt19937& random, std::size_t corners, const Vec3& middle) {
 TEST(PairProximity, TheDepthOfVeryRoundShapesExceedsTheWorkLimit) {
   std::mt19937 random(3);
   for (const std::size_t corners : {20u, 400u}) {
-    Model model = boxModel({{"a", Vec3::Zero(), Vec3::Ones()}, {"b", Vec3::Zero(), Vec3::Ones()}});
-    model.meshes = {ballMesh(random, corners, Vec3::Zero()),
-                    ballMesh(random, corners, Vec3(1.2, 0, 0))};
+    Model model =
+        makeBoxModel({{"a", Vec3::Zero(), Vec3::Ones()}, {"b", Vec3::Zero(), Vec3::Ones()}});
+    model.meshes = {makeBallMesh(random, corners, Vec3::Zero()),
+                    makeBallMesh(random, corners, Vec3(1.2, 0, 0))};
     const Still still(std::move(model));
     ASSERT_EQ(still.world.scene().collisionGeometry(0).hullCount(), 1u);
     std::size_t work = kMaxQueryWork;
@@ -161,8 +163,8 @@ TEST(PairProximity, TheDepthOfVeryRoundShapesExceedsTheWorkLimit) {
 }
 
 TEST(PairProximity, BoxesHaveTheDistancesThatWereBuilt) {
-  const Still still(boxModel(
-      {floorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}, {"inside", {5.1, 1, 0}, {6, 2, 1}}}));
+  const Still still(makeBoxModel(
+      {makeFloorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}, {"inside", {5.1, 1, 0}, {6, 2, 1}}}));
   const SceneAt& then = still.then;
   EXPECT_EQ(findEntity(then, "wall"), 2u);
   EXPECT_EQ(findEntity(then, "window"), 0u);
@@ -176,8 +178,8 @@ TEST(PairProximity, BoxesHaveTheDistancesThatWereBuilt) {
 
 TEST(PairProximity, NearbyEntitiesEqualThoseOfTheTick) {
   WorldFixture run(
-      {floorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}, {"post", {0, 0, 2}, {0.2, 3, 2.2}}});
-  EntityIndex index(sharedScene(run.world));
+      {makeFloorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}, {"post", {0, 0, 2}, {0.2, 3, 2.2}}});
+  EntityIndex index(shareScene(run.world));
   run.order("ann", Spawn{Vec3(0, 0.001, 0), 0});
   run.order("ann", Walk{{Vec3(8, 0, 0)}, 2});
   for (int i = 0; i < 240; ++i) {

@@ -35,7 +35,7 @@ inline NavigationMesh makeMesh(const World& world, const NavigationAgent& agent)
 }
 
 inline NavigationMesh makeRoomMesh(std::mt19937& random) {
-  return makeMesh(World(boxScene(makeRoom(random))), {});
+  return makeMesh(World(makeBoxScene(makeRoom(random))), {});
 }
 
 }  // namespace enfilade::scene::testing

@@ -14,15 +14,15 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr double kPi = std::numbers::pi;
 
-std::shared_ptr<const Scene> wallAndPane() {
-  Model model =
-      boxModel({floorBox(), {"pane", {2, 0, -3}, {2.01, 3, 3}}, {"wall", {5, 0, -3}, {5.2, 3, 3}}});
+std::shared_ptr<const Scene> makeWallAndPane() {
+  Model model = makeBoxModel(
+      {makeFloorBox(), {"pane", {2, 0, -3}, {2.01, 3, 3}}, {"wall", {5, 0, -3}, {5.2, 3, 3}}});
   model.materials.emplace_back().alpha = Material::Alpha::blend;
   model.meshes[1].material = 1;
   return std::make_shared<const Scene>(std::move(model));
 }
 
-Snapshot someoneAt(const Vec3& feet) {
+Snapshot makeSomeoneAt(const Vec3& feet) {
   Snapshot snapshot;
   AvatarSnapshot ann;
   ann.id = 100;
@@ -34,7 +34,7 @@ Snapshot someoneAt(const Vec3& feet) {
 }
 
 TEST(RayCaster, ReportsFirstHitPointAndNormal) {
-  const RayCaster caster(wallAndPane());
+  const RayCaster caster(makeWallAndPane());
   const auto hit = caster.firstHit({{0, 1, 0}, {3, 0, 0}});
   ASSERT_TRUE(hit);
   EXPECT_EQ(hit->entity, 2u);
@@ -44,7 +44,7 @@ TEST(RayCaster, ReportsFirstHitPointAndNormal) {
 }
 
 TEST(RayCaster, IgnoresGlassIfRequested) {
-  const RayCaster caster(wallAndPane());
+  const RayCaster caster(makeWallAndPane());
   const auto hit = caster.firstHit({{0, 1, 0}, Vec3::UnitX()}, {0, true});
   ASSERT_TRUE(hit);
   EXPECT_EQ(hit->entity, 3u);
@@ -52,7 +52,7 @@ TEST(RayCaster, IgnoresGlassIfRequested) {
 }
 
 TEST(RayCaster, EndsAtItsReach) {
-  const RayCaster caster(wallAndPane());
+  const RayCaster caster(makeWallAndPane());
   EXPECT_FALSE(caster.firstHit({{0, 1, 0}, Vec3::UnitX(), 1.999}));
   EXPECT_TRUE(caster.firstHit({{0, 1, 0}, Vec3::UnitX(), 2.0}));
   EXPECT_FALSE(caster.firstHit({{0, 1, 0}, -Vec3::UnitX()}));
@@ -61,13 +61,13 @@ TEST(RayCaster, EndsAtItsReach) {
 }
 
 TEST(RayCaster, SeesTheSurfaceThatItLooksAt) {
-  const RayCaster caster(wallAndPane());
+  const RayCaster caster(makeWallAndPane());
   const Ray toThePane{{0, 1, 0}, Vec3::UnitX(), 2.0};
   EXPECT_FALSE(caster.isBlocked(toThePane)) << "the query's own end does not block it";
 }
 
 TEST(RayCaster, HitsFlatGeometry) {
-  Model model = boxModel({floorBox(), {"sheet", {2, 0, -3}, {3, 3, 3}}});
+  Model model = makeBoxModel({makeFloorBox(), {"sheet", {2, 0, -3}, {3, 3, 3}}});
   model.objects[1].worldFromMesh.linear().row(0).setZero();  // flattens the object to x = 0
   model.objects[1].worldFromMesh.translation().x() = 2;
   const RayCaster caster(std::make_shared<const Scene>(std::move(model)));
@@ -78,10 +78,10 @@ TEST(RayCaster, HitsFlatGeometry) {
 }
 
 TEST(RayCaster, MeetsAvatarsWhereTheyAreNow) {
-  RayCaster caster(boxScene({floorBox()}));
+  RayCaster caster(makeBoxScene({makeFloorBox()}));
   const Ray ray{{-5, 1, 0}, Vec3::UnitX()};
   EXPECT_FALSE(caster.firstHit(ray));
-  caster.update(someoneAt({3, 0, 0}));
+  caster.update(makeSomeoneAt({3, 0, 0}));
   const auto hit = caster.firstHit(ray);
   ASSERT_TRUE(hit);
   EXPECT_EQ(hit->entity, 100u);
@@ -89,15 +89,15 @@ TEST(RayCaster, MeetsAvatarsWhereTheyAreNow) {
   EXPECT_FALSE(caster.firstHit(ray, {100, false})) << "the querying avatar does not see itself";
   EXPECT_TRUE(caster.isBlocked(ray));
   EXPECT_FALSE(caster.isBlocked(ray, {100, false}));
-  caster.update(someoneAt({3, 0, 4}));
+  caster.update(makeSomeoneAt({3, 0, 4}));
   EXPECT_FALSE(caster.firstHit(ray));
   caster.update({});
   EXPECT_FALSE(caster.firstHit({{-5, 1, 4}, Vec3::UnitX()}));
 }
 
 TEST(RayCaster, MeetsADoorWhereItHasTurnedTo) {
-  Model model = boxModel({floorBox(), {"door", {2, 0, 0}, {2.0625, 2, 1}}});
-  model.bodies.push_back(bodySpec("door", BodyKind::hinged, {1}));
+  Model model = makeBoxModel({makeFloorBox(), {"door", {2, 0, 0}, {2.0625, 2, 1}}});
+  model.bodies.push_back(makeBodySpec("door", BodyKind::hinged, {1}));
   model.bodies[0].anchor = {2, 0, 0};
   model.bodies[0].high = 2;
   RayCaster caster(std::make_shared<const Scene>(std::move(model)));
@@ -123,8 +123,8 @@ TEST(RayCaster, MeetsADoorWhereItHasTurnedTo) {
 }
 
 /// Reference: the test of Möller and Trumbore on every triangle, in doubles.
-std::optional<double> slowDistance(const std::vector<collision::Triangle>& triangles,
-                                   const Ray& ray) {
+std::optional<double> computeSlowDistance(const std::vector<collision::Triangle>& triangles,
+                                          const Ray& ray) {
   std::optional<double> nearest;
   for (const collision::Triangle& t : triangles) {
     const Vec3 a = t[1] - t[0], b = t[2] - t[0], p = ray.direction.cross(b);
@@ -142,9 +142,9 @@ std::optional<double> slowDistance(const std::vector<collision::Triangle>& trian
 }
 
 /// Boxes of random orientation, scattered.
-Model tumbledBoxes(std::mt19937& random) {
+Model makeTumbledBoxes(std::mt19937& random) {
   std::uniform_real_distribution<double> place(-20, 20), size(0.1, 2), turn(-1, 1);
-  Model model = boxModel({{"box", {-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}}});
+  Model model = makeBoxModel({{"box", {-0.5, -0.5, -0.5}, {0.5, 0.5, 0.5}}});
   model.objects.clear();
   for (int i = 0; i < 200; ++i) {
     const Vec3 at(place(random), place(random), place(random));
@@ -160,7 +160,7 @@ Model tumbledBoxes(std::mt19937& random) {
 
 TEST(RayCaster, AgreesWithDoublesOverAllTriangles) {
   std::mt19937 random(17);
-  const auto scene = std::make_shared<const Scene>(tumbledBoxes(random));
+  const auto scene = std::make_shared<const Scene>(makeTumbledBoxes(random));
   const RayCaster caster(scene);
   std::vector<collision::Triangle> triangles;
   for (const std::uint32_t object : scene->solidObjects())
@@ -171,7 +171,7 @@ TEST(RayCaster, AgreesWithDoublesOverAllTriangles) {
   for (int i = 0; i < 2000; ++i) {
     const Vec3 way(any(random), any(random), any(random));
     const Ray ray{15 * Vec3(any(random), any(random), any(random)), way.normalized()};
-    const auto slow = slowDistance(triangles, ray);
+    const auto slow = computeSlowDistance(triangles, ray);
     const auto fast = caster.firstHit(ray);
     if (slow.has_value() != fast.has_value()) {
       ++differ;  // along an edge, where one of them misses
@@ -186,7 +186,7 @@ TEST(RayCaster, AgreesWithDoublesOverAllTriangles) {
 }
 
 TEST(RayCaster, LosesNothingFarFromTheOrigin) {
-  const RayCaster caster(boxScene({{"far", {2000, 0, -1}, {2001, 2, 1}}}));
+  const RayCaster caster(makeBoxScene({{"far", {2000, 0, -1}, {2001, 2, 1}}}));
   const auto hit = caster.firstHit({{0, 1, 0}, {1, 1e-4, 0}});
   ASSERT_TRUE(hit);
   EXPECT_DOUBLE_EQ(hit->distance, 2000 * std::sqrt(1 + 1e-8));
@@ -228,10 +228,10 @@ TEST(RangeScan, GoesFromLeftToRightAndFromAboveToBelow) {
 }
 
 TEST(RangeScan, OfAFullTurnMeetsAllFourWallsOnce) {
-  const RayCaster caster(boxScene({{"east", {3, 0, -9}, {4, 3, 9}},
-                                   {"west", {-5, 0, -9}, {-4, 3, 9}},
-                                   {"south", {-9, 0, 6}, {9, 3, 7}},
-                                   {"north", {-9, 0, -6}, {9, 3, -5}}}));
+  const RayCaster caster(makeBoxScene({{"east", {3, 0, -9}, {4, 3, 9}},
+                                       {"west", {-5, 0, -9}, {-4, 3, 9}},
+                                       {"south", {-9, 0, 6}, {9, 3, 7}},
+                                       {"north", {-9, 0, -6}, {9, 3, -5}}}));
   RangeScan scan;
   scan.origin = {0, 1, 0};
   scan.width = 2 * kPi;

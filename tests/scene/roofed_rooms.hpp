@@ -8,7 +8,7 @@
 namespace enfilade::scene::testing {
 
 /// Rooms on 10 x 6 m. A wall at `x` has a gap around z = 0.
-inline std::vector<NamedBox> roofedRooms(double gap, double x = 5) {
+inline std::vector<NamedBox> makeRoofedRooms(double gap, double x = 5) {
   return {{"floor", {0, -0.2, -3}, {10, 0, 3}},
           {"wall/west", {0, 0, -3}, {0.2, 3, 3}},
           {"wall/east", {9.8, 0, -3}, {10, 3, 3}},

@@ -13,12 +13,12 @@
 namespace enfilade::scene::testing {
 namespace {
 
-std::shared_ptr<const Scene> hall(double gap) {
-  Model model = boxModel({{"floor", {0, -0.2, -3}, {8, 0, 3}},
-                          {"wall/left", {3.9, 0, -3}, {4.1, 2.5, -0.5 * gap}},
-                          {"wall/right", {3.9, 0, 0.5 * gap}, {4.1, 2.5, 3}},
-                          {"crate", {1, 0, -3}, {2, 1, -2}}});
-  BodySpec crate = bodySpec("crate", BodyKind::sliding, {3});
+std::shared_ptr<const Scene> makeHallWithCrate(double gap) {
+  Model model = makeBoxModel({{"floor", {0, -0.2, -3}, {8, 0, 3}},
+                              {"wall/left", {3.9, 0, -3}, {4.1, 2.5, -0.5 * gap}},
+                              {"wall/right", {3.9, 0, 0.5 * gap}, {4.1, 2.5, 3}},
+                              {"crate", {1, 0, -3}, {2, 1, -2}}});
+  BodySpec crate = makeBodySpec("crate", BodyKind::sliding, {3});
   crate.axis = Vec3::UnitX();
   crate.high = 4;
   model.bodies.push_back(crate);
@@ -44,7 +44,7 @@ std::string refuse(const std::shared_ptr<const Scene>& scene, const WorldSetting
 }
 
 TEST(SavedMeshes, AnswerAsThoseThatWereBuilt) {
-  const auto scene = hall(1);
+  const auto scene = makeHallWithCrate(1);
   Navigation built(scene, {}, {});
   Navigation loaded(scene, {}, {}, built.save());
   EXPECT_EQ(loaded.save(), built.save());
@@ -59,7 +59,7 @@ TEST(SavedMeshes, AnswerAsThoseThatWereBuilt) {
 }
 
 TEST(SavedMeshes, ABodyThatHasMovedSinceIsBuiltAgain) {
-  const auto scene = hall(1);
+  const auto scene = makeHallWithCrate(1);
   Navigation built(scene, {}, {});
   const std::vector<std::uint8_t> saved = built.save();
   World world(scene);
@@ -83,9 +83,9 @@ TEST(SavedMeshes, ABodyThatHasMovedSinceIsBuiltAgain) {
 }
 
 TEST(SavedMeshes, OfAnotherSceneOrSizeAreRefused) {
-  const auto scene = hall(1);
+  const auto scene = makeHallWithCrate(1);
   const std::vector<std::uint8_t> saved = Navigation(scene, {}, {}).save();
-  EXPECT_NE(refuse(hall(0.9), {}, {}, saved).find("another scene"), std::string::npos);
+  EXPECT_NE(refuse(makeHallWithCrate(0.9), {}, {}, saved).find("another scene"), std::string::npos);
   EXPECT_NE(refuse(scene, {}, {.radius = 0.25}, saved).find("radius of 0.3"), std::string::npos);
   WorldSettings settings;
   settings.stepHeight = 0.2;
@@ -98,7 +98,7 @@ TEST(SavedMeshes, OfAnotherSceneOrSizeAreRefused) {
 }
 
 TEST(SavedMeshes, ForgedBytesAreRefusedOrHarmless) {
-  const auto scene = hall(1);
+  const auto scene = makeHallWithCrate(1);
   const std::vector<std::uint8_t> saved = Navigation(scene, {}, {}).save();
   std::mt19937 random(1);
   int refused = 0;

@@ -205,7 +205,7 @@ TEST(ScanUpAxis, IsThatOfTheLargestLevelAreaAndCanBeSet) {
   EXPECT_EQ(importBox({8, 3, 6}).upAxis, UpAxis::y);
   EXPECT_EQ(importBox({3, 8, 6}).upAxis, UpAxis::x);
   EXPECT_EQ(importBox({5, 5, 5}).upAxis, UpAxis::z);
-  EXPECT_EQ(diagnosticText(importBox({8, 3, 6}), "guessed_up_axis"),
+  EXPECT_EQ(findDiagnosticText(importBox({8, 3, 6}), "guessed_up_axis"),
             "y is up: the largest levels across x, y, z have 18 48 24 of 180 square units; --up "
             "sets another");
   const Model cube = importBox({5, 5, 5});
@@ -238,7 +238,8 @@ TEST(ScanUpAxis, IsThatOfTheFloorOfARoomWithoutACeiling) {
     const Model model = importModel(folder.write("room.ply", makeOpenRoom(up)));
     EXPECT_EQ(model.upAxis, static_cast<UpAxis>(up));
     EXPECT_EQ(countDiagnostics(model, "guessed_up_axis"), 1u);
-    EXPECT_EQ(diagnosticText(model, "missing_texture"), "room.png: textures of PLY are not read");
+    EXPECT_EQ(findDiagnosticText(model, "missing_texture"),
+              "room.png: textures of PLY are not read");
   }
 }
 
@@ -275,7 +276,7 @@ TEST(ScanUpAxis, AFloorThatHangsIsReportedAndCanBeTurned) {
   const TemporaryFolder folder;
   for (const UpAxis up : {UpAxis::minusZ, UpAxis::minusY}) {
     const auto file = folder.write("room.ply", makeRoomSeenFromWithin(up, 0));
-    const std::string text = diagnosticText(importModel(file), "unclear_up_axis");
+    const std::string text = findDiagnosticText(importModel(file), "unclear_up_axis");
     EXPECT_NE(text.find("--up=" + toString(up)), std::string::npos) << text;
     ImportOptions options;
     options.up = up;
@@ -490,7 +491,7 @@ TEST(ScanColours, OfVerticesArePreferredToThoseOfFaces) {
   text += "4 0 1 4 3 255 0 0\n4 1 2 5 4 0 128 0\n3 2 6 5 255 0 0\n";
   const Model model = importModel(folder.write("both.ply", text));
   EXPECT_EQ(model.meshes.at(0).colours, std::vector<VertexColour>(7, {0, 0, 255, 255}));
-  EXPECT_EQ(diagnosticText(model, "vertex_colours_ignored"),
+  EXPECT_EQ(findDiagnosticText(model, "vertex_colours_ignored"),
             "mesh: those of its faces, because its vertices have colours, too");
 }
 
@@ -528,7 +529,7 @@ TEST(ScanColours, OfStlFacetsAreReported) {
 TEST(ScanSizes, DataAfterWhatTheHeaderAnnouncesIsReported) {
   const TemporaryFolder folder;
   const auto trailing = [&](const char* name, const std::string& text) {
-    return diagnosticText(importModel(folder.write(name, text)), "trailing_data");
+    return findDiagnosticText(importModel(folder.write(name, text)), "trailing_data");
   };
   std::string stl = makeBinaryStl(makeRoom());
   stl[80] = 11;
@@ -604,7 +605,7 @@ TEST(ZippedCollada, IsTheSameAsTheDocument) {
   for (const std::string& document : {std::string(kTriangleDae), blank}) {
     const Model plain = importModel(folder.write("a.dae", document));
     const Model zipped =
-        importModel(folder.write("a.zae", tests::storedZip({{"model.dae", document}})));
+        importModel(folder.write("a.zae", tests::makeStoredZip({{"model.dae", document}})));
     ASSERT_EQ(zipped.objects.size(), 1u);
     EXPECT_EQ(zipped.objects[0].path, plain.objects.at(0).path);
     EXPECT_EQ(zipped.metresPerUnit, 0.01);
@@ -616,7 +617,7 @@ TEST(ZippedCollada, IsTheSameAsTheDocument) {
 TEST(ZippedCollada, WithoutADocumentOrDamagedIsAnError) {
   const TemporaryFolder folder;
   const std::string other =
-      catchFailure(folder.write("a.zae", tests::storedZip({{"readme.txt", "hello"}})));
+      catchFailure(folder.write("a.zae", tests::makeStoredZip({{"readme.txt", "hello"}})));
   EXPECT_NE(other.find("contains no .dae file"), std::string::npos) << other;
   const std::string damaged = catchFailure(folder.write("b.zae", "PK\3\4 and no more"));
   EXPECT_NE(damaged.find("b.zae: cannot be unzipped"), std::string::npos) << damaged;
@@ -627,10 +628,12 @@ TEST(ZippedCollada, AllFilesTogetherMayTakeAnEighthOfTheMemoryLimit) {
   ImportOptions options;
   options.memoryLimit = std::size_t{256} << 20;
   const std::string half(std::size_t{17} << 20, ' ');
-  const auto fits = folder.write("fits.zae", tests::storedZip({{"a.dae", kTriangleDae + half}}));
+  const auto fits =
+      folder.write("fits.zae", tests::makeStoredZip({{"a.dae", kTriangleDae + half}}));
   EXPECT_EQ(importModel(fits, options).objects.size(), 1u);
   const auto large = folder.write(
-      "large.zae", tests::storedZip({{"a.dae", kTriangleDae}, {"a.png", half}, {"b.png", half}}));
+      "large.zae",
+      tests::makeStoredZip({{"a.dae", kTriangleDae}, {"a.png", half}, {"b.png", half}}));
   const std::string text = catchFailure(large, options);
   EXPECT_NE(text.find("large.zae: unpacks to more than the 32 MiB allowed"), std::string::npos)
       << text;

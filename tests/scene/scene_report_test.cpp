@@ -28,7 +28,7 @@ std::string findExample(const SceneReport& report, const std::string& kind) {
 }
 
 TEST(SceneReport, CountsObjectsTrianglesAndConvexParts) {
-  Model model = testing::boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {2, 0, 0}, {3, 1, 1}}});
+  Model model = testing::makeBoxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {2, 0, 0}, {3, 1, 1}}});
   model.objects.push_back({"copy", "", {0}, Eigen::Affine3d(Eigen::Translation3d(5, 0, 0))});
   Mesh open = model.meshes[0];
   open.indices.resize(30);
@@ -47,11 +47,11 @@ TEST(SceneReport, CountsObjectsTrianglesAndConvexParts) {
 }
 
 TEST(SceneReport, ReportsDiagnosticsWithTheirFirstExample) {
-  Model model = testing::boxModel({{"right", {0, 0, 0}, {1, 1, 1}},
-                                   {"repeats", {0, 0, 0}, {1, 2, 1}},
-                                   {"turned", {4, 0, 0}, {5, 1, 0.2}},
-                                   {"flat", {6, 0, 0}, {7, 1, 1}},
-                                   {"twisted", {8, 0, 0}, {9, 1, 1}}});
+  Model model = testing::makeBoxModel({{"right", {0, 0, 0}, {1, 1, 1}},
+                                       {"repeats", {0, 0, 0}, {1, 2, 1}},
+                                       {"turned", {4, 0, 0}, {5, 1, 0.2}},
+                                       {"flat", {6, 0, 0}, {7, 1, 1}},
+                                       {"twisted", {8, 0, 0}, {9, 1, 1}}});
   auto& repeats = model.meshes[1].indices;
   repeats.insert(repeats.end(), {0, 2, 3, 0, 3, 1, 1, 1, 1});
   auto& turned = model.meshes[2].indices;
@@ -75,7 +75,8 @@ TEST(SceneReport, ReportsDiagnosticsWithTheirFirstExample) {
 }
 
 TEST(SceneReport, RepeatedObjectsHaveTheShapeAndTheTransformOfAnother) {
-  Model model = testing::boxModel({{"box", {1, 0, 0}, {2, 1, 1}}, {"tall", {1, 0, 0}, {2, 2, 1}}});
+  Model model =
+      testing::makeBoxModel({{"box", {1, 0, 0}, {2, 1, 1}}, {"tall", {1, 0, 0}, {2, 2, 1}}});
   for (const double zero : {0.0, -0.0}) {
     Object again = model.objects[0];
     again.path = "again" + std::to_string(zero);
@@ -92,7 +93,7 @@ TEST(SceneReport, RepeatedObjectsHaveTheShapeAndTheTransformOfAnother) {
 
 /// The coplanar pairs of two boxes, the second of another colour if `coloured`.
 std::size_t countCoplanar(const testing::NamedBox& a, const testing::NamedBox& b, bool coloured) {
-  Model model = testing::boxModel({a, b});
+  Model model = testing::makeBoxModel({a, b});
   model.materials.emplace_back();
   model.materials[1].baseColour = {1, 0, 0, 1};
   if (coloured) model.meshes[1].material = 1;
@@ -119,8 +120,8 @@ TEST(SceneReport, SurfacesOfTwoObjectsInOnePlaneAreCountedIfTheyFlicker) {
 }
 
 /// A model of boxes of two colours: the second colour is that of the boxes from `firstRed` on.
-Model twoColoured(const std::vector<testing::NamedBox>& boxes, std::size_t firstRed) {
-  Model model = testing::boxModel(boxes);
+Model makeTwoColoured(const std::vector<testing::NamedBox>& boxes, std::size_t firstRed) {
+  Model model = testing::makeBoxModel(boxes);
   model.materials.emplace_back();
   model.materials[1].baseColour = {1, 0, 0, 1};
   for (std::size_t i = firstRed; i < boxes.size(); ++i) model.meshes[i].material = 1;
@@ -130,13 +131,13 @@ Model twoColoured(const std::vector<testing::NamedBox>& boxes, std::size_t first
 TEST(SceneReport, CoplanarPairsAreCountedOnceEachAndTheLargestIsTheExample) {
   // Most rafters share several planes with the slab. The wide one is found neither first nor last.
   const CoplanarSurfaces found =
-      findCoplanarSurfaces(twoColoured({{"slab", {0, 0, 0}, {4, 0.3, 4}},
-                                        {"far", {20, 0, 0}, {24, 0.3, 4}},
-                                        {"narrow", {0.5, 0, 0}, {0.7, 0.2, 3.5}},
-                                        {"wide", {1, 0, 0.2}, {3, 0.2, 4}},
-                                        {"short", {3.05, 0, 3}, {3.6, 0.28, 4}},
-                                        {"on far", {21, 0, 1}, {22, 0.2, 2}}},
-                                       2));
+      findCoplanarSurfaces(makeTwoColoured({{"slab", {0, 0, 0}, {4, 0.3, 4}},
+                                            {"far", {20, 0, 0}, {24, 0.3, 4}},
+                                            {"narrow", {0.5, 0, 0}, {0.7, 0.2, 3.5}},
+                                            {"wide", {1, 0, 0.2}, {3, 0.2, 4}},
+                                            {"short", {3.05, 0, 3}, {3.6, 0.28, 4}},
+                                            {"on far", {21, 0, 1}, {22, 0.2, 2}}},
+                                           2));
   EXPECT_EQ(found.countDifferentLooks(), 4u);
   EXPECT_EQ(found.example, "slab and wide");
   EXPECT_TRUE(found.isComplete);
@@ -155,12 +156,13 @@ TEST(SceneReport, CoplanarPairsAmongManyAreThoseOfEachPairAlone) {
     boxes.push_back({"box", min, min + Vec3(pick(1, 4), pick(1, 4), pick(1, 4))});
   }
   std::map<std::pair<std::uint32_t, std::uint32_t>, bool> found, expected;
-  for (const CoplanarPair& pair : findCoplanarSurfaces(twoColoured(boxes, kFirstRed)).pairs)
+  for (const CoplanarPair& pair : findCoplanarSurfaces(makeTwoColoured(boxes, kFirstRed)).pairs)
     found[{pair.first, pair.second}] = pair.looksEqual;
   for (std::uint32_t i = 0; i < kCount; ++i) {
     for (std::uint32_t j = i + 1; j < kCount; ++j) {
       const std::size_t firstRed = i >= kFirstRed ? 0 : j >= kFirstRed ? 1 : 2;
-      const auto alone = findCoplanarSurfaces(twoColoured({boxes[i], boxes[j]}, firstRed)).pairs;
+      const auto alone =
+          findCoplanarSurfaces(makeTwoColoured({boxes[i], boxes[j]}, firstRed)).pairs;
       if (!alone.empty()) expected[{i, j}] = alone[0].looksEqual;
     }
   }
@@ -170,10 +172,10 @@ TEST(SceneReport, CoplanarPairsAmongManyAreThoseOfEachPairAlone) {
 }
 
 TEST(SceneReport, CoplanarSurfacesBeyondTheLimitOfTrianglesAreLeftOut) {
-  const Model model = twoColoured({{"slab", {0, 0, 0}, {4, 0.3, 4}},
-                                   {"a", {1, 0, 1}, {2, 0.2, 2}},
-                                   {"b", {3, 0, 3}, {4, 0.2, 4}}},
-                                  1);
+  const Model model = makeTwoColoured({{"slab", {0, 0, 0}, {4, 0.3, 4}},
+                                       {"a", {1, 0, 1}, {2, 0.2, 2}},
+                                       {"b", {3, 0, 3}, {4, 0.2, 4}}},
+                                      1);
   const CoplanarSurfaces all = findCoplanarSurfaces(model, 36);  // a box has twelve
   EXPECT_TRUE(all.isComplete);
   EXPECT_EQ(all.pairs.size(), 2u);
@@ -192,7 +194,7 @@ TEST(SceneReport, ASearchForCoplanarSurfacesThatEndsEarlyIsReported) {
     }
     boxes.push_back({"rafter", {0, 0, 1}, {0.5, 0.2, 2}});
     const std::size_t firstRed = boxes.size() - (isRafterRed ? 1 : 0);
-    return makeSceneReport(Scene(twoColoured(boxes, firstRed)));
+    return makeSceneReport(Scene(makeTwoColoured(boxes, firstRed)));
   };
   // n tiles have 2 n triangles in each of the two planes of their ends: 4 n^2 comparisons.
   const SceneReport few = report(100), many = report(1500), manyAlike = report(1500, false);

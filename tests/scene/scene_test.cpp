@@ -9,7 +9,7 @@ namespace enfilade::scene {
 namespace {
 
 /// Random triangles by seed in `objects` objects, some of them degenerate.
-Model randomModel(unsigned seed, std::size_t objects) {
+Model makeRandomModel(unsigned seed, std::size_t objects) {
   std::mt19937 random(seed);
   const auto number = [&] { return static_cast<float>(random() % 2001) / 100.0f - 10.0f; };
   Model model;
@@ -38,7 +38,7 @@ Model randomModel(unsigned seed, std::size_t objects) {
 TEST(Scene, BoxesOfManyObjectsAreThoseOfOneThreadAndTheHashIsRepeatable) {
   // More objects than two threads take at once; meshes below and above the limit of the search for
   // repeated positions.
-  Model model = randomModel(3, 4);
+  Model model = makeRandomModel(3, 4);
   for (int repeats = 0; repeats < 3; ++repeats) {
     Mesh& large = model.meshes[0];
     large.positions.insert(large.positions.end(), large.positions.begin(), large.positions.end());
@@ -85,7 +85,7 @@ TEST(Scene, BoxesOfManyObjectsAreThoseOfOneThreadAndTheHashIsRepeatable) {
 }
 
 TEST(Scene, BoxesAreExactlyTheExtremesOfTheTrianglesWithArea) {
-  const Scene scene(randomModel(7, 40));
+  const Scene scene(makeRandomModel(7, 40));
   std::size_t skipped = 0;
   for (std::size_t i = 0; i < scene.solidObjects().size(); ++i) {
     const Object& object = scene.model().objects[scene.solidObjects()[i]];
@@ -114,7 +114,7 @@ TEST(Scene, BoxesAreExactlyTheExtremesOfTheTrianglesWithArea) {
 }
 
 TEST(Scene, ObjectsWithoutAreaCannotBeTouched) {
-  Model model = randomModel(8, 3);
+  Model model = makeRandomModel(8, 3);
   model.meshes[1].indices = {0, 0, 1, 2, 2, 2};
   const Scene scene(std::move(model));
   EXPECT_EQ(scene.solidObjects(), (std::vector<std::uint32_t>{0, 2}));
@@ -128,24 +128,24 @@ TEST(Scene, AnEmptyModelIsAnEmptyScene) {
 }
 
 TEST(Scene, HashFollowsPositionsPathsAndPlacesOnly) {
-  const std::uint64_t hash = Scene(randomModel(9, 5)).hash();
-  EXPECT_EQ(Scene(randomModel(9, 5)).hash(), hash);
-  Model recoloured = randomModel(9, 5);
+  const std::uint64_t hash = Scene(makeRandomModel(9, 5)).hash();
+  EXPECT_EQ(Scene(makeRandomModel(9, 5)).hash(), hash);
+  Model recoloured = makeRandomModel(9, 5);
   recoloured.materials[0].baseColour.setZero();
   EXPECT_EQ(Scene(recoloured).hash(), hash);
-  Model moved = randomModel(9, 5);
+  Model moved = makeRandomModel(9, 5);
   moved.objects[3].worldFromMesh.translation().x() += 1e-12;
   EXPECT_NE(Scene(moved).hash(), hash);
-  Model renamed = randomModel(9, 5);
+  Model renamed = makeRandomModel(9, 5);
   renamed.objects[3].path += "x";
   EXPECT_NE(Scene(renamed).hash(), hash);
-  Model bent = randomModel(9, 5);
+  Model bent = makeRandomModel(9, 5);
   bent.meshes[2].positions[4].y() = 11;
   EXPECT_NE(Scene(bent).hash(), hash);
 }
 
 TEST(Scene, AllCallersShareOneListOfParts) {
-  const Scene scene(randomModel(10, 50));
+  const Scene scene(makeRandomModel(10, 50));
   std::vector<std::vector<const CollisionGeometry*>> seen(4);
   std::vector<std::thread> threads;
   for (auto& list : seen) {
@@ -160,7 +160,7 @@ TEST(Scene, AllCallersShareOneListOfParts) {
 }
 
 TEST(Scene, CollisionDataIsCopiedOnlyWhenThePartsAreUsed) {
-  Model model = randomModel(12, 3);
+  Model model = makeRandomModel(12, 3);
   std::size_t unique = 0;
   for (const Mesh& mesh : model.meshes)
     unique += mesh.positions.size() * sizeof(mesh.positions[0]) + mesh.indices.size() * 4;
@@ -184,7 +184,7 @@ TEST(Scene, CollisionDataIsCopiedOnlyWhenThePartsAreUsed) {
 }
 
 TEST(Scene, IndicesThatPointNowhereAreRefused) {
-  Model model = randomModel(11, 2);
+  Model model = makeRandomModel(11, 2);
   model.meshes[1].indices[4] = 12;
   EXPECT_THROW(Scene{std::move(model)}, std::invalid_argument);
 }

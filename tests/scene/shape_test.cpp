@@ -14,9 +14,9 @@
 namespace enfilade::scene {
 namespace {
 
-using testing::boxMesh;
+using testing::buildBoxMesh;
 using testing::buildMeshShape;
-using testing::insideOut;
+using testing::turnInsideOut;
 
 void append(Mesh& to, const Mesh& from) {
   const auto first = static_cast<std::uint32_t>(to.positions.size());
@@ -25,7 +25,7 @@ void append(Mesh& to, const Mesh& from) {
 }
 
 /// Each triangle with its own vertices, as exporters write flat shading.
-Mesh unwelded(const Mesh& mesh) {
+Mesh unweld(const Mesh& mesh) {
   Mesh apart;
   for (const std::uint32_t i : mesh.indices) {
     apart.indices.push_back(static_cast<std::uint32_t>(apart.positions.size()));
@@ -35,7 +35,7 @@ Mesh unwelded(const Mesh& mesh) {
 }
 
 /// Transforms in doubles, then rounds to floats.
-Mesh turned(const Mesh& mesh, std::mt19937& random, double reach) {
+Mesh turnMesh(const Mesh& mesh, std::mt19937& random, double reach) {
   std::uniform_real_distribution<double> number(-1, 1);
   const double w = number(random), x = number(random), y = number(random), z = number(random);
   const Eigen::Quaterniond turn = Eigen::Quaterniond(w, x, y, z).normalized();
@@ -48,7 +48,7 @@ Mesh turned(const Mesh& mesh, std::mt19937& random, double reach) {
 }
 
 /// Two polygons of `sides` vertices, each a fan, with quads between them.
-Mesh prism(int sides, double radius, double height) {
+Mesh makePrismMesh(int sides, double radius, double height) {
   Mesh mesh;
   for (int i = 0; i < sides; ++i) {
     const double angle = 2 * std::numbers::pi * i / sides;
@@ -71,8 +71,8 @@ Mesh prism(int sides, double radius, double height) {
 }
 
 TEST(Shape, ABoxIsOneConvexSolidHoweverItsCornersAreStored) {
-  const Mesh box = boxMesh({-1, 0, 2}, {3, 0.5, 7});
-  for (const Mesh& mesh : {box, unwelded(box)}) {
+  const Mesh box = buildBoxMesh({-1, 0, 2}, {3, 0.5, 7});
+  for (const Mesh& mesh : {box, unweld(box)}) {
     const Shape shape = buildMeshShape(mesh);
     EXPECT_EQ(shape.vertices.size(), 8u);
     EXPECT_EQ(shape.triangles.size(), 12u);
@@ -85,11 +85,11 @@ TEST(Shape, ABoxIsOneConvexSolidHoweverItsCornersAreStored) {
 }
 
 TEST(Shape, ABoxOfSeveralMeshesIsOneSolid) {
-  const Mesh box = boxMesh({0, 0, 0}, {1, 1, 1});
+  const Mesh box = buildBoxMesh({0, 0, 0}, {1, 1, 1});
   Mesh sides = box, lid = box;
   lid.indices.assign(box.indices.begin(), box.indices.begin() + 6);
   sides.indices.assign(box.indices.begin() + 6, box.indices.end());
-  const std::vector<Mesh> meshes{lid, boxMesh({5, 5, 5}, {6, 6, 6}), sides};
+  const std::vector<Mesh> meshes{lid, buildBoxMesh({5, 5, 5}, {6, 6, 6}), sides};
   const std::vector<std::uint32_t> both{2, 0};
   const Shape shape = buildShape(meshes, both);
   ASSERT_EQ(shape.shells.size(), 1u);
@@ -102,9 +102,9 @@ TEST(Shape, TurnedBoxesAndPrismsAreConvexUpToTheRoundingOfTheirFloats) {
   std::mt19937 random(3);
   int exact = 0;
   for (int i = 0; i < 300; ++i) {
-    const Mesh mesh =
-        turned(i % 2 ? boxMesh({-4, 0, -0.1}, {4, 2.7, 0.1}) : prism(3 + i % 60, 1, 2), random,
-               i % 3 ? 500 : 0);
+    const Mesh mesh = turnMesh(
+        i % 2 ? buildBoxMesh({-4, 0, -0.1}, {4, 2.7, 0.1}) : makePrismMesh(3 + i % 60, 1, 2),
+        random, i % 3 ? 500 : 0);
     const Shape shape = buildMeshShape(mesh);
     ASSERT_EQ(shape.shells.size(), 1u);
     EXPECT_TRUE(shape.shells[0].isConvex()) << i;
@@ -117,7 +117,7 @@ TEST(Shape, TurnedBoxesAndPrismsAreConvexUpToTheRoundingOfTheirFloats) {
 TEST(Shape, ADentDeeperThanRoundingIsNotConvex) {
   // A dented box: its top is a pyramid whose apex lies `depth` units below it.
   for (const double depth : {0.0, 1e-7, 2e-6, 1e-4, 0.3}) {
-    Mesh mesh = boxMesh({0, 0, 0}, {1, 1, 1});
+    Mesh mesh = buildBoxMesh({0, 0, 0}, {1, 1, 1});
     mesh.indices.erase(mesh.indices.begin() + 18, mesh.indices.begin() + 24);  // the top
     mesh.positions.push_back(Vec3(0.5, 1 - depth, 0.5).cast<float>());
     for (const auto& [a, b] : {std::pair{2, 6}, {6, 7}, {7, 3}, {3, 2}})
@@ -160,7 +160,7 @@ TEST(Shape, SplitFacesAndPointsInsideOfFacesDoNoHarm) {
 }
 
 TEST(Shape, TrianglesWithoutAreaAndRepeatedOnesAreCountedAndLeftOut) {
-  Mesh mesh = boxMesh({0, 0, 0}, {1, 2, 3});
+  Mesh mesh = buildBoxMesh({0, 0, 0}, {1, 2, 3});
   mesh.indices.insert(mesh.indices.end(), {0, 0, 1, 5, 5, 5});  // duplicate corners
   mesh.indices.insert(mesh.indices.end(), {3, 2, 0, 3, 1, 0});  // duplicates with rotated or
                                                                 // reversed corners
@@ -175,14 +175,14 @@ TEST(Shape, TrianglesWithoutAreaAndRepeatedOnesAreCountedAndLeftOut) {
 }
 
 TEST(Shape, InsideOutSolidsAreRecognised) {
-  const Shape shape = buildMeshShape(insideOut(boxMesh({0, 0, 0}, {1, 2, 3})));
+  const Shape shape = buildMeshShape(turnInsideOut(buildBoxMesh({0, 0, 0}, {1, 2, 3})));
   ASSERT_EQ(shape.shells.size(), 1u);
   EXPECT_TRUE(shape.shells[0].isConvex());
   EXPECT_TRUE(shape.shells[0].inward);
 }
 
 TEST(Shape, FacesWoundAgainstTheRestAreTurned) {
-  Mesh mesh = boxMesh({0, 0, 0}, {1, 2, 3});
+  Mesh mesh = buildBoxMesh({0, 0, 0}, {1, 2, 3});
   std::swap(mesh.indices[4], mesh.indices[5]);
   std::swap(mesh.indices[22], mesh.indices[23]);
   const Shape shape = buildMeshShape(mesh);
@@ -193,9 +193,9 @@ TEST(Shape, FacesWoundAgainstTheRestAreTurned) {
 }
 
 TEST(Shape, ACavityMakesTheSolidAroundItHollow) {
-  Mesh mesh = boxMesh({0, 0, 0}, {5, 3, 5});
-  append(mesh, insideOut(boxMesh({0.2, 0.2, 0.2}, {4.8, 2.8, 4.8})));
-  append(mesh, boxMesh({10, 0, 0}, {11, 1, 1}));
+  Mesh mesh = buildBoxMesh({0, 0, 0}, {5, 3, 5});
+  append(mesh, turnInsideOut(buildBoxMesh({0.2, 0.2, 0.2}, {4.8, 2.8, 4.8})));
+  append(mesh, buildBoxMesh({10, 0, 0}, {11, 1, 1}));
   const Shape shape = buildMeshShape(mesh);
   ASSERT_EQ(shape.shells.size(), 3u);
   EXPECT_TRUE(shape.shells[0].hollow);
@@ -205,20 +205,20 @@ TEST(Shape, ACavityMakesTheSolidAroundItHollow) {
 }
 
 TEST(Shape, SolidsThatShareAnEdgeOrACornerAreNotOneSolid) {
-  Mesh corner = boxMesh({0, 0, 0}, {1, 1, 1});
-  append(corner, boxMesh({1, 1, 1}, {2, 2, 2}));
+  Mesh corner = buildBoxMesh({0, 0, 0}, {1, 1, 1});
+  append(corner, buildBoxMesh({1, 1, 1}, {2, 2, 2}));
   const Shape two = buildMeshShape(corner);
   ASSERT_EQ(two.shells.size(), 2u);
   EXPECT_TRUE(two.shells[0].isConvex() && two.shells[1].isConvex());
-  Mesh edge = boxMesh({0, 0, 0}, {1, 1, 1});
-  append(edge, boxMesh({1, 1, 0}, {2, 2, 1}));
+  Mesh edge = buildBoxMesh({0, 0, 0}, {1, 1, 1});
+  append(edge, buildBoxMesh({1, 1, 0}, {2, 2, 1}));
   const Shape crowded = buildMeshShape(edge);
   EXPECT_EQ(crowded.nonManifoldEdges, 1u);
   for (const Shell& shell : crowded.shells) EXPECT_FALSE(shell.isConvex());
 }
 
 TEST(Shape, ConcaveAndFlatSurfacesBoundNoConvexSolid) {
-  Mesh stairs = boxMesh({0, 0, 0}, {1, 1, 1});  // an L: two boxes in one outline
+  Mesh stairs = buildBoxMesh({0, 0, 0}, {1, 1, 1});  // an L: two boxes in one outline
   stairs.positions.clear();
   stairs.indices.clear();
   const std::array<Vec3, 6> outline{Vec3{0, 0, 0}, {2, 0, 0}, {2, 1, 0},

@@ -18,13 +18,14 @@
 namespace enfilade::scene::testing {
 namespace {
 
-double horizontal(const Vec3& a, const Vec3& b) {
+double computeHorizontal(const Vec3& a, const Vec3& b) {
   return std::hypot(b.x() - a.x(), b.z() - a.z());
 }
 
 double measureLine(const std::vector<Vec3>& points) {
   double length = 0;
-  for (std::size_t i = 1; i < points.size(); ++i) length += horizontal(points[i - 1], points[i]);
+  for (std::size_t i = 1; i < points.size(); ++i)
+    length += computeHorizontal(points[i - 1], points[i]);
   return length;
 }
 
@@ -58,9 +59,9 @@ double measureShortestSampled(const NavigationMesh& mesh, const MeshPoint& from,
     if (here > length[index]) continue;
     const Place place = places[index];
     if (place.polygon == to.polygon)
-      best = std::min(best, here + horizontal(place.point, to.point));
+      best = std::min(best, here + computeHorizontal(place.point, to.point));
     for (const std::size_t next : leaving[place.polygon]) {
-      const double through = here + horizontal(place.point, places[next].point);
+      const double through = here + computeHorizontal(place.point, places[next].point);
       if (!(through < length[next])) continue;
       length[next] = through;
       open.push({through, next});
@@ -133,7 +134,7 @@ TEST(ShortestCorridor, AClosedPortalIsNotPassed) {
 }
 
 TEST(ShortestCorridor, PortalsAcrossAnOpenFloorEndOnItsBoundaryAlone) {
-  NavigationMesh mesh = makeMesh(World(boxScene({{"floor", {0, -0.2, 0}, {12, 0, 12}}})), {});
+  NavigationMesh mesh = makeMesh(World(makeBoxScene({{"floor", {0, -0.2, 0}, {12, 0, 12}}})), {});
   const auto isOnBoundary = [](const Vec3& end) {
     return std::min({end.x(), end.z(), 12 - end.x(), 12 - end.z()}) < 0.5;
   };
@@ -153,7 +154,7 @@ TEST(ShortestCorridor, PortalsAcrossAnOpenFloorEndOnItsBoundaryAlone) {
 
 TEST(ShortestCorridor, AProvedPathForgetsTheFailuresOfItsPortals) {
   std::mt19937 random(3);
-  const World world(boxScene(makeRoom(random)));
+  const World world(makeBoxScene(makeRoom(random)));
   const NavigationAgent agent;
   NavigationMesh mesh = makeMesh(world, agent), scarce = makeMesh(world, agent);
   const Vec3 from(0.6, 0.01, 0.6), to(11.4, 0.01, 11.4);

@@ -9,28 +9,28 @@ namespace {
 
 using namespace testing;
 
-Model rooms() {
-  return boxModel({floorBox(),
-                   {"hall/leaf", {0, 0, 0}, {1, 2, 0.05}},
-                   {"hall/chair1", {3, 0, 0}, {3.5, 1, 0.5}},
-                   {"hall/chair2", {4, 0, 0}, {4.5, 1, 0.5}}});
+Model makeHallModel() {
+  return makeBoxModel({makeFloorBox(),
+                       {"hall/leaf", {0, 0, 0}, {1, 2, 0.05}},
+                       {"hall/chair1", {3, 0, 0}, {3.5, 1, 0.5}},
+                       {"hall/chair2", {4, 0, 0}, {4.5, 1, 0.5}}});
 }
 
 /// The error for the bodies of a sidecar; "" if they are valid.
-std::string complaint(const std::string& bodies) {
-  Model model = rooms();
+std::string findComplaint(const std::string& bodies) {
+  Model model = makeHallModel();
   try {
     applySidecar(model, R"({"walk":1,"bodies":[)" + bodies + "]}", "s.walk.json");
     return "";
   } catch (const SidecarError& error) {
     EXPECT_TRUE(model.bodies.empty()) << "left as it was";
-    EXPECT_EQ(model.objects.size(), rooms().objects.size());
+    EXPECT_EQ(model.objects.size(), makeHallModel().objects.size());
     return error.what();
   }
 }
 
 TEST(Sidecar, DefinesBodiesInRadiansAndMetres) {
-  Model model = rooms();
+  Model model = makeHallModel();
   applySidecar(model, R"({"walk":1,"bodies":[
     {"name":"door","kind":"hinged","objects":["hall/leaf"],"anchor":[0,0,0],"axis":[0,2,0],
      "limits":[-90,90],"closed":-90,"closes_after":2,"opened_by":"touch"},
@@ -49,7 +49,7 @@ TEST(Sidecar, DefinesBodiesInRadiansAndMetres) {
 }
 
 TEST(Sidecar, ABoxBecomesATriggersObject) {
-  Model model = rooms();
+  Model model = makeHallModel();
   applySidecar(model,
                R"({"walk":1,"bodies":[{"name":"exit","kind":"trigger","box":[[9,0,1],[8,2,-1]]}]})",
                "s.walk.json");
@@ -63,34 +63,37 @@ TEST(Sidecar, MistakesAreNamedWithTheirPlace) {
   const auto has = [](const std::string& text, const char* part) {
     EXPECT_NE(text.find(part), std::string::npos) << text;
   };
-  has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchr":[0,0,0]})"),
+  has(findComplaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchr":[0,0,0]})"),
       "s.walk.json.bodies[0]: unknown key \"anchr\"");
-  has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/gate"],"anchor":[0,0,0]})"),
+  has(findComplaint(R"({"name":"d","kind":"hinged","objects":["hall/gate"],"anchor":[0,0,0]})"),
       "bodies[0].objects[0]: unknown object \"hall/gate\"");
-  has(complaint(R"({"name":"d","kind":"spinning","objects":["hall/leaf"]})"), "bodies[0].kind");
-  has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"]})"), "anchor is missing");
-  has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[3,1]})"), "stops");
-  has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,1]})"),
+  has(findComplaint(R"({"name":"d","kind":"spinning","objects":["hall/leaf"]})"), "bodies[0].kind");
+  has(findComplaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"]})"),
+      "anchor is missing");
+  has(findComplaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[3,1]})"),
+      "stops");
+  has(findComplaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,1]})"),
       "s.walk.json.bodies[0]: body 'd': stops must ascend");
-  has(complaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,3]})"),
+  has(findComplaint(R"({"name":"d","kind":"lift","objects":["hall/leaf"],"stops":[0,3,3]})"),
       "stops must ascend strictly");
-  has(complaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchor":[0,0,0],
+  has(findComplaint(R"({"name":"d","kind":"hinged","objects":["hall/leaf"],"anchor":[0,0,0],
                     "limits":[10,90]})"),
       "bodies[0]: body 'd': limits: 0, the authored position");
-  has(complaint(R"({"name":"d","kind":"path","objects":["hall/leaf"],
+  has(findComplaint(R"({"name":"d","kind":"path","objects":["hall/leaf"],
                     "keys":[{"time":0},{"time":2},{"time":1}]})"),
       "bodies[0]: body 'd': keys: times must ascend");
-  has(complaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,0]]})"), "no volume");
-  has(complaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,1]]},
+  has(findComplaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,0]]})"), "no volume");
+  has(findComplaint(R"({"name":"d","kind":"trigger","box":[[0,0,0],[1,1,1]]},
                    {"name":"d","kind":"rigid","objects":["hall/leaf"]})"),
       "another body already uses it");
-  has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":"6"})"), "number");
-  has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":6,"density":500})"),
+  has(findComplaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":"6"})"), "number");
+  has(findComplaint(
+          R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":6,"density":500})"),
       "bodies[0]: has a density and a mass");
-  has(complaint(R"({"name":"d","kind":"trigger","objects":["hall/leaf"],
+  has(findComplaint(R"({"name":"d","kind":"trigger","objects":["hall/leaf"],
                     "box":[[0,0,0],[1,1,1]]})"),
       "bodies[0]: has objects and a box");
-  has(complaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":6,"mass":7})"),
+  has(findComplaint(R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":6,"mass":7})"),
       "s.walk.json: the key \"mass\" is repeated in an object");
 }
 
@@ -98,11 +101,11 @@ TEST(Sidecar, DeeplyNestedBracketsAreAnError) {
   const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
   for (const std::string& body :
        {nest, R"({"name":"d","kind":"rigid","objects":["hall/leaf"],"mass":)" + nest + "}"})
-    EXPECT_NE(complaint(body).find("nested too deeply"), std::string::npos);
+    EXPECT_NE(findComplaint(body).find("nested too deeply"), std::string::npos);
 }
 
 TEST(Sidecar, AnInvalidSidecarIsReported) {
-  Model model = rooms();
+  Model model = makeHallModel();
   EXPECT_THROW(applySidecar(model, "{", "s"), SidecarError);
   EXPECT_THROW(applySidecar(model, "[]", "s"), SidecarError);
   EXPECT_THROW(applySidecar(model, R"({"bodies":[]})", "s"), SidecarError);

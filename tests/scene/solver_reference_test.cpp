@@ -19,7 +19,7 @@ namespace {
 // ---- reference solver --------------------------------------------------------------------------
 
 /// Sums in the same order as the solver.
-double product(const Vec3& a, const Vec3& b) {
+double computeProduct(const Vec3& a, const Vec3& b) {
   return a.x() * b.x() + a.y() * b.y() + a.z() * b.z();
 }
 
@@ -127,9 +127,10 @@ class ReferenceSolver {
     if (a.isDynamic()) a.velocity = velocities.velocityA, a.angularVelocity = velocities.spinA;
     if (b.isDynamic()) b.velocity = velocities.velocityB, b.angularVelocity = velocities.spinB;
   }
-  static double speed(const Jacobian& d, const Velocities& velocities) {
-    return product(d.linear, velocities.velocityB - velocities.velocityA) +
-           product(d.angularB, velocities.spinB) - product(d.angularA, velocities.spinA);
+  static double computeSpeed(const Jacobian& d, const Velocities& velocities) {
+    return computeProduct(d.linear, velocities.velocityB - velocities.velocityA) +
+           computeProduct(d.angularB, velocities.spinB) -
+           computeProduct(d.angularA, velocities.spinA);
   }
   void applyImpulse(const ReferenceConstraint& row, const Jacobian& d, double impulse,
                     Velocities& velocities) const {
@@ -158,7 +159,8 @@ class ReferenceSolver {
     for (const ReferencePoint& point : row.points)
       normalImpulse += point.impulse + point.motorImpulse;
     const double maxFriction = row.patch->friction * normalImpulse;
-    const double speed1 = speed(row.first, velocities), speed2 = speed(row.second, velocities);
+    const double speed1 = computeSpeed(row.first, velocities),
+                 speed2 = computeSpeed(row.second, velocities);
     double tangent1 = row.tangent1 - (row.m11 * speed1 + row.m12 * speed2);
     double tangent2 = row.tangent2 - (row.m12 * speed1 + row.m22 * speed2);
     const double squared = tangent1 * tangent1 + tangent2 * tangent2;
@@ -170,14 +172,14 @@ class ReferenceSolver {
     applyImpulse(row, row.first, tangent1 - row.tangent1, velocities);
     applyImpulse(row, row.second, tangent2 - row.tangent2, velocities);
     row.tangent1 = tangent1, row.tangent2 = tangent2;
-    const double turning = product(row.patch->normal, velocities.spinB - velocities.spinA);
+    const double turning = computeProduct(row.patch->normal, velocities.spinB - velocities.spinA);
     const double widest = maxFriction * row.arm;
     const double twist = std::clamp(row.twist - row.twistMass * turning, -widest, widest);
     applyMoment(row, twist - row.twist, velocities);
     row.twist = twist;
   }
 
-  double velocityError(const ReferencePoint& point, double now) const {
+  double computeVelocityError(const ReferencePoint& point, double now) const {
     const double room = point.separation - step_.contactOffset;
     const double minSpeed = std::min(0.0, -room / seconds_),
                  maxSpeed = room < step_.contactOffset ? 0 : minSpeed;
@@ -188,13 +190,14 @@ class ReferenceSolver {
     Velocities velocities = getVelocities(row);
     if (row.patch->friction > 0) solveFriction(row, velocities);
     for (ReferencePoint& point : row.points) {
-      const double more = point.mass * velocityError(point, speed(point.normal, velocities));
+      const double more =
+          point.mass * computeVelocityError(point, computeSpeed(point.normal, velocities));
       const double impulse = std::max(0.0, point.impulse + more);
       applyImpulse(row, point.normal, impulse - point.impulse, velocities);
       point.impulse = impulse;
       if (impulse == 0) ++happened_.free;
       if (row.maxMotorImpulse == 0) continue;
-      const double slow = row.patch->targetSpeed - speed(point.normal, velocities);
+      const double slow = row.patch->targetSpeed - computeSpeed(point.normal, velocities);
       const double given =
           std::clamp(point.motorImpulse + point.mass * slow, 0.0, row.maxMotorImpulse);
       applyImpulse(row, point.normal, given - point.motorImpulse, velocities);
@@ -204,7 +207,7 @@ class ReferenceSolver {
     apply(row, velocities);
   }
 
-  double correctionSpeed(const ReferencePoint& point) const {
+  double computeCorrectionSpeed(const ReferencePoint& point) const {
     const double room = point.separation - step_.contactOffset;
     const double lacks = 0.5 * step_.contactOffset - point.separation;
     if (room > 0) return -room / seconds_;
@@ -216,8 +219,9 @@ class ReferenceSolver {
     Velocities apart = getCorrections(row);
     for (ReferencePoint& point : row.points) {
       const double also =
-          point.separation > step_.contactOffset ? speed(point.normal, velocities) : 0;
-      const double lacks = correctionSpeed(point) - (speed(point.normal, apart) + also);
+          point.separation > step_.contactOffset ? computeSpeed(point.normal, velocities) : 0;
+      const double lacks =
+          computeCorrectionSpeed(point) - (computeSpeed(point.normal, apart) + also);
       const double impulse = std::max(0.0, point.correction + point.mass * lacks);
       applyImpulse(row, point.normal, impulse - point.correction, apart);
       point.correction = impulse;
@@ -255,8 +259,8 @@ class ReferenceSolver {
     }
     for (ReferenceConstraint& row : rows_) {
       for (ReferencePoint& point : row.points) {
-        const double both =
-            speed(point.normal, getVelocities(row)) + speed(point.normal, getCorrections(row));
+        const double both = computeSpeed(point.normal, getVelocities(row)) +
+                            computeSpeed(point.normal, getCorrections(row));
         point.separation += seconds_ * both;
         point.sum += point.impulse;
       }
@@ -270,7 +274,7 @@ class ReferenceSolver {
     Velocities velocities = getVelocities(row);
     for (const ReferencePoint& point : row.points) {
       if (point.sum <= 0 || point.arrival > -minArrivalSpeed) continue;
-      const double lacks = -e * point.arrival - speed(point.normal, velocities);
+      const double lacks = -e * point.arrival - computeSpeed(point.normal, velocities);
       const double back = std::clamp(point.mass * lacks, 0.0, e * point.sum);
       applyImpulse(row, point.normal, back, velocities);
       if (back > 0) ++happened_.bounced;
@@ -311,7 +315,7 @@ struct Heap {
   std::vector<SubstepVelocity> substepVelocities;
   std::uint32_t drivenBody = 0;
 
-  std::vector<KinematicBody> driven() const { return {{drivenBody, substepVelocities}}; }
+  std::vector<KinematicBody> listDriven() const { return {{drivenBody, substepVelocities}}; }
 };
 
 class HeapMaker {
@@ -321,63 +325,64 @@ class HeapMaker {
   /// Body 0 is static, body 1 is kinematic. `hub`: number of constraints that touch body 2.
   Heap make(std::size_t bodies, std::size_t patches, std::size_t hub, const SolverSettings& step) {
     Heap heap;
-    for (std::size_t i = 0; i < bodies; ++i) heap.bodies.push_back(body(i > 1));
+    for (std::size_t i = 0; i < bodies; ++i) heap.bodies.push_back(makeBody(i > 1));
     heap.drivenBody = 1;
     for (int i = 0; i < step.substeps; ++i)
-      heap.substepVelocities.push_back({vector(0.5), vector(1)});
-    for (std::size_t i = 0; i < patches; ++i) heap.patches.push_back(patch(bodies, i < hub));
+      heap.substepVelocities.push_back({drawVector(0.5), drawVector(1)});
+    for (std::size_t i = 0; i < patches; ++i) heap.patches.push_back(makePatch(bodies, i < hub));
     return heap;
   }
 
  private:
-  double number(double low, double high) {
+  double drawNumber(double low, double high) {
     return std::uniform_real_distribution<double>(low, high)(random_);
   }
-  bool isOneIn(int many) { return number(0, many) < 1; }
-  Vec3 vector(double size) {
-    const double x = number(-size, size), y = number(-size, size);
-    return {x, y, number(-size, size)};
+  bool isOneIn(int many) { return drawNumber(0, many) < 1; }
+  Vec3 drawVector(double size) {
+    const double x = drawNumber(-size, size), y = drawNumber(-size, size);
+    return {x, y, drawNumber(-size, size)};
   }
-  std::uint32_t index(std::size_t from, std::size_t to) {
+  std::uint32_t drawIndex(std::size_t from, std::size_t to) {
     return static_cast<std::uint32_t>(
         std::uniform_int_distribution<std::size_t>(from, to)(random_));
   }
 
-  BodyMotion body(bool free) {
+  BodyMotion makeBody(bool free) {
     BodyMotion body;
-    body.centre = vector(1);
-    body.velocity = free ? vector(3) : Vec3(Vec3::Zero());
+    body.centre = drawVector(1);
+    body.velocity = free ? drawVector(3) : Vec3(Vec3::Zero());
     if (!free) return body;
-    body.angularVelocity = vector(3);
-    body.rotation = Quat(1, number(-1, 1), number(-1, 1), number(-1, 1)).normalized();
-    body.inverseMass = 1 / number(0.5, 8);
-    body.inertia = Vec3(number(0.1, 0.3), number(0.1, 0.3), number(0.1, 0.3)).asDiagonal();
+    body.angularVelocity = drawVector(3);
+    body.rotation = Quat(1, drawNumber(-1, 1), drawNumber(-1, 1), drawNumber(-1, 1)).normalized();
+    body.inverseMass = 1 / drawNumber(0.5, 8);
+    body.inertia =
+        Vec3(drawNumber(0.1, 0.3), drawNumber(0.1, 0.3), drawNumber(0.1, 0.3)).asDiagonal();
     body.inverseInertia = body.inertia.inverse();
     return body;
   }
 
-  ContactConstraint patch(std::size_t bodies, bool atHub) {
+  ContactConstraint makePatch(std::size_t bodies, bool atHub) {
     ContactConstraint patch;
-    patch.a = atHub ? 2 : index(0, bodies - 1);
-    do patch.b = index(2, bodies - 1);
+    patch.a = atHub ? 2 : drawIndex(0, bodies - 1);
+    do patch.b = drawIndex(2, bodies - 1);
     while (patch.b == patch.a);
     if (isOneIn(3)) std::swap(patch.a, patch.b);
-    patch.normal = (vector(1) + Vec3(0, 1e-3, 0)).normalized();
-    patch.friction = isOneIn(3) ? 0 : number(0.05, 1.2);
-    patch.restitution = isOneIn(2) ? 0 : number(0.1, 0.9);
-    patch.pointCount = index(1, ContactConstraint::kMaxPoints);
+    patch.normal = (drawVector(1) + Vec3(0, 1e-3, 0)).normalized();
+    patch.friction = isOneIn(3) ? 0 : drawNumber(0.05, 1.2);
+    patch.restitution = isOneIn(2) ? 0 : drawNumber(0.1, 0.9);
+    patch.pointCount = drawIndex(1, ContactConstraint::kMaxPoints);
     const bool warm = isOneIn(2);
-    if (isOneIn(4)) patch.maxPushForce = number(1, 200), patch.targetSpeed = number(0.1, 2);
+    if (isOneIn(4)) patch.maxPushForce = drawNumber(1, 200), patch.targetSpeed = drawNumber(0.1, 2);
     for (std::size_t i = 0; i < patch.pointCount; ++i) {
       ContactConstraintPoint& point = patch.points[i];
-      point.armA = vector(0.3), point.armB = vector(0.3);
-      point.separation = 0.5e-3 * number(-2, 4);
-      if (warm) point.impulse = number(0, 0.05);
+      point.armA = drawVector(0.3), point.armB = drawVector(0.3);
+      point.separation = 0.5e-3 * drawNumber(-2, 4);
+      if (warm) point.impulse = drawNumber(0, 0.05);
     }
     if (!warm || patch.friction == 0) return patch;
-    const Vec3 any = vector(0.02);
+    const Vec3 any = drawVector(0.02);
     patch.tangentImpulse = any - patch.normal.dot(any) * patch.normal;
-    patch.torsionImpulse = number(-0.01, 0.01);
+    patch.torsionImpulse = drawNumber(-0.01, 0.01);
     return patch;
   }
 
@@ -390,14 +395,14 @@ std::vector<std::uint32_t> computeOrder(const Heap& heap) {
   return colorConstraints(heap.patches, moves).order;
 }
 
-std::vector<std::uint32_t> originalOrder(const Heap& heap) {
+std::vector<std::uint32_t> makeOriginalOrder(const Heap& heap) {
   std::vector<std::uint32_t> order;
   for (std::uint32_t i = 0; i < heap.patches.size(); ++i) order.push_back(i);
   return order;
 }
 
 /// "" or the first number that differs; the sign of a zero is ignored.
-std::string difference(const Heap& a, const Heap& b) {
+std::string findHeapDifference(const Heap& a, const Heap& b) {
   for (std::size_t i = 0; i < a.bodies.size(); ++i) {
     const BodyMotion &x = a.bodies[i], &y = b.bodies[i];
     if (x.velocity != y.velocity || x.angularVelocity != y.angularVelocity)
@@ -439,16 +444,16 @@ void compareWithReference(bool byAvx) {
       Heap slow = start;
       const bool few = size.patches < kSmallConstraintThreshold;
       const CaseCounts one = ReferenceSolver(slow.bodies, slow.patches, step,
-                                             few ? originalOrder(slow) : computeOrder(slow))
-                                 .solve(slow.driven());
+                                             few ? makeOriginalOrder(slow) : computeOrder(slow))
+                                 .solve(slow.listDriven());
       all.slid += one.slid, all.held += one.held, all.pushed += one.pushed;
       all.bounced += one.bounced, all.parted += one.parted, all.free += one.free;
       for (const int threads : {1, 2}) {
         Heap fast = start;
         ThreadPool workers(threads);
-        solveConstraints(fast.bodies, fast.patches, fast.driven(), step, workers);
-        EXPECT_EQ(difference(slow, fast), "") << threads << " threads";
-        EXPECT_NE(difference(start, fast), "");
+        solveConstraints(fast.bodies, fast.patches, fast.listDriven(), step, workers);
+        EXPECT_EQ(findHeapDifference(slow, fast), "") << threads << " threads";
+        EXPECT_NE(findHeapDifference(start, fast), "");
       }
     }
   }
@@ -476,9 +481,9 @@ TEST(SolverReference, APatchWithoutPointsDoesNothing) {
   }
   for (Heap* each : {&heap, &more}) {
     ThreadPool workers(2);
-    solveConstraints(each->bodies, each->patches, each->driven(), step, workers);
+    solveConstraints(each->bodies, each->patches, each->listDriven(), step, workers);
   }
-  EXPECT_EQ(difference(heap, more), "");
+  EXPECT_EQ(findHeapDifference(heap, more), "");
 }
 
 }  // namespace

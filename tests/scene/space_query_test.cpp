@@ -15,14 +15,14 @@
 namespace enfilade::scene {
 namespace {
 
-using tests::by;
 using tests::IfcHouse;
+using tests::makeReaderOptions;
 using tests::TemporaryFolder;
 
 constexpr double kReach = 0.05;
 
 /// The number of the room at a point of the file: x, y, z up. "": none.
-std::string roomAt(const Model& model, double x, double y, double z) {
+std::string findRoomAt(const Model& model, double x, double y, double z) {
   const Space* space = findSpace(model, Vec3(x, z, -y), kReach);
   return space == nullptr ? "" : space->name;
 }
@@ -37,11 +37,11 @@ std::string makeRooms() {
            "',$,$,#15,#" + std::to_string(id + 15) + ",$,.ELEMENT.,.INTERNAL.,$);\n";
   };
   house.more =
-      space(500, "L", house.prism(510, {{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 6}, {0, 6}}, 2.5)) +
-      space(550, "H", house.prism(560, {{2.2, 2.2}, {12, 2.2}, {12, 12}, {2.2, 12}}, 2.5)) +
-      space(600, "B", house.prism(610, {{11, 11}, {12, 11}, {12, 12}, {11, 12}}, 2.2)) +
+      space(500, "L", house.makePrism(510, {{0, 0}, {6, 0}, {6, 2}, {2, 2}, {2, 6}, {0, 6}}, 2.5)) +
+      space(550, "H", house.makePrism(560, {{2.2, 2.2}, {12, 2.2}, {12, 12}, {2.2, 12}}, 2.5)) +
+      space(600, "B", house.makePrism(610, {{11, 11}, {12, 11}, {12, 12}, {11, 12}}, 2.2)) +
       "#650=IFCRELAGGREGATES('0000000000000000000650',$,$,$,#41,(#500,#550,#600));\n";
-  return house.text();
+  return house.makeText();
 }
 
 /// By each reader that is here.
@@ -49,8 +49,8 @@ std::vector<Model> importRooms() {
   const TemporaryFolder folder;
   const auto file = folder.write("rooms.ifc", makeRooms());
   std::vector<Model> models;
-  for (const IfcReader reader : tests::readersHere())
-    models.push_back(importModel(file, by(reader)));
+  for (const IfcReader reader : tests::listReadersHere())
+    models.push_back(importModel(file, makeReaderOptions(reader)));
   return models;
 }
 
@@ -58,29 +58,30 @@ TEST(SpaceQuery, ARoomShapedLikeAnLDoesNotClaimItsNotch) {
   for (const Model& model : importRooms()) {
     SCOPED_TRACE(model.reader);
     ASSERT_EQ(model.spaces.size(), 3u);
-    EXPECT_EQ(roomAt(model, 1, 5, 1), "L");
-    EXPECT_EQ(roomAt(model, 5, 1, 1), "L");
-    EXPECT_EQ(roomAt(model, 5, 5, 1), "H") << "in the box of the L, which is smaller";
-    EXPECT_EQ(roomAt(model, 2.2, 5, 1), "H") << "on the wall of the hall";
-    EXPECT_EQ(roomAt(model, 2.0, 5, 1), "L") << "on the wall of the corridor";
-    EXPECT_EQ(roomAt(model, 2.16, 2.5, 1), "H") << "4 cm from the hall, in the wall";
-    EXPECT_EQ(roomAt(model, 2.1, 5, 1), "") << "in the middle of the wall";
-    EXPECT_EQ(roomAt(model, 5, 5, 2.56), "") << "in the ceiling";
-    EXPECT_EQ(roomAt(model, 11.5, 11.5, 1), "B") << "the smaller of two";
-    EXPECT_EQ(roomAt(model, 11.5, 11.5, 2.4), "H") << "above the booth";
-    EXPECT_EQ(roomAt(model, 10.97, 11.5, 1), "H") << "in the hall, next to the booth";
+    EXPECT_EQ(findRoomAt(model, 1, 5, 1), "L");
+    EXPECT_EQ(findRoomAt(model, 5, 1, 1), "L");
+    EXPECT_EQ(findRoomAt(model, 5, 5, 1), "H") << "in the box of the L, which is smaller";
+    EXPECT_EQ(findRoomAt(model, 2.2, 5, 1), "H") << "on the wall of the hall";
+    EXPECT_EQ(findRoomAt(model, 2.0, 5, 1), "L") << "on the wall of the corridor";
+    EXPECT_EQ(findRoomAt(model, 2.16, 2.5, 1), "H") << "4 cm from the hall, in the wall";
+    EXPECT_EQ(findRoomAt(model, 2.1, 5, 1), "") << "in the middle of the wall";
+    EXPECT_EQ(findRoomAt(model, 5, 5, 2.56), "") << "in the ceiling";
+    EXPECT_EQ(findRoomAt(model, 11.5, 11.5, 1), "B") << "the smaller of two";
+    EXPECT_EQ(findRoomAt(model, 11.5, 11.5, 2.4), "H") << "above the booth";
+    EXPECT_EQ(findRoomAt(model, 10.97, 11.5, 1), "H") << "in the hall, next to the booth";
   }
 }
 
 TEST(SpaceQuery, ASurfaceInsideOutIsTheSameSolid) {
   const TemporaryFolder folder;
-  Model model = importModel(folder.write("rooms.ifc", makeRooms()), by(tests::readersHere()[0]));
+  Model model = importModel(folder.write("rooms.ifc", makeRooms()),
+                            makeReaderOptions(tests::listReadersHere()[0]));
   ASSERT_EQ(model.spaces.size(), 3u);
   for (Space& space : model.spaces)
     for (std::size_t i = 0; i < space.surface.size(); i += 3)
       std::swap(space.surface[i], space.surface[i + 1]);
-  EXPECT_EQ(roomAt(model, 1, 5, 1), "L");
-  EXPECT_EQ(roomAt(model, 5, 5, 1), "H");
+  EXPECT_EQ(findRoomAt(model, 1, 5, 1), "L");
+  EXPECT_EQ(findRoomAt(model, 5, 5, 1), "H");
 }
 
 TEST(SpaceMiddle, OfARoomShapedLikeAnLIsInItsCornerAwayFromTheWalls) {
@@ -108,8 +109,8 @@ TEST(SpaceMiddle, OfARoomShapedLikeAnLIsInItsCornerAwayFromTheWalls) {
 
 TEST(SpaceMiddle, IsInTheVisiblePart) {
   const TemporaryFolder folder;
-  const Model model =
-      importModel(folder.write("rooms.ifc", makeRooms()), by(tests::readersHere()[0]));
+  const Model model = importModel(folder.write("rooms.ifc", makeRooms()),
+                                  makeReaderOptions(tests::listReadersHere()[0]));
   const auto corridor = std::ranges::find(model.spaces, "L", &Space::name);
   ASSERT_NE(corridor, model.spaces.end());
   const Aabb end{Vec3(4, 0, -6), Vec3(20, 3, 0)}, arm{Vec3(0, 0, -20), Vec3(20, 3, -4)};

@@ -13,7 +13,7 @@ namespace enfilade::scene {
 namespace {
 
 using tests::BoxMesh;
-using tests::gltf;
+using tests::makeGltfFile;
 using tests::TemporaryFolder;
 
 /// Position of each object by path.
@@ -25,26 +25,27 @@ std::map<std::string, Vec3> computePlaces(const Model& model) {
   return places;
 }
 
-std::string node(const std::string& name, int x, const std::string& more = "") {
+std::string makeNode(const std::string& name, int x, const std::string& more = "") {
   return R"({"name":")" + name + R"(","mesh":0,"translation":[)" + std::to_string(x) + ",0,0]" +
          more + "}";
 }
 
-std::map<std::string, Vec3> imported(const TemporaryFolder& folder, const std::string& roots,
-                                     const std::string& nodes) {
+std::map<std::string, Vec3> importPlaces(const TemporaryFolder& folder, const std::string& roots,
+                                         const std::string& nodes) {
   return computePlaces(
-      importModel(folder.write("model.gltf", gltf(BoxMesh({1, 1, 1}), roots, nodes))));
+      importModel(folder.write("model.gltf", makeGltfFile(BoxMesh({1, 1, 1}), roots, nodes))));
 }
 
 TEST(StablePaths, AnotherOrderOfNodesAndAnotherNumberingChangeNothing) {
   const TemporaryFolder folder;
-  const auto first = imported(folder, "0",
-                              R"({"name":"hall","children":[1,2]},)" + node("door", 3) + "," +
-                                  node("table", 7, R"(,"children":[3])") + "," + node("lamp", 1));
-  const auto again =
-      imported(folder, "3",
-               node("lamp", 1) + "," + node("door", 3) + "," +
-                   node("table", 7, R"(,"children":[0])") + R"(,{"name":"hall","children":[2,1]})");
+  const auto first =
+      importPlaces(folder, "0",
+                   R"({"name":"hall","children":[1,2]},)" + makeNode("door", 3) + "," +
+                       makeNode("table", 7, R"(,"children":[3])") + "," + makeNode("lamp", 1));
+  const auto again = importPlaces(folder, "3",
+                                  makeNode("lamp", 1) + "," + makeNode("door", 3) + "," +
+                                      makeNode("table", 7, R"(,"children":[0])") +
+                                      R"(,{"name":"hall","children":[2,1]})");
   ASSERT_EQ(first.size(), 3u);
   EXPECT_EQ(first, again);
   EXPECT_TRUE(first.contains("hall/table/lamp"));
@@ -53,11 +54,12 @@ TEST(StablePaths, AnotherOrderOfNodesAndAnotherNumberingChangeNothing) {
 TEST(StablePaths, NewSiblingsAndNamelessOnesKeepOtherNames) {
   const TemporaryFolder folder;
   const auto first =
-      imported(folder, "0,1,2", node("chair", 1) + "," + node("chair", 2) + "," + node("desk", 3));
-  const auto again =
-      imported(folder, "0,1,2,3,4",
-               R"({"mesh":0,"translation":[9,0,0]},)" + node("plant", 8) + "," + node("chair", 1) +
-                   "," + node("chair", 2) + "," + node("desk", 3));
+      importPlaces(folder, "0,1,2",
+                   makeNode("chair", 1) + "," + makeNode("chair", 2) + "," + makeNode("desk", 3));
+  const auto again = importPlaces(folder, "0,1,2,3,4",
+                                  R"({"mesh":0,"translation":[9,0,0]},)" + makeNode("plant", 8) +
+                                      "," + makeNode("chair", 1) + "," + makeNode("chair", 2) +
+                                      "," + makeNode("desk", 3));
   ASSERT_EQ(first.size(), 3u);
   for (const auto& [path, place] : first) {
     ASSERT_TRUE(again.contains(path)) << path;
@@ -69,9 +71,9 @@ TEST(StablePaths, NewSiblingsAndNamelessOnesKeepOtherNames) {
 TEST(StablePaths, RepeatsBelowOneParentLeaveThoseBelowAnotherAlone) {
   const TemporaryFolder folder;
   const auto paths =
-      imported(folder, "0,1",
-               R"({"name":"north","children":[2]},{"name":"south","children":[3,4]},)" +
-                   node("bed", 1) + "," + node("bed", 2) + "," + node("bed", 3));
+      importPlaces(folder, "0,1",
+                   R"({"name":"north","children":[2]},{"name":"south","children":[3,4]},)" +
+                       makeNode("bed", 1) + "," + makeNode("bed", 2) + "," + makeNode("bed", 3));
   EXPECT_TRUE(paths.contains("north/bed"));
   EXPECT_TRUE(paths.contains("south/bed"));
   EXPECT_TRUE(paths.contains("south/bed#2"));
@@ -81,11 +83,11 @@ TEST(StablePaths, AMeshThatManyNodesUseIsStoredOnce) {
   const TemporaryFolder folder;
   std::string nodes, roots;
   for (int i = 0; i < 400; ++i) {
-    nodes += (i == 0 ? "" : ",") + node("chair", i);
+    nodes += (i == 0 ? "" : ",") + makeNode("chair", i);
     roots += (i == 0 ? "" : ",") + std::to_string(i);
   }
   const Model model =
-      importModel(folder.write("model.gltf", gltf(BoxMesh({1, 1, 1}), roots, nodes)));
+      importModel(folder.write("model.gltf", makeGltfFile(BoxMesh({1, 1, 1}), roots, nodes)));
   EXPECT_EQ(model.objects.size(), 400u);
   EXPECT_EQ(model.meshes.size(), 1u);
   EXPECT_EQ(Scene{Model(model)}.shapeCount(), 1u);

@@ -18,7 +18,7 @@ inline std::uint32_t computeCrc32(const std::string& bytes) {
 }
 
 /// Members are pairs of name and content. Layout: PKWARE APPNOTE.TXT, section 4.3.
-inline std::string storedZip(const std::vector<std::pair<std::string, std::string>>& members) {
+inline std::string makeStoredZip(const std::vector<std::pair<std::string, std::string>>& members) {
   const auto number = [](std::size_t value, std::size_t bytes) {  // little-endian
     std::string text;
     for (std::size_t i = 0; i < bytes; ++i, value >>= 8) text += static_cast<char>(value & 255);

@@ -21,10 +21,12 @@ namespace enfilade::scene::testing {
 class Seeded {
  public:
   explicit Seeded(std::uint64_t seed) : random_(seed) {}
-  double uniform(double low, double high) {
+  double drawUniform(double low, double high) {
     return low + (high - low) * (static_cast<double>(random_() >> 11) * 0x1p-53);
   }
-  int below(int bound) { return static_cast<int>(random_() % static_cast<std::uint64_t>(bound)); }
+  int drawBelow(int bound) {
+    return static_cast<int>(random_() % static_cast<std::uint64_t>(bound));
+  }
 
  private:
   std::mt19937_64 random_;
@@ -45,18 +47,18 @@ struct Builder {
                              {static_cast<std::uint32_t>(model.meshes.size() - 1)},
                              Eigen::Affine3d::Identity()});
   }
-  void box(const std::string& path, const Vec3& min, const Vec3& max) {
-    add(path, boxMesh(min, max));
+  void addBox(const std::string& path, const Vec3& min, const Vec3& max) {
+    add(path, buildBoxMesh(min, max));
   }
   /// A sheet of zero thickness: four corners in order.
-  void sheet(const std::string& path, const std::vector<Vec3>& corners) {
+  void addSheet(const std::string& path, const std::vector<Vec3>& corners) {
     Mesh mesh;
     for (const Vec3& corner : corners) mesh.positions.push_back(corner.cast<float>());
     mesh.indices = {0, 1, 2, 0, 2, 3};
     add(path, std::move(mesh));
   }
   /// The same sheet as slivers from its first corner: all triangles are long and thin.
-  void slivers(const std::string& path, const std::vector<Vec3>& corners, int count) {
+  void addSlivers(const std::string& path, const std::vector<Vec3>& corners, int count) {
     Mesh mesh;
     const auto along = [&](const Vec3& from, const Vec3& to, int i) {
       return Vec3(from + (to - from) * (double(i) / count));
@@ -73,13 +75,13 @@ struct Builder {
 };
 
 /// Side walls, roof and floor of one cell, of sheets: [x, x + size] x [z, z + size].
-inline void sheetCell(Builder& b, const std::string& name, const Vec3& min, const Vec3& max,
-                      bool sliced) {
+inline void addSheetCell(Builder& b, const std::string& name, const Vec3& min, const Vec3& max,
+                         bool sliced) {
   const auto wall = [&](const std::string& side, const std::vector<Vec3>& corners) {
     if (sliced) {
-      b.slivers(name + side, corners, 9);
+      b.addSlivers(name + side, corners, 9);
     } else {
-      b.sheet(name + side, corners);
+      b.addSheet(name + side, corners);
     }
   };
   const double x0 = min.x(), x1 = max.x(), y0 = min.y(), y1 = max.y(), z0 = min.z(), z1 = max.z();
@@ -93,7 +95,7 @@ inline void sheetCell(Builder& b, const std::string& name, const Vec3& min, cons
 
 /// The number of non-separated verdicts of every avatar part on each triangle and hull of the scene
 /// and on the other avatars' parts. Uses none of the tick's caches.
-inline int penetrations(const World& world) {
+inline int countPenetrations(const World& world) {
   const auto& avatars = world.snapshot()->avatars;
   std::vector<std::vector<collision::Triangle>> triangles;
   std::vector<std::pair<Aabb, collision::PlacedConvex>> still;
@@ -126,16 +128,16 @@ inline int penetrations(const World& world) {
   return found;
 }
 
-inline double randomSpeed(Seeded& random) {
-  return 0.01 * std::pow(10.0, random.uniform(0, 5));
+inline double drawSpeed(Seeded& random) {
+  return 0.01 * std::pow(10.0, random.drawUniform(0, 5));
 }
 
 /// A velocity for an avatar, sometimes straight at a wall.
-inline Vec3 randomVelocity(Seeded& random, bool flies) {
-  const double angle =
-      random.below(4) == 0 ? 0.5 * 3.14159265358979 * random.below(4) : random.uniform(0, 6.2832);
-  const double speed = randomSpeed(random);
-  const double up = flies ? random.uniform(-1, 1) : 0;
+inline Vec3 makeRandomVelocity(Seeded& random, bool flies) {
+  const double angle = random.drawBelow(4) == 0 ? 0.5 * 3.14159265358979 * random.drawBelow(4)
+                                                : random.drawUniform(0, 6.2832);
+  const double speed = drawSpeed(random);
+  const double up = flies ? random.drawUniform(-1, 1) : 0;
   return speed * Vec3(std::cos(angle), up, std::sin(angle)).normalized();
 }
 
@@ -156,7 +158,7 @@ struct CellFixture {
   CellFixture(const Model& model, std::vector<Cell> inside, const WorldSettings& settings = {})
       : world(std::make_shared<const Scene>(model), settings), cells(std::move(inside)) {}
 
-  std::string name(std::size_t i) const { return "a" + std::to_string(100 + i); }
+  std::string getName(std::size_t i) const { return "a" + std::to_string(100 + i); }
 
   void spawn(double height = 1.75, double radius = 0.3) {
     for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -174,17 +176,17 @@ struct CellFixture {
   }
 
   void command(std::size_t i, Order order) {
-    if (const auto why = submitAvatarCommand(world, {name(i), std::move(order), 0}))
+    if (const auto why = submitAvatarCommand(world, {getName(i), std::move(order), 0}))
       throw std::runtime_error(*why);
   }
 
-  void randomMoves(Seeded& random, int count) {
+  void moveRandomly(Seeded& random, int count) {
     for (int k = 0; k < count; ++k) {
       for (std::size_t i = 0; i < cells.size(); ++i) {
         const bool flies = i % 3 == 1;
         if (k == 0 && flies) command(i, Fly{});
-        if (k % 3 == 1) command(i, Drive{randomVelocity(random, flies)});
-        if (i % 3 == 2 && k % 7 == 3) command(i, Jump{random.uniform(0.05, 2.5)});
+        if (k % 3 == 1) command(i, Drive{makeRandomVelocity(random, flies)});
+        if (i % 3 == 2 && k % 7 == 3) command(i, Jump{random.drawUniform(0.05, 2.5)});
       }
       step(k % 16 == 0);
     }
@@ -202,41 +204,41 @@ struct CellFixture {
       blocked += avatar.move.blockedBy != 0;
     }
     penetrating += report.maxPenetration > 0;
-    if (judgeAll) penetrating += penetrations(world);
+    if (judgeAll) penetrating += countPenetrations(world);
   }
 };
 
-inline std::vector<Cell> gridOfCells(Builder& b, int side, double size, double height,
-                                     bool sliced) {
+inline std::vector<Cell> addGridOfCells(Builder& b, int side, double size, double height,
+                                        bool sliced) {
   std::vector<Cell> cells;
   for (int i = 0; i < side * side; ++i) {
     const Vec3 min{size * (i % side), 0, size * (i / side)};
     const Vec3 max = min + Vec3(size, height, size);
-    sheetCell(b, "cell" + std::to_string(i), min, max, sliced);
+    addSheetCell(b, "cell" + std::to_string(i), min, max, sliced);
     cells.push_back({min, max});
   }
   return cells;
 }
 
 /// Rooms of panes one millimetre thick, with ledges, needles and plates in them.
-inline std::vector<Cell> paneRooms(Builder& b, int count, Seeded& random) {
+inline std::vector<Cell> addPaneRooms(Builder& b, int count, Seeded& random) {
   std::vector<Cell> cells;
   for (int i = 0; i < count; ++i) {
     const Vec3 min{3.0 * i, 0, 0}, max{3.0 * i + 2.999, 3, 3};
     const std::string room = "room" + std::to_string(i);
-    b.box(room + "/floor", min - Vec3(0.1, 0.2, 0.1), {max.x() + 0.1, 0, 3.1});
-    b.box(room + "/roof", {min.x() - 0.1, 3, -0.1}, max + Vec3(0.1, 0.001, 0.1));
-    b.box(room + "/south", min - Vec3(0, 0, 0.001), {max.x(), 3, 0});
-    b.box(room + "/north", {min.x(), 0, 3}, max + Vec3(0, 0, 0.001));
-    b.box(room + "/west", min - Vec3(0.001, 0, 0), {min.x(), 3, 3});
-    b.box(room + "/east", {max.x(), 0, 0}, max + Vec3(0.001, 0, 0));
+    b.addBox(room + "/floor", min - Vec3(0.1, 0.2, 0.1), {max.x() + 0.1, 0, 3.1});
+    b.addBox(room + "/roof", {min.x() - 0.1, 3, -0.1}, max + Vec3(0.1, 0.001, 0.1));
+    b.addBox(room + "/south", min - Vec3(0, 0, 0.001), {max.x(), 3, 0});
+    b.addBox(room + "/north", {min.x(), 0, 3}, max + Vec3(0, 0, 0.001));
+    b.addBox(room + "/west", min - Vec3(0.001, 0, 0), {min.x(), 3, 3});
+    b.addBox(room + "/east", {max.x(), 0, 0}, max + Vec3(0.001, 0, 0));
     for (int k = 0; k < 12; ++k) {
-      const double x = min.x() + random.uniform(0, 2.9), z = random.uniform(0, 2.9);
+      const double x = min.x() + random.drawUniform(0, 2.9), z = random.drawUniform(0, 2.9);
       const bool whereOneEnters = std::abs(x - min.x() - 1.5) < 0.6 && std::abs(z - 1.5) < 0.6;
       if (whereOneEnters) continue;
-      const double y = random.uniform(0, 2);
-      b.box(room + "/bit" + std::to_string(k), {x, y, z},
-            {x + random.uniform(1e-4, 0.1), y + random.uniform(1e-4, 0.4), z + 0.001});
+      const double y = random.drawUniform(0, 2);
+      b.addBox(room + "/bit" + std::to_string(k), {x, y, z},
+               {x + random.drawUniform(1e-4, 0.1), y + random.drawUniform(1e-4, 0.4), z + 0.001});
     }
     cells.push_back({min, max});
   }
@@ -245,16 +247,16 @@ inline std::vector<Cell> paneRooms(Builder& b, int count, Seeded& random) {
 
 /// Pairs of rooms of sheets along z. The wall of zero thickness at x = 0 between two rooms has a
 /// gap of `gap` metres in its middle.
-inline std::vector<Cell> gapRooms(Builder& b, int count, double gap) {
+inline std::vector<Cell> addGapRooms(Builder& b, int count, double gap) {
   std::vector<Cell> cells;
   for (int i = 0; i < count; ++i) {
     const double z = 2.0 * i, south = z - 1, north = z + 1;
     const Vec3 min{-1.5, 0, south}, max{1.5, 2.5, north};
     const std::string room = "rooms" + std::to_string(i);
-    sheetCell(b, room, min, max, false);
+    addSheetCell(b, room, min, max, false);
     const double left = z - 0.5 * gap, right = z + 0.5 * gap;
-    b.sheet(room + "/left", {{0, 0, south}, {0, 0, left}, {0, 2.5, left}, {0, 2.5, south}});
-    b.sheet(room + "/right", {{0, 0, right}, {0, 0, north}, {0, 2.5, north}, {0, 2.5, right}});
+    b.addSheet(room + "/left", {{0, 0, south}, {0, 0, left}, {0, 2.5, left}, {0, 2.5, south}});
+    b.addSheet(room + "/right", {{0, 0, right}, {0, 0, north}, {0, 2.5, north}, {0, 2.5, right}});
     cells.push_back({min, max, Vec3(-0.8, 0, z)});
   }
   return cells;
@@ -262,12 +264,12 @@ inline std::vector<Cell> gapRooms(Builder& b, int count, double gap) {
 
 /// A straight flight of sheets of zero thickness between two side walls of sheets. It rises along
 /// +x from x = 0, in the middle of z.
-inline Cell stairCell(Builder& b, const std::string& name, double riser, double tread, int steps,
-                      double z) {
+inline Cell addStairCell(Builder& b, const std::string& name, double riser, double tread, int steps,
+                         double z) {
   const double top = riser * steps, end = tread * steps, south = z - 1, north = z + 1;
   const double roof = top + 4;
   const auto sheet = [&](const char* part, const std::vector<Vec3>& corners) {
-    b.sheet(name + "/" + part, corners);
+    b.addSheet(name + "/" + part, corners);
   };
   const auto level = [&](const char* part, double x0, double x1, double y) {
     sheet(part, {{x0, y, south}, {x1, y, south}, {x1, y, north}, {x0, y, north}});

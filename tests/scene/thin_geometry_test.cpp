@@ -28,15 +28,15 @@ void PrintTo(const Shut& shut, std::ostream* to) {
 
 std::vector<Cell> makeCells(const Shut& shut, Builder& b, Seeded& random) {
   const std::string in = shut.in;
-  if (in == "Sheets") return gridOfCells(b, 3, shut.seed % 2 ? 1.4 : 0.7, 3, false);
-  if (in == "Slivers") return gridOfCells(b, 3, shut.seed % 2 ? 1.4 : 4, 3, true);
-  if (in == "Panes") return paneRooms(b, 4, random);
-  if (in == "Gaps") return gapRooms(b, 4, 0.601);
+  if (in == "Sheets") return addGridOfCells(b, 3, shut.seed % 2 ? 1.4 : 0.7, 3, false);
+  if (in == "Slivers") return addGridOfCells(b, 3, shut.seed % 2 ? 1.4 : 4, 3, true);
+  if (in == "Panes") return addPaneRooms(b, 4, random);
+  if (in == "Gaps") return addGapRooms(b, 4, 0.601);
   std::vector<Cell> stairs;  // from 1:35 to 35:1, log-uniform
   for (int i = 0; i < 8; ++i) {
-    const double riser = 0.02 * std::pow(35, random.uniform(0, 1));
-    const double tread = 0.02 * std::pow(35, random.uniform(0, 1));
-    stairs.push_back(stairCell(b, "stair" + std::to_string(i), riser, tread, 9, 2.5 * i));
+    const double riser = 0.02 * std::pow(35, random.drawUniform(0, 1));
+    const double tread = 0.02 * std::pow(35, random.drawUniform(0, 1));
+    stairs.push_back(addStairCell(b, "stair" + std::to_string(i), riser, tread, 9, 2.5 * i));
   }
   return stairs;
 }
@@ -49,7 +49,7 @@ TEST_P(ThinGeometry, AreNotCrossedByRandomMovesOfAnySpeed) {
   const std::vector<Cell> cells = makeCells(GetParam(), b, random);
   CellFixture run(b.model, cells);
   run.spawn();
-  run.randomMoves(random, kMovesOfOne / static_cast<int>(cells.size()));
+  run.moveRandomly(random, kMovesOfOne / static_cast<int>(cells.size()));
   EXPECT_EQ(run.outside, 0);
   EXPECT_EQ(run.penetrating, 0);
   EXPECT_GE(run.moves, kMovesOfOne * 9 / 10);
@@ -57,7 +57,7 @@ TEST_P(ThinGeometry, AreNotCrossedByRandomMovesOfAnySpeed) {
   EXPECT_LT(run.blocked, run.moves * 19 / 20);
 }
 
-std::vector<Shut> shutUp() {
+std::vector<Shut> listShut() {
   std::vector<Shut> all;
   for (std::uint64_t seed = 1; seed <= 3; ++seed)
     for (const char* in : {"Sheets", "Slivers", "Panes", "Gaps", "Stairs"})
@@ -66,7 +66,7 @@ std::vector<Shut> shutUp() {
   return all;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ThinGeometry, ::testing::ValuesIn(shutUp()), [](const auto& shut) {
+INSTANTIATE_TEST_SUITE_P(All, ThinGeometry, ::testing::ValuesIn(listShut()), [](const auto& shut) {
   return shut.param.in + std::to_string(shut.param.seed);
 });
 
@@ -77,9 +77,9 @@ TEST(ThinGaps, ADoorGapAMillimetreWiderIsPassedAndOneNarrowerIsNot) {
     for (const double speed : {0.3, 1.4, 40.0}) {
       Builder b;
       const double gap = 0.6 + wider;
-      b.box("floor", {-4, -0.2, -2}, {4, 0, 2});
-      b.sheet("left", {{0, 0, -2}, {0, 0, -0.5 * gap}, {0, 3, -0.5 * gap}, {0, 3, -2}});
-      b.sheet("right", {{0, 0, 0.5 * gap}, {0, 0, 2}, {0, 3, 2}, {0, 3, 0.5 * gap}});
+      b.addBox("floor", {-4, -0.2, -2}, {4, 0, 2});
+      b.addSheet("left", {{0, 0, -2}, {0, 0, -0.5 * gap}, {0, 3, -0.5 * gap}, {0, 3, -2}});
+      b.addSheet("right", {{0, 0, 0.5 * gap}, {0, 0, 2}, {0, 3, 2}, {0, 3, 0.5 * gap}});
       World world(std::make_shared<const Scene>(b.model));
       ASSERT_FALSE(submitAvatarCommand(world, {"ann", Spawn{{-2, 0, 0}}, 0}));
       ASSERT_FALSE(submitAvatarCommand(world, {"ann", Walk{{{2, 0, 0}}, speed}, 0}));
@@ -88,7 +88,7 @@ TEST(ThinGaps, ADoorGapAMillimetreWiderIsPassedAndOneNarrowerIsNot) {
         ASSERT_EQ(report.maxPenetration, 0);
         if (i > 3 && report.idle) break;
       }
-      EXPECT_EQ(penetrations(world), 0);
+      EXPECT_EQ(countPenetrations(world), 0);
       const double x = world.snapshot()->avatars[0].footPosition.x();
       if (wider > 0) {
         EXPECT_NEAR(x, 2, 1e-3) << speed;
@@ -103,13 +103,13 @@ TEST(ThinGaps, AnOffCentreAvatarSlidesIntoTheGap) {
   int through = 0;
   for (int i = -4; i <= 4; ++i) {
     Builder b;
-    gapRooms(b, 1, 0.601);
+    addGapRooms(b, 1, 0.601);
     World world(std::make_shared<const Scene>(b.model));
     ASSERT_FALSE(submitAvatarCommand(world, {"ann", Spawn{{-0.8, 0.01, 0.01 * i}}, 0}));
     tickWorld(world);
     ASSERT_FALSE(submitAvatarCommand(world, {"ann", Drive{{1.4, 0, 0}}, 0}));
     for (int k = 0; k < 150; ++k) ASSERT_EQ(tickWorld(world).maxPenetration, 0);
-    EXPECT_EQ(penetrations(world), 0);
+    EXPECT_EQ(countPenetrations(world), 0);
     through += world.snapshot()->avatars[0].footPosition.x() > 0.5;
   }
   EXPECT_GE(through, 5) << "of 9";
@@ -118,12 +118,12 @@ TEST(ThinGaps, AnOffCentreAvatarSlidesIntoTheGap) {
 TEST(ThinGeometryOracle, TheOracleFindsAPointInside) {
   // The avatar is placed into a sheet by hand: the check above must find it.
   Builder b;
-  b.box("floor", {-4, -0.2, -4}, {4, 0, 4});
-  b.sheet("pane", {{1, 0, -4}, {1, 0, 4}, {1, 3, 4}, {1, 3, -4}});
+  b.addBox("floor", {-4, -0.2, -4}, {4, 0, 4});
+  b.addSheet("pane", {{1, 0, -4}, {1, 0, 4}, {1, 3, 4}, {1, 3, -4}});
   World world(std::make_shared<const Scene>(b.model));
   ASSERT_FALSE(submitAvatarCommand(world, {"ann", Spawn{{0, 0, 0}}, 0}));
   tickWorld(world);
-  EXPECT_EQ(penetrations(world), 0);
+  EXPECT_EQ(countPenetrations(world), 0);
   auto moved = std::make_shared<Snapshot>(*world.snapshot());
   collision::FeatureCache cache;
   const AvatarSnapshot& ann = moved->avatars[0];

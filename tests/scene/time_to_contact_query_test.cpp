@@ -12,8 +12,8 @@ namespace {
 
 using Action = BodyCommand::Action;
 
-TimeToContact apartAt(const World& world, EntityIndex& index, EntityId a, EntityId b,
-                      MotionAssumption assume, double minWait = 0) {
+TimeToContact queryTimeToContact(const World& world, EntityIndex& index, EntityId a, EntityId b,
+                                 MotionAssumption assume, double minWait = 0) {
   std::size_t work = kMaxQueryWork;
   const SceneAt then{index, *world.snapshot()};
   return std::get<TimeToContact>(
@@ -21,60 +21,63 @@ TimeToContact apartAt(const World& world, EntityIndex& index, EntityId a, Entity
 }
 
 TEST(TimeToContact, AWalkerReachesTheWallWhenItWasSaid) {
-  WorldFixture run({floorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}});
-  EntityIndex index(sharedScene(run.world));
+  WorldFixture run({makeFloorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}});
+  EntityIndex index(shareScene(run.world));
   run.order("ann", Spawn{Vec3(0, 0.001, 0), 0});
   run.order("ann", Walk{{Vec3(8, 0, 3)}, 2});
-  run.ticks(30);
+  run.runTicks(30);
   for (int i = 0; i < 60; ++i) {
     run.step();
-    const EntityId ann = run.view("ann").id;
-    const TimeToContact now = apartAt(run.world, index, ann, 2, MotionAssumption::presentMotion);
+    const EntityId ann = run.getView("ann").id;
+    const TimeToContact now =
+        queryTimeToContact(run.world, index, ann, 2, MotionAssumption::presentMotion);
     EXPECT_TRUE(now.nextCheck.proved);
     // The speed is 2 m/s towards (8, 3); this is its component towards the wall.
     const double speed = 2 * 8 / std::hypot(8, 3);
     EXPECT_NEAR(now.separatedUntil, now.proximity.separation.distance / speed, 0.02);
-    EXPECT_LT(apartAt(run.world, index, ann, 2, MotionAssumption::anyCommand).separatedUntil,
-              now.separatedUntil);
-    EXPECT_FALSE(
-        apartAt(run.world, index, ann, 2, MotionAssumption::presentMotion, 9).nextCheck.proved);
+    EXPECT_LT(
+        queryTimeToContact(run.world, index, ann, 2, MotionAssumption::anyCommand).separatedUntil,
+        now.separatedUntil);
+    EXPECT_FALSE(queryTimeToContact(run.world, index, ann, 2, MotionAssumption::presentMotion, 9)
+                     .nextCheck.proved);
     if (run.open.contains({ann, 2})) break;
   }
 }
 
 TEST(TimeToContact, ARiderGoesWithTheLift) {
-  BodyFixture t(busyRoom());
-  EntityIndex index(sharedScene(t.world));
+  BodyFixture t(makeBusyRoom());
+  EntityIndex index(shareScene(t.world));
   t.order("ann", Spawn{{-4, 0.11, -4}, 0});
-  t.ticks(30);
+  t.runTicks(30);
   t.submit({"lift", Action::moveToLevel, 0, 2, {}});
-  t.ticks(5);
+  t.runTicks(5);
   const EntityId ann = t.world.snapshot()->avatars[0].id, ceiling = 2;
-  const TimeToContact said = apartAt(t.world, index, ann, ceiling, MotionAssumption::presentMotion);
+  const TimeToContact said =
+      queryTimeToContact(t.world, index, ann, ceiling, MotionAssumption::presentMotion);
   EXPECT_NEAR(said.separatedUntil, said.proximity.separation.distance / 1.0, 0.01) << "at 1 m/s";
   EXPECT_NEAR(said.closing.speed, 1, 1e-6);
 }
 
 TEST(TimeToContact, AnAvatarOnACrateMovesWithTheLift) {
-  Model model = boxModel({floorBox(),
-                          {"ceiling", {-3, 5, -3}, {3, 5.2, 3}},
-                          {"car", {-2, 0.05, -2}, {2, 0.1, 2}},
-                          {"crate", {-0.5, 0.101, -0.5}, {0.5, 1.5, 0.5}}});
-  BodySpec lift = bodySpec("lift", BodyKind::lift, {2});
+  Model model = makeBoxModel({makeFloorBox(),
+                              {"ceiling", {-3, 5, -3}, {3, 5.2, 3}},
+                              {"car", {-2, 0.05, -2}, {2, 0.1, 2}},
+                              {"crate", {-0.5, 0.101, -0.5}, {0.5, 1.5, 0.5}}});
+  BodySpec lift = makeBodySpec("lift", BodyKind::lift, {2});
   lift.high = 3, lift.stops = {0, 3}, lift.speed = 1;
-  BodySpec crate = bodySpec("crate", BodyKind::rigid, {3});
+  BodySpec crate = makeBodySpec("crate", BodyKind::rigid, {3});
   model.bodies = {lift, crate};
   BodyFixture t(std::move(model));
-  EntityIndex index(sharedScene(t.world));
+  EntityIndex index(shareScene(t.world));
   t.order("ann", Spawn{Vec3(0, 1.51, 0), 0});
-  t.ticks(120);
+  t.runTicks(120);
   t.submit({"lift", Action::moveToLevel, 0, 1, {}});
-  t.ticks(30);
+  t.runTicks(30);
   const EntityId ann = t.world.data().findAvatarByName("ann")->id, ceiling = 2;
-  const double gap = 5 - 1.75 - t.feet("ann").y();
+  const double gap = 5 - 1.75 - t.getFeet("ann").y();
   for (const MotionAssumption assume :
        {MotionAssumption::presentMotion, MotionAssumption::anyCommand}) {
-    const TimeToContact now = apartAt(t.world, index, ann, ceiling, assume);
+    const TimeToContact now = queryTimeToContact(t.world, index, ann, ceiling, assume);
     EXPECT_LE(now.separatedUntil, gap / lift.speed + 0.01);  // the lift keeps its speed
     EXPECT_GT(now.separatedUntil,
               assume == MotionAssumption::presentMotion ? 0.39 * gap / lift.speed : 0);
@@ -83,32 +86,35 @@ TEST(TimeToContact, AnAvatarOnACrateMovesWithTheLift) {
 
 TEST(TimeToContact, ASwingWithinATickCountsInFull) {
   // 0.2 m out and back in each tick; the post is 0.1 m away, the wall ten times as far.
-  Model model = boxModel({floorBox(),
-                          {"ram", {-1, 0.1, -0.5}, {0, 1.1, 0.5}},
-                          {"post", {0.1, 0.05, 0}, {0.2, 1, 0.2}},
-                          {"wall", {2, 0.05, -1}, {2.1, 1, 1}}});
-  BodySpec ram = bodySpec("ram", BodyKind::path, {1});
+  Model model = makeBoxModel({makeFloorBox(),
+                              {"ram", {-1, 0.1, -0.5}, {0, 1.1, 0.5}},
+                              {"post", {0.1, 0.05, 0}, {0.2, 1, 0.2}},
+                              {"wall", {2, 0.05, -1}, {2.1, 1, 1}}});
+  BodySpec ram = makeBodySpec("ram", BodyKind::path, {1});
   ram.keys = {{0, Vec3::Zero(), 0}, {1.0 / 120, {0.2, 0, 0}, 0}, {1.0 / 60, Vec3::Zero(), 0}};
   ram.loops = true;
   model.bodies = {ram};
   BodyFixture t(std::move(model));
-  EntityIndex index(sharedScene(t.world));
-  t.ticks(3);
+  EntityIndex index(shareScene(t.world));
+  t.runTicks(3);
   EXPECT_EQ(t.countEvents(ContactEvent::Kind::begin, "ram", "post"), 3);
-  const TimeToContact said = apartAt(t.world, index, 2, 3, MotionAssumption::presentMotion);
+  const TimeToContact said =
+      queryTimeToContact(t.world, index, 2, 3, MotionAssumption::presentMotion);
   EXPECT_LE(said.separatedUntil, 1.0 / 120) << "it arrives within the next tick";
   EXPECT_NEAR(said.closing.speed, 24, 1e-6);
-  EXPECT_NEAR(apartAt(t.world, index, 2, 4, MotionAssumption::presentMotion).separatedUntil,
-              2.0 / 24, 1e-3);
+  EXPECT_NEAR(
+      queryTimeToContact(t.world, index, 2, 4, MotionAssumption::presentMotion).separatedUntil,
+      2.0 / 24, 1e-3);
 }
 
 TEST(TimeToContact, FallingAvatarsAccelerate) {
-  WorldFixture run({floorBox()});
-  EntityIndex index(sharedScene(run.world));
+  WorldFixture run({makeFloorBox()});
+  EntityIndex index(shareScene(run.world));
   run.order("ann", Spawn{Vec3(0, 5, 0), 0});
-  run.ticks(10);
-  const EntityId ann = run.view("ann").id;
-  const TimeToContact said = apartAt(run.world, index, ann, 1, MotionAssumption::presentMotion);
+  run.runTicks(10);
+  const EntityId ann = run.getView("ann").id;
+  const TimeToContact said =
+      queryTimeToContact(run.world, index, ann, 1, MotionAssumption::presentMotion);
   int ticks = 0;
   while (run.open.empty()) run.step(), ++ticks;
   const double landed = ticks * run.world.settings().tickDuration;
@@ -117,59 +123,64 @@ TEST(TimeToContact, FallingAvatarsAccelerate) {
 }
 
 TEST(TimeToContact, APushedAvatarMovesAsFastAsItsPusher) {
-  Model model =
-      boxModel({floorBox(), {"ram", {-2, 0.01, -1}, {-1, 2, 1}}, {"post", {3, 0, -1}, {4, 3, 1}}});
-  BodySpec ram = bodySpec("ram", BodyKind::sliding, {1});
+  Model model = makeBoxModel(
+      {makeFloorBox(), {"ram", {-2, 0.01, -1}, {-1, 2, 1}}, {"post", {3, 0, -1}, {4, 3, 1}}});
+  BodySpec ram = makeBodySpec("ram", BodyKind::sliding, {1});
   ram.axis = {1, 0, 0};
   ram.high = 6;
   ram.speed = 1;
   model.bodies = {ram};
   BodyFixture t(std::move(model));
-  EntityIndex index(sharedScene(t.world));
+  EntityIndex index(shareScene(t.world));
   t.order("ann", Spawn{{0, 0.001, 0}, 0});
-  t.ticks(10);
+  t.runTicks(10);
   t.submit({"ram", Action::moveTo, 6, 0, {}});
-  t.ticks(60);
+  t.runTicks(60);
   const EntityId ann = t.world.snapshot()->avatars[0].id, post = 3;
-  const double before = t.feet("ann").x();
-  const TimeToContact said = apartAt(t.world, index, ann, post, MotionAssumption::presentMotion);
-  t.ticks(30);
-  EXPECT_NEAR(t.feet("ann").x() - before, 0.5, 0.01) << "it is pushed";
+  const double before = t.getFeet("ann").x();
+  const TimeToContact said =
+      queryTimeToContact(t.world, index, ann, post, MotionAssumption::presentMotion);
+  t.runTicks(30);
+  EXPECT_NEAR(t.getFeet("ann").x() - before, 0.5, 0.01) << "it is pushed";
   EXPECT_GE(said.closing.speed, 1);
   EXPECT_LE(said.separatedUntil, said.proximity.separation.distance / 1);
   EXPECT_GT(said.separatedUntil, 0.3 * said.proximity.separation.distance);
 }
 
 TEST(TimeToContact, TipsOfRotatingBodiesCount) {
-  BodyFixture t(busyRoom());
-  EntityIndex index(sharedScene(t.world));
-  t.ticks(1);
+  BodyFixture t(makeBusyRoom());
+  EntityIndex index(shareScene(t.world));
+  t.runTicks(1);
   const EntityId plank = 9, post = 4;
-  const TimeToContact said = apartAt(t.world, index, plank, post, MotionAssumption::presentMotion);
+  const TimeToContact said =
+      queryTimeToContact(t.world, index, plank, post, MotionAssumption::presentMotion);
   const double radius = t.world.scene().bodyShape(4)->radius;
-  EXPECT_GE(said.closing.speed, t.body("plank").angularVelocity.norm() * radius);
+  EXPECT_GE(said.closing.speed, t.getBody("plank").angularVelocity.norm() * radius);
   EXPECT_LT(said.separatedUntil, said.proximity.separation.distance / 5 / radius);
 }
 
 TEST(TimeToContact, OfConvexShapesInUniformMotionItIsTheTimeOfImpact) {
   // The leaf turns about the origin towards -z and meets one post; the other is out of its reach,
   // though no farther from it.
-  Model model = boxModel({{"leaf", {0, 0.1, -0.02}, {1, 2, 0.02}},
-                          {"post", {-0.05, 0, -0.9}, {0.05, 2.2, -0.8}},
-                          {"pillar", {1.1, 0, -0.3}, {1.4, 2.2, 0.3}}});
-  BodySpec leaf = bodySpec("leaf", BodyKind::hinged, {0});
+  Model model = makeBoxModel({{"leaf", {0, 0.1, -0.02}, {1, 2, 0.02}},
+                              {"post", {-0.05, 0, -0.9}, {0.05, 2.2, -0.8}},
+                              {"pillar", {1.1, 0, -0.3}, {1.4, 2.2, 0.3}}});
+  BodySpec leaf = makeBodySpec("leaf", BodyKind::hinged, {0});
   leaf.high = 3;
   leaf.speed = 0.5;
   model.bodies = {leaf};
   BodyFixture t(std::move(model));
-  EntityIndex index(sharedScene(t.world));
+  EntityIndex index(shareScene(t.world));
   t.submit({"leaf", Action::open, 0, 0, {}});
-  t.ticks(10);
+  t.runTicks(10);
   const EntityId moving = 1, post = 2, pillar = 3;
-  const TimeToContact now = apartAt(t.world, index, moving, post, MotionAssumption::presentMotion);
-  EXPECT_GE(apartAt(t.world, index, moving, pillar, MotionAssumption::presentMotion).separatedUntil,
+  const TimeToContact now =
+      queryTimeToContact(t.world, index, moving, post, MotionAssumption::presentMotion);
+  EXPECT_GE(queryTimeToContact(t.world, index, moving, pillar, MotionAssumption::presentMotion)
+                .separatedUntil,
             600);
-  EXPECT_LT(apartAt(t.world, index, moving, pillar, MotionAssumption::anyCommand).separatedUntil,
+  EXPECT_LT(queryTimeToContact(t.world, index, moving, pillar, MotionAssumption::anyCommand)
+                .separatedUntil,
             1);
   int ticks = 0;
   while (t.countEvents(ContactEvent::Kind::begin, "leaf", "post") == 0 && ticks < 1000)
@@ -180,16 +191,18 @@ TEST(TimeToContact, OfConvexShapesInUniformMotionItIsTheTimeOfImpact) {
 }
 
 TEST(TimeToContact, OfDynamicBodiesNothingIsKnownUnderAnyCommand) {
-  BodyFixture t(busyRoom());
-  EntityIndex index(sharedScene(t.world));
-  t.ticks(1);
+  BodyFixture t(makeBusyRoom());
+  EntityIndex index(shareScene(t.world));
+  t.runTicks(1);
   const EntityId crate = 8, floor = 1;
-  const TimeToContact any = apartAt(t.world, index, crate, floor, MotionAssumption::anyCommand, 2);
+  const TimeToContact any =
+      queryTimeToContact(t.world, index, crate, floor, MotionAssumption::anyCommand, 2);
   EXPECT_FALSE(any.bounded);
   EXPECT_EQ(any.separatedUntil, 0);
   EXPECT_EQ(any.nextCheck.after, 2);
   EXPECT_FALSE(any.nextCheck.proved);
-  EXPECT_GT(apartAt(t.world, index, crate, floor, MotionAssumption::presentMotion).separatedUntil,
+  EXPECT_GT(queryTimeToContact(t.world, index, crate, floor, MotionAssumption::presentMotion)
+                .separatedUntil,
             0.3);
 }
 
@@ -292,7 +305,7 @@ TEST(TimeToContact, InABusyRoomNoPairTouchesBeforeTheReportedTime) {
   Tally tally;
   for (const std::uint32_t seed : {1u, 2u, 3u}) {
     BusyRoom room(seed);
-    EntityIndex index(sharedScene(room.world));
+    EntityIndex index(shareScene(room.world));
     std::vector<Watch> watches;
     auto before = room.world.snapshot();
     for (int i = 0; i < 400; ++i) {
@@ -308,13 +321,13 @@ TEST(TimeToContact, InABusyRoomNoPairTouchesBeforeTheReportedTime) {
         const EntityId last = after->avatars.empty() ? 9 : after->avatars.back().id;
         const SceneAt then{index, *after};
         const auto any = [&] {
-          return resolveEntity(then, static_cast<EntityId>(room.number(1, last + 0.999)));
+          return resolveEntity(then, static_cast<EntityId>(room.drawNumber(1, last + 0.999)));
         };
         const EntityId a = any(), b = any();
         if (a == 0 || b == 0 || a == b) continue;
         const MotionAssumption assume =
             k % 2 == 0 ? MotionAssumption::presentMotion : MotionAssumption::anyCommand;
-        const TimeToContact said = apartAt(room.world, index, a, b, assume);
+        const TimeToContact said = queryTimeToContact(room.world, index, a, b, assume);
         if (said.bounded) watches.push_back({a, b, assume, after->tick, said, motions});
       }
     }

@@ -38,8 +38,8 @@ TEST(ToolchainVersion, OtherFilesAreIdentifiedByTheirContent) {
     ASSERT_TRUE(computeFileVersion(file)) << bytes.size();
     EXPECT_EQ(computeFileVersion(file), computeFileHash(file)) << bytes.size();
   }
-  EXPECT_FALSE(computeFileVersion(folder.path() / "missing"));
-  EXPECT_FALSE(computeFileVersion(folder.path()));
+  EXPECT_FALSE(computeFileVersion(folder.getPath() / "missing"));
+  EXPECT_FALSE(computeFileVersion(folder.getPath()));
 }
 
 }  // namespace

@@ -16,7 +16,7 @@ namespace {
 TEST(UnreachableReasons, NameWhatStopsTheAgentAndWhatItWouldNeed) {
   const NamedBox floor{"floor", {0, -0.2, 0}, {10, 0, 5}};
   const auto findReason = [](const std::vector<NamedBox>& boxes, const Vec3& goal) {
-    return Navigation(boxScene(boxes), {}, {}).findPath({2, 0, 2}, goal).reason;
+    return Navigation(makeBoxScene(boxes), {}, {}).findPath({2, 0, 2}, goal).reason;
   };
   EXPECT_EQ(findReason({floor, {"wall", {5, 0, -1}, {5.2, 2.5, 6}}}, {8, 0, 2}),
             "wall is in the way");
@@ -34,7 +34,7 @@ TEST(UnreachableReasons, AreThoseOfTheFirstRoomOnTheWay) {
   std::vector<NamedBox> boxes{{"floor", {0, -0.2, 0}, {15, 0, 5}},
                               {"kerb", {5, 0, -1}, {5.4, 0.5, 6}},
                               {"wall", {10, 0, -1}, {10.2, 2.5, 6}}};
-  Navigation navigation(boxScene(boxes), {}, {});
+  Navigation navigation(makeBoxScene(boxes), {}, {});
   EXPECT_EQ(navigation.findPath({2, 0, 2}, {13, 0, 2}).reason,
             "kerb is in the way: a step of 0.500 m, climbs 0.300");
   EXPECT_EQ(navigation.findPath({13, 0, 2}, {2, 0, 2}).reason, "wall is in the way");
@@ -42,10 +42,10 @@ TEST(UnreachableReasons, AreThoseOfTheFirstRoomOnTheWay) {
 
 /// A strip of floor belongs to the other room and runs behind a panel of this one: no agent fits.
 TEST(UnreachableReasons, AreOfPlacesWhereAnAgentFits) {
-  Navigation navigation(boxScene({{"floor", {0, -0.2, -1}, {10, 0, 5}},
-                                  {"facade", {-1, 0, -1}, {11, 2.5, 0}},
-                                  {"panel", {-1, 0, 0.15}, {5, 2.5, 0.2}},
-                                  {"party", {5, 0, 0.15}, {5.4, 2.5, 6}}}),
+  Navigation navigation(makeBoxScene({{"floor", {0, -0.2, -1}, {10, 0, 5}},
+                                      {"facade", {-1, 0, -1}, {11, 2.5, 0}},
+                                      {"panel", {-1, 0, 0.15}, {5, 2.5, 0.2}},
+                                      {"party", {5, 0, 0.15}, {5.4, 2.5, 6}}}),
                         {}, {});
   for (const auto& [from, to] : {std::pair(2, 8), std::pair(8, 2)}) {
     const std::string reason = navigation.findPath(Vec3(from, 0, 2), Vec3(to, 0, 2)).reason;
@@ -55,7 +55,8 @@ TEST(UnreachableReasons, AreOfPlacesWhereAnAgentFits) {
 
 TEST(UnreachableReasons, TheFirstPathThatIsNotFoundReportsTheirMesh) {
   Navigation navigation(
-      boxScene({{"floor", {0, -0.2, 0}, {40, 0, 5}}, {"wall", {5, 0, -1}, {5.2, 2.5, 6}}}), {}, {});
+      makeBoxScene({{"floor", {0, -0.2, 0}, {40, 0, 5}}, {"wall", {5, 0, -1}, {5.2, 2.5, 6}}}), {},
+      {});
   std::vector<double> shares;
   const auto find = [&](const Vec3& goal) {
     shares.clear();

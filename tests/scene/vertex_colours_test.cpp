@@ -23,13 +23,13 @@ constexpr std::array<std::array<double, 4>, 3> kLinear{
     {{1, 0, 0, 1}, {0, 0.5, 0, 1}, {0, 0, 1, 0.2}}};
 
 /// As wanted from a file with alpha, and from one without. 0.5 is 188 in sRGB (IEC 61966-2-1).
-std::vector<VertexColour> wantedColours(bool alpha) {
+std::vector<VertexColour> listWantedColours(bool alpha) {
   return {{255, 0, 0, 255},
           {0, 188, 0, 255},
           {0, 0, 255, alpha ? std::uint8_t{51} : std::uint8_t{255}}};
 }
 
-GltfWriter plainTriangle() {
+GltfWriter makePlainTriangle() {
   GltfWriter file;
   file.addPrimitive(file.addPoints({{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}), -1);
   return file;
@@ -53,7 +53,7 @@ unsigned addColours(GltfWriter& file, int componentType, std::size_t channels, d
 
 std::vector<VertexColour> readColours(const GltfWriter& file) {
   const TemporaryFolder folder;
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   EXPECT_EQ(countDiagnostics(model, "vertex_colours_ignored"), 0u);
   return model.meshes.at(0).colours;
 }
@@ -69,13 +69,13 @@ TEST(VertexColours, OfGltfAreLinearInAllEncodings) {
     SCOPED_TRACE(channels);
     for (int encoding = 0; encoding < 3; ++encoding) {
       SCOPED_TRACE(encoding);
-      GltfWriter file = plainTriangle();
+      GltfWriter file = makePlainTriangle();
       Json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
       attributes["COLOR_0"] = encoding == 0 ? addColours<std::uint8_t>(file, 5121, channels, 255)
                               : encoding == 1
                                   ? addColours<std::uint16_t>(file, 5123, channels, 65535)
                                   : addColours<float>(file, 5126, channels, 1);
-      expectNear(readColours(file), wantedColours(channels == 4));
+      expectNear(readColours(file), listWantedColours(channels == 4));
     }
   }
 }
@@ -132,7 +132,7 @@ TEST(VertexColours, OfMeshoptsFilterAreDecodedWithinAStepOfTheirBits) {
 
 TEST(VertexColours, OfMeshoptsFilterAreDrawn) {
   for (const char* extension : {"EXT_meshopt_compression", "KHR_meshopt_compression"}) {
-    GltfWriter file = plainTriangle();
+    GltfWriter file = makePlainTriangle();
     std::vector<std::array<std::uint8_t, 4>> encoded;
     for (const auto& colour : kLinear) {
       std::array<int, 4> bytes{};
@@ -145,7 +145,7 @@ TEST(VertexColours, OfMeshoptsFilterAreDrawn) {
     file.compressView(view, extension, tests::packVertices(tests::toBytes(encoded), 4),
                       "ATTRIBUTES", 4, 3, "COLOR", false);
     file.use(extension);
-    const std::vector<VertexColour> read = readColours(file), wanted = wantedColours(true);
+    const std::vector<VertexColour> read = readColours(file), wanted = listWantedColours(true);
     ASSERT_EQ(read.size(), wanted.size());
     // A step of linear 8 bits near black is 13 of sRGB.
     for (std::size_t i = 0; i < read.size(); ++i)
@@ -155,39 +155,39 @@ TEST(VertexColours, OfMeshoptsFilterAreDrawn) {
 }
 
 TEST(VertexColours, OfGltfSurviveARewriteForAnotherReason) {
-  GltfWriter file = plainTriangle();
+  GltfWriter file = makePlainTriangle();
   file.json["meshes"][0]["primitives"][0]["mode"] = 5;  // a strip
   file.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] =
       addColours<float>(file, 5126, 4, 1);
-  expectNear(readColours(file), wantedColours(true));
+  expectNear(readColours(file), listWantedColours(true));
 }
 
 TEST(VertexColours, ThatAreNotOnePerVertexAreReported) {
   const TemporaryFolder folder;
-  GltfWriter file = plainTriangle();
+  GltfWriter file = makePlainTriangle();
   Json& attributes = file.json["meshes"][0]["primitives"][0]["attributes"];
   attributes["COLOR_0"] = file.addPoints({{1, 0, 0}, {1, 0, 0}});
-  Model model = importModel(folder.write("short.glb", file.glb()));
+  Model model = importModel(folder.write("short.glb", file.toGlb()));
   EXPECT_TRUE(model.meshes.at(0).colours.empty());
-  EXPECT_EQ(diagnosticText(model, "vertex_colours_ignored"),
+  EXPECT_EQ(findDiagnosticText(model, "vertex_colours_ignored"),
             "meshes[0].primitives[0]: not one per vertex");
   attributes["COLOR_0"] = attributes["POSITION"];
   file.json["accessors"][0]["type"] = "VEC3";
   file.json["accessors"].push_back(file.json["accessors"][0]);
   file.json["accessors"].back()["componentType"] = 5120;
   attributes["COLOR_0"] = file.json["accessors"].size() - 1;
-  model = importModel(folder.write("signed.glb", file.glb()));
-  EXPECT_EQ(diagnosticText(model, "vertex_colours_ignored"),
+  model = importModel(folder.write("signed.glb", file.toGlb()));
+  EXPECT_EQ(findDiagnosticText(model, "vertex_colours_ignored"),
             "meshes[0].primitives[0]: of a type that glTF does not allow");
 }
 
 TEST(VertexColours, ThatCannotBeReadLeaveTheMeshAsItIs) {
   const TemporaryFolder folder;
-  GltfWriter file = plainTriangle();
+  GltfWriter file = makePlainTriangle();
   const unsigned colours = addColours<std::uint8_t>(file, 5121, 4, 255);
   file.json["accessors"][colours]["byteOffset"] = 1 << 20;
   file.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] = colours;
-  const Model model = importModel(folder.write("a.glb", file.glb()));
+  const Model model = importModel(folder.write("a.glb", file.toGlb()));
   EXPECT_EQ(model.meshes.at(0).triangleCount(), 1u);
   EXPECT_TRUE(model.meshes[0].colours.empty());
   EXPECT_EQ(countDiagnostics(model, "vertex_colours_ignored"), 1u);
@@ -195,7 +195,7 @@ TEST(VertexColours, ThatCannotBeReadLeaveTheMeshAsItIs) {
 }
 
 TEST(VertexColours, ThatAreAllWhiteTakeNoMemory) {
-  GltfWriter file = plainTriangle();
+  GltfWriter file = makePlainTriangle();
   file.json["meshes"][0]["primitives"][0]["attributes"]["COLOR_0"] =
       file.addPoints({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}});
   EXPECT_TRUE(readColours(file).empty());

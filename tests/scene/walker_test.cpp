@@ -22,15 +22,16 @@ constexpr int kRestTicks = 30;
 std::shared_ptr<const Scene> makeBumpyRoom(unsigned seed) {
   std::mt19937 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
-  std::vector<NamedBox> boxes{
-      floorBox(), {"platform", {-1, 0, -1}, {1, 0.5, 1}}, {"ledge", {1, 0, -1}, {1.6, 0.15, 1}}};
+  std::vector<NamedBox> boxes{makeFloorBox(),
+                              {"platform", {-1, 0, -1}, {1, 0.5, 1}},
+                              {"ledge", {1, 0, -1}, {1.6, 0.15, 1}}};
   for (int i = 0; i < 60; ++i) {
     const double x = 2 + 3 * unit(random), z = -5 + 10 * unit(random);
     const double width = 0.1 + 0.8 * unit(random), depth = 0.1 + 0.8 * unit(random);
     const double height = 0.32 * unit(random);
     boxes.push_back({"box/" + std::to_string(i), {x, 0, z}, {x + width, height, z + depth}});
   }
-  Model model = boxModel(boxes);
+  Model model = makeBoxModel(boxes);
   Mesh& platform = model.meshes[model.objects[1].meshes.front()];
   for (auto& position : platform.positions)
     if (position.x() > 0 && position.y() < 0.1) position.x() = 1.25F;
@@ -88,7 +89,7 @@ TEST(Walker, AProvedWalkIsThatOfAnAvatar) {
 
 /// A waypoint in the air is reached, and the fall continues: as a whole it is at most a step deep.
 TEST(Walker, AFallIsMeasuredFromTheFloorAlsoOverAWaypoint) {
-  const World world(boxScene({floorBox(), {"platform", {-1, 0, -1}, {1, 0.5, 1}}}));
+  const World world(makeBoxScene({makeFloorBox(), {"platform", {-1, 0, -1}, {1, 0.5, 1}}}));
   Walker walker(world.data(), {});
   walker.returnTo({0, 0.5 + world.settings().contactOffset, 0});
   const WalkOutcome first = walker.walkOn({1.55, 0, 0});
@@ -99,7 +100,7 @@ TEST(Walker, AFallIsMeasuredFromTheFloorAlsoOverAWaypoint) {
 }
 
 TEST(Walker, TheWayOfTheFeetCountsHeights) {
-  const World world(boxScene({floorBox(), {"step", {1, 0, -1}, {2, 0.25, 1}}}));
+  const World world(makeBoxScene({makeFloorBox(), {"step", {1, 0, -1}, {2, 0.25, 1}}}));
   Walker walker(world.data(), {});
   walker.returnTo({0, world.settings().contactOffset, 0});
   ASSERT_EQ(walker.walkTo({3, 0, 0}).kind, WalkOutcome::Kind::arrived);

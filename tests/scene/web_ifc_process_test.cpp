@@ -16,16 +16,16 @@ namespace {
 class ScriptedNode {
  public:
   explicit ScriptedNode(const std::string& script) {
-    std::filesystem::create_directories(folder_.path() / "node_modules/web-ifc");
+    std::filesystem::create_directories(folder_.getPath() / "node_modules/web-ifc");
     folder_.write("package.json", R"({"type":"module"})");
     folder_.write("read_ifc.js", kFrames + script);
-    setenv("ENFILADE_WEB_IFC", folder_.path().c_str(), 1);
+    setenv("ENFILADE_WEB_IFC", folder_.getPath().c_str(), 1);
   }
   ~ScriptedNode() { unsetenv("ENFILADE_WEB_IFC"); }
   ScriptedNode(const ScriptedNode&) = delete;
   ScriptedNode& operator=(const ScriptedNode&) = delete;
 
-  std::filesystem::path house(const std::string& text = tests::IfcHouse().text()) const {
+  std::filesystem::path writeHouse(const std::string& text = tests::IfcHouse().makeText()) const {
     return folder_.write("house.ifc", text);
   }
 
@@ -60,20 +60,20 @@ if (first !== 0) send('D', Buffer.alloc(0));
 setTimeout(() => {}, first === 0 ? 10000 : 0);
 )");
   ENFILADE_NEED_WEB_IFC();
-  const Model model = importModel(node.house());
+  const Model model = importModel(node.writeHouse());
   EXPECT_EQ(model.reader, "web-ifc");
   ASSERT_EQ(model.objects.size(), 2u);
-  EXPECT_NE(diagnosticText(model, "openings_unverified").find("000000000000000000Wall"),
+  EXPECT_NE(findDiagnosticText(model, "openings_unverified").find("000000000000000000Wall"),
             std::string::npos)
       << "ifcplusplus reads the wall";
 
   ImportOptions alone;
   alone.ifcReader = IfcReader::webIfc;
-  const Model left = importModel(node.house(), alone);
+  const Model left = importModel(node.writeHouse(), alone);
   ASSERT_EQ(left.objects.size(), 1u);
   EXPECT_EQ(left.objects[0].ifcClass, "IfcDoor");
-  EXPECT_NE(diagnosticText(left, "missing_product").find("was killed"), std::string::npos)
-      << diagnosticText(left, "missing_product");
+  EXPECT_NE(findDiagnosticText(left, "missing_product").find("was killed"), std::string::npos)
+      << findDiagnosticText(left, "missing_product");
 }
 
 /// A reader that gives no triangles of the wall, and a sheet for the door: x from 2.2 to 3.1, y up.
@@ -91,44 +91,44 @@ send('D', Buffer.alloc(0));
 /// closed behind the door. `width` and `height`: stated by the door, in metres.
 std::string makeClosedHouse(double width, double height) {
   const tests::IfcHouse house;
-  std::string text = house.text();
+  std::string text = house.makeText();
   const auto replace = [&](const std::string& what, const std::string& with) {
     const std::size_t at = text.find(what);
     ASSERT_NE(at, std::string::npos) << what;
     text.replace(at, what.size(), with);
   };
-  replace("#200=IFCCARTESIANPOINT((" + house.length(1.5),
-          "#200=IFCCARTESIANPOINT((" + house.length(0.2));
-  replace("#300=IFCCARTESIANPOINT((" + house.length(0),
-          "#300=IFCCARTESIANPOINT((" + house.length(2));
-  replace("#315,$," + house.length(2.1) + "," + house.length(0.9),
-          "#315,$," + house.length(height) + "," + house.length(width));
+  replace("#200=IFCCARTESIANPOINT((" + house.formatLength(1.5),
+          "#200=IFCCARTESIANPOINT((" + house.formatLength(0.2));
+  replace("#300=IFCCARTESIANPOINT((" + house.formatLength(0),
+          "#300=IFCCARTESIANPOINT((" + house.formatLength(2));
+  replace("#315,$," + house.formatLength(2.1) + "," + house.formatLength(0.9),
+          "#315,$," + house.formatLength(height) + "," + house.formatLength(width));
   return text;
 }
 
 TEST(WebIfcProcess, AWallThatNoReaderCutsStaysSolidAndIsReported) {
   const ScriptedNode node(kDoorAlone);
   ENFILADE_NEED_WEB_IFC();
-  const Model model = importModel(node.house(makeClosedHouse(0.9, 2.1)));
+  const Model model = importModel(node.writeHouse(makeClosedHouse(0.9, 2.1)));
   EXPECT_EQ(model.reader, "web-ifc");
   EXPECT_EQ(model.objects.size(), 2u);
-  EXPECT_NE(diagnosticText(model, "solid_product").find("000000000000000000Wall"),
+  EXPECT_NE(findDiagnosticText(model, "solid_product").find("000000000000000000Wall"),
             std::string::npos);
-  EXPECT_NE(diagnosticText(model, "openings_unverified").find("000000000000000000Wall"),
+  EXPECT_NE(findDiagnosticText(model, "openings_unverified").find("000000000000000000Wall"),
             std::string::npos);
-  EXPECT_EQ(diagnosticText(model, "cut_away_product"), "");
+  EXPECT_EQ(findDiagnosticText(model, "cut_away_product"), "");
 }
 
 TEST(WebIfcProcess, AFramesWallThatIsNoLargerThanItsDoorIsLeftOutAndReported) {
   const ScriptedNode node(kDoorAlone);
   ENFILADE_NEED_WEB_IFC();
-  const Model model = importModel(node.house(makeClosedHouse(4, 3)));
+  const Model model = importModel(node.writeHouse(makeClosedHouse(4, 3)));
   ASSERT_EQ(model.objects.size(), 1u);
   EXPECT_EQ(model.objects[0].ifcClass, "IfcDoor");
-  EXPECT_NE(diagnosticText(model, "cut_away_product").find("000000000000000000Wall"),
+  EXPECT_NE(findDiagnosticText(model, "cut_away_product").find("000000000000000000Wall"),
             std::string::npos);
-  EXPECT_EQ(diagnosticText(model, "solid_product"), "");
-  EXPECT_EQ(diagnosticText(model, "missing_product"), "");
+  EXPECT_EQ(findDiagnosticText(model, "solid_product"), "");
+  EXPECT_EQ(findDiagnosticText(model, "missing_product"), "");
 }
 
 TEST(WebIfcProcess, ARunawayIsStoppedByItsMemoryLimit) {
@@ -140,9 +140,9 @@ for (;;) all.push(Buffer.alloc(1 << 24, 1));
   ImportOptions options;
   options.memoryLimit = std::size_t{700} << 20;
   options.timeLimit = 60;
-  const Model model = importModel(node.house(), options);
+  const Model model = importModel(node.writeHouse(), options);
   EXPECT_EQ(model.reader, "ifcplusplus");
-  const std::string why = diagnosticText(model, "ifc_reader_failed");
+  const std::string why = findDiagnosticText(model, "ifc_reader_failed");
   EXPECT_TRUE(why.starts_with("web-ifc: ")) << why;
   EXPECT_EQ(why.find("too long"), std::string::npos) << why;
 }
@@ -152,9 +152,9 @@ TEST(WebIfcProcess, NoiseAndSilenceAreFailures) {
        {"send('X', words(1));", "send('G', words(1, 5, 5));", "", "throw 1;"}) {
     const ScriptedNode node(script);
     ENFILADE_NEED_WEB_IFC();
-    const Model model = importModel(node.house());
+    const Model model = importModel(node.writeHouse());
     EXPECT_EQ(model.reader, "ifcplusplus") << script;
-    EXPECT_NE(diagnosticText(model, "ifc_reader_failed"), "") << script;
+    EXPECT_NE(findDiagnosticText(model, "ifc_reader_failed"), "") << script;
   }
 }
 

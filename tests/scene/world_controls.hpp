@@ -14,21 +14,21 @@ template <class Fixture>
 class WorldControls {
  public:
   void order(const std::string& name, Order o) {
-    const auto why = submitAvatarCommand(fixture().world, {name, std::move(o), 0});
+    const auto why = submitAvatarCommand(getFixture().world, {name, std::move(o), 0});
     ASSERT_FALSE(why) << *why;
   }
-  void ticks(int count) {
-    for (int i = 0; i < count; ++i) fixture().step();
+  void runTicks(int count) {
+    for (int i = 0; i < count; ++i) getFixture().step();
   }
   /// Steps until every queue is empty; fails after a simulated minute.
-  void untilIdle() {
+  void waitUntilIdle() {
     for (int i = 0; i < 3600; ++i)
-      if (fixture().step().idle) return;
+      if (getFixture().step().idle) return;
     FAIL() << "not idle after a minute";
   }
 
  private:
-  Fixture& fixture() { return static_cast<Fixture&>(*this); }
+  Fixture& getFixture() { return static_cast<Fixture&>(*this); }
 };
 
 }  // namespace enfilade::scene::testing

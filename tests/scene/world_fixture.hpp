@@ -16,7 +16,7 @@ namespace enfilade::scene::testing {
 /// A world and all events that its ticks reported.
 struct WorldFixture : WorldControls<WorldFixture> {
   explicit WorldFixture(const std::vector<NamedBox>& boxes, const WorldSettings& settings = {})
-      : WorldFixture(boxScene(boxes), settings) {}
+      : WorldFixture(makeBoxScene(boxes), settings) {}
   explicit WorldFixture(std::shared_ptr<const Scene> scene, const WorldSettings& settings = {})
       : world(std::move(scene), settings) {}
 
@@ -38,15 +38,15 @@ struct WorldFixture : WorldControls<WorldFixture> {
       EXPECT_EQ(open.erase(pair), 1u) << "ended, not begun";
     }
   }
-  AvatarSnapshot view(const std::string& name) const {
+  AvatarSnapshot getView(const std::string& name) const {
     for (const AvatarSnapshot& a : world.snapshot()->avatars)
       if (a.name == name) return a;
     ADD_FAILURE() << name << " is not in the world";
     return {};
   }
-  Vec3 feet(const std::string& name) const { return view(name).footPosition; }
+  Vec3 getFeet(const std::string& name) const { return getView(name).footPosition; }
   /// The text of the last notice of this kind; "" if there was none.
-  std::string text(Notice::Kind kind) const {
+  std::string getText(Notice::Kind kind) const {
     std::string found;
     for (const Notice& n : notices)
       if (n.kind == kind) found = n.text;
@@ -56,7 +56,7 @@ struct WorldFixture : WorldControls<WorldFixture> {
     return static_cast<int>(std::count_if(notices.begin(), notices.end(),
                                           [&](const Notice& n) { return n.kind == kind; }));
   }
-  bool touched(const std::string& name) const {
+  bool hasTouched(const std::string& name) const {
     return std::any_of(events.begin(), events.end(), [&](const ContactEvent& e) {
       return e.kind == ContactEvent::Kind::begin && findEntityName(world, e.b) == name;
     });
@@ -70,11 +70,11 @@ struct WorldFixture : WorldControls<WorldFixture> {
 };
 
 /// A shared scene of a world, which outlives the queries on it.
-inline std::shared_ptr<const Scene> sharedScene(const World& world) {
+inline std::shared_ptr<const Scene> shareScene(const World& world) {
   return {std::shared_ptr<void>(), &world.scene()};
 }
 
-inline Walk to(double x, double z, double speed = 1.5, double y = 0) {
+inline Walk makeWalkTo(double x, double z, double speed = 1.5, double y = 0) {
   return {{{x, y, z}}, speed};
 }
 

@@ -17,31 +17,31 @@ using Kind = Notice::Kind;
 const double kNaN = std::nan("");
 
 TEST(World, ASpawnAtTheFloorsOwnHeightComesToRestOnIt) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.untilIdle();
-  EXPECT_GE(run.feet("ann").y(), run.world.settings().contactOffset);
-  EXPECT_LT(run.feet("ann").y(), 2 * run.world.settings().contactOffset);
+  run.waitUntilIdle();
+  EXPECT_GE(run.getFeet("ann").y(), run.world.settings().contactOffset);
+  EXPECT_LT(run.getFeet("ann").y(), 2 * run.world.settings().contactOffset);
   EXPECT_TRUE(run.world.snapshot()->avatars[0].grounded);
-  EXPECT_TRUE(run.touched("floor"));
+  EXPECT_TRUE(run.hasTouched("floor"));
 }
 
 TEST(World, ASpawnALittleAboveAFloorDropsOntoIt) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 1, 0}});
   run.step();
-  EXPECT_GT(run.feet("ann").y(), 0.9);
-  run.untilIdle();
-  EXPECT_LT(run.feet("ann").y(), 0.001);
+  EXPECT_GT(run.getFeet("ann").y(), 0.9);
+  run.waitUntilIdle();
+  EXPECT_LT(run.getFeet("ann").y(), 0.001);
   EXPECT_EQ(run.count(Kind::spawned), 1);
 }
 
 TEST(World, ASpawnInsideSomethingOrOffEveryFloorSaysSo) {
-  WorldFixture run({floorBox(), {"pillar", {-1, 0, -1}, {1, 3, 1}}});
+  WorldFixture run({makeFloorBox(), {"pillar", {-1, 0, -1}, {1, 3, 1}}});
   run.order("inside", Spawn{{0, 0.5, 0}});  // wholly inside the closed pillar
   run.order("across", Spawn{{1, 0, 0}});    // cuts its surface
   run.order("nowhere", Spawn{{50, 0, 0}});
-  run.order("nowhere", to(0, 0));
+  run.order("nowhere", makeWalkTo(0, 0));
   run.step();
   ASSERT_EQ(run.count(Kind::refused), 3);
   std::map<std::string, std::string> text;
@@ -55,26 +55,26 @@ TEST(World, ASpawnInsideSomethingOrOffEveryFloorSaysSo) {
 }
 
 TEST(World, AWalkArrivesExactlyWhereItWasSent) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{-5, 0, 0}});
   run.order("ann", Walk{{{-2, 0, 1}, {3, 0, -2}}, 1.5});
-  run.untilIdle();
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::arrived), 1);
-  EXPECT_NEAR(run.feet("ann").x(), 3, 1e-9);
-  EXPECT_NEAR(run.feet("ann").z(), -2, 1e-9);
+  EXPECT_NEAR(run.getFeet("ann").x(), 3, 1e-9);
+  EXPECT_NEAR(run.getFeet("ann").z(), -2, 1e-9);
 }
 
 TEST(World, AWallStopsAWalkAndIsReported) {
-  WorldFixture run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  WorldFixture run({makeFloorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.order("ann", to(5, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(5, 0));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "wall");
-  EXPECT_TRUE(run.touched("wall"));
+  EXPECT_TRUE(run.hasTouched("wall"));
   // The wall, minus the radius, minus a gap between one and two contact offsets.
-  EXPECT_LT(run.feet("ann").x(), 1.7 - run.world.settings().contactOffset * 0.8);
-  EXPECT_GT(run.feet("ann").x(), 1.7 - run.world.settings().contactOffset * 2);
+  EXPECT_LT(run.getFeet("ann").x(), 1.7 - run.world.settings().contactOffset * 0.8);
+  EXPECT_GT(run.getFeet("ann").x(), 1.7 - run.world.settings().contactOffset * 2);
   EXPECT_EQ(run.worstPenetration, 0);
   const bool blocked = std::any_of(run.events.begin(), run.events.end(), [](const auto& e) {
     return e.kind == ContactEvent::Kind::blocked;
@@ -83,24 +83,24 @@ TEST(World, AWallStopsAWalkAndIsReported) {
 }
 
 TEST(World, ASlantedPathSlidesAlongAWall) {
-  WorldFixture run({floorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
+  WorldFixture run({makeFloorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.order("ann", to(3, 6));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(3, 6));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
-  EXPECT_NEAR(run.feet("ann").z(), 6, 0.05);
+  EXPECT_NEAR(run.getFeet("ann").z(), 6, 0.05);
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
 TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
   WorldFixture run(
-      {floorBox(), {"low", {2, 0, -3}, {4, 0.29, 3}}, {"high", {4, 0, -3}, {6, 0.65, 3}}});
+      {makeFloorBox(), {"low", {2, 0, -3}, {4, 0.29, 3}}, {"high", {4, 0, -3}, {6, 0.65, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", Walk{{{3, 0.29, 0}, {5, 0.65, 0}}, 1.5});
-  run.untilIdle();
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
-  EXPECT_NEAR(run.feet("ann").y(), 0.29, 0.001);
-  EXPECT_GT(run.feet("ann").x(), 3.5);
+  EXPECT_NEAR(run.getFeet("ann").y(), 0.29, 0.001);
+  EXPECT_GT(run.getFeet("ann").x(), 3.5);
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
@@ -120,11 +120,11 @@ double findHighestClimbedLedge(const WorldSettings& settings, const std::vector<
     run.order("of" + std::to_string(height), Walk{{{2, height, z}}, 1.5});
     z += kApart;
   }
-  run.untilIdle();
+  run.waitUntilIdle();
   EXPECT_EQ(run.worstPenetration, 0);
   double highest = 0;
   for (const double height : ledges) {
-    const double feet = run.feet("of" + std::to_string(height)).y();
+    const double feet = run.getFeet("of" + std::to_string(height)).y();
     if (feet < 0.5 * height) continue;
     EXPECT_NEAR(feet, height, 2 * settings.contactOffset);
     highest = std::max(highest, height);
@@ -150,17 +150,18 @@ TEST(World, StepsAreClimbedWhateverSlopeIs) {
 }
 
 TEST(World, ASkirtingBoardIsNoStep) {
-  WorldFixture run(
-      {floorBox(), {"skirting", {1.98, 0, -3}, {2, 0.1, 3}}, {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  WorldFixture run({makeFloorBox(),
+                    {"skirting", {1.98, 0, -3}, {2, 0.1, 3}},
+                    {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.order("ann", to(5, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(5, 0));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
-  EXPECT_LT(run.feet("ann").y(), 0.001);
+  EXPECT_LT(run.getFeet("ann").y(), 0.001);
 }
 
-std::vector<NamedBox> stair(double riser, double tread, int steps) {
-  std::vector<NamedBox> boxes{floorBox()};
+std::vector<NamedBox> makeStair(double riser, double tread, int steps) {
+  std::vector<NamedBox> boxes{makeFloorBox()};
   for (int i = 0; i < steps; ++i)
     boxes.push_back({"step" + std::to_string(i + 1),
                      {tread * i, -0.1, -1},
@@ -170,61 +171,61 @@ std::vector<NamedBox> stair(double riser, double tread, int steps) {
 
 TEST(World, AStairIsWalkedUpAndDown) {
   for (const auto& [riser, tread] : {std::pair{0.17, 0.29}, {0.2, 0.2}, {0.1, 0.4}, {0.28, 0.25}}) {
-    WorldFixture run(stair(riser, tread, 12));
+    WorldFixture run(makeStair(riser, tread, 12));
     const double top = 12 * riser, end = 12 * tread + 1;
     run.order("ann", Spawn{{-2, 0, 0}});
-    run.order("ann", to(end, 0, 1.4, top));
-    run.untilIdle();
+    run.order("ann", makeWalkTo(end, 0, 1.4, top));
+    run.waitUntilIdle();
     EXPECT_EQ(run.count(Kind::arrived), 1) << riser;
-    EXPECT_NEAR(run.feet("ann").y(), top, 0.001) << riser;
-    run.order("ann", to(-2, 0));
-    run.untilIdle();
+    EXPECT_NEAR(run.getFeet("ann").y(), top, 0.001) << riser;
+    run.order("ann", makeWalkTo(-2, 0));
+    run.waitUntilIdle();
     EXPECT_EQ(run.count(Kind::arrived), 2) << riser;
-    EXPECT_NEAR(run.feet("ann").y(), 0, 0.001) << riser;
+    EXPECT_NEAR(run.getFeet("ann").y(), 0, 0.001) << riser;
     EXPECT_EQ(run.worstPenetration, 0) << riser;
   }
 }
 
 TEST(World, ALedgeIsFallenFromAndLandedBelow) {
-  WorldFixture run({floorBox(), {"platform", {-3, 0, -3}, {0, 2, 3}}});
+  WorldFixture run({makeFloorBox(), {"platform", {-3, 0, -3}, {0, 2, 3}}});
   run.order("ann", Spawn{{-1, 2, 0}});
-  run.order("ann", to(3, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(3, 0));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::arrived), 1);
-  EXPECT_LT(run.feet("ann").y(), 0.001);
+  EXPECT_LT(run.getFeet("ann").y(), 0.001);
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
 TEST(World, FallingOutOfTheSceneIsLeavingIt) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{9, 0, 0}});
-  run.order("ann", to(30, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(30, 0));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::left), 1);
   EXPECT_TRUE(run.open.empty());
 }
 
 TEST(World, AvatarsBlockEachOtherAndTouch) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{-3, 0, 0}});
   run.order("bob", Spawn{{3, 0, 0}});
-  run.order("ann", to(3, 0));
-  run.order("bob", to(-3, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(3, 0));
+  run.order("bob", makeWalkTo(-3, 0));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 2);
-  EXPECT_GE(run.feet("bob").x() - run.feet("ann").x(), 0.6);
-  EXPECT_LT(run.feet("bob").x() - run.feet("ann").x(), 0.602);
-  EXPECT_TRUE(run.touched("bob"));
+  EXPECT_GE(run.getFeet("bob").x() - run.getFeet("ann").x(), 0.6);
+  EXPECT_LT(run.getFeet("bob").x() - run.getFeet("ann").x(), 0.602);
+  EXPECT_TRUE(run.hasTouched("bob"));
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
 TEST(World, AnAvatarBlockedByAnotherGetsDistanceAndPoint) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{-3, 0, 0}});
   run.order("bob", Spawn{{3, 0, 0}});
-  run.order("ann", to(3, 0));
-  run.order("bob", to(-3, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(3, 0));
+  run.order("bob", makeWalkTo(-3, 0));
+  run.waitUntilIdle();
   int blocked = 0;
   for (const ContactEvent& e : run.events) {
     if (e.kind != ContactEvent::Kind::blocked) continue;
@@ -234,35 +235,35 @@ TEST(World, AnAvatarBlockedByAnotherGetsDistanceAndPoint) {
     EXPECT_GT(e.separation.distance, 0.8 * run.world.settings().contactOffset);
     EXPECT_LT(e.separation.distance, 2 * run.world.settings().contactOffset);
     EXPECT_NEAR(e.separation.pointA.x(),
-                run.feet(findEntityName(run.world, e.a)).x() + 0.3 * towards, 1e-3);
+                run.getFeet(findEntityName(run.world, e.a)).x() + 0.3 * towards, 1e-3);
     EXPECT_NEAR((e.separation.pointB - e.separation.pointA).norm(), e.separation.distance, 1e-12);
   }
   EXPECT_EQ(blocked, 2);
 }
 
 TEST(World, AVerySlowWalkArrives) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.order("ann", to(0.03, 0, 0.001));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(0.03, 0, 0.001));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::arrived), 1);
   EXPECT_EQ(run.count(Kind::blocked), 0);
 }
 
 TEST(World, AWalkToAPlaceOverheadIsBlockedByNothingOfTheLastWalk) {
-  WorldFixture run({floorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
+  WorldFixture run({makeFloorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.order("ann", to(5, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(5, 0));
+  run.waitUntilIdle();
   EXPECT_NE(run.notices.back().obstacle, 0u);
-  run.order("ann", to(run.feet("ann").x(), run.feet("ann").z(), 1.5, 3));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(run.getFeet("ann").x(), run.getFeet("ann").z(), 1.5, 3));
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 2);
   EXPECT_EQ(run.notices.back().obstacle, 0u);
 }
 
 TEST(World, APaneOfNoThicknessIsNotCrossedAtAnySpeed) {
-  Model model = boxModel({floorBox()});
+  Model model = makeBoxModel({makeFloorBox()});
   Mesh pane;
   pane.positions = {{2, 0, -9}, {2, 0, 9}, {2, 3, 9}, {2, 3, -9}};
   pane.indices = {0, 1, 2, 0, 2, 3};
@@ -282,7 +283,7 @@ TEST(World, APaneOfNoThicknessIsNotCrossedAtAnySpeed) {
 TEST(World, ASteepRoofPushesNoAvatarThroughTheAdjacentWall) {
   // A fast fall onto a slope of 60 degrees continues sideways, towards a pane that was not close
   // before.
-  Model model = boxModel({floorBox()});
+  Model model = makeBoxModel({makeFloorBox()});
   Mesh roof;
   roof.positions = {{-1, 2.4F, -3}, {-1, 2.4F, 3}, {0.4F, 0, 3}, {0.4F, 0, -3}};
   roof.indices = {0, 1, 2, 0, 2, 3};
@@ -309,7 +310,7 @@ TEST(World, ARoomOfNoiseIsNeverPenetratedAndEventsBalance) {
   const auto uniform = [&](double low, double high) {
     return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
   };
-  std::vector<NamedBox> boxes{floorBox()};
+  std::vector<NamedBox> boxes{makeFloorBox()};
   for (int i = 0; i < 120; ++i) {
     const double x = uniform(-9, 9), z = uniform(-9, 9), y = uniform(0, 0.6);
     const double w = uniform(0.01, 0.8), h = uniform(0.01, 1.5), d = uniform(0.01, 0.8);
@@ -321,10 +322,10 @@ TEST(World, ARoomOfNoiseIsNeverPenetratedAndEventsBalance) {
     run.order(name, Spawn{{uniform(-8, 8), 3, uniform(-8, 8)}});
     for (int k = 0; k < 6; ++k) {
       const double x = uniform(-9, 9), z = uniform(-9, 9);
-      run.order(name, to(x, z, 2.5));
+      run.order(name, makeWalkTo(x, z, 2.5));
     }
   }
-  run.ticks(1500);
+  run.runTicks(1500);
   EXPECT_EQ(run.worstPenetration, 0);
   EXPECT_GT(run.events.size(), 100u);
   for (const ContactEvent& e : endAllContacts(run.world, ContactEvent::Reason::shutdown))
@@ -333,7 +334,7 @@ TEST(World, ARoomOfNoiseIsNeverPenetratedAndEventsBalance) {
 }
 
 TEST(World, WaitsLooksAndCapturesRunInTheirOrder) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", Look{{0, 1.6, -5}});
   run.order("ann", Capture{"north"});
@@ -358,23 +359,23 @@ TEST(World, WaitsLooksAndCapturesRunInTheirOrder) {
 }
 
 TEST(World, DriveActsAtOnceAndZeroStops) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.untilIdle();
+  run.waitUntilIdle();
   run.order("ann", Drive{{1.2, 0, 0}});
-  run.ticks(60);
-  EXPECT_NEAR(run.feet("ann").x(), 1.2, 1e-9);
+  run.runTicks(60);
+  EXPECT_NEAR(run.getFeet("ann").x(), 1.2, 1e-9);
   run.order("ann", Drive{});
-  run.ticks(10);
-  EXPECT_NEAR(run.feet("ann").x(), 1.2, 1e-9);
+  run.runTicks(10);
+  EXPECT_NEAR(run.getFeet("ann").x(), 1.2, 1e-9);
 }
 
 TEST(World, ADriveOfAnAbsentAvatarIsRefusedAndReportsDroppedOrders) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.order("ann", to(1, 0));
+  run.order("ann", makeWalkTo(1, 0));
   run.order("ann", Drive{{1.2, 0, 0}});
-  run.ticks(10);
+  run.runTicks(10);
   ASSERT_EQ(run.notices.size(), 3u);
   EXPECT_EQ(run.count(Kind::dropped), 2);
   EXPECT_EQ(run.notices[2].kind, Kind::refused);
@@ -383,7 +384,7 @@ TEST(World, ADriveOfAnAbsentAvatarIsRefusedAndReportsDroppedOrders) {
 }
 
 /// Tags of the cancelled orders, in order, each with the reason.
-std::vector<std::uint64_t> droppedTags(const WorldFixture& run, const std::string& by) {
+std::vector<std::uint64_t> listDroppedTags(const WorldFixture& run, const std::string& by) {
   std::vector<std::uint64_t> tags;
   for (const Notice& notice : run.notices) {
     if (notice.kind != Kind::dropped) continue;
@@ -394,54 +395,54 @@ std::vector<std::uint64_t> droppedTags(const WorldFixture& run, const std::strin
 }
 
 TEST(World, OrdersDroppedByADriveAreReportedWithTheirTags) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.untilIdle();
-  submitAvatarCommand(run.world, {"ann", to(3, 0), 7});
+  run.waitUntilIdle();
+  submitAvatarCommand(run.world, {"ann", makeWalkTo(3, 0), 7});
   submitAvatarCommand(run.world, {"ann", Wait{5}, 8});
   submitAvatarCommand(run.world, {"bob", Wait{5}, 9});
-  run.ticks(10);
+  run.runTicks(10);
   run.notices.clear();
   submitAvatarCommand(run.world, {"ann", Drive{{0, 0, 1}}, 10});
-  run.ticks(2);
-  EXPECT_EQ(droppedTags(run, "by a Drive"), (std::vector<std::uint64_t>{7, 8}));
-  EXPECT_EQ(run.notices[0].id, run.view("ann").id);
-  run.ticks(60);
+  run.runTicks(2);
+  EXPECT_EQ(listDroppedTags(run, "by a Drive"), (std::vector<std::uint64_t>{7, 8}));
+  EXPECT_EQ(run.notices[0].id, run.getView("ann").id);
+  run.runTicks(60);
   EXPECT_EQ(run.count(Kind::arrived), 0);
 }
 
 TEST(World, OrdersAfterARefusedSpawnAreReportedAsDropped) {
-  WorldFixture run({floorBox(), {"block", {-1, 0, -1}, {1, 2, 1}}});
+  WorldFixture run({makeFloorBox(), {"block", {-1, 0, -1}, {1, 2, 1}}});
   submitAvatarCommand(run.world, {"ann", Spawn{{0, 0.5, 0}}, 1});
-  submitAvatarCommand(run.world, {"ann", to(3, 0), 2});
+  submitAvatarCommand(run.world, {"ann", makeWalkTo(3, 0), 2});
   submitAvatarCommand(run.world, {"ann", Leave{}, 3});
-  run.ticks(2);
+  run.runTicks(2);
   EXPECT_EQ(run.count(Kind::refused), 1);
-  EXPECT_EQ(droppedTags(run, "by a refused Spawn"), (std::vector<std::uint64_t>{2, 3}));
+  EXPECT_EQ(listDroppedTags(run, "by a refused Spawn"), (std::vector<std::uint64_t>{2, 3}));
 }
 
 TEST(World, TheLastNoticeOfManyDroppedOrdersCountsTheOthers) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.untilIdle();
+  run.waitUntilIdle();
   for (int i = 0; i < 10'500; ++i) run.order("ann", Wait{5});
   run.order("ann", Drive{});
-  run.ticks(1);
+  run.runTicks(1);
   EXPECT_EQ(run.count(Kind::dropped), 10'000);
   EXPECT_EQ(run.notices.back().text, "by a Drive, and 500 more orders");
 }
 
 TEST(World, ARespawnUnderTheSameNameIsAnotherAvatar) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("bob", Spawn{{0.7, 0, 0}});
-  run.order("bob", to(0, 0));
-  run.ticks(30);
-  EXPECT_TRUE(run.touched("ann") || run.touched("bob"));
+  run.order("bob", makeWalkTo(0, 0));
+  run.runTicks(30);
+  EXPECT_TRUE(run.hasTouched("ann") || run.hasTouched("bob"));
   const EntityId before = run.world.snapshot()->avatars[0].id;
   run.order("ann", Leave{});
   run.order("ann", Spawn{{0, 0, 3}});
-  run.untilIdle();
+  run.waitUntilIdle();
   EXPECT_EQ(run.count(Kind::arrived), 1) << "bob still has contacts with the avatar that left";
   ASSERT_EQ(run.world.snapshot()->avatars.size(), 2u);
   EXPECT_GT(run.world.snapshot()->avatars[1].id, before + 1);
@@ -452,15 +453,15 @@ TEST(World, ARespawnUnderTheSameNameIsAnotherAvatar) {
 
 TEST(World, AWorldOfNothingTicksAndRefusesSpawns) {
   WorldFixture run(std::vector<NamedBox>{});
-  run.ticks(3);
+  run.runTicks(3);
   run.order("ann", Spawn{{0, 0, 0}});
-  run.ticks(3);
+  run.runTicks(3);
   EXPECT_EQ(run.count(Kind::refused), 1);
   EXPECT_TRUE(run.world.snapshot()->avatars.empty());
 }
 
 TEST(World, AbsurdCommandsAreRefusedByNameAndChangeNothing) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   const auto why = [&](Order o, const std::string& name = "ann") {
     const auto text = submitAvatarCommand(run.world, {name, std::move(o), 0});
     return text.value_or("taken");
@@ -470,8 +471,8 @@ TEST(World, AbsurdCommandsAreRefusedByNameAndChangeNothing) {
   EXPECT_NE(why(Spawn{{0, 0, 0}, kNaN}).find("facing"), std::string::npos);
   EXPECT_NE(why(Walk{{}, 1}).find("along"), std::string::npos);
   EXPECT_NE(why(Walk{{{0, 0, 0}, {0, 0, INFINITY}}, 1}).find("along[1].z"), std::string::npos);
-  EXPECT_NE(why(to(1, 1, 0)).find("speed"), std::string::npos);
-  EXPECT_NE(why(to(1, 1, 1e6)).find("speed"), std::string::npos);
+  EXPECT_NE(why(makeWalkTo(1, 1, 0)).find("speed"), std::string::npos);
+  EXPECT_NE(why(makeWalkTo(1, 1, 1e6)).find("speed"), std::string::npos);
   EXPECT_NE(why(Wait{-1}).find("seconds"), std::string::npos);
   EXPECT_NE(why(Capture{"../../etc"}).find("as"), std::string::npos);
   EXPECT_NE(why(Drive{{kNaN, 0, 0}}).find("velocity.x"), std::string::npos);
@@ -481,8 +482,8 @@ TEST(World, AbsurdCommandsAreRefusedByNameAndChangeNothing) {
 }
 
 TEST(World, OrdersForAnAbsentAvatarAreRefusedWhenReached) {
-  WorldFixture run({floorBox()});
-  run.order("ghost", to(1, 1));
+  WorldFixture run({makeFloorBox()});
+  run.order("ghost", makeWalkTo(1, 1));
   run.order("ghost", Drive{{1, 0, 0}});
   run.step();
   EXPECT_GE(run.count(Kind::refused), 1);
@@ -490,12 +491,12 @@ TEST(World, OrdersForAnAbsentAvatarAreRefusedWhenReached) {
 
 TEST(World, TheSameCommandsGiveTheSameHashAndOthersDoNot) {
   const auto computeHash = [](double speed) {
-    WorldFixture run(stair(0.17, 0.29, 8));
+    WorldFixture run(makeStair(0.17, 0.29, 8));
     run.order("ann", Spawn{{-2, 0, 0}, 33});
     run.order("bob", Spawn{{-2, 0, 1.5}, 33});
-    run.order("ann", to(4, 0.2, speed, 1.36));
-    run.order("bob", to(4, 0, speed, 1.36));
-    run.ticks(400);
+    run.order("ann", makeWalkTo(4, 0.2, speed, 1.36));
+    run.order("bob", makeWalkTo(4, 0, speed, 1.36));
+    run.runTicks(400);
     return run.world.snapshot()->stateHash;
   };
   EXPECT_EQ(computeHash(1.5), computeHash(1.5));
@@ -503,10 +504,10 @@ TEST(World, TheSameCommandsGiveTheSameHashAndOthersDoNot) {
 }
 
 TEST(World, ARestingAvatarCostsNoQueries) {
-  WorldFixture run({floorBox()});
+  WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.untilIdle();
-  run.ticks(3);
+  run.waitUntilIdle();
+  run.runTicks(3);
   EXPECT_EQ(run.step().narrowQueries, 0u);
   EXPECT_EQ(run.step().activeContacts, 1u);
 }
@@ -514,27 +515,27 @@ TEST(World, ARestingAvatarCostsNoQueries) {
 TEST(World, NearMissesAreReportedOncePerApproach) {
   WorldSettings settings;
   settings.nearMissDistance = 0.05;
-  WorldFixture run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, settings);
+  WorldFixture run({makeFloorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, settings);
   run.order("ann", Spawn{{-2, 0, 0}});
-  run.order("ann", to(2, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(2, 0));
+  run.waitUntilIdle();
   const auto nears = std::count_if(run.events.begin(), run.events.end(), [&](const auto& e) {
     return e.kind == ContactEvent::Kind::nearMiss && e.phase == ContactEvent::Phase::begin &&
            findEntityName(run.world, e.b) == "post";
   });
   EXPECT_EQ(nears, 1);
-  EXPECT_FALSE(run.touched("post"));
+  EXPECT_FALSE(run.hasTouched("post"));
 }
 
 TEST(World, ANearMissEndsWithItsMinimumWhenTheAvatarLeaves) {
   WorldSettings settings;
   settings.nearMissDistance = 0.05;
-  WorldFixture run({floorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, settings);
+  WorldFixture run({makeFloorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, settings);
   run.order("ann", Spawn{{-2, 0, 0}});
-  run.order("ann", to(0, 0));
-  run.untilIdle();
+  run.order("ann", makeWalkTo(0, 0));
+  run.waitUntilIdle();
   run.order("ann", Leave{});
-  run.ticks(2);
+  run.runTicks(2);
   std::vector<ContactEvent> nears;
   for (const ContactEvent& e : run.events)
     if (e.kind == ContactEvent::Kind::nearMiss && e.b == 2) nears.push_back(e);

@@ -15,7 +15,7 @@ namespace {
 const std::string kLooker = "looker-0123456789", kDriver = "driver-0123456789",
                   kAdmin = "keeper-0123456789";
 
-Access threeTokens() {
+Access makeThreeTokens() {
   Access access;
   access.tokens = {{Role::observe, kLooker}, {Role::drive, kDriver}, {Role::admin, kAdmin}};
   return access;
@@ -36,7 +36,7 @@ TEST(Access, WithoutTokensEveryoneIsAdmin) {
 }
 
 TEST(Access, OnlyACompleteTokenIsAccepted) {
-  const Access access = threeTokens();
+  const Access access = makeThreeTokens();
   EXPECT_EQ(findRole(access, kDriver), Role::drive);
   for (const std::string& wrong : {std::string(), kDriver.substr(1), kDriver + "0",
                                    std::string(kDriver.size(), 'x'), kDriver + kDriver}) {
@@ -60,7 +60,7 @@ TEST(Access, BrowsersMayComeOnlyFromPagesThatAreKnown) {
 }
 
 TEST(Access, ATokenFileIsReadOrItsLineNamed) {
-  const auto file = tests::ownFile("tokens");
+  const auto file = tests::makeOwnFile("tokens");
   const auto write = [&](const std::string& text) { std::ofstream(file) << text; };
   write("# observer\nobserve " + kLooker + "\n\nadmin " + kAdmin + "\n");
   EXPECT_EQ(readTokens(file).size(), 2u);
@@ -75,17 +75,17 @@ TEST(Access, ATokenFileIsReadOrItsLineNamed) {
 
 class Roles : public ServedRoom {
  protected:
-  void SetUp() override { serve({}, smallRoom(), threeTokens()); }
+  void SetUp() override { serve({}, makeSmallRoom(), makeThreeTokens()); }
 };
 
 TEST_F(Roles, AWrongOrMissingTokenIsRefused) {
-  EXPECT_EQ(catchCode([&] { client("none"); }), v1::ERROR_UNAUTHENTICATED);
-  EXPECT_EQ(catchCode([&] { client("wrong", kAdmin + "x"); }), v1::ERROR_UNAUTHENTICATED);
-  EXPECT_EQ(client("right", kLooker).welcome().role(), v1::ROLE_OBSERVE);
+  EXPECT_EQ(catchCode([&] { makeClient("none"); }), v1::ERROR_UNAUTHENTICATED);
+  EXPECT_EQ(catchCode([&] { makeClient("wrong", kAdmin + "x"); }), v1::ERROR_UNAUTHENTICATED);
+  EXPECT_EQ(makeClient("right", kLooker).welcome().role(), v1::ROLE_OBSERVE);
 }
 
 TEST_F(Roles, EachRoleHasItsPermissions) {
-  protocol::Client looker = client("looker", kLooker), driver = client("driver", kDriver);
+  protocol::Client looker = makeClient("looker", kLooker), driver = makeClient("driver", kDriver);
   v1::ClientMessage restart;
   restart.mutable_restart();
   EXPECT_EQ(catchCode([&] { looker.step(); }), v1::ERROR_NOT_ALLOWED);
@@ -94,13 +94,13 @@ TEST_F(Roles, EachRoleHasItsPermissions) {
   EXPECT_EQ(driver.step().tick(), 1u);
   EXPECT_EQ(catchCode([&] { looker.request(restart); }), v1::ERROR_NOT_ALLOWED);
   EXPECT_EQ(driver.request(restart).restart().tick(), 0u);
-  protocol::Client admin = client("admin", kAdmin);
+  protocol::Client admin = makeClient("admin", kAdmin);
   EXPECT_FALSE(admin.command(spawn("a", 0, 0, 0)));
   EXPECT_EQ(catchCode([&] { driver.request(restart); }), v1::ERROR_NOT_ALLOWED) << "admin's avatar";
 }
 
 TEST_F(Roles, TheAdminRestartsTheWorld) {
-  protocol::Client admin = client("admin", kAdmin);
+  protocol::Client admin = makeClient("admin", kAdmin);
   const std::uint64_t first = admin.step().state_hash();
   admin.command(spawn("a", 0, 0.01, 0));
   admin.step(10);
@@ -129,13 +129,13 @@ TEST_F(Roles, PagesWantATokenTooButHealthDoesNot) {
 TEST(Listening, APublicAddressRequiresATokenAndInsecure) {
   const HostPort everywhere{"0.0.0.0", 0};
   Access access;
-  EXPECT_THROW(Server(smallRoom(), everywhere), ServerError);
+  EXPECT_THROW(Server(makeSmallRoom(), everywhere), ServerError);
   access.insecure = true;
-  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, {}, access, {}, {}}), ServerError);
-  access = threeTokens();
-  EXPECT_THROW(Server(smallRoom(), everywhere, {{}, {}, access, {}, {}}), ServerError);
+  EXPECT_THROW(Server(makeSmallRoom(), everywhere, {{}, {}, access, {}, {}}), ServerError);
+  access = makeThreeTokens();
+  EXPECT_THROW(Server(makeSmallRoom(), everywhere, {{}, {}, access, {}, {}}), ServerError);
   access.insecure = true;
-  EXPECT_GT(Server(smallRoom(), everywhere, {{}, {}, access, {}, {}}).port(), 0);
+  EXPECT_GT(Server(makeSmallRoom(), everywhere, {{}, {}, access, {}, {}}).port(), 0);
 }
 
 }  // namespace

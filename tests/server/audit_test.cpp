@@ -23,7 +23,7 @@ class Log {
   ~Log() { spdlog::set_default_logger(before_); }
   Log(const Log&) = delete;
   Log& operator=(const Log&) = delete;
-  std::string text() const { return text_.str(); }
+  std::string getText() const { return text_.str(); }
 
  private:
   std::shared_ptr<spdlog::logger> before_;
@@ -66,7 +66,7 @@ TEST(AuditOption, IsAWholeNumberOfTicksAndOffWithoutIt) {
 }
 
 TEST(AuditOfAWalk, AMissedPairIsCountedLoggedAndAViolation) {
-  scene::World blind(smallRoom());
+  scene::World blind(makeSmallRoom());
   withholdTheWall(blind);
   scene::setAuditInterval(blind, 2);
   RecordableWorld world(std::move(blind));
@@ -74,7 +74,7 @@ TEST(AuditOfAWalk, AMissedPairIsCountedLoggedAndAViolation) {
   const Log log;
   ASSERT_FALSE(driver.submit(spawn("ann", 4.8, 0.01, 0)));
   driver.step();
-  EXPECT_EQ(log.text(), "") << "the first tick is not audited";
+  EXPECT_EQ(log.getText(), "") << "the first tick is not audited";
   driver.step();
   const v1::Audit audit = driver.metrics().audit();
   EXPECT_EQ(audit.ticks(), 1u);
@@ -83,13 +83,13 @@ TEST(AuditOfAWalk, AMissedPairIsCountedLoggedAndAViolation) {
   EXPECT_EQ(audit.extra(), 0u);
   EXPECT_GT(audit.timing().max_us(), 0);
   for (const char* word : {"error", "tick 2", "missed", "'ann'", "'room_wall'", "(5, 0, -4)"}) {
-    EXPECT_NE(log.text().find(word), std::string::npos) << word << " in " << log.text();
+    EXPECT_NE(log.getText().find(word), std::string::npos) << word << " in " << log.getText();
   }
   EXPECT_EQ(computeExitCode({}, driver.metrics(), false), ExitCode::violations);
 }
 
 TEST(AuditOfAWalk, ManyFindingsOfATickAreCountedAndTheFirstLogged) {
-  scene::World world(smallRoom());
+  scene::World world(makeSmallRoom());
   scene::TickReport report;
   report.snapshot = world.snapshot();
   report.audit.emplace();
@@ -100,7 +100,7 @@ TEST(AuditOfAWalk, ManyFindingsOfATickAreCountedAndTheFirstLogged) {
   EXPECT_FALSE(totals.isClean());
   const Log log;
   logFindings(world, report);
-  EXPECT_NE(log.text().find("12 more"), std::string::npos) << log.text();
+  EXPECT_NE(log.getText().find("12 more"), std::string::npos) << log.getText();
 }
 
 TEST(AuditOfAWalk, ACorrectTickIsNoViolation) {
@@ -117,10 +117,10 @@ class AuditedServer : public ServedRoom {};
 TEST_F(AuditedServer, ReportsItsAuditInTheMetricsAndAtItsEnd) {
   ServerOptions options;
   options.world.auditEvery = 5;
-  server_ = std::make_unique<Server>(smallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
+  server_ = std::make_unique<Server>(makeSmallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   v1::Audit audit;
   {
-    protocol::Client ann = client("ann");
+    protocol::Client ann = makeClient("ann");
     ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
     ASSERT_FALSE(ann.command(walkTo("ann", 8, 0, 0)));
     ann.step(60);
@@ -138,7 +138,7 @@ TEST_F(AuditedServer, ReportsItsAuditInTheMetricsAndAtItsEnd) {
 
 TEST_F(AuditedServer, ReportsNoAuditByDefault) {
   serve();
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ann.step(10);
   EXPECT_FALSE(ann.metrics().has_audit());
 }

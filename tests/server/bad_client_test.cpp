@@ -13,13 +13,13 @@ class BadClients : public ServedRoom {
   /// The server still serves: an existing client continues, and a new one may connect.
   void expectOthersGoOn(protocol::Client& other) {
     const std::uint64_t tick = other.step().tick();
-    EXPECT_EQ(client("newcomer").welcome().tick(), tick);
+    EXPECT_EQ(makeClient("newcomer").welcome().tick(), tick);
   }
 };
 
 TEST_F(BadClients, WrongMagicIsAnsweredWithAnError) {
   serve();
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   RawConnection raw(server_->port());
   raw.send("EHLO there\r\n");
   const RawConnection::End end = raw.readToEnd();
@@ -30,7 +30,7 @@ TEST_F(BadClients, WrongMagicIsAnsweredWithAnError) {
 
 TEST_F(BadClients, AnOversizedMessageIsRefusedByItsLengthAlone) {
   serve();
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   RawConnection raw(server_->port());
   raw.sendHello();
   raw.send(std::vector<std::uint8_t>{0xFF, 0xFF, 0xFF, 0x7F, 0, 0, 0, 0});
@@ -40,7 +40,7 @@ TEST_F(BadClients, AnOversizedMessageIsRefusedByItsLengthAlone) {
 
 TEST_F(BadClients, BytesThatAreNoMessageAreRefused) {
   serve();
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   RawConnection raw(server_->port());
   raw.sendHello();
   raw.send(std::vector<std::uint8_t>{8, 0, 0, 0, 4, 0, 0, 0, 0xFF, 0xFF, 0xFF, 0xFF});
@@ -60,7 +60,7 @@ TEST_F(BadClients, TheFirstMessageHasToBeHello) {
   ASSERT_TRUE(error);
   EXPECT_EQ(error->reply_to(), 7u);
   EXPECT_EQ(error->error().code(), v1::ERROR_BAD_MESSAGE);
-  EXPECT_EQ(client("other").step().tick(), 1u) << "no tick was made";
+  EXPECT_EQ(makeClient("other").step().tick(), 1u) << "no tick was made";
 }
 
 TEST_F(BadClients, ARequestNeedsANumberForItsAnswer) {
@@ -72,7 +72,7 @@ TEST_F(BadClients, ARequestNeedsANumberForItsAnswer) {
   step.mutable_step()->set_ticks(1);
   raw.send(step);
   EXPECT_EQ(raw.readToEnd().error.code(), v1::ERROR_BAD_MESSAGE);
-  EXPECT_EQ(client("other").step().tick(), 1u) << "no tick was made";
+  EXPECT_EQ(makeClient("other").step().tick(), 1u) << "no tick was made";
 }
 
 TEST_F(BadClients, AnotherMajorVersionIsRefused) {
@@ -89,7 +89,7 @@ TEST_F(BadClients, AnotherMajorVersionIsRefused) {
 
 TEST_F(BadClients, AMessageCutShortByClosingAffectsNoOtherClient) {
   serve();
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   {
     RawConnection raw(server_->port());
     raw.sendHello();
@@ -123,7 +123,7 @@ TEST_F(BadClients, SilenceBetweenMessagesIsNoFault) {
   ServerLimits limits;
   limits.helloTimeout = limits.messageTimeout = std::chrono::milliseconds(30);
   serve(limits);
-  protocol::Client quiet = client("quiet");
+  protocol::Client quiet = makeClient("quiet");
   std::this_thread::sleep_for(std::chrono::milliseconds(120));
   EXPECT_EQ(quiet.step().tick(), 1u);
 }
@@ -134,7 +134,7 @@ TEST_F(BadClients, AClientThatDoesNotReadIsDisconnectedAlone) {
   limits.sendBuffer = 4096;
   limits.closeTimeout = std::chrono::milliseconds(200);
   serve(limits);
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   RawConnection raw(server_->port());
   raw.sendHello();
   v1::ClientMessage question;
@@ -156,7 +156,7 @@ TEST_F(BadClients, AClientThatFloodsIsThrottledAndGetsAllReplies) {
   ServerLimits limits;
   limits.pendingRequestBytes = 100;
   serve(limits);
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   RawConnection raw(server_->port());
   raw.sendHello();
   ASSERT_TRUE(raw.receive()->has_welcome());
@@ -224,9 +224,9 @@ TEST_F(BadClients, ASilentConnectionIsEvictedForANewOne) {
   ServerLimits limits;
   limits.connections = 3;
   serve(limits);
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   RawConnection first(server_->port()), second(server_->port());
-  protocol::Client bob = client("bob");
+  protocol::Client bob = makeClient("bob");
   EXPECT_FALSE(first.receive()) << "closed as the oldest silent connection";
   second.sendHello();
   EXPECT_TRUE(second.receive()->has_welcome()) << "there was no need to close this one";
@@ -239,7 +239,7 @@ TEST_F(BadClients, ConnectionsAboveTheLimitAreRefused) {
   ServerLimits limits;
   limits.connections = 2;
   serve(limits);
-  protocol::Client ann = client("ann"), bob = client("bob");
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
   RawConnection third(server_->port());
   EXPECT_EQ(third.readToEnd().bye.code(), v1::ERROR_NOT_ALLOWED);
   EXPECT_EQ(ann.step().tick(), 1u);
@@ -247,7 +247,7 @@ TEST_F(BadClients, ConnectionsAboveTheLimitAreRefused) {
 
 TEST_F(BadClients, ManyVisitsOfNoiseLeaveTheServerServing) {
   serve();
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   std::uint32_t seed = 12345;
   for (int visit = 0; visit < 50; ++visit) {
     RawConnection raw(server_->port());
@@ -267,14 +267,14 @@ TEST_F(BadClients, AWorldHasRoomForSoManyAvatars) {
   limits.avatars = 2;
   limits.waypoints = 2;
   serve(limits);
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   EXPECT_FALSE(ann.command(spawn("a", 0, 0.01, 0)));
   EXPECT_FALSE(ann.command(spawn("b", 2, 0.01, 0)));
   EXPECT_EQ(ann.command(spawn("c", 4, 0.01, 0))->code(), v1::ERROR_TOO_LARGE);
   v1::Command walk = walkTo("a", 1, 0, 0);
-  *walk.mutable_walk()->add_along() = vec(2, 0, 0);
+  *walk.mutable_walk()->add_along() = makeVec(2, 0, 0);
   EXPECT_FALSE(ann.command(walk));
-  *walk.mutable_walk()->add_along() = vec(3, 0, 0);
+  *walk.mutable_walk()->add_along() = makeVec(3, 0, 0);
   EXPECT_EQ(ann.command(walk)->code(), v1::ERROR_TOO_LARGE);
 }
 

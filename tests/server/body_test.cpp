@@ -11,10 +11,10 @@ namespace {
 
 class ServedBodies : public ServedRoom {
  protected:
-  void SetUp() override { serve({}, bodyRoom()); }
+  void SetUp() override { serve({}, makeBodyRoom()); }
 };
 
-v1::BodyCommand opening(const std::string& body) {
+v1::BodyCommand makeOpening(const std::string& body) {
   v1::BodyCommand command;
   command.set_body(body);
   command.mutable_open();
@@ -40,7 +40,7 @@ std::optional<v1::BodyState> findState(const std::deque<v1::ServerMessage>& mess
 }
 
 TEST_F(ServedBodies, WelcomeListsTheBodies) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const auto& bodies = ann.welcome().scene().bodies();
   ASSERT_EQ(bodies.size(), 3);
   EXPECT_EQ(bodies[0].name(), "door");
@@ -52,9 +52,9 @@ TEST_F(ServedBodies, WelcomeListsTheBodies) {
 }
 
 TEST_F(ServedBodies, AnUnknownBodyIsRefusedWithTheNearestOne) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const auto refuse = [&](const std::string& name) {
-    const auto refused = ann.bodyCommand(opening(name));
+    const auto refused = ann.bodyCommand(makeOpening(name));
     return refused ? refused->message() : "accepted";
   };
   EXPECT_EQ(refuse("dor"), "body: no body named 'dor'; did you mean 'door'?");
@@ -70,11 +70,11 @@ TEST_F(ServedBodies, AnUnknownBodyIsRefusedWithTheNearestOne) {
 }
 
 TEST_F(ServedBodies, AnOpeningDoorPushesAnAvatarAndReportsIt) {
-  protocol::Client ann = client("ann"), guest = client("guest");
-  guest.subscribe(everything());
+  protocol::Client ann = makeClient("ann"), guest = makeClient("guest");
+  guest.subscribe(makeFullSubscription());
   ASSERT_FALSE(ann.command(spawn("ann", 2.6, 0.001, 0.2)));
   ann.step(10);
-  ASSERT_FALSE(guest.bodyCommand(opening("door"))) << "a door has no owner";
+  ASSERT_FALSE(guest.bodyCommand(makeOpening("door"))) << "a door has no owner";
   ann.step(90);
   guest.metrics();  // all events of the steps arrive before its reply
   const auto messages = guest.takeEvents();
@@ -91,9 +91,9 @@ TEST_F(ServedBodies, AnOpeningDoorPushesAnAvatarAndReportsIt) {
 }
 
 TEST_F(ServedBodies, AnAvatarWithoutRoomBlocksTheDoorAndIsReported) {
-  scene::Model model = bodyRoomModel();
+  scene::Model model = makeBodyRoomModel();
   const auto add = [&](const char* path, const scene::Vec3& min, const scene::Vec3& max) {
-    model.meshes.push_back(scene::testing::boxMesh(min, max));
+    model.meshes.push_back(scene::testing::buildBoxMesh(min, max));
     model.objects.push_back({path,
                              "",
                              {static_cast<std::uint32_t>(model.meshes.size() - 1)},
@@ -103,11 +103,11 @@ TEST_F(ServedBodies, AnAvatarWithoutRoomBlocksTheDoorAndIsReported) {
   add("left stop", {2.3, 0, -0.4}, {2.75, 3, -0.25});
   add("right stop", {2.3, 0, 0.45}, {2.75, 3, 0.6});
   serve({}, std::make_shared<const scene::Scene>(model));
-  protocol::Client ann = client("ann");
-  ann.subscribe(everything());
+  protocol::Client ann = makeClient("ann");
+  ann.subscribe(makeFullSubscription());
   ASSERT_FALSE(ann.command(spawn("ann", 2.43, 0.001, 0.1)));
   ann.step(10);
-  ASSERT_FALSE(ann.bodyCommand(opening("door")));
+  ASSERT_FALSE(ann.bodyCommand(makeOpening("door")));
   ann.step(120);
   ann.metrics();
   const auto messages = ann.takeEvents();
@@ -125,7 +125,7 @@ TEST_F(ServedBodies, AnAvatarWithoutRoomBlocksTheDoorAndIsReported) {
 }
 
 TEST_F(ServedBodies, AnAvatarThroughATriggerEntersAndLeavesIt) {
-  protocol::Client ann = client("ann"), guest = client("guest");
+  protocol::Client ann = makeClient("ann"), guest = makeClient("guest");
   v1::Subscribe contacts;
   contacts.set_contacts(true);
   guest.subscribe(contacts);
@@ -147,8 +147,8 @@ TEST_F(ServedBodies, AnAvatarThroughATriggerEntersAndLeavesIt) {
 }
 
 TEST_F(ServedBodies, ABodyThatFallsOutOfTheWorldIsReportedOnce) {
-  protocol::Client ann = client("ann");
-  ann.subscribe(everything());
+  protocol::Client ann = makeClient("ann");
+  ann.subscribe(makeFullSubscription());
   for (int i = 0; i < 4; ++i) ann.step(150);
   ann.metrics();
   ReceivedEvents received;
@@ -162,12 +162,12 @@ TEST_F(ServedBodies, ABodyThatFallsOutOfTheWorldIsReportedOnce) {
 
 TEST_F(ServedBodies, APictureShowsTheDoorWhereItIs) {
   ENFILADE_NEED_PICTURES(*server_);
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const auto idsNow = [&] {
     v1::FrameRequest request;
     v1::FreeCamera& camera = *request.mutable_free();
-    *camera.mutable_eye() = vec(-1, 1.5, 0);
-    *camera.mutable_forward() = vec(1, 0, 0);
+    *camera.mutable_eye() = makeVec(-1, 1.5, 0);
+    *camera.mutable_forward() = makeVec(1, 0, 0);
     request.set_width(64);
     request.set_height(64);
     request.add_channels(v1::CHANNEL_IDS);
@@ -186,7 +186,7 @@ TEST_F(ServedBodies, APictureShowsTheDoorWhereItIs) {
   EXPECT_EQ(shut.at(middle), kLeaf);
   EXPECT_EQ(countPixels(shut, kEnd), 0) << "nothing is visible behind the door";
   EXPECT_EQ(countPixels(shut, kZone), 0) << "volumes are not drawn";
-  ASSERT_FALSE(ann.bodyCommand(opening("door")));
+  ASSERT_FALSE(ann.bodyCommand(makeOpening("door")));
   ann.step(90);
   const auto open = idsNow();
   EXPECT_EQ(open.at(middle), kEnd);
@@ -195,14 +195,14 @@ TEST_F(ServedBodies, APictureShowsTheDoorWhereItIs) {
 }
 
 TEST_F(ServedBodies, ARayGoesThroughTheDoorWhenItIsOpen) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   v1::RayQuery query;
-  *query.add_rays()->mutable_origin() = vec(-1, 1.5, 0.1);
-  *query.mutable_rays(0)->mutable_direction() = vec(1, 0, 0);
+  *query.add_rays()->mutable_origin() = makeVec(-1, 1.5, 0.1);
+  *query.mutable_rays(0)->mutable_direction() = makeVec(1, 0, 0);
   ann.step(1);
   EXPECT_EQ(ann.rays(query).hits(0).entity(), kLeaf);
   EXPECT_NEAR(ann.rays(query).hits(0).distance(), 3.02, 1e-6);
-  ASSERT_FALSE(ann.bodyCommand(opening("door")));
+  ASSERT_FALSE(ann.bodyCommand(makeOpening("door")));
   ann.step(90);
   EXPECT_EQ(ann.rays(query).hits(0).entity(), kEnd);
 }

@@ -15,7 +15,7 @@ constexpr double kFps = 10;
 
 /// The error message; "" if parsing succeeds.
 template <class Parse>
-std::string saidBy(const Parse& parse) {
+std::string catchPathError(const Parse& parse) {
   try {
     parse();
   } catch (const CameraPathError& error) {
@@ -24,11 +24,11 @@ std::string saidBy(const Parse& parse) {
   return "";
 }
 
-std::string saidOfTum(const std::string& text) {
-  return saidBy([&] { parseTumPath(text, "path.txt", CameraAxes::opengl); });
+std::string catchTumError(const std::string& text) {
+  return catchPathError([&] { parseTumPath(text, "path.txt", CameraAxes::opengl); });
 }
-std::string saidOfJson(const std::string& text) {
-  return saidBy([&] { parseJsonPath(text, "path.json", CameraAxes::opengl, kFps); });
+std::string catchJsonError(const std::string& text) {
+  return catchPathError([&] { parseJsonPath(text, "path.json", CameraAxes::opengl, kFps); });
 }
 
 bool holds(const std::string& text, const std::string& part) {
@@ -37,7 +37,7 @@ bool holds(const std::string& text, const std::string& part) {
 
 TEST(JsonPath, DeeplyNestedBracketsAreAnError) {
   const std::string nest = std::string(200'000, '[') + std::string(200'000, ']');
-  EXPECT_TRUE(holds(saidOfJson(R"({"frames":[)" + nest + "]}"), "a too deeply nested value"));
+  EXPECT_TRUE(holds(catchJsonError(R"({"frames":[)" + nest + "]}"), "a too deeply nested value"));
 }
 
 TEST(TumPath, LinesAreTimePlaceAndRotation) {
@@ -62,17 +62,18 @@ TEST(TumPath, OpenCvsCameraLooksAlongItsOwnZWithYDown) {
 
 TEST(TumPath, WrongLinesAreReportedWithFileLineAndValue) {
   const std::string good = "0 0 0 0 0 0 0 1\n";
-  EXPECT_TRUE(holds(saidOfTum(good + "\n1 0 0 x 0 0 0 1"), "path.txt:3: 'x'"));
-  EXPECT_TRUE(holds(saidOfTum(good + "1 0 0 nan 0 0 0 1"), "path.txt:2: 'nan'"));
-  EXPECT_TRUE(holds(saidOfTum(good + "1 0 0 inf 0 0 0 1"), "path.txt:2: 'inf'"));
-  EXPECT_TRUE(holds(saidOfTum(good + "1 0 0 0 0 0 1"), "path.txt:2: 7 numbers"));
-  EXPECT_TRUE(holds(saidOfTum(good + "1 0 0 0 0 0 0 1 9"), "path.txt:2: more than eight"));
-  EXPECT_TRUE(holds(saidOfTum(good + "1 0 0 0 0 0 0 0"), "path.txt:2: the quaternion's length"));
-  EXPECT_TRUE(holds(saidOfTum(good + "0 0 0 0 0 0 0 1"), "path.txt:2: time"));
-  EXPECT_TRUE(holds(saidOfTum(good + "1 2e9 0 0 0 0 0 1"), "path.txt:2: the position"));
-  EXPECT_TRUE(holds(saidOfTum("# nothing\n\n"), "path.txt: contains no pose"));
+  EXPECT_TRUE(holds(catchTumError(good + "\n1 0 0 x 0 0 0 1"), "path.txt:3: 'x'"));
+  EXPECT_TRUE(holds(catchTumError(good + "1 0 0 nan 0 0 0 1"), "path.txt:2: 'nan'"));
+  EXPECT_TRUE(holds(catchTumError(good + "1 0 0 inf 0 0 0 1"), "path.txt:2: 'inf'"));
+  EXPECT_TRUE(holds(catchTumError(good + "1 0 0 0 0 0 1"), "path.txt:2: 7 numbers"));
+  EXPECT_TRUE(holds(catchTumError(good + "1 0 0 0 0 0 0 1 9"), "path.txt:2: more than eight"));
   EXPECT_TRUE(
-      holds(saidOfTum("#t [ns],p,q\n1403636579763555584,1,2,3,1,0,0,0"), "path.txt:2: commas"));
+      holds(catchTumError(good + "1 0 0 0 0 0 0 0"), "path.txt:2: the quaternion's length"));
+  EXPECT_TRUE(holds(catchTumError(good + "0 0 0 0 0 0 0 1"), "path.txt:2: time"));
+  EXPECT_TRUE(holds(catchTumError(good + "1 2e9 0 0 0 0 0 1"), "path.txt:2: the position"));
+  EXPECT_TRUE(holds(catchTumError("# nothing\n\n"), "path.txt: contains no pose"));
+  EXPECT_TRUE(
+      holds(catchTumError("#t [ns],p,q\n1403636579763555584,1,2,3,1,0,0,0"), "path.txt:2: commas"));
 }
 
 TEST(Quaternions, ComeBackFromTheirRotation) {
@@ -137,31 +138,34 @@ TEST(JsonPath, BlendersAngleIsTheOpeningFromSideToSide) {
   EXPECT_NEAR(sized.lens->pinhole.fx, 46.7742, 1e-4);  // 32 / tan 0.6
   EXPECT_EQ(sized.lens->pinhole.fy, sized.lens->pinhole.fx);
   EXPECT_EQ(sized.lens->pinhole.cy, 24);
-  EXPECT_TRUE(holds(saidOfJson(R"({"camera_angle_x":3.2,)" + frames), "between 0 and pi"));
+  EXPECT_TRUE(holds(catchJsonError(R"({"camera_angle_x":3.2,)" + frames), "between 0 and pi"));
 }
 
 TEST(JsonPath, ErrorsAreReportedWithTheirPlace) {
-  EXPECT_TRUE(holds(saidOfJson("{"), "path.json: byte"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,1e999],"look_at":[1,0,0]}])"),
+  EXPECT_TRUE(holds(catchJsonError("{"), "path.json: byte"));
+  EXPECT_TRUE(holds(catchJsonError(R"([{"eye":[0,0,1e999],"look_at":[1,0,0]}])"),
                     "path.json: a number exceeds the range of a double"));
-  EXPECT_TRUE(holds(saidOfJson("{}"), "list of poses"));
-  EXPECT_TRUE(holds(saidOfJson("[]"), "0 poses"));
-  EXPECT_TRUE(holds(saidOfJson("[7]"), "pose[0]: must be an object"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look":[1,0,0]}])"), "\"look\" is not a key"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0],"look_at":[1,0,0]}])"), "pose[0].eye"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,null],"look_at":[1,0,0]}])"), "pose[0].eye[2]"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0]}])"), "has no direction"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look_at":[0,3,0]}])"), "zero or parallel to"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"look_at":[0,0,0]}])"), "zero or parallel to"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"eye":[0,0,0],"quaternion":[0,0,0,2]}])"), "length is 2"));
+  EXPECT_TRUE(holds(catchJsonError("{}"), "list of poses"));
+  EXPECT_TRUE(holds(catchJsonError("[]"), "0 poses"));
+  EXPECT_TRUE(holds(catchJsonError("[7]"), "pose[0]: must be an object"));
   EXPECT_TRUE(
-      holds(saidOfJson(R"({"frames":[{"transform_matrix":[[2,0,0,0],[0,2,0,0],[0,0,2,0]]}]})"),
+      holds(catchJsonError(R"([{"eye":[0,0,0],"look":[1,0,0]}])"), "\"look\" is not a key"));
+  EXPECT_TRUE(holds(catchJsonError(R"([{"eye":[0,0],"look_at":[1,0,0]}])"), "pose[0].eye"));
+  EXPECT_TRUE(holds(catchJsonError(R"([{"eye":[0,0,null],"look_at":[1,0,0]}])"), "pose[0].eye[2]"));
+  EXPECT_TRUE(holds(catchJsonError(R"([{"eye":[0,0,0]}])"), "has no direction"));
+  EXPECT_TRUE(
+      holds(catchJsonError(R"([{"eye":[0,0,0],"look_at":[0,3,0]}])"), "zero or parallel to"));
+  EXPECT_TRUE(
+      holds(catchJsonError(R"([{"eye":[0,0,0],"look_at":[0,0,0]}])"), "zero or parallel to"));
+  EXPECT_TRUE(holds(catchJsonError(R"([{"eye":[0,0,0],"quaternion":[0,0,0,2]}])"), "length is 2"));
+  EXPECT_TRUE(
+      holds(catchJsonError(R"({"frames":[{"transform_matrix":[[2,0,0,0],[0,2,0,0],[0,0,2,0]]}]})"),
             "frames[0].transform_matrix: its left 3x3"));
   EXPECT_TRUE(
-      holds(saidOfJson(R"({"frames":[{"transform_matrix":[[-1,0,0,0],[0,1,0,0],[0,0,1,0]]}]})"),
+      holds(catchJsonError(R"({"frames":[{"transform_matrix":[[-1,0,0,0],[0,1,0,0],[0,0,1,0]]}]})"),
             "is a reflection"));
-  EXPECT_TRUE(holds(saidOfJson(R"({"k1":0.2,"frames":[{}]})"), "distortion"));
-  EXPECT_TRUE(holds(saidOfJson(R"([{"time":1,"eye":[0,0,0],"look_at":[1,0,0]},
+  EXPECT_TRUE(holds(catchJsonError(R"({"k1":0.2,"frames":[{}]})"), "distortion"));
+  EXPECT_TRUE(holds(catchJsonError(R"([{"time":1,"eye":[0,0,0],"look_at":[1,0,0]},
                                    {"time":1,"eye":[0,0,0],"look_at":[1,0,0]}])"),
                     "pose[1].time"));
 }

@@ -55,10 +55,10 @@ inline std::vector<std::string> getNames(const std::map<std::string, std::string
   return names;
 }
 
-inline bool picturesCanBeHad() {
+inline bool canHavePictures() {
   static const bool can = [] {
     try {
-      render::GlRenderer renderer(smallRoom());
+      render::GlRenderer renderer(makeSmallRoom());
       return true;
     } catch (const render::RenderError&) {
       return false;
@@ -69,7 +69,7 @@ inline bool picturesCanBeHad() {
 
 /// A path of `poses` poses along +x from x = 0, 0.2 m apart, at eye height, looking along +x; 30 a
 /// second.
-inline std::string ahead(int poses) {
+inline std::string makePathAhead(int poses) {
   std::ostringstream text;
   for (int i = 0; i < poses; ++i)
     text << i / 30.0 << " " << 0.2 * i << " 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n";
@@ -79,17 +79,17 @@ inline std::string ahead(int poses) {
 class Capture : public ProgramFixture {
  protected:
   void SetUp() override {
-    if (!picturesCanBeHad()) {
+    if (!canHavePictures()) {
       ASSERT_EQ(std::getenv("CI"), nullptr) << "no EGL device: install libegl-mesa0";
       GTEST_SKIP() << "no EGL device: install libegl-mesa0";
     }
     ProgramFixture::SetUp();
   }
 
-  Ended captured(const std::string& pathFile, const std::string& out,
-                 std::vector<std::string> options = {}) const {
-    std::vector<std::string> arguments{"capture", path("room.obj"), path(pathFile), "--out",
-                                       path(out)};
+  Ended runCapture(const std::string& pathFile, const std::string& out,
+                   std::vector<std::string> options = {}) const {
+    std::vector<std::string> arguments{"capture", getPath("room.obj"), getPath(pathFile), "--out",
+                                       getPath(out)};
     if (!film_) options.push_back("--no-mp4");
     if (std::find(options.begin(), options.end(), "--size") == options.end())
       options.insert(options.end(), {"--size", "64x48"});

@@ -12,8 +12,8 @@ namespace enfilade::server::testing {
 namespace {
 
 TEST_F(Capture, FilesFollowTheLayoutAndHoldTheImages) {
-  write(folder_ / "path.txt", ahead(2));
-  const Ended ended = captured("path.txt", "out", {"--fov", "90"});
+  write(folder_ / "path.txt", makePathAhead(2));
+  const Ended ended = runCapture("path.txt", "out", {"--fov", "90"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   EXPECT_EQ(getNames(readTree(folder_ / "out")),
             (std::vector<std::string>{"capture.json", "depth/000000.npy", "depth/000001.npy",
@@ -35,7 +35,7 @@ TEST_F(Capture, FilesFollowTheLayoutAndHoldTheImages) {
 }
 
 TEST(Instances, DescribeAnIfcProductAndItsOperation) {
-  scene::Model model = bodyRoomModel();
+  scene::Model model = makeBodyRoomModel();
   scene::Object& leaf = model.objects[kLeaf - 1];
   leaf.globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
   leaf.ifcClass = "IfcDoor";
@@ -54,7 +54,7 @@ TEST(Instances, DescribeAnIfcProductAndItsOperation) {
 TEST_F(Capture, TransformsSayWhereAPixelLies) {
   write(folder_ / "path.json",
         R"([{"eye":[0,1.6,0],"look_at":[5,1,1]},{"eye":[-2,2.2,-1.5],"look_at":[5,1,0]}])");
-  ASSERT_EQ(captured("path.json", "out", {"--intrinsics", "40,50,30,25"}).code, 0);
+  ASSERT_EQ(runCapture("path.json", "out", {"--intrinsics", "40,50,30,25"}).code, 0);
   const auto file = json::parse(readText(folder_ / "out/transforms.json"));
   struct View {
     Eigen::Matrix4d worldFromCamera;
@@ -105,23 +105,23 @@ TEST_F(Capture, TransformsSayWhereAPixelLies) {
 TEST_F(Capture, AnEmptyFrameIsReportedAndIsAViolationWithStrict) {
   write(folder_ / "path.json",
         R"([{"eye":[0,1.6,0],"look_at":[5,1,0]},{"eye":[1e6,0,0],"look_at":[2e6,0,0]}])");
-  const Ended blind = captured("path.json", "out", {"--every", "3"});
+  const Ended blind = runCapture("path.json", "out", {"--every", "3"});
   EXPECT_EQ(blind.code, 0) << blind.err;
   EXPECT_EQ(json::parse(blind.out).at("blind_frames"), json::array({1}));
   EXPECT_NE(blind.err.find("the first is frame 1"), std::string::npos) << blind.err;
   EXPECT_NE(blind.err.find("--every has no effect"), std::string::npos) << blind.err;
-  EXPECT_EQ(captured("path.json", "strict", {"--strict"}).code, 3);
+  EXPECT_EQ(runCapture("path.json", "strict", {"--strict"}).code, 3);
 }
 
 TEST_F(Capture, AFrameInsideAWallIsReportedByNameAndIsAViolationWithStrict) {
   write(folder_ / "path.txt",
-        ahead(1) + "1 5.1 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n");
-  const Ended run = captured("path.txt", "out");
+        makePathAhead(1) + "1 5.1 1.6 0 0 -0.7071067811865476 0 0.7071067811865476\n");
+  const Ended run = runCapture("path.txt", "out");
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(json::parse(run.out).at("frames_within_solids"), json::array({1}));
   EXPECT_NE(run.err.find("frame 1: its camera is inside \"room_wall\""), std::string::npos)
       << run.err;
-  EXPECT_EQ(captured("path.txt", "strict", {"--strict"}).code, 3);
+  EXPECT_EQ(runCapture("path.txt", "strict", {"--strict"}).code, 3);
 }
 
 TEST_F(Capture, AFailedScriptIsCountedAndIsAViolationWithStrict) {
@@ -129,10 +129,10 @@ TEST_F(Capture, AFailedScriptIsCountedAndIsAViolationWithStrict) {
 {"walk":"bob","to":[1,0,0]}
 {"capture":"ann","as":"here"}
 )");
-  const Ended run = captured("path.jsonl", "out");
+  const Ended run = runCapture("path.jsonl", "out");
   EXPECT_EQ(run.code, 0) << run.err;
   EXPECT_EQ(json::parse(run.out).at("went_wrong"), 1);
-  EXPECT_EQ(captured("path.jsonl", "strict", {"--strict"}).code, 3);
+  EXPECT_EQ(runCapture("path.jsonl", "strict", {"--strict"}).code, 3);
 }
 
 TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
@@ -144,7 +144,7 @@ TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
 {"capture":"ann","as":"second"}
 {"capture":"bob","as":"bobs"}
 )");
-  const Ended ended = captured("walk.jsonl", "out");
+  const Ended ended = runCapture("walk.jsonl", "out");
   ASSERT_EQ(ended.code, 0) << ended.err;
   EXPECT_EQ(json::parse(ended.out).at("frames"), 3);
   const auto instances = json::parse(readText(folder_ / "out/instances.json"));
@@ -164,11 +164,11 @@ TEST_F(Capture, AWalkIsSeenThroughItsAvatarsEyes) {
     EXPECT_EQ(seen(annSees ? ann : bob), 0) << i;
   }
   const Ended every =
-      captured("walk.jsonl", "every",
-               {"--every", "6", "--avatar", "ann", "--channels", "rgb", "--shard", "1/4"});
+      runCapture("walk.jsonl", "every",
+                 {"--every", "6", "--avatar", "ann", "--channels", "rgb", "--shard", "1/4"});
   ASSERT_EQ(every.code, 0) << every.err;
   EXPECT_GT(json::parse(every.out).at("frames"), 9);
-  EXPECT_EQ(captured("walk.jsonl", "unknown", {"--every", "6", "--avatar", "eve"}).code, 1);
+  EXPECT_EQ(runCapture("walk.jsonl", "unknown", {"--every", "6", "--avatar", "eve"}).code, 1);
 }
 
 TEST(LabelName, SaysWhatAPersonWouldSay) {
@@ -200,7 +200,7 @@ TEST_F(Capture, AvatarsAreDrawnAsPeopleOrAsTheirShapes) {
 {"capture":"ann","as":"bob"}
 )");
   const auto pixels = [&](const std::string& avatars) {
-    const Ended ended = captured("walk.jsonl", avatars, {"--avatars", avatars});
+    const Ended ended = runCapture("walk.jsonl", avatars, {"--avatars", avatars});
     EXPECT_EQ(ended.code, 0) << ended.err;
     EXPECT_EQ(json::parse(readText(folder_ / avatars / "capture.json")).at("avatars"), avatars);
     const auto ids = readNpy<std::uint32_t>(folder_ / avatars / "ids/000000.npy").values;
@@ -209,16 +209,16 @@ TEST_F(Capture, AvatarsAreDrawnAsPeopleOrAsTheirShapes) {
   const auto people = pixels("people"), shapes = pixels("shapes");
   EXPECT_GT(people, 50);
   EXPECT_GT(2 * shapes, 3 * people);
-  const Ended other = captured("walk.jsonl", "other", {"--avatars", "ghosts"});
+  const Ended other = runCapture("walk.jsonl", "other", {"--avatars", "ghosts"});
   EXPECT_EQ(other.code, 2);
   EXPECT_NE(other.err.find("--avatars"), std::string::npos) << other.err;
   EXPECT_NE(other.err.find("shapes"), std::string::npos) << other.err;
 }
 
 TEST_F(Capture, SamplesAndShadowsChangeOnlyTheColour) {
-  write(folder_ / "path.txt", ahead(1));
+  write(folder_ / "path.txt", makePathAhead(1));
   const auto manifest = [&](const std::string& out, std::vector<std::string> options) {
-    const Ended ended = captured("path.txt", out, std::move(options));
+    const Ended ended = runCapture("path.txt", out, std::move(options));
     EXPECT_EQ(ended.code, 0) << ended.err;
     return json::parse(readText(folder_ / out / "capture.json"));
   };
@@ -234,7 +234,7 @@ TEST_F(Capture, SamplesAndShadowsChangeOnlyTheColour) {
     for (const char* file : {"ids/000000.npy", "depth/000000.npy"})
       EXPECT_EQ(readText(folder_ / other / file), readText(folder_ / "plain" / file)) << other;
   }
-  const Ended refused = captured("path.txt", "refused", {"--samples", "3"});
+  const Ended refused = runCapture("path.txt", "refused", {"--samples", "3"});
   EXPECT_EQ(refused.code, 2);
   EXPECT_NE(refused.err.find("--samples"), std::string::npos) << refused.err;
   for (const char* allowed : {"1", "4", "16"})
@@ -242,45 +242,45 @@ TEST_F(Capture, SamplesAndShadowsChangeOnlyTheColour) {
 }
 
 TEST_F(Capture, SixteenBitFilesRefuseValuesOutOfRangeByDefault) {
-  write(folder_ / "path.txt", ahead(1));
-  const Ended fits = captured("path.txt", "fits", {"--depth", "png", "--ids", "png"});
+  write(folder_ / "path.txt", makePathAhead(1));
+  const Ended fits = runCapture("path.txt", "fits", {"--depth", "png", "--ids", "png"});
   ASSERT_EQ(fits.code, 0) << fits.err;
   EXPECT_TRUE(fs::exists(folder_ / "fits/depth/000000.png"));
   EXPECT_TRUE(fs::exists(folder_ / "fits/ids/000000.png"));
   const Ended refused =
-      captured("path.txt", "refused", {"--depth", "png", "--depth-scale", "14000"});
+      runCapture("path.txt", "refused", {"--depth", "png", "--depth-scale", "14000"});
   EXPECT_EQ(refused.code, 1);
   EXPECT_NE(refused.err.find("depth/000000.png: "), std::string::npos) << refused.err;
   EXPECT_NE(refused.err.find("--too-far clamp"), std::string::npos) << refused.err;
   EXPECT_FALSE(fs::exists(folder_ / "refused/depth/000000.png"));
-  const Ended clamped = captured(
+  const Ended clamped = runCapture(
       "path.txt", "clamped", {"--depth", "zst", "--depth-scale", "14000", "--too-far", "clamp"});
   ASSERT_EQ(clamped.code, 0) << clamped.err;
   EXPECT_GT(json::parse(clamped.out).at("clamped_pixels"), 0);
 }
 
 TEST_F(Capture, TheTumLayoutIsReadBackAsTheSamePath) {
-  write(folder_ / "path.txt", ahead(3));
-  const Ended first = captured("path.txt", "tum", {"--layout", "tum", "--channels", "rgb,depth"});
+  write(folder_ / "path.txt", makePathAhead(3));
+  const Ended first = runCapture("path.txt", "tum", {"--layout", "tum", "--channels", "rgb,depth"});
   ASSERT_EQ(first.code, 0) << first.err;
   EXPECT_NE(readText(folder_ / "tum/rgb.txt").find("0.033333 rgb/000001.png"), std::string::npos);
   EXPECT_NE(readText(folder_ / "tum/depth.txt").find("0.066667 depth/000002.png"),
             std::string::npos);
-  const Ended again = captured(
+  const Ended again = runCapture(
       "tum/groundtruth.txt", "again",
       {"--axes", "opencv", "--channels", "rgb,depth", "--depth", "png", "--depth-scale", "5000"});
   ASSERT_EQ(again.code, 0) << again.err;
   for (const char* file : {"rgb/000000.png", "rgb/000002.png", "depth/000001.png"})
     EXPECT_EQ(readText(folder_ / "again" / file), readText(folder_ / "tum" / file)) << file;
-  const Ended own = captured("tum/transforms.json", "own", {"--channels", "rgb"});
+  const Ended own = runCapture("tum/transforms.json", "own", {"--channels", "rgb"});
   ASSERT_EQ(own.code, 0) << own.err;
   EXPECT_EQ(readText(folder_ / "own/rgb/000001.png"), readText(folder_ / "tum/rgb/000001.png"));
 }
 
 TEST_F(Capture, EveryChannelIsWrittenOnRequest) {
-  write(folder_ / "path.txt", ahead(1));
+  write(folder_ / "path.txt", makePathAhead(1));
   const Ended ended =
-      captured("path.txt", "out", {"--channels", "normals,range,depth,rgb", "--rgb", "jpeg"});
+      runCapture("path.txt", "out", {"--channels", "normals,range,depth,rgb", "--rgb", "jpeg"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   EXPECT_TRUE(fs::exists(folder_ / "out/rgb/000000.jpg"));
   const auto depth = readNpy<float>(folder_ / "out/depth/000000.npy");
@@ -293,9 +293,9 @@ TEST_F(Capture, EveryChannelIsWrittenOnRequest) {
 }
 
 TEST_F(Capture, RaysDrawTheSameSceneAndTheManifestNamesThem) {
-  write(folder_ / "path.txt", ahead(1));
-  const Ended gl = captured("path.txt", "gl", {"--renderer", "gl"});
-  const Ended rays = captured("path.txt", "rays", {"--renderer", "rays"});
+  write(folder_ / "path.txt", makePathAhead(1));
+  const Ended gl = runCapture("path.txt", "gl", {"--renderer", "gl"});
+  const Ended rays = runCapture("path.txt", "rays", {"--renderer", "rays"});
   ASSERT_EQ(gl.code, 0) << gl.err;
   ASSERT_EQ(rays.code, 0) << rays.err;
   EXPECT_NE(json::parse(rays.out).at("renderer"), json::parse(gl.out).at("renderer"));
@@ -306,7 +306,7 @@ TEST_F(Capture, RaysDrawTheSameSceneAndTheManifestNamesThem) {
   int other = 0;
   for (std::size_t i = 0; i < drawn.values.size(); ++i) other += drawn.values[i] != cast.values[i];
   EXPECT_LT(other, 64);  // along edges
-  const Ended mixed = captured("path.txt", "gl", {"--renderer", "rays"});
+  const Ended mixed = runCapture("path.txt", "gl", {"--renderer", "rays"});
   EXPECT_EQ(mixed.code, 1);
   EXPECT_NE(mixed.err.find("renderer: "), std::string::npos) << mixed.err;
 }
@@ -319,9 +319,9 @@ TEST_F(Capture, AnOverlayMarksACopyAndLeavesTheColourAlone) {
 {"wait":2,"for":"ann"}
 {"capture":"ann","as":"one"}
 )");
-  ASSERT_EQ(captured("walk.jsonl", "plain", {"--size", "160x120"}).code, 0);
-  const Ended ended = captured("walk.jsonl", "marked",
-                               {"--size", "160x120", "--overlay", "boxes,paths,contacts,names"});
+  ASSERT_EQ(runCapture("walk.jsonl", "plain", {"--size", "160x120"}).code, 0);
+  const Ended ended = runCapture("walk.jsonl", "marked",
+                                 {"--size", "160x120", "--overlay", "boxes,paths,contacts,names"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const auto readImage = [&](const char* file) {
     const std::string png = readText(folder_ / file);
@@ -349,7 +349,7 @@ TEST_F(Capture, AnOverlayMarksACopyAndLeavesTheColourAlone) {
   ASSERT_LT(top, 120);
   EXPECT_TRUE(changed(left, top));
   EXPECT_GT(floorMarked, 20);
-  EXPECT_EQ(captured("walk.jsonl", "wrong", {"--overlay", "boxen"}).code, 2);
+  EXPECT_EQ(runCapture("walk.jsonl", "wrong", {"--overlay", "boxen"}).code, 2);
 }
 
 TEST(Overlay, LabelsOfConcentricObjectsAreSeparateAndInsideTheImage) {
@@ -383,13 +383,13 @@ TEST(Overlay, LabelsOfConcentricObjectsAreSeparateAndInsideTheImage) {
 }
 
 TEST_F(Capture, DepthReportsAreNextToTheFramesAndAddedIfMissing) {
-  write(folder_ / "path.txt", ahead(3));
+  write(folder_ / "path.txt", makePathAhead(3));
   const std::vector<std::string> options{"--size", "64x48", "--channels", "rgb"};
-  ASSERT_EQ(captured("path.txt", "out", options).code, 0);
+  ASSERT_EQ(runCapture("path.txt", "out", options).code, 0);
   const auto before = readTree(folder_ / "out");
   std::vector<std::string> reporting = options;
   reporting.push_back("--report-depth");
-  ASSERT_EQ(captured("path.txt", "out", reporting).code, 0);
+  ASSERT_EQ(runCapture("path.txt", "out", reporting).code, 0);
   const auto after = readTree(folder_ / "out");
   EXPECT_EQ(after.size(), before.size() + 4);
   for (const auto& [name, text] : before) EXPECT_EQ(after.at(name), text) << name;

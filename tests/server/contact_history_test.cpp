@@ -18,7 +18,7 @@ using Event = v1::ContactEvent;
 void recordPassing(const std::filesystem::path& file) {
   scene::WorldSettings settings;
   settings.nearMissDistance = 2;
-  RecordableWorld world{scene::World(smallRoom(), settings)};
+  RecordableWorld world{scene::World(makeSmallRoom(), settings)};
   RecordingOptions options;
   options.choice.file = file;
   options.model.file = "room.obj";
@@ -37,7 +37,7 @@ void recordPassing(const std::filesystem::path& file) {
 
 TEST(ContactHistory, EventsOfATimelineAscendAndPagesLoseNone) {
   const tests::TemporaryFolder folder;
-  const auto file = folder.path() / "passing.mcap";
+  const auto file = folder.getPath() / "passing.mcap";
   recordPassing(file);
   const ContactHistory history(file);
   const v1::RecordedEvents all = history.findEventsAfter(0, 1 << 20);

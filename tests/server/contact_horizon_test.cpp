@@ -30,7 +30,8 @@ class ContactHorizons : public ServedRoom {
   void SetUp() override {
     ServerOptions options;
     options.world.settings.maxSpeed = 2;  // so that horizons are far ahead
-    server_ = std::make_unique<Server>(bodyRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
+    server_ =
+        std::make_unique<Server>(makeBodyRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   }
 
   /// The id of an avatar that is in the world.
@@ -44,7 +45,7 @@ class ContactHorizons : public ServedRoom {
 };
 
 TEST_F(ContactHorizons, AreReportedInTheTicksInWhichTheyChange) {
-  protocol::Client ann = client("ann"), bob = client("bob");
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
   const auto& offers = ann.welcome().capabilities();
   EXPECT_NE(std::find(offers.begin(), offers.end(), "contact_horizon"), offers.end());
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
@@ -85,7 +86,7 @@ TEST_F(ContactHorizons, AreReportedInTheTicksInWhichTheyChange) {
 }
 
 TEST_F(ContactHorizons, NoContactBeginsBeforeThem) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   EXPECT_FALSE(ann.command(spawn("ann", -1, 0.001, 0)));
   ann.step(30);
   v1::Subscribe subscription = toHorizons({findId(ann, "ann")}, 16);
@@ -117,7 +118,7 @@ TEST_F(ContactHorizons, NoContactBeginsBeforeThem) {
 }
 
 TEST_F(ContactHorizons, OneClientGetsItsAvatarAndAnotherAll) {
-  protocol::Client ann = client("ann"), bob = client("bob");
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   EXPECT_FALSE(bob.command(spawn("bob", -2, 0.001, 3)));
   ann.step(30);
@@ -141,7 +142,7 @@ TEST_F(ContactHorizons, OneClientGetsItsAvatarAndAnotherAll) {
 }
 
 TEST_F(ContactHorizons, StartOverAtARestart) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ann.subscribe(toHorizons());
   for (int run = 0; run < 2; ++run) {
     EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
@@ -156,7 +157,7 @@ TEST_F(ContactHorizons, StartOverAtARestart) {
 }
 
 TEST_F(ContactHorizons, AListOutlivesItsAvatars) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(2);
   v1::Subscribe subscription = toHorizons({findId(ann, "ann")});
@@ -174,7 +175,7 @@ TEST_F(ContactHorizons, AListOutlivesItsAvatars) {
 }
 
 TEST_F(ContactHorizons, AreNotSentAgainBySubscribingToOtherEvents) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
   v1::Subscribe subscription = toHorizons();
@@ -193,7 +194,7 @@ TEST_F(ContactHorizons, AreNotSentAgainBySubscribingToOtherEvents) {
 }
 
 TEST_F(ContactHorizons, InvalidRequestsAreRefusedByTheirField) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(2);
   const std::uint32_t id = findId(ann, "ann");

@@ -13,7 +13,7 @@
 namespace enfilade::server {
 namespace {
 
-WalkEvent at(double x, double time) {
+WalkEvent makeEventAt(double x, double time) {
   WalkEvent happening;
   happening.point = Vec3(x, 0, 0);
   happening.time = time;
@@ -48,23 +48,26 @@ double computeCost(const IndexPairs& pairs, const std::vector<WalkEvent>& before
 }
 
 TEST(AlignEvents, TheSameListIsItsOwnMatch) {
-  const std::vector<WalkEvent> list{at(0, 1), at(5, 2), at(0, 3), at(0, 4)};
+  const std::vector<WalkEvent> list{makeEventAt(0, 1), makeEventAt(5, 2), makeEventAt(0, 3),
+                                    makeEventAt(0, 4)};
   EXPECT_EQ(alignEvents(list, list), (IndexPairs{{0, 0}, {1, 1}, {2, 2}, {3, 3}}));
 }
 
 TEST(AlignEvents, ANewEventInTheMiddleMovesNoOther) {
-  const std::vector<WalkEvent> before{at(0, 1), at(6, 3), at(12, 5)};
-  const std::vector<WalkEvent> after{at(0, 1), at(3, 2), at(6, 3), at(12, 5)};
+  const std::vector<WalkEvent> before{makeEventAt(0, 1), makeEventAt(6, 3), makeEventAt(12, 5)};
+  const std::vector<WalkEvent> after{makeEventAt(0, 1), makeEventAt(3, 2), makeEventAt(6, 3),
+                                     makeEventAt(12, 5)};
   EXPECT_EQ(alignEvents(before, after), (IndexPairs{{0, 0}, {1, 2}, {2, 3}}));
 }
 
 TEST(AlignEvents, ALaterTimeAtTheSamePlaceIsTheSame) {
-  EXPECT_EQ(alignEvents({at(1, 10)}, {at(1, 40)}), (IndexPairs{{0, 0}}));
+  EXPECT_EQ(alignEvents({makeEventAt(1, 10)}, {makeEventAt(1, 40)}), (IndexPairs{{0, 0}}));
 }
 
 TEST(AlignEvents, AnotherPlaceIsAnother) {
-  EXPECT_EQ(alignEvents({at(0, 10)}, {at(kMaxMatchDistance, 10)}), IndexPairs{});
-  EXPECT_EQ(alignEvents({at(0, 10)}, {at(0.99 * kMaxMatchDistance, 10)}), (IndexPairs{{0, 0}}));
+  EXPECT_EQ(alignEvents({makeEventAt(0, 10)}, {makeEventAt(kMaxMatchDistance, 10)}), IndexPairs{});
+  EXPECT_EQ(alignEvents({makeEventAt(0, 10)}, {makeEventAt(0.99 * kMaxMatchDistance, 10)}),
+            (IndexPairs{{0, 0}}));
 }
 
 TEST(AlignEvents, NoMatchingIsCheaper) {
@@ -75,9 +78,9 @@ TEST(AlignEvents, NoMatchingIsCheaper) {
   for (int round = 0; round < 200; ++round) {
     std::vector<WalkEvent> before, after;
     for (int i = length(random); i > 0; --i)
-      before.push_back(at(place(random), static_cast<double>(before.size())));
+      before.push_back(makeEventAt(place(random), static_cast<double>(before.size())));
     for (int i = length(random); i > 0; --i)
-      after.push_back(at(place(random), static_cast<double>(after.size())));
+      after.push_back(makeEventAt(place(random), static_cast<double>(after.size())));
     const IndexPairs pairs = alignEvents(before, after);
     // Times break ties between equal positions at a cost of one millimetre a second.
     EXPECT_NEAR(computeCost(pairs, before, after), computeMinCost(before, 0, after, 0), 0.1);
@@ -91,8 +94,8 @@ TEST(AlignEvents, NoMatchingIsCheaper) {
 TEST(AlignEvents, LongListsAreCutIntoPieces) {
   std::vector<WalkEvent> before, after;
   for (int i = 0; i < 4500; ++i) {
-    before.push_back(at(i % 7, i));
-    if (i % 10 != 3) after.push_back(at(i % 7, i));
+    before.push_back(makeEventAt(i % 7, i));
+    if (i % 10 != 3) after.push_back(makeEventAt(i % 7, i));
   }
   const IndexPairs pairs = alignEvents(before, after);
   EXPECT_EQ(pairs.size(), after.size());
@@ -102,8 +105,8 @@ TEST(AlignEvents, LongListsAreCutIntoPieces) {
   }
 }
 
-std::filesystem::path fileFor(const std::string& name) {
-  return tests::ownFile(name + ".mcap");
+std::filesystem::path makeDifferenceFile(const std::string& name) {
+  return tests::makeOwnFile(name + ".mcap");
 }
 
 constexpr double kTick = 1.0 / 60;
@@ -122,7 +125,10 @@ class Recorded {
  public:
   Recorded(const std::string& name, const v1::ContactEvent& contact,
            const Otherwise& otherwise = {})
-      : file_(fileFor(name)), writer_(file_, "test"), contact_(contact), tick_(otherwise.parent) {
+      : file_(makeDifferenceFile(name)),
+        writer_(file_, "test"),
+        contact_(contact),
+        tick_(otherwise.parent) {
     v1::RecordingStart start;
     start.mutable_lengths()->set_walkable_normal_y(0.6);
     start.mutable_lengths()->set_epsilon(5e-4);
@@ -161,7 +167,7 @@ class Recorded {
     return file_;
   }
   /// The file of a recording whose writer is killed now.
-  std::filesystem::path cutOff() const {
+  std::filesystem::path copyCutOff() const {
     auto cut = file_;
     cut.replace_extension(".cut.mcap");
     std::filesystem::copy_file(file_, cut, std::filesystem::copy_options::overwrite_existing);
@@ -214,7 +220,7 @@ v1::ContactEvent touch(const char* a, const char* b, double sign) {
 TEST(ComparedWalks, EventsAfterTheCutOfATruncatedRecordingAreNotWorse) {
   const v1::ContactEvent contact = touch("barrel", "crate", 1);
   const auto whole = Recorded("whole", contact).go(120).close();
-  const auto cut = Recorded("killed", contact).go(50).cutOff();
+  const auto cut = Recorded("killed", contact).go(50).copyCutOff();
   for (const auto& difference : {compareWalks(whole, cut, 1e-3), compareWalks(cut, whole, 1e-3)}) {
     EXPECT_TRUE(difference.isEmpty());
     EXPECT_EQ(difference.worse, 0u);
@@ -251,7 +257,7 @@ TEST(ComparedWalks, HappeningsNameGlobalIds) {
   EXPECT_EQ(named, 1u);
 }
 
-v1::ContactEvent near(double distance, v1::ContactEvent::Phase phase) {
+v1::ContactEvent makeNearEvent(double distance, v1::ContactEvent::Phase phase) {
   v1::ContactEvent event = touch("ann", "house/door", 1);
   event.set_kind(v1::ContactEvent::KIND_NEAR);
   event.set_phase(phase);
@@ -262,7 +268,7 @@ v1::ContactEvent near(double distance, v1::ContactEvent::Phase phase) {
 TEST(ComparedWalks, AClearanceIsTheMinimumAndNotTheFirstReport) {
   const auto recorded = [](const char* name, double distance, v1::ContactEvent::Phase phase,
                            double radius = 0.3) {
-    return Recorded(name, near(distance, phase), {.nearMiss = radius}).go(20).close();
+    return Recorded(name, makeNearEvent(distance, phase), {.nearMiss = radius}).go(20).close();
   };
   using Event = v1::ContactEvent;
   const auto atMinimum = recorded("near", 0.2, Event::PHASE_MIN);
@@ -310,7 +316,7 @@ TEST(ComparedWalks, ADoorIsTheSameWhateverItIsCalledAndWhetherItMoves) {
 
 TEST(ComparedWalks, TimesThatDescendAreRefused) {
   std::vector<WalkEvent> list;
-  for (int i = 0; i < 5000; ++i) list.push_back(at(0, 5000 - i));
+  for (int i = 0; i < 5000; ++i) list.push_back(makeEventAt(0, 5000 - i));
   EXPECT_THROW(alignEvents(list, list), protocol::mcap::RecordingError);
 }
 

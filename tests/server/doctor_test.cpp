@@ -50,7 +50,7 @@ TEST(Doctor, VendorFilesAreReadAndMissingFieldsReported) {
   folder.write("a.json", R"({"ICD":{"library_path":"libc.so.6"}})");
   folder.write("b.json", R"({"ICD":{"library_path":"libEGL_missing.so.0"}})");
   folder.write("c.json", "{");
-  ::setenv("__EGL_VENDOR_LIBRARY_DIRS", folder.path().c_str(), 1);
+  ::setenv("__EGL_VENDOR_LIBRARY_DIRS", folder.getPath().c_str(), 1);
   const std::vector<EglVendor> vendors = listEglVendors();
   ::unsetenv("__EGL_VENDOR_LIBRARY_DIRS");
   ASSERT_EQ(vendors.size(), 3u);

@@ -87,7 +87,7 @@ TEST(EventPlace, IsUnknownForEventsWithoutAPointAndScenesWithoutStoreys) {
 }
 
 TEST(EventPlace, IsInTheMessage) {
-  scene::Model model = smallRoom()->model();
+  scene::Model model = makeSmallRoom()->model();
   model.storeys = {{"Ground", "", 0}};
   model.spaces = {{"101", "Kitchen", "", 0, {Vec3(-50, -1, -50), Vec3(50, 5, 50)}}};
   const scene::World world(std::make_shared<const scene::Scene>(std::move(model)), {});

@@ -62,13 +62,13 @@ TEST_F(ReplayHtml, AScriptThatWouldEndItsElementIsRefused) {
 }
 
 TEST_F(ReplayHtml, WrongUsageExitsWithTwo) {
-  write(folder_ / "model.obj", smallRoomObj());
+  write(folder_ / "model.obj", makeSmallRoomObj());
   const std::vector<std::vector<std::string>> mistakes{
-      {"export", path("model.obj"), "--html", path("a.html")},
-      {"export", path("model.obj"), "--html", path("a.html"), "--glb", path("a.glb")},
-      {"export", path("model.obj"), path("model.obj"), "--glb", path("a.glb")},
-      {"export", path("model.obj"), "--glb", path("a.glb"), "--max-size", "7"},
-      {"export", path("model.obj"), "--html", path("a.html"), "--max-size", "0"}};
+      {"export", getPath("model.obj"), "--html", getPath("a.html")},
+      {"export", getPath("model.obj"), "--html", getPath("a.html"), "--glb", getPath("a.glb")},
+      {"export", getPath("model.obj"), getPath("model.obj"), "--glb", getPath("a.glb")},
+      {"export", getPath("model.obj"), "--glb", getPath("a.glb"), "--max-size", "7"},
+      {"export", getPath("model.obj"), "--html", getPath("a.html"), "--max-size", "0"}};
   for (const auto& arguments : mistakes) {
     const Ended ended = run(arguments);
     EXPECT_EQ(ended.code, 2) << ::testing::PrintToString(arguments) << ended.err;

@@ -16,7 +16,7 @@ using collision::Vec3;
 
 /// A column, 1 m square and 3 m high at (5, 0, 5). A wall of one face along x from 0 to 4 m, 2 m
 /// high.
-scene::Model columnAndSheet() {
+scene::Model makeColumnAndSheet() {
   const scene::Mesh column = scene::makeBoxMesh({{4.5, 0, 4.5}, {5.5, 3, 5.5}});
   scene::Mesh sheet;
   sheet.positions = {{0, 0, 0}, {4, 0, 0}, {4, 2, 0}, {0, 2, 0}};
@@ -42,7 +42,7 @@ double computeLength(const ObjectSection& section) {
 }
 
 TEST(FloorPlanSection, ClosedSolidsGiveOneLoopAndSingleFacesOneLine) {
-  const scene::Scene scene(columnAndSheet());
+  const scene::Scene scene(makeColumnAndSheet());
   const auto both = cutStatic(scene, 1.2);
   ASSERT_EQ(both.size(), 2u);
   EXPECT_EQ(both[0].loops.size(), 1u);
@@ -59,7 +59,7 @@ TEST(FloorPlanSection, ClosedSolidsGiveOneLoopAndSingleFacesOneLine) {
 }
 
 TEST(FloorPlanSection, BodiesAreNotStaticAndAreCutAlone) {
-  scene::Model model = columnAndSheet();
+  scene::Model model = makeColumnAndSheet();
   scene::BodySpec door;
   door.name = "door";
   door.kind = scene::BodyKind::sliding;
@@ -72,7 +72,7 @@ TEST(FloorPlanSection, BodiesAreNotStaticAndAreCutAlone) {
 }
 
 TEST(FloorPlanSection, TwoOutlinesOfOneObjectAreTwoLoops) {
-  scene::Model model = columnAndSheet();
+  scene::Model model = makeColumnAndSheet();
   for (std::size_t i = 0; i < 8; ++i)
     model.meshes[0].positions.push_back(model.meshes[0].positions[i] + Eigen::Vector3f(3, 0, 0));
   for (std::size_t i = 0; i < 36; ++i)

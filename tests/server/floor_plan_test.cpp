@@ -23,9 +23,9 @@ std::vector<const PlanShape*> findShapes(const FloorPlan& plan, Kind kind) {
 
 /// The room with bodies, a shelf, a sliding door, a lift, a storey with a room, and north.
 scene::Model makeFurnishedRoom() {
-  scene::Model model = bodyRoomModel();
+  scene::Model model = makeBodyRoomModel();
   const auto addBox = [&](const char* name, const Vec3& min, const Vec3& max) {
-    const scene::Model box = scene::testing::boxModel({{name, min, max}});
+    const scene::Model box = scene::testing::makeBoxModel({{name, min, max}});
     scene::Object object = box.objects.front();
     object.meshes = {static_cast<std::uint32_t>(model.meshes.size())};
     model.meshes.push_back(box.meshes.front());
@@ -51,12 +51,12 @@ scene::Model makeFurnishedRoom() {
   return model;
 }
 
-FloorPlan planOfFurnishedRoom() {
+FloorPlan computePlanOfFurnishedRoom() {
   return computeFloorPlan(scene::Scene(makeFurnishedRoom()), {0, "Ground", 0});
 }
 
 TEST(FloorPlan, WallsFurnitureAndBodiesAreToldApart) {
-  const FloorPlan plan = planOfFurnishedRoom();
+  const FloorPlan plan = computePlanOfFurnishedRoom();
   const auto walls = findShapes(plan, Kind::wall);
   ASSERT_EQ(walls.size(), 3u) << "left, right and end";
   for (const PlanShape* wall : walls) EXPECT_EQ(wall->loops.size(), 1u);
@@ -72,7 +72,7 @@ TEST(FloorPlan, WallsFurnitureAndBodiesAreToldApart) {
 }
 
 TEST(FloorPlan, DoorsHaveTheirSwing) {
-  const FloorPlan plan = planOfFurnishedRoom();
+  const FloorPlan plan = computePlanOfFurnishedRoom();
   const auto open = findShapes(plan, Kind::openDoor), swings = findShapes(plan, Kind::swing);
   ASSERT_EQ(open.size(), 1u) << "the closed limit has none";
   ASSERT_EQ(swings.size(), 2u) << "an arc, and the open panel";
@@ -91,7 +91,7 @@ TEST(FloorPlan, DoorsHaveTheirSwing) {
 }
 
 TEST(FloorPlan, AHingeThatTurnsOftenHasOneWholeArc) {
-  scene::Model model = bodyRoomModel();
+  scene::Model model = makeBodyRoomModel();
   model.bodies[0].low = -1e6, model.bodies[0].high = 1e6;
   const FloorPlan plan = computeFloorPlan(scene::Scene(std::move(model)), {});
   const auto swings = findShapes(plan, Kind::swing);
@@ -129,12 +129,12 @@ using ServedPlan = ServedRoom;
 TEST_F(ServedPlan, IsThatOfTheSceneToTheLastBit) {
   const auto scene = std::make_shared<const scene::Scene>(makeFurnishedRoom());
   serve({}, scene);
-  const FloorPlan received = floorPlanFromProto(client("ann").floorPlan(0.3));
+  const FloorPlan received = floorPlanFromProto(makeClient("ann").floorPlan(0.3));
   EXPECT_EQ(received.floor, 0.3) << "the storey near a floor keeps the height that was given";
   EXPECT_EQ(received.storey, "Ground");
   expectEqual(received, makeFloorPlanSource(scene)(0.3).value());
   EXPECT_EQ(findShapes(received, Kind::wall).size(), 3u);
-  const FloorPlan above = floorPlanFromProto(client("bob").floorPlan(20));
+  const FloorPlan above = floorPlanFromProto(makeClient("bob").floorPlan(20));
   EXPECT_TRUE(findShapes(above, Kind::wall).empty());
   EXPECT_TRUE(above.rooms.empty() && above.storey.empty());
 }
@@ -144,7 +144,7 @@ TEST_F(ServedPlan, ThatDoesNotFitAReplyIsRefused) {
   limits.replyBytes = 200;
   serve(limits);
   try {
-    client("ann").floorPlan(0);
+    makeClient("ann").floorPlan(0);
     FAIL() << "no refusal";
   } catch (const protocol::ProtocolError& refused) {
     EXPECT_EQ(refused.code, v1::ERROR_TOO_LARGE);

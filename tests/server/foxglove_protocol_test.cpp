@@ -16,8 +16,8 @@ std::string getReason(const wire::ClientRequest& request) {
   return refused ? refused->reason : "";
 }
 
-std::vector<std::uint8_t> playbackControl(std::uint8_t command, float speed, bool seeks,
-                                          std::uint64_t time, const std::string& id) {
+std::vector<std::uint8_t> makePlaybackControl(std::uint8_t command, float speed, bool seeks,
+                                              std::uint64_t time, const std::string& id) {
   std::vector<std::uint8_t> bytes{3, command};
   const auto append = [&](const void* data, std::size_t count) {
     const auto* first = static_cast<const std::uint8_t*>(data);
@@ -63,13 +63,13 @@ TEST(FoxgloveProtocol, RefusesTextInWords) {
 }
 
 TEST(FoxgloveProtocol, ReadsPlaybackControlWithAndWithoutAnId) {
-  auto bytes = playbackControl(0, 2.5f, true, 5'000'000'000, "abc");
+  auto bytes = makePlaybackControl(0, 2.5f, true, 5'000'000'000, "abc");
   auto control = std::get<wire::PlaybackControl>(wire::parseBinary(bytes));
   EXPECT_TRUE(control.play);
   EXPECT_EQ(control.speed, 2.5f);
   EXPECT_EQ(control.seekTo, 5'000'000'000u);
   EXPECT_EQ(control.requestId, "abc");
-  bytes = playbackControl(1, 1, false, 9, "");
+  bytes = makePlaybackControl(1, 1, false, 9, "");
   bytes.resize(15);  // as older clients send it
   control = std::get<wire::PlaybackControl>(wire::parseBinary(bytes));
   EXPECT_FALSE(control.play);
@@ -79,10 +79,10 @@ TEST(FoxgloveProtocol, ReadsPlaybackControlWithAndWithoutAnId) {
 TEST(FoxgloveProtocol, RefusesBinaryMessagesInWords) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   EXPECT_NE(getReason(wire::parseBinary({})), "");
-  EXPECT_NE(getReason(wire::parseBinary(playbackControl(2, 1, false, 0, ""))), "");
-  EXPECT_NE(getReason(wire::parseBinary(playbackControl(0, 0, false, 0, ""))), "");
-  EXPECT_NE(getReason(wire::parseBinary(playbackControl(0, kInfinity, false, 0, ""))), "");
-  auto cut = playbackControl(0, 1, false, 0, "abc");
+  EXPECT_NE(getReason(wire::parseBinary(makePlaybackControl(2, 1, false, 0, ""))), "");
+  EXPECT_NE(getReason(wire::parseBinary(makePlaybackControl(0, 0, false, 0, ""))), "");
+  EXPECT_NE(getReason(wire::parseBinary(makePlaybackControl(0, kInfinity, false, 0, ""))), "");
+  auto cut = makePlaybackControl(0, 1, false, 0, "abc");
   cut.pop_back();
   EXPECT_NE(getReason(wire::parseBinary(cut)), "");
 }
@@ -91,7 +91,7 @@ TEST(FoxgloveProtocol, SurvivesMutatedMessages) {
   std::mt19937 random(11);
   const std::string text =
       R"({"op":"subscribe","subscriptions":[{"id":7,"channelId":2},{"id":8,"channelId":3}]})";
-  const auto binary = playbackControl(0, 2, true, 77, "identity");
+  const auto binary = makePlaybackControl(0, 2, true, 77, "identity");
   for (int round = 0; round < 2000; ++round) {
     std::string mutatedText = text;
     auto mutatedBinary = binary;

@@ -55,7 +55,7 @@ v1::ErrorCode catchCode(protocol::Client& client, const v1::FrameRequest& reques
 }
 
 TEST_F(Frames, AnAvatarSeesTheWallItFacesAtItsDistance) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   const v1::StepReply step = ann.step(30, true);
   v1::FrameRequest request = makeEyesRequest("ann");
@@ -76,13 +76,13 @@ TEST_F(Frames, AnAvatarSeesTheWallItFacesAtItsDistance) {
 }
 
 TEST_F(Frames, AnotherAvatarIsSeenFromAboveUnderItsOwnId) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const std::uint32_t id = standAt(ann, 1, 1);
   v1::FrameRequest request = makeEyesRequest("ann");
   v1::FreeCamera& camera = *request.mutable_free();
-  *camera.mutable_eye() = vec(1, 6, 1);
-  *camera.mutable_forward() = vec(0, -1, 0);
-  *camera.mutable_up() = vec(0, 0, -1);
+  *camera.mutable_eye() = makeVec(1, 6, 1);
+  *camera.mutable_forward() = makeVec(0, -1, 0);
+  *camera.mutable_up() = makeVec(0, 0, -1);
   camera.set_height_y(4);
   const auto ids = readValues<std::uint32_t>(ann.frame(request), v1::CHANNEL_IDS);
   EXPECT_EQ(ids[24 * 64 + 32], id);
@@ -92,12 +92,12 @@ TEST_F(Frames, AnotherAvatarIsSeenFromAboveUnderItsOwnId) {
 }
 
 TEST_F(Frames, AvatarsAreFiguresAndOnRequestTheirCollisionShapes) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const std::uint32_t id = standAt(ann, 1, 1);
   v1::FrameRequest request = makeEyesRequest("ann");
   v1::FreeCamera& camera = *request.mutable_free();
-  *camera.mutable_eye() = vec(-1, 0.9, 1);
-  *camera.mutable_forward() = vec(1, 0, 0);
+  *camera.mutable_eye() = makeVec(-1, 0.9, 1);
+  *camera.mutable_forward() = makeVec(1, 0, 0);
   const auto pixels = [&](bool shapes) {
     request.set_collision_shapes(shapes);
     const protocol::ReceivedFrame frame = ann.frame(request);
@@ -111,7 +111,7 @@ TEST_F(Frames, AvatarsAreFiguresAndOnRequestTheirCollisionShapes) {
 }
 
 TEST_F(Frames, SamplesSmoothTheColourAloneAndOtherNumbersAreRefused) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
   v1::FrameRequest request = makeEyesRequest("ann");
@@ -137,7 +137,7 @@ TEST_F(Frames, SamplesSmoothTheColourAloneAndOtherNumbersAreRefused) {
 }
 
 TEST_F(Frames, ShadowsAreDrawnByDefaultInLargePictures) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
   v1::FrameRequest request = makeEyesRequest("ann");
@@ -151,7 +151,7 @@ TEST_F(Frames, ShadowsAreDrawnByDefaultInLargePictures) {
 }
 
 TEST_F(Frames, APngHoldsTheSamePicture) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
   v1::FrameRequest request = makeEyesRequest("ann");
@@ -164,7 +164,7 @@ TEST_F(Frames, APngHoldsTheSamePicture) {
 }
 
 TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
   v1::FrameRequest request = makeEyesRequest("ann");
@@ -204,7 +204,7 @@ TEST_F(Frames, IntrinsicsRangeAndNormalsTravel) {
 }
 
 TEST_F(Frames, TheRequestedRendererDrawsTheSameScene) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(30);
   v1::FrameRequest request = makeEyesRequest("ann");
@@ -224,7 +224,7 @@ TEST_F(Frames, TheRequestedRendererDrawsTheSameScene) {
 }
 
 TEST_F(Frames, AnImageAboveTheClientLimitIsRefusedAndTheConnectionContinues) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   v1::FrameRequest request;
   request.mutable_free();
   request.set_width(4096);
@@ -236,14 +236,14 @@ TEST_F(Frames, AnImageAboveTheClientLimitIsRefusedAndTheConnectionContinues) {
 }
 
 TEST_F(Frames, InvalidFrameRequestsAreRefusedByName) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   v1::FrameRequest request = makeEyesRequest("unknown");
   EXPECT_EQ(catchCode(ann, request), v1::ERROR_UNKNOWN_AVATAR);
   request.mutable_free();
   request.set_width(5000);
   EXPECT_EQ(catchCode(ann, request), v1::ERROR_BAD_CAMERA);
   request.set_width(64);
-  *request.mutable_free()->mutable_forward() = vec(0, 0, 0);
+  *request.mutable_free()->mutable_forward() = makeVec(0, 0, 0);
   try {
     ann.frame(request);
     ADD_FAILURE() << "a camera without a direction";
@@ -251,7 +251,7 @@ TEST_F(Frames, InvalidFrameRequestsAreRefusedByName) {
     EXPECT_EQ(error.code, v1::ERROR_BAD_CAMERA);
     EXPECT_EQ(error.field, "frame.forward");
   }
-  *request.mutable_free()->mutable_forward() = vec(1, 0, 0);
+  *request.mutable_free()->mutable_forward() = makeVec(1, 0, 0);
   request.set_tick(77);
   EXPECT_EQ(catchCode(ann, request), v1::ERROR_TICK_GONE);
   request.clear_tick();
@@ -279,9 +279,9 @@ TEST_F(Frames, InvalidFrameRequestsAreRefusedByName) {
 }
 
 TEST(FrameOrder, RawImagesDoNotOvertakeEncodedOnes) {
-  FrameService service(smallRoom());
+  FrameService service(makeSmallRoom());
   ENFILADE_NEED_PICTURES(service.deviceName());
-  const scene::World world(smallRoom());
+  const scene::World world(makeSmallRoom());
   std::mutex mutex;
   std::vector<std::uint64_t> order;
   std::uint64_t id = 0;
@@ -305,9 +305,9 @@ TEST(FrameOrder, RawImagesDoNotOvertakeEncodedOnes) {
 }
 
 TEST(FrameOrder, ImagesThatWaitAreDrawnTogetherAlsoOfSeveralWorlds) {
-  FrameService service(smallRoom());
+  FrameService service(makeSmallRoom());
   ENFILADE_NEED_PICTURES(service.deviceName());
-  const scene::World world(smallRoom());
+  const scene::World world(makeSmallRoom());
   std::mutex mutex;
   std::vector<double> seconds;  // views drawn together share their time equally
   std::vector<std::uint64_t> ticks;

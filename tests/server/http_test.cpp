@@ -13,7 +13,8 @@ const std::string kUpgrade =
     "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==\r\n";
 
 /// A client's WebSocket message, masked by zeros: up to 125 bytes (RFC 6455, 5.2).
-std::vector<std::uint8_t> webSocketMessage(int opcode, const std::vector<std::uint8_t>& payload) {
+std::vector<std::uint8_t> makeWebSocketMessage(int opcode,
+                                               const std::vector<std::uint8_t>& payload) {
   std::vector<std::uint8_t> bytes{static_cast<std::uint8_t>(0x80 | opcode),
                                   static_cast<std::uint8_t>(0x80 | payload.size()),
                                   0,
@@ -24,7 +25,7 @@ std::vector<std::uint8_t> webSocketMessage(int opcode, const std::vector<std::ui
   return bytes;
 }
 
-std::vector<std::uint8_t> hello() {
+std::vector<std::uint8_t> makeHello() {
   v1::ClientMessage message;
   message.set_request_id(1);
   message.mutable_hello()->set_protocol_version(protocol::kVersion);
@@ -33,13 +34,13 @@ std::vector<std::uint8_t> hello() {
 
 class Http : public ServedRoom {
  protected:
-  std::string answerTo(const std::string& request) {
+  std::string sendRequest(const std::string& request) {
     RawConnection raw(server_->port());
     raw.send(request);
     return raw.readText();
   }
   std::string get(const std::string& target) {
-    return answerTo("GET " + target + " HTTP/1.1\r\n" + kHost + "\r\n");
+    return sendRequest("GET " + target + " HTTP/1.1\r\n" + kHost + "\r\n");
   }
 };
 
@@ -47,27 +48,29 @@ TEST_F(Http, HealthIsOkAndUnknownPagesAreNamed) {
   serve();
   EXPECT_NE(get("/healthz").find("\r\n\r\nok\n"), std::string::npos);
   EXPECT_EQ(get("/secrets").substr(0, 12), "HTTP/1.1 404");
-  EXPECT_EQ(answerTo("POST /metrics HTTP/1.1\r\n" + kHost + "\r\n").substr(0, 12), "HTTP/1.1 405");
-  EXPECT_EQ(answerTo("GET  nonsense\r\n\r\n").substr(0, 12), "HTTP/1.1 400");
-  EXPECT_EQ(answerTo("GET / HTTP/1.1\r\nX: " + std::string(20'000, 'x') + "\r\n\r\n").substr(0, 12),
-            "HTTP/1.1 431");
+  EXPECT_EQ(sendRequest("POST /metrics HTTP/1.1\r\n" + kHost + "\r\n").substr(0, 12),
+            "HTTP/1.1 405");
+  EXPECT_EQ(sendRequest("GET  nonsense\r\n\r\n").substr(0, 12), "HTTP/1.1 400");
+  EXPECT_EQ(
+      sendRequest("GET / HTTP/1.1\r\nX: " + std::string(20'000, 'x') + "\r\n\r\n").substr(0, 12),
+      "HTTP/1.1 431");
 }
 
 TEST_F(Http, MethodsSchemesAndHostsFollowTheStandards) {
   Access access;
   access.tokens = {{Role::observe, "0123456789abcdef"}};
   access.hosts = {"Model.Example.org"};
-  serve({}, smallRoom(), access);
+  serve({}, makeSmallRoom(), access);
   const std::string post =
-      answerTo("POST /healthz HTTP/1.1\r\n" + kHost + "Content-Length: 3\r\n\r\nabc");
+      sendRequest("POST /healthz HTTP/1.1\r\n" + kHost + "Content-Length: 3\r\n\r\nabc");
   EXPECT_EQ(post.substr(0, 12), "HTTP/1.1 405");
   EXPECT_NE(post.find("\r\nAllow: GET, HEAD\r\n"), std::string::npos) << post;
-  const std::string head = answerTo("HEAD /healthz HTTP/1.1\r\n" + kHost + "\r\n");
+  const std::string head = sendRequest("HEAD /healthz HTTP/1.1\r\n" + kHost + "\r\n");
   EXPECT_EQ(head.substr(0, 12), "HTTP/1.1 200");
   EXPECT_NE(head.find("Content-Length: 3\r\n"), std::string::npos) << head;
   EXPECT_TRUE(head.ends_with("\r\n\r\n")) << "no body: " << head;
   const auto metrics = [&](const std::string& headers) {
-    return answerTo("GET /metrics HTTP/1.1\r\n" + headers + "\r\n").substr(9, 3);
+    return sendRequest("GET /metrics HTTP/1.1\r\n" + headers + "\r\n").substr(9, 3);
   };
   EXPECT_EQ(metrics(kHost + "Authorization: bearer 0123456789abcdef\r\n"), "200");
   EXPECT_EQ(metrics(kHost + "Authorization: Basic 0123456789abcdef\r\n"), "401");
@@ -82,7 +85,7 @@ TEST_F(Http, AWebSocketsKeyHasSixteenBytes) {
   const std::string shortKey =
       "Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
       "Sec-WebSocket-Key: short\r\n";
-  EXPECT_EQ(answerTo("GET / HTTP/1.1\r\n" + kHost + shortKey + "\r\n").substr(0, 12),
+  EXPECT_EQ(sendRequest("GET / HTTP/1.1\r\n" + kHost + shortKey + "\r\n").substr(0, 12),
             "HTTP/1.1 400");
 }
 
@@ -91,7 +94,7 @@ TEST_F(Http, AFullServerAnswersHealthChecksAndNoOneElse) {
   limits.connections = 2;
   limits.reservedConnections = 4;
   serve(limits);
-  const protocol::Client one = client("one"), two = client("two");
+  const protocol::Client one = makeClient("one"), two = makeClient("two");
   for (int round = 0; round < 3; ++round) {
     EXPECT_EQ(get("/healthz").substr(0, 12), "HTTP/1.1 200");
     EXPECT_EQ(get("/metrics").substr(0, 12), "HTTP/1.1 200");
@@ -132,13 +135,13 @@ TEST_F(Http, TheLastPictureIsSentAgain) {
            kHost + "\r\n");
   EXPECT_NE(raw.readText("X-Tick: 0").find("X-Tick: 0"), std::string::npos);
   EXPECT_NE(raw.readText("X-Tick: 0").find("X-Tick: 0"), std::string::npos);
-  client("other").step();
+  makeClient("other").step();
   EXPECT_NE(raw.readText("X-Tick: 1").find("X-Tick: 1"), std::string::npos);
 }
 
 TEST_F(Http, MetricsContainTheTicks) {
   serve();
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   other.step(7);
   const std::string page = get("/metrics");
   EXPECT_NE(page.find("text/plain; version=0.0.4"), std::string::npos);
@@ -151,8 +154,8 @@ TEST_F(Http, MetricsContainTheTicks) {
 
 TEST_F(Http, MetricsContainTheWorkOfTheTicks) {
   constexpr std::uint32_t kTicks = 40;
-  serve({}, bodyRoom());
-  protocol::Client ann = client("ann");
+  serve({}, makeBodyRoom());
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 3.5, 0.01, 0)));
   ASSERT_FALSE(ann.command(walkTo("ann", 5.5, 0, 0)));
   const v1::StepReply stepped = ann.step(kTicks, true);
@@ -184,10 +187,11 @@ TEST_F(Http, MetricsContainTheWorkOfTheTicks) {
 TEST_F(Http, ForeignPagesAreRefused) {
   serve();
   const std::string upgrade = "GET / HTTP/1.1\r\n" + kUpgrade;
-  EXPECT_EQ(answerTo(upgrade + kHost + "Origin: https://evil.example.com\r\n\r\n").substr(0, 12),
+  EXPECT_EQ(sendRequest(upgrade + kHost + "Origin: https://evil.example.com\r\n\r\n").substr(0, 12),
             "HTTP/1.1 403");
-  EXPECT_EQ(answerTo(upgrade + "Host: rebound.example.com\r\n\r\n").substr(0, 12), "HTTP/1.1 403");
-  EXPECT_EQ(answerTo("GET /metrics HTTP/1.1\r\n\r\n").substr(0, 12), "HTTP/1.1 403");
+  EXPECT_EQ(sendRequest(upgrade + "Host: rebound.example.com\r\n\r\n").substr(0, 12),
+            "HTTP/1.1 403");
+  EXPECT_EQ(sendRequest("GET /metrics HTTP/1.1\r\n\r\n").substr(0, 12), "HTTP/1.1 403");
 }
 
 TEST_F(Http, AWebSocketSpeaksTheProtocol) {
@@ -197,16 +201,16 @@ TEST_F(Http, AWebSocketSpeaksTheProtocol) {
   const std::string head = raw.readText("\r\n\r\n");
   EXPECT_EQ(head.substr(0, 12), "HTTP/1.1 101");
   EXPECT_NE(head.find("s3pPLMBiTxaQ9kYGzzhZRbK+xOo="), std::string::npos) << "RFC 6455, 1.3";
-  raw.send(webSocketMessage(2, hello()));
+  raw.send(makeWebSocketMessage(2, makeHello()));
   EXPECT_NE(raw.readText("small_room").find("small_room"), std::string::npos);
-  raw.send(webSocketMessage(8, {}));
+  raw.send(makeWebSocketMessage(8, {}));
   EXPECT_NE(raw.readText().find('\x88'), std::string::npos) << "closed in return";
 }
 
 TEST_F(Http, TextInAWebSocketAndTooLongMessagesEndIt) {
   serve();
   for (const auto& bytes :
-       {webSocketMessage(1, hello()),
+       {makeWebSocketMessage(1, makeHello()),
         std::vector<std::uint8_t>{0x82, 0xFF, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0, 0, 0}}) {
     RawConnection raw(server_->port());
     raw.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
@@ -218,14 +222,14 @@ TEST_F(Http, TextInAWebSocketAndTooLongMessagesEndIt) {
     EXPECT_EQ(answer.find("\x03\xEBonly binary messages") != std::string::npos, isText)
         << "code 1003";
   }
-  EXPECT_EQ(client("other").step().tick(), 1u);
+  EXPECT_EQ(makeClient("other").step().tick(), 1u);
 }
 
 TEST_F(Http, ASlowRequestTimesOut) {
   ServerLimits limits;
   limits.helloTimeout = std::chrono::milliseconds(50);
   serve(limits);
-  EXPECT_EQ(answerTo("GET /healthz HTTP/1.1\r\nX-Slow: ").substr(0, 12), "HTTP/1.1 408");
+  EXPECT_EQ(sendRequest("GET /healthz HTTP/1.1\r\nX-Slow: ").substr(0, 12), "HTTP/1.1 408");
   RawConnection never(server_->port());
   never.send("GE");
   EXPECT_EQ(never.readToEnd().error.code(), v1::ERROR_BAD_MESSAGE);
@@ -246,7 +250,7 @@ TEST_F(Http, ATlsGreetingGetsAnError) {
 TEST_F(Http, PicturesFlowAsTheWorldMoves) {
   serve();
   ENFILADE_NEED_PICTURES(*server_);
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   RawConnection raw(server_->port());
   raw.send("GET /mjpeg/camera?eye=0,1,0&target=5,1,0&width=32&height=24&rate=0 HTTP/1.1\r\n" +
            kHost + "\r\n");
@@ -267,7 +271,7 @@ TEST_F(Http, TheEndOfTheServerEndsItsVisits) {
   RawConnection raw(server_->port());
   raw.send("GET / HTTP/1.1\r\n" + kHost + kUpgrade + "\r\n");
   raw.readText("\r\n\r\n");
-  raw.send(webSocketMessage(2, hello()));
+  raw.send(makeWebSocketMessage(2, makeHello()));
   raw.readText("small_room");
   server_->stop();
   EXPECT_NE(raw.readText().find("the server is stopping"), std::string::npos);

@@ -13,7 +13,7 @@ namespace fs = std::filesystem;
 class Inspect : public ProgramFixture {};
 
 TEST_F(Inspect, DescribesTheSceneAsJson) {
-  const Ended ended = run({"inspect", path("room.obj"), "--json", "--unit", "m", "--objects"});
+  const Ended ended = run({"inspect", getPath("room.obj"), "--json", "--unit", "m", "--objects"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const auto all = nlohmann::json::parse(ended.out);
   EXPECT_EQ(all.at("objects"), 3);
@@ -34,8 +34,8 @@ TEST_F(Inspect, DescribesTheSceneAsJson) {
 }
 
 TEST_F(Inspect, DescribesTheOperationOfADoor) {
-  write(folder_ / "house.ifc", tests::IfcHouse().text());
-  const Ended ended = run({"inspect", path("house.ifc"), "--json", "--objects"});
+  write(folder_ / "house.ifc", tests::IfcHouse().makeText());
+  const Ended ended = run({"inspect", getPath("house.ifc"), "--json", "--objects"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const auto all = nlohmann::json::parse(ended.out);
   int doors = 0;
@@ -48,8 +48,8 @@ TEST_F(Inspect, DescribesTheOperationOfADoor) {
 }
 
 TEST_F(Inspect, ListsStoreysOfIfcWithTheirObjects) {
-  write(folder_ / "house.ifc", tests::IfcHouse().text());
-  const Ended ended = run({"inspect", path("house.ifc"), "--json", "--objects"});
+  write(folder_ / "house.ifc", tests::IfcHouse().makeText());
+  const Ended ended = run({"inspect", getPath("house.ifc"), "--json", "--objects"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const auto all = nlohmann::json::parse(ended.out);
   ASSERT_EQ(all.at("storeys").size(), 1u);
@@ -60,17 +60,17 @@ TEST_F(Inspect, ListsStoreysOfIfcWithTheirObjects) {
   EXPECT_EQ(storey.at("classes"), nlohmann::json({{"IfcDoor", 1}, {"IfcWall", 1}}));
   EXPECT_EQ(all.at("classes"), storey.at("classes"));
   EXPECT_EQ(all.at("object_list").at(0).at("storey"), "Ground/floor");
-  const Ended table = run({"inspect", path("house.ifc")});
+  const Ended table = run({"inspect", getPath("house.ifc")});
   EXPECT_NE(table.out.find("0.000 m       2  Ground/floor"), std::string::npos) << table.out;
 }
 
 TEST_F(Inspect, ReportsNorthAsTheIfcFileStatesItAndElseItsYAxis) {
-  const Ended room = run({"inspect", path("room.obj"), "--json", "--unit", "m"});
+  const Ended room = run({"inspect", getPath("room.obj"), "--json", "--unit", "m"});
   EXPECT_TRUE(nlohmann::json::parse(room.out).at("north").is_null()) << "OBJ has no north";
-  std::string text = tests::IfcHouse().text();
+  std::string text = tests::IfcHouse().makeText();
   write(folder_ / "house.ifc", text);
   const auto report = [&] {
-    const Ended ended = run({"inspect", path("house.ifc"), "--json"});
+    const Ended ended = run({"inspect", getPath("house.ifc"), "--json"});
     EXPECT_EQ(ended.code, 0) << ended.err;
     return nlohmann::json::parse(ended.out).at("north");
   };
@@ -88,7 +88,7 @@ TEST_F(Inspect, DescribesThePathOfABody) {
   write(folder_ / "room.walk.json",
         R"({"walk":1,"bodies":[{"name":"sign","kind":"path","objects":["room_wall"],
             "keys":[{"time":0},{"time":2,"offset":[0,1,0],"turn":180}]}]})");
-  const Ended ended = run({"inspect", path("room.obj"), "--json", "--unit", "m"});
+  const Ended ended = run({"inspect", getPath("room.obj"), "--json", "--unit", "m"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const auto body = nlohmann::json::parse(ended.out).at("bodies").at(0);
   EXPECT_EQ(body.at("seconds"), 2);
@@ -99,17 +99,17 @@ TEST_F(Inspect, DescribesThePathOfABody) {
 
 TEST_F(Inspect, StrictFailsOnWarningsThatAreNotAccepted) {
   const auto strictly = [&](std::vector<std::string> more) {
-    more.insert(more.begin(), {"inspect", path("room.obj"), "--strict", "--unit", "m"});
+    more.insert(more.begin(), {"inspect", getPath("room.obj"), "--strict", "--unit", "m"});
     return run(more);
   };
   EXPECT_EQ(strictly({}).code, 0);
-  write(folder_ / "room.obj", smallRoomObj() + "o again\nf 1 2 3\nf 1 2 3\n");
+  write(folder_ / "room.obj", makeSmallRoomObj() + "o again\nf 1 2 3\nf 1 2 3\n");
   const Ended notes = strictly({});
   EXPECT_EQ(notes.code, 0) << "notes never fail";
   EXPECT_NE(notes.out.find("note           1  duplicate_triangle"), std::string::npos) << notes.out;
 
-  write(folder_ / "room.obj", "mtllib absent.mtl\n" + smallRoomObj());
-  EXPECT_EQ(run({"inspect", path("room.obj"), "--unit", "m"}).code, 0);
+  write(folder_ / "room.obj", "mtllib absent.mtl\n" + makeSmallRoomObj());
+  EXPECT_EQ(run({"inspect", getPath("room.obj"), "--unit", "m"}).code, 0);
   const Ended failed = strictly({});
   EXPECT_EQ(failed.code, 3);
   EXPECT_NE(failed.err.find("--accept missing_material_file"), std::string::npos) << failed.err;
@@ -127,10 +127,10 @@ TEST_F(Inspect, StrictFailsOnWarningsThatAreNotAccepted) {
 TEST_F(Inspect, StrictFailsOnTheProblemsThatAreNotAcceptedAlone) {
   // No unit, no material file, and the same object twice; a degenerate triangle is but a note.
   write(folder_ / "room.obj",
-        "mtllib absent.mtl\n" + smallRoomObj() +
+        "mtllib absent.mtl\n" + makeSmallRoomObj() +
             "o first\nf 1 2 3\no second\nf 1 2 3\no thin\nf 1 2 4\nf 1 1 2\n");
   const auto failing = [&](const std::string& accepted) {
-    std::vector<std::string> arguments{"inspect", path("room.obj"), "--strict", "--json"};
+    std::vector<std::string> arguments{"inspect", getPath("room.obj"), "--strict", "--json"};
     if (!accepted.empty()) arguments.insert(arguments.end(), {"--accept", accepted});
     const Ended ended = run(arguments);
     std::vector<std::string> kinds;
@@ -153,11 +153,11 @@ TEST_F(Inspect, StrictFailsOnTheProblemsThatAreNotAcceptedAlone) {
 }
 
 TEST_F(Inspect, WritesAPageWithPlansAndEscapesTheFilesText) {
-  write(folder_ / "room.obj", "mtllib <b>absent.mtl\n" + smallRoomObj());
+  write(folder_ / "room.obj", "mtllib <b>absent.mtl\n" + makeSmallRoomObj());
   const Ended ended =
-      run({"inspect", path("room.obj"), "--unit", "m", "--html", path("report.html")});
+      run({"inspect", getPath("room.obj"), "--unit", "m", "--html", getPath("report.html")});
   ASSERT_EQ(ended.code, 0) << ended.err;
-  const std::string page = readText(path("report.html"));
+  const std::string page = readText(getPath("report.html"));
   EXPECT_NE(page.find("<h1>room.obj</h1>"), std::string::npos);
   EXPECT_NE(page.find("missing_material_file"), std::string::npos);
   EXPECT_NE(page.find("&lt;b&gt;absent.mtl"), std::string::npos);
@@ -167,7 +167,7 @@ TEST_F(Inspect, WritesAPageWithPlansAndEscapesTheFilesText) {
 }
 
 TEST_F(Inspect, DrawsAPlanOfEachStorey) {
-  const Ended drawn = run({"inspect", path("room.obj"), "--plan", path("plans")});
+  const Ended drawn = run({"inspect", getPath("room.obj"), "--plan", getPath("plans")});
   ASSERT_EQ(drawn.code, 0) << drawn.err;
   EXPECT_TRUE(fs::exists(folder_ / "plans/storey-1.png"));
   EXPECT_FALSE(fs::exists(folder_ / "plans/storey-2.png"));
@@ -175,10 +175,10 @@ TEST_F(Inspect, DrawsAPlanOfEachStorey) {
 
 TEST_F(Inspect, PagesOfPlansAreToScale) {
   const auto pageWidth = [&](const std::string& scale) {
-    const Ended drawn = run({"inspect", path("room.obj"), "--plan", path("pages"), "--plan-format",
-                             "svg", "--plan-scale", scale});
+    const Ended drawn = run({"inspect", getPath("room.obj"), "--plan", getPath("pages"),
+                             "--plan-format", "svg", "--plan-scale", scale});
     EXPECT_EQ(drawn.code, 0) << drawn.err;
-    const std::string svg = readText(path("pages/storey-1.svg"));
+    const std::string svg = readText(getPath("pages/storey-1.svg"));
     EXPECT_EQ(svg.rfind("<?xml", 0), 0u);
     std::smatch width;
     EXPECT_TRUE(std::regex_search(svg, width, std::regex("viewBox=\"0 0 ([0-9.]+)")));
@@ -191,8 +191,8 @@ TEST_F(Inspect, PagesOfPlansAreToScale) {
 }
 
 TEST_F(Inspect, ADamagedRecordingIsNoUnknownModel) {
-  write(path("x.mcap"), "garbage");
-  const Ended ended = run({"inspect", path("x.mcap")});
+  write(getPath("x.mcap"), "garbage");
+  const Ended ended = run({"inspect", getPath("x.mcap")});
   EXPECT_EQ(ended.code, 1);
   EXPECT_NE(ended.err.find("x.mcap: not an MCAP file by its first bytes"), std::string::npos)
       << ended.err;
@@ -201,26 +201,26 @@ TEST_F(Inspect, ADamagedRecordingIsNoUnknownModel) {
 TEST_F(Inspect, WrongUsageExitsWithTwoAndUnreadableFilesWithOne) {
   const std::vector<std::vector<std::string>> mistakes{
       {"inspect"},
-      {"inspect", path("room.obj"), path("room.obj")},
-      {"inspect", path("room.obj"), "--plan"},
-      {"inspect", path("room.obj"), "--plan", ""},
-      {"inspect", path("room.obj"), "--plan-format", "dxf"},
-      {"inspect", path("room.obj"), "--plan-scale", "0"},
-      {"inspect", path("room.obj"), "--plan-format", "svg"},
-      {"inspect", path("room.obj"), "--plan-scale", "50"},
-      {"inspect", path("room.obj"), "--plan", path("pages"), "--plan-scale", "50"},
-      {"inspect", path("room.obj"), "--strict", "--accept", "no_unti"},
-      {"inspect", path("room.obj"), "--accept", "no_unit"},
-      {"inspect", path("room.obj"), "--html", ""},
-      {"inspect", path("room.obj"), "--jsno"},
-      {"inspect", path("room.obj"), "--up", "North"}};
+      {"inspect", getPath("room.obj"), getPath("room.obj")},
+      {"inspect", getPath("room.obj"), "--plan"},
+      {"inspect", getPath("room.obj"), "--plan", ""},
+      {"inspect", getPath("room.obj"), "--plan-format", "dxf"},
+      {"inspect", getPath("room.obj"), "--plan-scale", "0"},
+      {"inspect", getPath("room.obj"), "--plan-format", "svg"},
+      {"inspect", getPath("room.obj"), "--plan-scale", "50"},
+      {"inspect", getPath("room.obj"), "--plan", getPath("pages"), "--plan-scale", "50"},
+      {"inspect", getPath("room.obj"), "--strict", "--accept", "no_unti"},
+      {"inspect", getPath("room.obj"), "--accept", "no_unit"},
+      {"inspect", getPath("room.obj"), "--html", ""},
+      {"inspect", getPath("room.obj"), "--jsno"},
+      {"inspect", getPath("room.obj"), "--up", "North"}};
   for (const auto& arguments : mistakes) {
     const Ended ended = run(arguments);
     EXPECT_EQ(ended.code, 2) << ::testing::PrintToString(arguments);
     EXPECT_EQ(ended.out, "");
     EXPECT_NE(ended.err.find("inspect --help"), std::string::npos) << ended.err;
   }
-  for (const std::string& file : {path("absent.obj"), folder_.string()}) {
+  for (const std::string& file : {getPath("absent.obj"), folder_.string()}) {
     const Ended ended = run({"inspect", file});
     EXPECT_EQ(ended.code, 1);
     EXPECT_EQ(ended.out, "");
@@ -229,25 +229,26 @@ TEST_F(Inspect, WrongUsageExitsWithTwoAndUnreadableFilesWithOne) {
 }
 
 TEST_F(Inspect, AnUnwritablePlanIsReportedBeforeTheImport) {
-  write(path("file"), "in the way");
+  write(getPath("file"), "in the way");
   for (const std::string& folder :
-       {path("file"), path("file") + "/below", std::string("/proc/x")}) {
-    const Ended ended = run({"inspect", path("absent.obj"), "--plan", folder});
+       {getPath("file"), getPath("file") + "/below", std::string("/proc/x")}) {
+    const Ended ended = run({"inspect", getPath("absent.obj"), "--plan", folder});
     EXPECT_EQ(ended.code, 1);
     EXPECT_EQ(ended.out, "");
     EXPECT_NE(ended.err.find("cannot write to " + folder), std::string::npos) << ended.err;
     EXPECT_NE(ended.err.find("--plan"), std::string::npos) << ended.err;
   }
-  EXPECT_EQ(readText(path("file")), "in the way");
+  EXPECT_EQ(readText(getPath("file")), "in the way");
 }
 
 TEST_F(Inspect, UnwritableFilesAreNamedAndExitWithOne) {
-  fs::create_symlink("/dev/full", path("stdout"));
-  EXPECT_EQ(awaitExitCode(start({"inspect", path("room.obj"), "--json"})), 1);
-  EXPECT_NE(readText(path("stderr")).find("stdout"), std::string::npos) << readText(path("stderr"));
-  fs::remove(path("stdout"));
-  fs::create_directories(path("plans/storey-1.png"));  // blocks the path of the image
-  const Ended ended = run({"inspect", path("room.obj"), "--plan", path("plans")});
+  fs::create_symlink("/dev/full", getPath("stdout"));
+  EXPECT_EQ(awaitExitCode(start({"inspect", getPath("room.obj"), "--json"})), 1);
+  EXPECT_NE(readText(getPath("stderr")).find("stdout"), std::string::npos)
+      << readText(getPath("stderr"));
+  fs::remove(getPath("stdout"));
+  fs::create_directories(getPath("plans/storey-1.png"));  // blocks the path of the image
+  const Ended ended = run({"inspect", getPath("room.obj"), "--plan", getPath("plans")});
   EXPECT_EQ(ended.code, 1);
   EXPECT_NE(ended.err.find("storey-1.png"), std::string::npos) << ended.err;
 }

@@ -11,7 +11,7 @@ namespace {
 
 class Load : public ServedRoom {};
 
-std::string listed(const std::vector<std::string>& faults) {
+std::string listFaults(const std::vector<std::string>& faults) {
   std::string all;
   for (const std::string& fault : faults) all += fault + "\n";
   return all;
@@ -19,15 +19,15 @@ std::string listed(const std::vector<std::string>& faults) {
 
 TEST_F(Load, TwentyClientsHearEveryEventOnce) {
   constexpr int kClients = 20;
-  const auto room = smallRoom();
+  const auto room = makeSmallRoom();
   serve({}, room);
   tests::LoadOptions options;
   options.port = server_->port();
-  options.places = tests::standingPlaces(room, kClients, 1);
+  options.places = tests::findStandingPlaces(room, kClients, 1);
   ASSERT_EQ(options.places.size(), std::size_t{kClients});
   const tests::LoadResult result = tests::runLoad(
       options, [] {}, [this] { server_->stop(); });
-  EXPECT_TRUE(result.faults.empty()) << listed(result.faults);
+  EXPECT_TRUE(result.faults.empty()) << listFaults(result.faults);
   EXPECT_EQ(result.welcomed, result.clients);
   EXPECT_EQ(result.spawned, result.clients);
   EXPECT_EQ(result.closedInPeace, result.clients);
@@ -40,7 +40,7 @@ TEST_F(Load, TwentyClientsHearEveryEventOnce) {
 
 TEST_F(Load, VisitorsLeaveNothingBehind) {
   serve();
-  protocol::Client other = client("other");
+  protocol::Client other = makeClient("other");
   v1::SetClock freely;  // so that avatars spawn, and leave with their clients
   freely.mutable_free_run()->set_speed(10);
   other.setClock(freely);
@@ -49,17 +49,18 @@ TEST_F(Load, VisitorsLeaveNothingBehind) {
     return other.metrics().clients() == 1 && other.metrics().avatars() == 0;
   };
   ASSERT_TRUE(becomesTrue(alone));
-  const tests::Footprint before = tests::footprint();
+  const tests::Footprint before = tests::measureFootprint();
   tests::visitRudely(server_->port(), 100, 2);
   {
-    protocol::Client visitor = client("visitor");  // in the world for certain
+    protocol::Client visitor = makeClient("visitor");  // in the world for certain
     ASSERT_FALSE(visitor.command(spawn("guest", 3, 0.01, 0)));
     ASSERT_TRUE(becomesTrue([&] { return other.metrics().contacts() > 0; }));
   }
   ASSERT_TRUE(becomesTrue(alone));
-  EXPECT_EQ(tests::footprint().threads, before.threads);
+  EXPECT_EQ(tests::measureFootprint().threads, before.threads);
   // A session leaves the world a moment before its socket is closed.
-  EXPECT_TRUE(becomesTrue([&] { return tests::footprint().descriptors <= before.descriptors; }));
+  EXPECT_TRUE(
+      becomesTrue([&] { return tests::measureFootprint().descriptors <= before.descriptors; }));
 }
 
 TEST_F(Load, TheExampleClientWalksUntilTheWallStopsIt) {

@@ -20,7 +20,7 @@ v1::ClientMessage orderGo(bool progress) {
   v1::ClientMessage message;
   v1::Command& command = *message.mutable_command();
   command.set_avatar("ann");
-  *command.mutable_go()->mutable_to()->mutable_point() = vec(8, 0, 0);
+  *command.mutable_go()->mutable_to()->mutable_point() = makeVec(8, 0, 0);
   command.mutable_go()->set_progress(progress);
   return message;
 }
@@ -44,7 +44,7 @@ class MeshProgress : public ServedRoom {
 TEST_F(MeshProgress, GoReportsItIfItIsAsked) {
   for (const bool isAsked : {false, true}) {
     serve();
-    auto ann = client("ann");
+    auto ann = makeClient("ann");
     ASSERT_FALSE(ann.command(spawn("ann", 2, 0, 0)));
     const std::vector<double> shares = order(ann, orderGo(isAsked));
     EXPECT_EQ(shares.empty(), !isAsked);
@@ -58,7 +58,7 @@ TEST_F(MeshProgress, GoReportsItIfItIsAsked) {
 
 /// The first query holds the thread until the others wait.
 TEST(QueryService, AQueryReportsTheMeshesOfThoseBeforeIt) {
-  const auto scene = smallRoom();
+  const auto scene = makeSmallRoom();
   const scene::World world(scene);
   const auto makeQuery = [&](double radius) {
     SceneQuery query{world.snapshot(), {}, world.settings(), {}};
@@ -86,7 +86,7 @@ TEST(QueryService, AQueryReportsTheMeshesOfThoseBeforeIt) {
 
 /// The first world continues when the second one knows its share.
 TEST(SharedMeshes, AWorldReportsTheMeshesThatAnotherOneBuilds) {
-  const auto scene = smallRoom();
+  const auto scene = makeSmallRoom();
   const MeshRequest request{scene, {}, {}, false, scene::World(scene).snapshot()};
   std::atomic<double> built{0}, known{0};
   std::atomic<int> unknown{0};
@@ -113,7 +113,7 @@ TEST(SharedMeshes, AWorldReportsTheMeshesThatAnotherOneBuilds) {
 }
 
 TEST(SharedMeshes, AfterAFailureTheWorldThatWaitsBuildsThem) {
-  const auto scene = smallRoom();
+  const auto scene = makeSmallRoom();
   const MeshRequest request{scene, {}, {}, false, scene::World(scene).snapshot()};
   std::atomic<bool> begun{false}, waits{false};
   std::jthread first([&] {

@@ -59,7 +59,7 @@ TEST(MotionOptions, SettingsOutOfRangeAreUsageErrors) {
 
 class AvatarOrders : public ::testing::Test {
  protected:
-  RecordableWorld world{scene::World(smallRoom())};
+  RecordableWorld world{scene::World(makeSmallRoom())};
   InProcessDriver driver{world, nullptr};
 
   static v1::Command armAt(double x, double y, double z) {

@@ -36,30 +36,30 @@ Answered ask(const std::shared_ptr<const scene::Scene>& scene, const v1::Navigat
 }
 
 /// Roofed rooms with a gap, in which a door leaf may stand. `more`: further objects.
-scene::Model roomsWithDoor(double gap, bool hasDoor,
-                           const std::vector<scene::testing::NamedBox>& more = {}) {
-  std::vector<scene::testing::NamedBox> boxes = scene::testing::roofedRooms(gap, 6);
+scene::Model makeRoomsWithDoor(double gap, bool hasDoor,
+                               const std::vector<scene::testing::NamedBox>& more = {}) {
+  std::vector<scene::testing::NamedBox> boxes = scene::testing::makeRoofedRooms(gap, 6);
   if (hasDoor)
     boxes.push_back({"leaf", {5.98, 0.01, -0.5 * gap + 0.01}, {6.02, 2.9, 0.5 * gap - 0.01}});
   boxes.insert(boxes.end(), more.begin(), more.end());
-  scene::Model model = scene::testing::boxModel(boxes);
+  scene::Model model = scene::testing::makeBoxModel(boxes);
   if (!hasDoor) return model;
-  scene::BodySpec door = scene::testing::bodySpec("door", scene::BodyKind::hinged, {8});
+  scene::BodySpec door = scene::testing::makeBodySpec("door", scene::BodyKind::hinged, {8});
   door.anchor = {6, 0, -0.5 * gap + 0.01};
   door.low = -1.5;
   model.bodies.push_back(door);
   return model;
 }
 
-v1::NavigationQuery islandsQuery() {
+v1::NavigationQuery makeIslandsQuery() {
   v1::NavigationQuery query;
   query.mutable_islands()->set_count(10);
   return query;
 }
 
 TEST(NavigationService, IslandsNameTheGapThatSeparatesThem) {
-  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(0.58, false));
-  const v1::NavigationReply reply = ask(scene, islandsQuery()).reply;
+  const auto scene = std::make_shared<const scene::Scene>(makeRoomsWithDoor(0.58, false));
+  const v1::NavigationReply reply = ask(scene, makeIslandsQuery()).reply;
   ASSERT_EQ(reply.islands_size(), 3);
   EXPECT_TRUE(reply.islands(0).roof());
   EXPECT_FALSE(reply.islands(0).drawn());
@@ -76,8 +76,8 @@ TEST(NavigationService, IslandsNameTheGapThatSeparatesThem) {
 }
 
 TEST(NavigationService, IslandsNameTheClosedDoorBetweenThem) {
-  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, true));
-  const v1::NavigationReply reply = ask(scene, islandsQuery()).reply;
+  const auto scene = std::make_shared<const scene::Scene>(makeRoomsWithDoor(1, true));
+  const v1::NavigationReply reply = ask(scene, makeIslandsQuery()).reply;
   ASSERT_EQ(reply.islands_size(), 3);
   for (int i = 1; i < 3; ++i) {
     EXPECT_EQ(reply.islands(i).path().obstacle_name(), "door") << reply.islands(i).path().reason();
@@ -87,8 +87,8 @@ TEST(NavigationService, IslandsNameTheClosedDoorBetweenThem) {
 
 /// A closed door is remembered as the reason, until something else stands in the doorway.
 TEST(NavigationService, AClosedDoorIsTheReasonAsLongAsAWayLeadsThroughIt) {
-  scene::Model model = roomsWithDoor(1, true, {{"gate", {5.5, -3, -0.6}, {5.6, -1, 0.6}}});
-  scene::BodySpec gate = scene::testing::bodySpec("gate", scene::BodyKind::lift, {9});
+  scene::Model model = makeRoomsWithDoor(1, true, {{"gate", {5.5, -3, -0.6}, {5.6, -1, 0.6}}});
+  scene::BodySpec gate = scene::testing::makeBodySpec("gate", scene::BodyKind::lift, {9});
   gate.stops = {0, 3.01};
   gate.high = 3.01;
   model.bodies.push_back(gate);
@@ -120,7 +120,7 @@ TEST(NavigationService, AClosedDoorIsTheReasonAsLongAsAWayLeadsThroughIt) {
 
 /// With doors as they are: closed, half open, open.
 TEST(NavigationService, ADoorAsItIsIsAReasonOrALeg) {
-  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, true));
+  const auto scene = std::make_shared<const scene::Scene>(makeRoomsWithDoor(1, true));
   NavigationService service(scene);
   scene::World world(scene);
   v1::Command go;
@@ -165,7 +165,7 @@ TEST(NavigationService, ADoorAsItIsIsAReasonOrALeg) {
 /// A share that falls begins the next meshes.
 TEST(NavigationService, MeshesOfReasonsAndOfMovedBodiesReportProgress) {
   const auto scene = std::make_shared<const scene::Scene>(
-      roomsWithDoor(1, true, {{"yard", {12, -0.2, -3}, {50, 0, 3}}}));  // of several tiles
+      makeRoomsWithDoor(1, true, {{"yard", {12, -0.2, -3}, {50, 0, 3}}}));  // of several tiles
   NavigationService service(scene);
   scene::World world(scene);
   v1::NavigationQuery query;
@@ -189,7 +189,7 @@ TEST(NavigationService, MeshesOfReasonsAndOfMovedBodiesReportProgress) {
 }
 
 TEST(NavigationService, AStoreyIsReachedFromBothSidesOfAClosedDoor) {
-  scene::Model model = roomsWithDoor(1, true);
+  scene::Model model = makeRoomsWithDoor(1, true);
   model.storeys.push_back({"Ground", "", 0});
   const auto scene = std::make_shared<const scene::Scene>(std::move(model));
   for (const double x : {2.0, 8.0}) {
@@ -204,7 +204,7 @@ TEST(NavigationService, AStoreyIsReachedFromBothSidesOfAClosedDoor) {
 
 /// Of two halls the closer one is outside, where no door leads.
 TEST(NavigationService, ANamedGoalBehindAClosedDoorHasTheDoorAsReason) {
-  scene::Model model = roomsWithDoor(1, true, {{"terrace", {-6, -0.3, -2}, {-2, 0, 2}}});
+  scene::Model model = makeRoomsWithDoor(1, true, {{"terrace", {-6, -0.3, -2}, {-2, 0, 2}}});
   for (const double x : {-4.0, 8.5}) {
     scene::Space& hall = model.spaces.emplace_back();
     hall.name = "Hall";
@@ -219,7 +219,7 @@ TEST(NavigationService, ANamedGoalBehindAClosedDoorHasTheDoorAsReason) {
 }
 
 TEST(NavigationService, StepsAreListedIfTheyAreAskedFor) {
-  const auto scene = scene::testing::boxScene(
+  const auto scene = scene::testing::makeBoxScene(
       {{"floor", {0, -0.2, 0}, {4, 0, 4}}, {"kerb", {4, -0.2, 0}, {8, 0.15, 4}}});
   v1::NavigationQuery query;
   *query.mutable_path()->mutable_from()->mutable_point() = toProto(scene::Vec3(1, 0, 2));
@@ -235,7 +235,7 @@ TEST(NavigationService, StepsAreListedIfTheyAreAskedFor) {
 }
 
 TEST(NavigationService, MapsAreBytesBitsOrAPicture) {
-  const auto scene = std::make_shared<const scene::Scene>(roomsWithDoor(1, false));
+  const auto scene = std::make_shared<const scene::Scene>(makeRoomsWithDoor(1, false));
   v1::NavigationQuery query;
   query.mutable_map()->set_cell(0.3);
   const Answered bytes = ask(scene, query);
@@ -270,12 +270,12 @@ class MeshCache : public ProgramFixture {
  protected:
   void SetUp() override {
     ProgramFixture::SetUp();
-    setenv("ENFILADE_CACHE", path("cache").c_str(), 1);
+    setenv("ENFILADE_CACHE", getPath("cache").c_str(), 1);
   }
   void TearDown() override { setenv("ENFILADE_CACHE", "off", 1); }
 
-  Ended route(const std::vector<std::string>& more = {}) const {
-    std::vector<std::string> arguments{"route", path("room.obj"), "2,0,0", "8,0,0", "--json"};
+  Ended runRoute(const std::vector<std::string>& more = {}) const {
+    std::vector<std::string> arguments{"route", getPath("room.obj"), "2,0,0", "8,0,0", "--json"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     Ended ended = run(arguments);
     EXPECT_EQ(ended.code, 0) << ended.err;
@@ -284,9 +284,9 @@ class MeshCache : public ProgramFixture {
   static bool hasBuilt(const Ended& ended) {
     return ended.err.find("built in") != std::string::npos;
   }
-  std::vector<std::filesystem::path> meshFiles() const {
+  std::vector<std::filesystem::path> listMeshFiles() const {
     std::vector<std::filesystem::path> files;
-    for (const auto& file : std::filesystem::directory_iterator(path("cache")))
+    for (const auto& file : std::filesystem::directory_iterator(getPath("cache")))
       if (file.path().extension() == ".text") files.push_back(file.path());
     return files;
   }
@@ -296,36 +296,36 @@ class MeshCache : public ProgramFixture {
 };
 
 TEST_F(MeshCache, TheNextStartReadsTheMeshes) {
-  const Ended first = route();
+  const Ended first = runRoute();
   EXPECT_TRUE(hasBuilt(first)) << first.err;
-  const Ended second = route();
+  const Ended second = runRoute();
   EXPECT_FALSE(hasBuilt(second)) << second.err;
   EXPECT_EQ(parsePoints(second), parsePoints(first));
-  EXPECT_TRUE(hasBuilt(route({"--radius", "0.2"}))) << "another size";
-  EXPECT_TRUE(hasBuilt(route({"--no-cache"})));
+  EXPECT_TRUE(hasBuilt(runRoute({"--radius", "0.2"}))) << "another size";
+  EXPECT_TRUE(hasBuilt(runRoute({"--no-cache"})));
   setenv("ENFILADE_CACHE", "off", 1);
-  EXPECT_TRUE(hasBuilt(route()));
+  EXPECT_TRUE(hasBuilt(runRoute()));
 }
 
 TEST_F(MeshCache, ADamagedFileIsReportedAndBuiltAgain) {
-  const Ended first = route();
-  ASSERT_EQ(meshFiles().size(), 1u);
-  std::string bytes = readText(meshFiles()[0]);
+  const Ended first = runRoute();
+  ASSERT_EQ(listMeshFiles().size(), 1u);
+  std::string bytes = readText(listMeshFiles()[0]);
   bytes[bytes.size() / 2] = static_cast<char>(bytes[bytes.size() / 2] ^ 1);
-  write(meshFiles()[0], bytes);
-  const Ended second = route();
+  write(listMeshFiles()[0], bytes);
+  const Ended second = runRoute();
   EXPECT_TRUE(hasBuilt(second));
   EXPECT_NE(second.err.find("damaged"), std::string::npos) << second.err;
   EXPECT_EQ(parsePoints(second), parsePoints(first));
-  EXPECT_FALSE(hasBuilt(route())) << "it was written again";
+  EXPECT_FALSE(hasBuilt(runRoute())) << "it was written again";
 }
 
 TEST_F(MeshCache, OpenDoorsHaveMeshesOfTheirOwnAndThePolicyOfSizeHolds) {
-  route();
-  route({"--doors-as-they-are"});
-  EXPECT_EQ(meshFiles().size(), 2u);
+  runRoute();
+  runRoute({"--doors-as-they-are"});
+  EXPECT_EQ(listMeshFiles().size(), 2u);
   setenv("ENFILADE_CACHE_MB", "0", 1);
-  const Ended full = route({"--radius", "0.25"});
+  const Ended full = runRoute({"--radius", "0.25"});
   unsetenv("ENFILADE_CACHE_MB");
   EXPECT_NE(full.err.find("the navigation meshes are not kept"), std::string::npos) << full.err;
 }

@@ -23,15 +23,15 @@ class NavigationRequests : public ServedRoom {};
 
 TEST_F(NavigationRequests, AnObserverMayAskAndTheReplyHasTheTick) {
   serve();
-  auto ann = client("ann");
+  auto ann = makeClient("ann");
   v1::ClientMessage step;
   step.mutable_step()->set_ticks(3);
   ann.request(std::move(step));
   v1::ClientMessage request;
   v1::NavigationQuery& query = *request.mutable_navigation();
   query.set_tick(3);
-  *query.mutable_path()->mutable_from()->mutable_point() = vec(2, 0, 0);
-  *query.mutable_path()->add_to()->mutable_point() = vec(8, 0, 0);
+  *query.mutable_path()->mutable_from()->mutable_point() = makeVec(2, 0, 0);
+  *query.mutable_path()->add_to()->mutable_point() = makeVec(8, 0, 0);
   query.mutable_path()->add_to()->set_name("room_column");
   const v1::NavigationReply reply = ann.request(request).navigation();
   EXPECT_EQ(reply.tick(), 3u);
@@ -46,17 +46,17 @@ TEST_F(NavigationRequests, AnObserverMayAskAndTheReplyHasTheTick) {
 
 TEST_F(NavigationRequests, GoIsAWalkAfterTheQueuedOrders) {
   serve();
-  auto ann = client("ann");
+  auto ann = makeClient("ann");
   v1::Subscribe subscription;
   subscription.set_notices(true);
   ann.subscribe(subscription);
   EXPECT_FALSE(ann.command(spawn("ann", 2, 0, 0)));
-  EXPECT_FALSE(ann.command(go("ann", vec(8, 0, 0))));
-  EXPECT_FALSE(ann.command(go("ann", vec(2, 0, 0))));
-  const auto refused = ann.command(go("ann", vec(5.1, 1, 0)));
+  EXPECT_FALSE(ann.command(go("ann", makeVec(8, 0, 0))));
+  EXPECT_FALSE(ann.command(go("ann", makeVec(2, 0, 0))));
+  const auto refused = ann.command(go("ann", makeVec(5.1, 1, 0)));
   ASSERT_TRUE(refused);
   EXPECT_EQ(refused->field(), "go.to");
-  EXPECT_TRUE(ann.command(go("bob", vec(2, 0, 0))));
+  EXPECT_TRUE(ann.command(go("bob", makeVec(2, 0, 0))));
   int arrived = 0;
   for (int i = 0; i < 60 && arrived < 2; ++i) {
     ann.step(60);
@@ -71,14 +71,14 @@ TEST_F(NavigationRequests, GoIsAWalkAfterTheQueuedOrders) {
 }
 
 /// The log lines of an answer.
-std::string logOfAnswer(const std::shared_ptr<const scene::Scene>& scene, const std::string& goal,
-                        std::string& error) {
+std::string captureLogOfAnswer(const std::shared_ptr<const scene::Scene>& scene,
+                               const std::string& goal, std::string& error) {
   std::ostringstream log;
   const auto usual = spdlog::default_logger();
   spdlog::set_default_logger(std::make_shared<spdlog::logger>(
       "answer", std::make_shared<spdlog::sinks::ostream_sink_mt>(log)));
   v1::NavigationQuery query;
-  *query.mutable_path()->mutable_from()->mutable_point() = vec(2, 0, 0);
+  *query.mutable_path()->mutable_from()->mutable_point() = makeVec(2, 0, 0);
   query.mutable_path()->add_to()->set_name(goal);
   std::vector<std::uint8_t> attachment;
   NavigationService service(scene);
@@ -90,11 +90,11 @@ std::string logOfAnswer(const std::shared_ptr<const scene::Scene>& scene, const 
 }
 
 TEST(NavigationPlaces, AnUnknownNameIsRefusedBeforeMeshesAreBuilt) {
-  const auto scene = smallRoom();
+  const auto scene = makeSmallRoom();
   std::string error;
-  EXPECT_EQ(logOfAnswer(scene, "room:attic", error), "");
+  EXPECT_EQ(captureLogOfAnswer(scene, "room:attic", error), "");
   EXPECT_NE(error.find("'room:attic'"), std::string::npos) << error;
-  const std::string log = logOfAnswer(scene, scene->model().objects.back().path, error);
+  const std::string log = captureLogOfAnswer(scene, scene->model().objects.back().path, error);
   EXPECT_NE(log.find("built in"), std::string::npos) << log;
   EXPECT_EQ(error, "");
 }
@@ -102,24 +102,24 @@ TEST(NavigationPlaces, AnUnknownNameIsRefusedBeforeMeshesAreBuilt) {
 class Route : public ProgramFixture {};
 
 TEST_F(Route, PrintsAPathItsLengthAndItsNarrowestPlace) {
-  const Ended ended = run({"route", path("room.obj"), "2,0,0", "8,0,0", "--json"});
+  const Ended ended = run({"route", getPath("room.obj"), "2,0,0", "8,0,0", "--json"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const auto report = nlohmann::json::parse(ended.out);
   EXPECT_TRUE(report.at("found").get<bool>());
   EXPECT_GT(report.at("length").get<double>(), 10);
   EXPECT_GE(report.at("points").size(), 3u);
-  const Ended text = run({"route", path("room.obj"), "2,0,0", "object:room_column"});
+  const Ended text = run({"route", getPath("room.obj"), "2,0,0", "object:room_column"});
   ASSERT_EQ(text.code, 0) << text.err;
   EXPECT_NE(text.out.find(" m from 2,0,0 to object:room_column"), std::string::npos) << text.out;
 }
 
 TEST_F(Route, WithoutAPathItExitsWithThreeAndTheReason) {
-  const Ended ended = run({"route", path("room.obj"), "2,0,0", "5.1,3.05,0", "--json"});
+  const Ended ended = run({"route", getPath("room.obj"), "2,0,0", "5.1,3.05,0", "--json"});
   EXPECT_EQ(ended.code, 3) << ended.err;
   const auto report = nlohmann::json::parse(ended.out);
   EXPECT_FALSE(report.at("found").get<bool>());
   EXPECT_FALSE(report.at("reason").get<std::string>().empty());
-  const Ended unknown = run({"route", path("room.obj"), "2,0,0", "attic"});
+  const Ended unknown = run({"route", getPath("room.obj"), "2,0,0", "attic"});
   EXPECT_EQ(unknown.code, 1);
   EXPECT_NE(unknown.err.find("TO: 'attic'"), std::string::npos) << unknown.err;
   EXPECT_NE(unknown.err.find("inspect --objects"), std::string::npos) << unknown.err;
@@ -131,8 +131,8 @@ constexpr const char* kGate =
     R"("limits":[0,3.2],"speed":1.6}]})";
 
 TEST_F(Route, DoorsAreLegsAndStandWhereTheWalkerMeetsThem) {
-  write(path("room.walk.json"), kGate);
-  const Ended ended = run({"route", path("room.obj"), "2,0,0", "8,0,0", "--json"});
+  write(getPath("room.walk.json"), kGate);
+  const Ended ended = run({"route", getPath("room.obj"), "2,0,0", "8,0,0", "--json"});
   ASSERT_EQ(ended.code, 0) << ended.err;
   const auto report = nlohmann::json::parse(ended.out);
   ASSERT_EQ(report.at("doors").size(), 1u);
@@ -146,38 +146,39 @@ TEST_F(Route, DoorsAreLegsAndStandWhereTheWalkerMeetsThem) {
   }
   EXPECT_EQ(doors, 1);
   EXPECT_NEAR(seconds, report.at("seconds").get<double>(), 1e-9);
-  const Ended text = run({"route", path("room.obj"), "2,0,0", "8,0,0"});
+  const Ended text = run({"route", getPath("room.obj"), "2,0,0", "8,0,0"});
   EXPECT_NE(text.out.find("door: gate, after 2.7"), std::string::npos) << text.out;
 }
 
 TEST_F(Route, ThePlanShowsThePathOrWhatIsInTheWay) {
-  const std::string plan = path("plan.png");
-  EXPECT_EQ(run({"route", path("room.obj"), "2,0,0", "8,0,0", "--plan", plan}).code, 0);
+  const std::string plan = getPath("plan.png");
+  EXPECT_EQ(run({"route", getPath("room.obj"), "2,0,0", "8,0,0", "--plan", plan}).code, 0);
   const std::string found = readText(plan);
   EXPECT_EQ(found.substr(1, 3), "PNG");
-  const Ended refused = run({"route", path("room.obj"), "2,0,0", "5.1,3.05,0", "--plan", plan});
+  const Ended refused = run({"route", getPath("room.obj"), "2,0,0", "5.1,3.05,0", "--plan", plan});
   EXPECT_EQ(refused.code, 3);
   const std::string none = readText(plan);
   EXPECT_EQ(none.substr(1, 3), "PNG");
   EXPECT_NE(none, found);
   for (const char* wrong : {"plan.svg", "plan", "nowhere/plan.png"}) {
-    const Ended ended = run({"route", path("room.obj"), "2,0,0", "8,0,0", "--plan", path(wrong)});
+    const Ended ended =
+        run({"route", getPath("room.obj"), "2,0,0", "8,0,0", "--plan", getPath(wrong)});
     EXPECT_EQ(ended.code, 2) << wrong;
     EXPECT_NE(ended.err.find("--plan"), std::string::npos) << ended.err;
   }
 }
 
 TEST_F(Route, AScriptGoesAroundTheWall) {
-  write(path("walk.jsonl"),
+  write(getPath("walk.jsonl"),
         "{\"spawn\":\"ann\",\"at\":[2,0,0]}\n{\"go\":\"ann\",\"to\":[8,0,0]}\n"
         "{\"go\":\"ann\",\"to\":\"room_column\"}\n");
-  const Ended ended =
-      run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--strict"});
+  const Ended ended = run(
+      {"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out", getPath("out"), "--strict"});
   EXPECT_EQ(ended.code, 0) << ended.err << ended.out;
-  write(path("bad.jsonl"),
+  write(getPath("bad.jsonl"),
         "{\"spawn\":\"ann\",\"at\":[2,0,0]}\n{\"go\":\"ann\",\"to\":\"attic\"}\n");
-  const Ended refused =
-      run({"replay", path("room.obj"), path("bad.jsonl"), "--out", path("out"), "--strict"});
+  const Ended refused = run(
+      {"replay", getPath("room.obj"), getPath("bad.jsonl"), "--out", getPath("out"), "--strict"});
   EXPECT_EQ(refused.code, 3);
   EXPECT_NE((refused.err + refused.out).find("'attic'"), std::string::npos) << refused.err;
 }

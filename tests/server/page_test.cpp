@@ -33,9 +33,9 @@ std::string unpackGzip(const std::string& packed) {
 
 struct Response {
   std::string head, body;
-  std::string status() const { return head.substr(9, 3); }
+  std::string getStatus() const { return head.substr(9, 3); }
   /// The value of a header, or "".
-  std::string header(const std::string& name) const {
+  std::string findHeader(const std::string& name) const {
     const std::size_t at = head.find("\r\n" + name + ": ");
     if (at == std::string::npos) return "";
     const std::size_t start = at + name.size() + 4;
@@ -59,9 +59,10 @@ class Page : public ServedRoom {
   void servePage(Access access = {}, bool withPage = true) {
     ServerOptions options;
     options.access = std::move(access);
-    options.additionalScenes = {bodyRoom()};
+    options.additionalScenes = {makeBodyRoom()};
     if (withPage) options.pageFolder = folder_ / "page";
-    server_ = std::make_unique<Server>(smallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
+    server_ =
+        std::make_unique<Server>(makeSmallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   }
   Response get(const std::string& target, const std::string& headers = "") {
     RawConnection raw(server_->port());
@@ -72,40 +73,40 @@ class Page : public ServedRoom {
   }
 
   const tests::TemporaryFolder own_;
-  const fs::path folder_ = own_.path();
+  const fs::path folder_ = own_.getPath();
 };
 
 TEST_F(Page, TheSceneIsServedAsGlb) {
   servePage();
   const Response response = get("/scene.glb");
-  EXPECT_EQ(response.status(), "200");
-  EXPECT_EQ(response.header("Content-Type"), "model/gltf-binary");
-  EXPECT_EQ(response.header("Content-Length"), std::to_string(response.body.size()));
-  EXPECT_EQ(response.header("Content-Encoding"), "");
-  EXPECT_EQ(response.header("X-Content-Type-Options"), "nosniff");
+  EXPECT_EQ(response.getStatus(), "200");
+  EXPECT_EQ(response.findHeader("Content-Type"), "model/gltf-binary");
+  EXPECT_EQ(response.findHeader("Content-Length"), std::to_string(response.body.size()));
+  EXPECT_EQ(response.findHeader("Content-Encoding"), "");
+  EXPECT_EQ(response.findHeader("X-Content-Type-Options"), "nosniff");
   const GlbReader file(response.body);
-  EXPECT_EQ(file.drawnTriangles().size(), 36u);
+  EXPECT_EQ(file.collectDrawnTriangles().size(), 36u);
   EXPECT_EQ(file.json.at("scenes").at(0).at("extras").at("entities").at(1).at("path"), "room_wall");
   const std::string hash = file.json.at("scenes").at(0).at("extras").at("sceneHash");
-  EXPECT_EQ(response.header("ETag").substr(0, 18), "\"" + hash + "-");
+  EXPECT_EQ(response.findHeader("ETag").substr(0, 18), "\"" + hash + "-");
 }
 
 TEST_F(Page, AnUnchangedSceneIsNotSentAgain) {
   servePage();
-  const std::string tag = get("/scene.glb").header("ETag");
+  const std::string tag = get("/scene.glb").findHeader("ETag");
   const Response again = get("/scene.glb", "If-None-Match: \"other\", " + tag + "\r\n");
-  EXPECT_EQ(again.status(), "304");
+  EXPECT_EQ(again.getStatus(), "304");
   EXPECT_EQ(again.body, "");
-  EXPECT_EQ(again.header("ETag"), tag);
-  EXPECT_EQ(get("/scene.glb", "If-None-Match: \"other\"\r\n").status(), "200");
+  EXPECT_EQ(again.findHeader("ETag"), tag);
+  EXPECT_EQ(get("/scene.glb", "If-None-Match: \"other\"\r\n").getStatus(), "200");
 }
 
 TEST_F(Page, TheSceneIsCompressedForClientsThatAcceptIt) {
   servePage();
   const Response plain = get("/scene.glb");
   const Response packed = get("/scene.glb", "Accept-Encoding: br, gzip;q=0.8\r\n");
-  EXPECT_EQ(packed.header("Content-Encoding"), "gzip");
-  EXPECT_EQ(packed.header("Vary"), "Accept-Encoding");
+  EXPECT_EQ(packed.findHeader("Content-Encoding"), "gzip");
+  EXPECT_EQ(packed.findHeader("Vary"), "Accept-Encoding");
   EXPECT_LT(packed.body.size(), plain.body.size());
   EXPECT_EQ(unpackGzip(packed.body), plain.body);
 }
@@ -113,9 +114,9 @@ TEST_F(Page, TheSceneIsCompressedForClientsThatAcceptIt) {
 TEST_F(Page, EachWorldHasItsScene) {
   servePage();
   const Response other = get("/scene.glb?world=body_room");
-  EXPECT_EQ(other.status(), "200");
+  EXPECT_EQ(other.getStatus(), "200");
   EXPECT_NE(other.body.find("\"body\":\"door\""), std::string::npos);
-  EXPECT_EQ(get("/scene.glb?world=nowhere").status(), "404");
+  EXPECT_EQ(get("/scene.glb?world=nowhere").getStatus(), "404");
 }
 
 TEST_F(Page, SimultaneousRequestsShareTheFile) {
@@ -135,36 +136,37 @@ TEST_F(Page, TheSceneNeedsATokenButThePageDoesNot) {
   Access access;
   access.tokens = {{Role::observe, "look"}};
   servePage(access);
-  EXPECT_EQ(get("/scene.glb").status(), "401");
-  EXPECT_EQ(get("/scene.glb?token=look").status(), "200");
-  EXPECT_EQ(get("/scene.glb", "Authorization: Bearer look\r\n").status(), "200");
-  EXPECT_EQ(get("/").status(), "200");
-  EXPECT_EQ(get("/page/app.js").status(), "200");
-  EXPECT_EQ(get("/", "Origin: https://evil.example.com\r\n").status(), "403");
-  EXPECT_EQ(get("/scene.glb?token=look", "Origin: https://evil.example.com\r\n").status(), "403");
+  EXPECT_EQ(get("/scene.glb").getStatus(), "401");
+  EXPECT_EQ(get("/scene.glb?token=look").getStatus(), "200");
+  EXPECT_EQ(get("/scene.glb", "Authorization: Bearer look\r\n").getStatus(), "200");
+  EXPECT_EQ(get("/").getStatus(), "200");
+  EXPECT_EQ(get("/page/app.js").getStatus(), "200");
+  EXPECT_EQ(get("/", "Origin: https://evil.example.com\r\n").getStatus(), "403");
+  EXPECT_EQ(get("/scene.glb?token=look", "Origin: https://evil.example.com\r\n").getStatus(),
+            "403");
 }
 
 TEST_F(Page, ItsFilesHaveTypesAndASecurityPolicy) {
   servePage();
   const Response index = get("/");
-  EXPECT_EQ(index.status(), "200");
+  EXPECT_EQ(index.getStatus(), "200");
   EXPECT_EQ(index.body, "<!doctype html><title>Enfilade</title>");
-  EXPECT_EQ(index.header("Content-Type"), "text/html; charset=utf-8");
-  EXPECT_EQ(index.header("Cache-Control"), "no-cache");
-  EXPECT_EQ(index.header("Referrer-Policy"), "no-referrer");
-  EXPECT_EQ(index.header("X-Content-Type-Options"), "nosniff");
-  EXPECT_EQ(index.header("Content-Security-Policy"),
+  EXPECT_EQ(index.findHeader("Content-Type"), "text/html; charset=utf-8");
+  EXPECT_EQ(index.findHeader("Cache-Control"), "no-cache");
+  EXPECT_EQ(index.findHeader("Referrer-Policy"), "no-referrer");
+  EXPECT_EQ(index.findHeader("X-Content-Type-Options"), "nosniff");
+  EXPECT_EQ(index.findHeader("Content-Security-Policy"),
             "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; "
             "worker-src 'self' blob:; connect-src 'self' ws: wss: blob: data:; "
             "script-src 'self' 'wasm-unsafe-eval'");
   EXPECT_EQ(get("/?world=main#x").body, index.body);
   EXPECT_EQ(get("/page/index.html").body, index.body);
-  EXPECT_EQ(get("/page/app.js").header("Content-Type"), "text/javascript; charset=utf-8");
+  EXPECT_EQ(get("/page/app.js").findHeader("Content-Type"), "text/javascript; charset=utf-8");
   const Response wasm = get("/page/assets/a%2520b.wasm");
-  EXPECT_EQ(wasm.header("Content-Type"), "application/wasm");
+  EXPECT_EQ(wasm.findHeader("Content-Type"), "application/wasm");
   EXPECT_EQ(wasm.body, std::string("\0asm", 4));
-  EXPECT_EQ(get("/", "If-None-Match: " + index.header("ETag") + "\r\n").status(), "304");
-  EXPECT_NE(index.header("ETag"), get("/page/app.js").header("ETag"));
+  EXPECT_EQ(get("/", "If-None-Match: " + index.findHeader("ETag") + "\r\n").getStatus(), "304");
+  EXPECT_NE(index.findHeader("ETag"), get("/page/app.js").findHeader("ETag"));
 }
 
 TEST_F(Page, NoPathLeadsOutOfItsFolder) {
@@ -174,19 +176,19 @@ TEST_F(Page, NoPathLeadsOutOfItsFolder) {
         "/page/..%5csecret.txt", "/page//etc/passwd", "/page/./app.js", "/page/assets", "/page/",
         "/page/linked.txt", "/page/app.js%00.html", "/page/assets/../../secret.txt"}) {
     const Response response = get(target);
-    EXPECT_EQ(response.status(), "404") << target;
+    EXPECT_EQ(response.getStatus(), "404") << target;
     EXPECT_EQ(response.body.find("HIDDEN-42"), std::string::npos) << target;
   }
-  EXPECT_EQ(get("/secret.txt").status(), "404");
+  EXPECT_EQ(get("/secret.txt").getStatus(), "404");
 }
 
 TEST_F(Page, WithoutAFolderTheAnswerSaysHowToBuildIt) {
   servePage({}, false);
   const Response response = get("/");
-  EXPECT_EQ(response.status(), "404");
+  EXPECT_EQ(response.getStatus(), "404");
   EXPECT_NE(response.body.find("./dev build"), std::string::npos);
-  EXPECT_EQ(get("/page/app.js").status(), "404");
-  EXPECT_EQ(get("/scene.glb").status(), "200");
+  EXPECT_EQ(get("/page/app.js").getStatus(), "404");
+  EXPECT_EQ(get("/scene.glb").getStatus(), "200");
 }
 
 TEST_F(Page, TheWebSocketIsStillAtTheRoot) {

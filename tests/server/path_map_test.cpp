@@ -8,7 +8,7 @@
 namespace enfilade::server::testing {
 namespace {
 
-WalkedPath pathAt(std::initializer_list<std::pair<double, int>> heightsAndTicks) {
+WalkedPath makePathAt(std::initializer_list<std::pair<double, int>> heightsAndTicks) {
   WalkedPath path{"ann", {}, 1};
   for (const auto& [height, ticks] : heightsAndTicks) {
     for (int i = 0; i < ticks; ++i) path.footPositions.push_back(Vec3(i, height, 0));
@@ -18,20 +18,20 @@ WalkedPath pathAt(std::initializer_list<std::pair<double, int>> heightsAndTicks)
 
 TEST(PathMap, StoreysAreTheHeightsWalkedOnForLong) {
   EXPECT_TRUE(findWalkedStoreys({}).empty());
-  EXPECT_EQ(findWalkedStoreys({pathAt({{0.0005, 100}})}), std::vector<double>{0.0005});
-  const auto two = findWalkedStoreys({pathAt({{0, 300}, {1.1, 5}, {2.2, 5}, {4.2, 200}})});
+  EXPECT_EQ(findWalkedStoreys({makePathAt({{0.0005, 100}})}), std::vector<double>{0.0005});
+  const auto two = findWalkedStoreys({makePathAt({{0, 300}, {1.1, 5}, {2.2, 5}, {4.2, 200}})});
   EXPECT_EQ(two, (std::vector<double>{0, 4.2})) << "stairs are no storey";
 }
 
 TEST(PathMap, AStandingAvatarDefinesNoStorey) {
   WalkedPath waiting{"bob", std::vector<Vec3>(5000, Vec3(0, 0, 0)), 2};
-  const auto two = findWalkedStoreys({pathAt({{0, 100}, {4.2, 50}}), waiting});
+  const auto two = findWalkedStoreys({makePathAt({{0, 100}, {4.2, 50}}), waiting});
   EXPECT_EQ(two, (std::vector<double>{0, 4.2}));
 }
 
 TEST(PathMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
   WalkTrace trace;
-  trace.paths = {pathAt({{0, 50}})};
+  trace.paths = {makePathAt({{0, 50}})};
   int plans = 0;
   const auto blank = [&](const render::Camera& camera) -> std::optional<PlanPicture> {
     ++plans;
@@ -70,7 +70,7 @@ TEST(PathMap, PathsAreDrawnInTheirOwnColourOnThePlan) {
     for (std::size_t i = 0; i < image.rgb.size(); i += 3) ink += image.rgb[i] < 80;
     return ink;
   };
-  const auto room = smallRoom();
+  const auto room = makeSmallRoom();
   EXPECT_GT(countInk(drawMap(trace, {blank, makeFloorPlanSource(room)}).value()),
             countInk(*map) + 500);
 }
@@ -93,7 +93,7 @@ TEST(PathMap, BlockedWalksAndRefusedOrdersAreDrawn) {
     return marked;
   };
   WalkTrace trace;
-  trace.paths = {pathAt({{0, 50}})};
+  trace.paths = {makePathAt({{0, 50}})};
   EXPECT_EQ(countMarks(trace), 0u);
   // The legend has one mark for both kinds; the map has one for each.
   trace.blockedWalks = {{Vec3(10, 0, 2), Vec3::UnitX()}};
@@ -106,7 +106,7 @@ TEST(PathMap, BlockedWalksAndRefusedOrdersAreDrawn) {
 TEST(PathMap, ARefusedOrderFarAwayDoesNotStretchTheMap) {
   const auto measureWidth = [](const std::vector<Vec3>& refused) {
     WalkTrace trace;
-    trace.paths = {pathAt({{0, 50}})};
+    trace.paths = {makePathAt({{0, 50}})};
     for (const Vec3& at : refused) trace.refusedOrders.push_back({at, Vec3::UnitX()});
     double width = 0;
     const auto blank = [&](const render::Camera& camera) -> std::optional<PlanPicture> {

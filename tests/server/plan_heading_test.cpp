@@ -32,11 +32,11 @@ std::array<double, 2> readPageSize(const std::filesystem::path& file) {
 }
 
 TEST(PlanHeadings, ANarrowPageHasMoreLinesAboveThePlan) {
-  const auto scene = scene::testing::boxScene(
+  const auto scene = scene::testing::makeBoxScene(
       {{"floor", {0, -0.2, 0}, {4, 0, 4}}, {"wall", {0, 0, 0}, {0.2, 3, 4}}});
   const tests::TemporaryFolder folder;
   const auto sizeAt = [&](const std::string& name) {
-    const auto file = folder.path() / "page.svg";
+    const auto file = folder.getPath() / "page.svg";
     EXPECT_TRUE(writeStoreyPage(*scene, {0, name}, renderBlank, 100, file));
     return readPageSize(file);
   };
@@ -47,11 +47,11 @@ TEST(PlanHeadings, ANarrowPageHasMoreLinesAboveThePlan) {
 }
 
 TEST(PlanPages, RoomsFarFromWallsAreOnThePage) {
-  scene::Model model = scene::testing::boxModel(
+  scene::Model model = scene::testing::makeBoxModel(
       {{"floor", {0, -0.2, 0}, {40, 0, 40}}, {"wall", {0, 0, 0}, {0.2, 3, 20}}});
   model.storeys = {{"EG", "", 0}};
   const tests::TemporaryFolder folder;
-  const auto file = folder.path() / "page.svg";
+  const auto file = folder.getPath() / "page.svg";
   const auto writePage = [&] {
     EXPECT_TRUE(writeStoreyPage(scene::Scene(model), {0, "EG", 0}, renderBlank, 100, file));
     return readPageSize(file);

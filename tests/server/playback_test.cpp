@@ -20,10 +20,10 @@ class ProgramPlayback : public ProgramFixture {
                        R"({"walk":"ann","along":[)";
     for (int i = 0; i < 6; ++i) walk += "[4,0,2],[-8,0,-3],";
     walk += "[0,0,0]]}\n";
-    write(path("walk.jsonl"), walk);
-    write(path("wait.jsonl"), "{\"wait\":10}\n");
-    ASSERT_EQ(replay({path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--record",
-                      path("walk.mcap")})
+    write(getPath("walk.jsonl"), walk);
+    write(getPath("wait.jsonl"), "{\"wait\":10}\n");
+    ASSERT_EQ(replay({getPath("room.obj"), getPath("walk.jsonl"), "--out", getPath("out"),
+                      "--record", getPath("walk.mcap")})
                   .code,
               0);
   }
@@ -32,7 +32,7 @@ class ProgramPlayback : public ProgramFixture {
     return run(arguments);
   }
   Ended verify(const std::string& file, std::vector<std::string> more = {}) const {
-    more.insert(more.begin(), {path(file), "--verify"});
+    more.insert(more.begin(), {getPath(file), "--verify"});
     return replay(more);
   }
   static nlohmann::json readReport(const Ended& ended) {
@@ -55,17 +55,18 @@ TEST_F(ProgramPlayback, IsVerifiedFromTheCheckpointBeforeATick) {
 }
 
 TEST_F(ProgramPlayback, AContinuedWalkEndsIdentically) {
-  const Ended branched = replay({path("walk.mcap"), "--from", "1500", "--then", path("wait.jsonl"),
-                                 "--out", path("branch"), "--record", path("branch.mcap")});
+  const Ended branched =
+      replay({getPath("walk.mcap"), "--from", "1500", "--then", getPath("wait.jsonl"), "--out",
+              getPath("branch"), "--record", getPath("branch.mcap")});
   ASSERT_EQ(branched.code, 0) << branched.err;
   const auto whole = readReport(verify("branch.mcap"));
   EXPECT_GE(whole.value("ticks", 0u), 600u);
   // Ann continues her orders: after the same tick the recorded walk has the same hash.
   const std::uint64_t end = 1500 + whole.value("ticks", std::uint64_t{0});
-  write(path("none.jsonl"), "{\"wait\":0}\n");
+  write(getPath("none.jsonl"), "{\"wait\":0}\n");
   const Ended other =
-      replay({path("walk.mcap"), "--from", std::to_string(end), "--then", path("none.jsonl"),
-              "--out", path("other"), "--record", path("other.mcap")});
+      replay({getPath("walk.mcap"), "--from", std::to_string(end), "--then", getPath("none.jsonl"),
+              "--out", getPath("other"), "--record", getPath("other.mcap")});
   if (other.code == 0) {
     const auto made = readReport(verify("other.mcap"));
     EXPECT_EQ(made.value("ticks", 1u), 0u);
@@ -76,12 +77,12 @@ TEST_F(ProgramPlayback, AContinuedWalkEndsIdentically) {
 }
 
 TEST_F(ProgramPlayback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
-  write(path("bob.jsonl"), R"({"spawn":"bob","at":[-3,0,5]})"
-                           "\n"
-                           R"({"walk":"ann","along":[[0,0,2]]})"
-                           "\n");
-  ASSERT_EQ(replay({path("room.obj"), path("walk.mcap"), "--from", "700", "--then",
-                    path("bob.jsonl"), "--out", path("b"), "--record", path("b.mcap")})
+  write(getPath("bob.jsonl"), R"({"spawn":"bob","at":[-3,0,5]})"
+                              "\n"
+                              R"({"walk":"ann","along":[[0,0,2]]})"
+                              "\n");
+  ASSERT_EQ(replay({getPath("room.obj"), getPath("walk.mcap"), "--from", "700", "--then",
+                    getPath("bob.jsonl"), "--out", getPath("b"), "--record", getPath("b.mcap")})
                 .code,
             0);
   const auto whole = readReport(verify("b.mcap"));
@@ -91,15 +92,15 @@ TEST_F(ProgramPlayback, ABranchIsARecordingThatCanBeSoughtAndLeftAgain) {
   const Ended early = verify("b.mcap", {"--from", "699"});
   EXPECT_EQ(early.code, 1);
   EXPECT_NE(early.err.find("give one from 700"), std::string::npos) << early.err;
-  EXPECT_EQ(replay({path("b.mcap"), "--from", "800", "--then", path("wait.jsonl"), "--out",
-                    path("c"), "--record", path("c.mcap")})
+  EXPECT_EQ(replay({getPath("b.mcap"), "--from", "800", "--then", getPath("wait.jsonl"), "--out",
+                    getPath("c"), "--record", getPath("c.mcap")})
                 .code,
             0);
   EXPECT_EQ(verify("c.mcap").code, 0);
 }
 
 /// The contacts reported as active at the start of a recording; contacts that end must have begun.
-std::set<std::pair<std::string, std::string>> livingAtItsBeginning(const std::string& file) {
+std::set<std::pair<std::string, std::string>> readLivingContacts(const std::string& file) {
   protocol::RecordingReader reader(file);
   std::set<std::pair<std::string, std::string>> live, first;
   bool ticked = false;
@@ -122,11 +123,11 @@ std::set<std::pair<std::string, std::string>> livingAtItsBeginning(const std::st
 }
 
 TEST_F(ProgramPlayback, ActiveContactsAreReportedAtTheStartOfABranch) {
-  ASSERT_EQ(replay({path("walk.mcap"), "--from", "700", "--then", path("wait.jsonl"), "--out",
-                    path("b"), "--record", path("b.mcap")})
+  ASSERT_EQ(replay({getPath("walk.mcap"), "--from", "700", "--then", getPath("wait.jsonl"), "--out",
+                    getPath("b"), "--record", getPath("b.mcap")})
                 .code,
             0);
-  EXPECT_TRUE(livingAtItsBeginning(path("b.mcap")).contains({"ann", "room_floor"}));
+  EXPECT_TRUE(readLivingContacts(getPath("b.mcap")).contains({"ann", "room_floor"}));
   EXPECT_EQ(verify("b.mcap").code, 0);
 }
 
@@ -134,14 +135,17 @@ TEST_F(ProgramPlayback, InvalidStartsAreRefusedWithTheReason) {
   const Ended beyond = verify("walk.mcap", {"--from", "100000000"});
   EXPECT_EQ(beyond.code, 1);
   EXPECT_NE(beyond.err.find("give one from 0 to"), std::string::npos) << beyond.err;
-  write(path("other.obj"), "o floor\nv -9 0 -9\nv 9 0 -9\nv 9 0 9\nf 1 2 3\n");
-  const Ended other = replay({path("other.obj"), path("walk.mcap"), "--verify", "--from", "2400"});
+  write(getPath("other.obj"), "o floor\nv -9 0 -9\nv 9 0 -9\nv 9 0 9\nf 1 2 3\n");
+  const Ended other =
+      replay({getPath("other.obj"), getPath("walk.mcap"), "--verify", "--from", "2400"});
   EXPECT_NE(other.code, 0);
   EXPECT_NE(other.err.find("another scene"), std::string::npos) << other.err;
-  EXPECT_EQ(replay({path("walk.mcap"), "--from", "5"}).code, 2);
-  EXPECT_EQ(replay({path("walk.mcap"), "--then", path("wait.jsonl"), "--out", path("x")}).code, 2);
-  EXPECT_EQ(replay({path("walk.mcap"), "--from", "5", "--then", path("wait.jsonl"), "--out",
-                    path("x"), "--epsilon", "0.001"})
+  EXPECT_EQ(replay({getPath("walk.mcap"), "--from", "5"}).code, 2);
+  EXPECT_EQ(
+      replay({getPath("walk.mcap"), "--then", getPath("wait.jsonl"), "--out", getPath("x")}).code,
+      2);
+  EXPECT_EQ(replay({getPath("walk.mcap"), "--from", "5", "--then", getPath("wait.jsonl"), "--out",
+                    getPath("x"), "--epsilon", "0.001"})
                 .code,
             2);
 }

@@ -41,9 +41,9 @@ class ProgramFixture : public ::testing::Test {
     std::string out, err;
   };
 
-  void SetUp() override { write(folder_ / "room.obj", smallRoomObj()); }
+  void SetUp() override { write(folder_ / "room.obj", makeSmallRoomObj()); }
 
-  std::string path(const std::string& name) const { return (folder_ / name).string(); }
+  std::string getPath(const std::string& name) const { return (folder_ / name).string(); }
 
   pid_t start(std::vector<std::string> arguments) const {
     arguments.insert(arguments.begin(), ENFILADE_PROGRAM);
@@ -53,8 +53,8 @@ class ProgramFixture : public ::testing::Test {
     posix_spawn_file_actions_t actions;
     posix_spawn_file_actions_init(&actions);
     const int flags = O_WRONLY | O_CREAT | O_TRUNC;
-    posix_spawn_file_actions_addopen(&actions, 1, path("stdout").c_str(), flags, 0600);
-    posix_spawn_file_actions_addopen(&actions, 2, path("stderr").c_str(), flags, 0600);
+    posix_spawn_file_actions_addopen(&actions, 1, getPath("stdout").c_str(), flags, 0600);
+    posix_spawn_file_actions_addopen(&actions, 2, getPath("stderr").c_str(), flags, 0600);
     pid_t child = -1;
     EXPECT_EQ(posix_spawn(&child, ENFILADE_PROGRAM, &actions, nullptr, argv.data(), environ), 0);
     posix_spawn_file_actions_destroy(&actions);
@@ -69,13 +69,13 @@ class ProgramFixture : public ::testing::Test {
 
   Ended run(const std::vector<std::string>& arguments) const {
     const int code = awaitExitCode(start(arguments));
-    return {code, readText(path("stdout")), readText(path("stderr"))};
+    return {code, readText(getPath("stdout")), readText(getPath("stderr"))};
   }
 
   /// The port from the ready line, once it was printed.
   int awaitReady() const {
     for (int i = 0; i < 3000; ++i) {
-      const auto ready = nlohmann::json::parse(readText(path("stdout")), nullptr, false);
+      const auto ready = nlohmann::json::parse(readText(getPath("stdout")), nullptr, false);
       if (!ready.is_discarded() && ready.value("ready", false)) return ready.at("port");
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     }
@@ -83,7 +83,7 @@ class ProgramFixture : public ::testing::Test {
   }
 
   const tests::TemporaryFolder own_;
-  const std::filesystem::path folder_ = own_.path();
+  const std::filesystem::path folder_ = own_.getPath();
 };
 
 }  // namespace enfilade::server::testing

@@ -102,56 +102,56 @@ TEST_F(Program, HelpMarksRequiredOptionsAndHasNoTypes) {
 
 TEST_F(Program, UnreadableFilesAreNamedAndExitWithOne) {
   const auto replay = [&](const std::string& scene, const std::string& script) {
-    return run({"replay", scene, script, "--out", path("out")});
+    return run({"replay", scene, script, "--out", getPath("out")});
   };
-  const Ended noScene = replay(path("absent.obj"), path("walk.jsonl"));
+  const Ended noScene = replay(getPath("absent.obj"), getPath("walk.jsonl"));
   EXPECT_EQ(noScene.code, 1);
   EXPECT_NE(noScene.err.find("absent.obj: no such file; check the path\n"), std::string::npos)
       << noScene.err;
-  write(path("room.xyz"), smallRoomObj());
-  const Ended unknown = replay(path("room.xyz"), path("walk.jsonl"));
+  write(getPath("room.xyz"), makeSmallRoomObj());
+  const Ended unknown = replay(getPath("room.xyz"), getPath("walk.jsonl"));
   EXPECT_EQ(unknown.code, 1);
   EXPECT_NE(unknown.err.find("room.xyz"), std::string::npos) << unknown.err;
   EXPECT_NE(unknown.err.find(".xyz"), std::string::npos) << unknown.err;
-  const Ended noScript = replay(path("room.obj"), path("absent.jsonl"));
+  const Ended noScript = replay(getPath("room.obj"), getPath("absent.jsonl"));
   EXPECT_EQ(noScript.code, 1);
   EXPECT_NE(noScript.err.find("absent.jsonl"), std::string::npos) << noScript.err;
-  write(path("bad.jsonl"), "{\"spawn\":\"ann\",\"at\":[0,0,0]}\n{\"walk\":\"ann\"}\n");
-  const Ended badScript = replay(path("room.obj"), path("bad.jsonl"));
+  write(getPath("bad.jsonl"), "{\"spawn\":\"ann\",\"at\":[0,0,0]}\n{\"walk\":\"ann\"}\n");
+  const Ended badScript = replay(getPath("room.obj"), getPath("bad.jsonl"));
   EXPECT_EQ(badScript.code, 1);
   EXPECT_NE(badScript.err.find("bad.jsonl:2"), std::string::npos) << badScript.err;
-  EXPECT_FALSE(fs::exists(path("out") + "/summary.json"));
+  EXPECT_FALSE(fs::exists(getPath("out") + "/summary.json"));
 }
 
 TEST_F(Program, AMissingDeviceExitsWithOne) {
   write(folder_ / "path.txt", "0 0 1 0 0 0 0 1\n");
   for (const std::vector<std::string>& verb : std::vector<std::vector<std::string>>{
-           {"serve", path("room.obj"), "--listen", "127.0.0.1:0"},
-           {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out")},
-           {"capture", path("room.obj"), path("path.txt"), "--out", path("frames")}}) {
+           {"serve", getPath("room.obj"), "--listen", "127.0.0.1:0"},
+           {"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out", getPath("out")},
+           {"capture", getPath("room.obj"), getPath("path.txt"), "--out", getPath("frames")}}) {
     std::vector<std::string> arguments = verb;
     arguments.insert(arguments.end(), {"--device", "abacus of 1642"});
     const Ended ended = run(arguments);
     EXPECT_EQ(ended.code, 1) << verb[0];
     EXPECT_NE(ended.err.find("abacus of 1642"), std::string::npos) << ended.err;
   }
-  EXPECT_EQ(run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--renderer",
-                 "rays", "--require-gpu"})
+  EXPECT_EQ(run({"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out", getPath("out"),
+                 "--renderer", "rays", "--require-gpu"})
                 .code,
             1);
 }
 
 TEST_F(Program, TheRequestedRendererDrawsTheWalk) {
-  const Ended ended = run(
-      {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--renderer", "rays"});
+  const Ended ended = run({"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out",
+                           getPath("out"), "--renderer", "rays"});
   EXPECT_EQ(ended.code, 0) << ended.err;
   EXPECT_NE(ended.err.find("by Embree"), std::string::npos) << ended.err;
 }
 
 TEST_F(Program, AnUnwritableFolderIsReportedBeforeTheWalk) {
-  write(path("file"), "in the way");
-  const Ended ended =
-      run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("file") + "/out"});
+  write(getPath("file"), "in the way");
+  const Ended ended = run(
+      {"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out", getPath("file") + "/out"});
   EXPECT_EQ(ended.code, 1);
   EXPECT_NE(ended.err.find("file/out: Not a directory; give another folder with --out\n"),
             std::string::npos)
@@ -161,43 +161,44 @@ TEST_F(Program, AnUnwritableFolderIsReportedBeforeTheWalk) {
 
 TEST_F(Program, ASecondWalkIntoAFolderRemovesOnlyTheFirstOnesFiles) {
   const auto replay = [&](const std::string& script) {
-    return run({"replay", path("room.obj"), path(script), "--out", path("out")}).code;
+    return run({"replay", getPath("room.obj"), getPath(script), "--out", getPath("out")}).code;
   };
   ASSERT_EQ(replay("walk.jsonl"), 0);
-  write(path("out/sheet.png"), "of a first walk with a renderer");
-  write(path("out/notes.txt"), "the visitor's own");
-  write(path("out/frames/mine.png"), "the visitor's own");
-  write(path("still.jsonl"), "{\"spawn\":\"ann\",\"at\":[0,0.01,0]}\n");
+  write(getPath("out/sheet.png"), "of a first walk with a renderer");
+  write(getPath("out/notes.txt"), "the visitor's own");
+  write(getPath("out/frames/mine.png"), "the visitor's own");
+  write(getPath("still.jsonl"), "{\"spawn\":\"ann\",\"at\":[0,0.01,0]}\n");
   ASSERT_EQ(replay("still.jsonl"), 0);
-  EXPECT_FALSE(fs::exists(path("out/frames/wall.png")));
-  EXPECT_FALSE(fs::exists(path("out/sheet.png"))) << "this walk took no picture";
-  EXPECT_TRUE(fs::exists(path("out/summary.json")));
-  EXPECT_TRUE(fs::exists(path("out/notes.txt")));
-  EXPECT_TRUE(fs::exists(path("out/frames/mine.png")));
+  EXPECT_FALSE(fs::exists(getPath("out/frames/wall.png")));
+  EXPECT_FALSE(fs::exists(getPath("out/sheet.png"))) << "this walk took no picture";
+  EXPECT_TRUE(fs::exists(getPath("out/summary.json")));
+  EXPECT_TRUE(fs::exists(getPath("out/notes.txt")));
+  EXPECT_TRUE(fs::exists(getPath("out/frames/mine.png")));
 }
 
 TEST_F(Program, AFailedWriteToStdoutExitsWithOne) {
   write(folder_ / "path.txt", "0 0 1 0 0 0 0 1\n");
-  fs::create_symlink("/dev/full", path("stdout"));
+  fs::create_symlink("/dev/full", getPath("stdout"));
   for (const std::vector<std::string>& arguments : std::vector<std::vector<std::string>>{
            {"--help"},
            {"--version"},
-           {"serve", path("room.obj"), "--listen", "127.0.0.1:0"},
-           {"inspect", path("room.obj")},
+           {"serve", getPath("room.obj"), "--listen", "127.0.0.1:0"},
+           {"inspect", getPath("room.obj")},
            {"doctor"},
-           {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"), "--record",
-            path("walk.mcap")},
-           {"replay", path("room.obj"), path("walk.mcap"), "--verify"},
-           {"replay", path("room.obj"), path("walk.mcap"), "--out", path("again")},
-           {"inspect", path("walk.mcap")},
-           {"diff", path("walk.mcap"), path("walk.mcap")},
-           {"export", path("walk.mcap"), "--out", path("export")},
-           {"capture", path("room.obj"), path("path.txt"), "--out", path("frames"), "--dry-run"},
-           {"capture", path("room.obj"), path("path.txt"), "--out", path("frames"), "--size",
-            "16x16", "--renderer", "rays"}}) {
+           {"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out", getPath("out"),
+            "--record", getPath("walk.mcap")},
+           {"replay", getPath("room.obj"), getPath("walk.mcap"), "--verify"},
+           {"replay", getPath("room.obj"), getPath("walk.mcap"), "--out", getPath("again")},
+           {"inspect", getPath("walk.mcap")},
+           {"diff", getPath("walk.mcap"), getPath("walk.mcap")},
+           {"export", getPath("walk.mcap"), "--out", getPath("export")},
+           {"capture", getPath("room.obj"), getPath("path.txt"), "--out", getPath("frames"),
+            "--dry-run"},
+           {"capture", getPath("room.obj"), getPath("path.txt"), "--out", getPath("frames"),
+            "--size", "16x16", "--renderer", "rays"}}) {
     EXPECT_EQ(awaitExitCode(start(arguments)), 1) << ::testing::PrintToString(arguments);
-    EXPECT_NE(readText(path("stderr")).find("stdout"), std::string::npos)
-        << readText(path("stderr"));
+    EXPECT_NE(readText(getPath("stderr")).find("stdout"), std::string::npos)
+        << readText(getPath("stderr"));
   }
 }
 
@@ -218,7 +219,7 @@ class DoctorBesideACrash : public ProgramFixture {
     return nlohmann::json::parse(ended.out);
   }
 
-  const std::string vendor_ = path("vendor.json");
+  const std::string vendor_ = getPath("vendor.json");
 };
 
 TEST_F(DoctorBesideACrash, NamesTheDriverThatCrashes) {
@@ -247,53 +248,55 @@ TEST_F(Program, AFileBeyondTheLimitIsAnErrorNotADeath) {
   ASSERT_EQ(getrlimit(RLIMIT_FSIZE, &before), 0);
   const rlimit few{2048, before.rlim_max};
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &few), 0);  // the program inherits it
-  const pid_t child = start({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("out"),
-                             "--record", path("walk.mcap")});
+  const pid_t child = start({"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out",
+                             getPath("out"), "--record", getPath("walk.mcap")});
   ASSERT_EQ(setrlimit(RLIMIT_FSIZE, &before), 0);
   EXPECT_EQ(awaitExitCode(child), 1);
-  EXPECT_NE(readText(path("stderr")).find("File too large"), std::string::npos)
-      << readText(path("stderr"));
+  EXPECT_NE(readText(getPath("stderr")).find("File too large"), std::string::npos)
+      << readText(getPath("stderr"));
 }
 
 TEST_F(Program, ARecordingKeepsThatTheRequiredAppearanceIsIgnored) {
-  std::string text = tests::gltf(tests::BoxMesh({1, 2, 3}), "0", tests::kOneNode);
+  std::string text = tests::makeGltfFile(tests::BoxMesh({1, 2, 3}), "0", tests::kOneNode);
   text.replace(0, 1, R"({"extensionsRequired":["KHR_materials_unlit"],)");
   write(folder_ / "unlit.gltf", text);
-  const Ended refused = run({"inspect", path("unlit.gltf")});
+  const Ended refused = run({"inspect", getPath("unlit.gltf")});
   EXPECT_EQ(refused.code, 1);
   EXPECT_NE(refused.err.find("KHR_materials_unlit; --ignore-appearance"), std::string::npos)
       << refused.err;
   write(folder_ / "wait.jsonl", "{\"wait\":0.1}\n");
-  EXPECT_EQ(run({"replay", path("unlit.gltf"), path("wait.jsonl"), "--ignore-appearance", "--out",
-                 path("out"), "--record", path("unlit.mcap")})
+  EXPECT_EQ(run({"replay", getPath("unlit.gltf"), getPath("wait.jsonl"), "--ignore-appearance",
+                 "--out", getPath("out"), "--record", getPath("unlit.mcap")})
                 .code,
             0);
-  EXPECT_EQ(run({"replay", path("unlit.mcap"), "--verify"}).code, 0);
-  EXPECT_EQ(run({"replay", path("unlit.mcap"), "--from", "1", "--then", path("wait.jsonl"), "--out",
-                 path("branch"), "--ignore-appearance"})
+  EXPECT_EQ(run({"replay", getPath("unlit.mcap"), "--verify"}).code, 0);
+  EXPECT_EQ(run({"replay", getPath("unlit.mcap"), "--from", "1", "--then", getPath("wait.jsonl"),
+                 "--out", getPath("branch"), "--ignore-appearance"})
                 .code,
             2);
-  EXPECT_EQ(run({"replay", path("unlit.gltf"), path("unlit.mcap"), "--out", path("again")}).code, 0)
+  EXPECT_EQ(
+      run({"replay", getPath("unlit.gltf"), getPath("unlit.mcap"), "--out", getPath("again")}).code,
+      0)
       << "the later version of the model";
 }
 
 TEST_F(Program, ServingAPublicAddressExitsWithOne) {
-  const Ended ended = run({"serve", path("room.obj"), "--listen", "0.0.0.0:0"});
+  const Ended ended = run({"serve", getPath("room.obj"), "--listen", "0.0.0.0:0"});
   EXPECT_EQ(ended.code, 1);
   EXPECT_NE(ended.err.find("--token-file and --insecure"), std::string::npos) << ended.err;
 }
 
 TEST_F(Program, WalkingWithoutAServerEndsWithOne) {
   const Ended ended =
-      run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:1", "--out", path("out")});
+      run({"walk", getPath("walk.jsonl"), "--connect", "127.0.0.1:1", "--out", getPath("out")});
   EXPECT_EQ(ended.code, 1);
   EXPECT_NE(ended.err.find("127.0.0.1:1"), std::string::npos) << ended.err;
 }
 
 TEST_F(Program, SignalsEndAServerInOrder) {
   for (const auto& [signal, code] : {std::pair{SIGTERM, 0}, std::pair{SIGINT, 130}}) {
-    fs::remove(path("stdout"));
-    const pid_t child = start({"serve", path("room.obj"), "--listen", "127.0.0.1:0"});
+    fs::remove(getPath("stdout"));
+    const pid_t child = start({"serve", getPath("room.obj"), "--listen", "127.0.0.1:0"});
     EXPECT_GT(awaitReady(), 0);
     kill(child, signal);
     EXPECT_EQ(awaitExitCode(child), code);
@@ -302,8 +305,8 @@ TEST_F(Program, SignalsEndAServerInOrder) {
 
 TEST_F(Program, StrictTurnsABlockedWalkIntoThree) {
   const auto arguments = [&](bool strict) {
-    std::vector<std::string> all{"replay", path("room.obj"), path("walk.jsonl"), "--out",
-                                 path("out")};
+    std::vector<std::string> all{"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out",
+                                 getPath("out")};
     if (strict) all.push_back("--strict");
     return all;
   };
@@ -352,22 +355,22 @@ void expectBalanced(const fs::path& out) {
 }
 
 TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
-  const Ended replayed = run(
-      {"replay", path("room.obj"), path("walk.jsonl"), "--out", path("replayed"), "--audit", "10"});
+  const Ended replayed = run({"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out",
+                              getPath("replayed"), "--audit", "10"});
   ASSERT_EQ(replayed.code, 0) << replayed.err;
-  fs::remove(path("stdout"));
+  fs::remove(getPath("stdout"));
   const pid_t server =
-      start({"serve", path("room.obj"), "--listen", "127.0.0.1:0", "--audit", "10"});
+      start({"serve", getPath("room.obj"), "--listen", "127.0.0.1:0", "--audit", "10"});
   const std::string port = std::to_string(awaitReady());
-  const Ended walked =
-      run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--out", path("walked")});
+  const Ended walked = run({"walk", getPath("walk.jsonl"), "--connect", "127.0.0.1:" + port,
+                            "--out", getPath("walked")});
   kill(server, SIGTERM);
   EXPECT_EQ(awaitExitCode(server), 0);
   ASSERT_EQ(walked.code, 0) << walked.err;
 
   const auto summary = nlohmann::json::parse(replayed.out);
   const auto socketSummary = nlohmann::json::parse(walked.out);
-  EXPECT_EQ(summary, nlohmann::json::parse(readText(path("replayed/summary.json"))));
+  EXPECT_EQ(summary, nlohmann::json::parse(readText(getPath("replayed/summary.json"))));
   for (const char* key : {"ticks", "state_hash", "contacts", "worst_penetration", "pairs", "walks",
                           "outcomes", "scene_hash", "blocked", "arrived", "audit"}) {
     EXPECT_EQ(summary.at(key), socketSummary.at(key)) << key;
@@ -382,26 +385,26 @@ TEST_F(Program, AWalkOverTheSocketIsTheReplayToTheLastBit) {
     EXPECT_TRUE(summary["stages_us"].contains(stage)) << stage;
   }
   const std::uint64_t last = summary["ticks"];
-  EXPECT_EQ(readContacts(path("replayed"), last), readContacts(path("walked"), last));
-  expectBalanced(path("replayed"));
-  expectBalanced(path("walked"));
+  EXPECT_EQ(readContacts(getPath("replayed"), last), readContacts(getPath("walked"), last));
+  expectBalanced(getPath("replayed"));
+  expectBalanced(getPath("walked"));
   if (summary["renderer"] == "") {
     if (std::getenv("CI")) FAIL() << "no EGL device";
     GTEST_SKIP() << "no EGL device: pictures are not compared";
   }
   for (const char* file : {"frames/wall.png", "sheet.png", "map.png"}) {
-    EXPECT_FALSE(readText(path("replayed/") + file).empty()) << file;
-    EXPECT_EQ(readText(path("replayed/") + file), readText(path("walked/") + file)) << file;
+    EXPECT_FALSE(readText(getPath("replayed/") + file).empty()) << file;
+    EXPECT_EQ(readText(getPath("replayed/") + file), readText(getPath("walked/") + file)) << file;
   }
-  EXPECT_GT(countDarkPixels(path("walked/map.png")), 500) << "walls";
+  EXPECT_GT(countDarkPixels(getPath("walked/map.png")), 500) << "walls";
 }
 
 TEST_F(Program, ASecondStartReadsTheCacheOfTheFirst) {
   const auto fromCache = [&](const std::string& option) {
-    const Ended ended = run({"inspect", path("room.obj"), "--json", option});
+    const Ended ended = run({"inspect", getPath("room.obj"), "--json", option});
     return nlohmann::json::parse(ended.out).at("from_cache").get<bool>();
   };
-  setenv("ENFILADE_CACHE", path("cache").c_str(), 1);
+  setenv("ENFILADE_CACHE", getPath("cache").c_str(), 1);
   EXPECT_FALSE(fromCache("--unit=m"));
   EXPECT_TRUE(fromCache("--unit=m"));
   EXPECT_FALSE(fromCache("--no-cache"));

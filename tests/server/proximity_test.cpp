@@ -11,50 +11,51 @@ namespace {
 
 constexpr std::uint32_t kRoomFloor = 1;
 
-v1::EntityRef entity(std::uint32_t id) {
+v1::EntityRef makeEntityRef(std::uint32_t id) {
   v1::EntityRef ref;
   ref.set_id(id);
   return ref;
 }
 
-v1::EntityRef entity(const std::string& name) {
+v1::EntityRef makeEntityRef(const std::string& name) {
   v1::EntityRef ref;
   ref.set_name(name);
   return ref;
 }
 
 template <class A, class B>
-v1::DistanceQuery between(const A& a, const B& b) {
+v1::DistanceQuery makeDistanceQuery(const A& a, const B& b) {
   v1::DistanceQuery query;
   v1::DistanceQuery::Pair& pair = *query.add_pairs();
-  *pair.mutable_a() = entity(a);
-  *pair.mutable_b() = entity(b);
+  *pair.mutable_a() = makeEntityRef(a);
+  *pair.mutable_b() = makeEntityRef(b);
   return query;
 }
 
 template <class A>
-v1::TouchingQuery near(const A& which, double within) {
+v1::TouchingQuery makeTouchingQuery(const A& which, double within) {
   v1::TouchingQuery query;
-  *query.mutable_entity() = entity(which);
+  *query.mutable_entity() = makeEntityRef(which);
   query.set_within(within);
   return query;
 }
 
-v1::CannotTouchQuery apart(const std::string& a, const std::string& b, double minWait = 0) {
+v1::CannotTouchQuery makeCannotTouchQuery(const std::string& a, const std::string& b,
+                                          double minWait = 0) {
   v1::CannotTouchQuery query;
-  *query.mutable_a() = entity(a);
-  *query.mutable_b() = entity(b);
+  *query.mutable_a() = makeEntityRef(a);
+  *query.mutable_b() = makeEntityRef(b);
   query.set_least(minWait);
   return query;
 }
 
 class Pairs : public ServedRoom {
  protected:
-  void SetUp() override { serve({}, bodyRoom()); }
+  void SetUp() override { serve({}, makeBodyRoom()); }
 
   /// A client whose avatar "ann" stands at x = 0, 2 m before the door's wall.
-  protocol::Client inTheRoom() {
-    protocol::Client ann = client("ann");
+  protocol::Client enterTheRoom() {
+    protocol::Client ann = makeClient("ann");
     EXPECT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
     ann.step(30);
     return ann;
@@ -73,11 +74,11 @@ protocol::ProtocolError catchRefusal(const Ask& ask) {
 }
 
 TEST_F(Pairs, DistancesAreThoseThatWereBuiltByIdAndByName) {
-  protocol::Client ann = inTheRoom();
-  v1::DistanceQuery query = between("left", "end");
-  *query.add_pairs() = between("ann", "left").pairs(0);
-  *query.add_pairs() = between(kLeaf, kRoomFloor).pairs(0);
-  *query.add_pairs() = between("left", "floor").pairs(0);
+  protocol::Client ann = enterTheRoom();
+  v1::DistanceQuery query = makeDistanceQuery("left", "end");
+  *query.add_pairs() = makeDistanceQuery("ann", "left").pairs(0);
+  *query.add_pairs() = makeDistanceQuery(kLeaf, kRoomFloor).pairs(0);
+  *query.add_pairs() = makeDistanceQuery("left", "floor").pairs(0);
   const v1::DistanceReply reply = ann.distances(query);
   ASSERT_EQ(reply.pairs_size(), 4);
   EXPECT_EQ(reply.tick(), 30u);
@@ -93,10 +94,10 @@ TEST_F(Pairs, DistancesAreThoseThatWereBuiltByIdAndByName) {
 
 TEST_F(Pairs, RefinedPairsHaveTheDepth) {
   const auto block =
-      scene::testing::boxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {0.75, 0, 0}, {2, 1, 1}}});
+      scene::testing::makeBoxModel({{"a", {0, 0, 0}, {1, 1, 1}}, {"b", {0.75, 0, 0}, {2, 1, 1}}});
   serve({}, std::make_shared<const scene::Scene>(block));
-  protocol::Client ann = client("ann");
-  v1::DistanceQuery query = between("a", "b");
+  protocol::Client ann = makeClient("ann");
+  v1::DistanceQuery query = makeDistanceQuery("a", "b");
   EXPECT_EQ(ann.distances(query).pairs(0).penetration(), 0);
   query.set_refined(true);
   const v1::PairState state = ann.distances(query).pairs(0);
@@ -105,11 +106,11 @@ TEST_F(Pairs, RefinedPairsHaveTheDepth) {
 }
 
 TEST_F(Pairs, TouchingEntitiesAreSortedByDistance) {
-  protocol::Client ann = inTheRoom();
-  const v1::TouchingReply touching = ann.touching(near("left", 0));
+  protocol::Client ann = enterTheRoom();
+  const v1::TouchingReply touching = ann.touching(makeTouchingQuery("left", 0));
   ASSERT_EQ(touching.found_size(), 1);
   EXPECT_EQ(touching.found(0).b_name(), "floor");
-  const v1::TouchingReply around = ann.touching(near("ann", 2.5));
+  const v1::TouchingReply around = ann.touching(makeTouchingQuery("ann", 2.5));
   std::vector<std::string> names;
   for (const v1::PairState& one : around.found()) names.push_back(one.b_name());
   EXPECT_EQ(names, (std::vector<std::string>{"floor", "door", "left", "right"}));
@@ -117,9 +118,9 @@ TEST_F(Pairs, TouchingEntitiesAreSortedByDistance) {
 }
 
 TEST_F(Pairs, TheMountingOfALiftIsListed) {
-  scene::Model model = scene::testing::boxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}},
-                                                 {"car", {-1, 0, -1}, {1, 0.2, 1}},
-                                                 {"beam", {0.5, 2, -1}, {3, 2.2, 1}}});
+  scene::Model model = scene::testing::makeBoxModel({{"floor", {-5, -0.2, -5}, {5, 0, 5}},
+                                                     {"car", {-1, 0, -1}, {1, 0.2, 1}},
+                                                     {"beam", {0.5, 2, -1}, {3, 2.2, 1}}});
   scene::BodySpec lift;
   lift.name = "lift";
   lift.kind = scene::BodyKind::lift;
@@ -127,48 +128,48 @@ TEST_F(Pairs, TheMountingOfALiftIsListed) {
   lift.high = 3, lift.stops = {0, 3};
   model.bodies = {lift};
   serve({}, std::make_shared<const scene::Scene>(std::move(model)));
-  protocol::Client ann = client("ann");
-  const v1::TouchingReply ofLift = ann.touching(near("lift", 0));
+  protocol::Client ann = makeClient("ann");
+  const v1::TouchingReply ofLift = ann.touching(makeTouchingQuery("lift", 0));
   ASSERT_EQ(ofLift.mounting_size(), 1);
   EXPECT_EQ(ofLift.mounting(0), 1u);
   EXPECT_EQ(ofLift.found_size(), 1) << "it is reported when requested";
-  EXPECT_EQ(ann.touching(near("beam", 0)).mounting_size(), 0);
+  EXPECT_EQ(ann.touching(makeTouchingQuery("beam", 0)).mounting_size(), 0);
 }
 
 TEST_F(Pairs, EntitiesBeyondOneReplyAreCounted) {
   ServerLimits limits;
   limits.replyBytes = 400;  // two pairs
-  serve(limits, bodyRoom());
-  protocol::Client ann = inTheRoom();
-  const v1::TouchingReply around = ann.touching(near("ann", 2.5));
+  serve(limits, makeBodyRoom());
+  protocol::Client ann = enterTheRoom();
+  const v1::TouchingReply around = ann.touching(makeTouchingQuery("ann", 2.5));
   EXPECT_EQ(around.found_size() + static_cast<int>(around.left_out()), 4);
   EXPECT_GT(around.left_out(), 0u);
   EXPECT_EQ(around.found(0).b_name(), "floor");
 }
 
 TEST_F(Pairs, AnAvatarTouchesTheWallAtTheReportedTime) {
-  protocol::Client ann = inTheRoom();
+  protocol::Client ann = enterTheRoom();
   v1::Command drive;
   drive.set_avatar("ann");
-  *drive.mutable_drive()->mutable_velocity() = vec(2, 0, -1);
+  *drive.mutable_drive()->mutable_velocity() = makeVec(2, 0, -1);
   ASSERT_FALSE(ann.command(drive));
   ann.step(1);
-  const v1::CannotTouchReply said = ann.cannotTouch(apart("ann", "left"));
+  const v1::CannotTouchReply said = ann.cannotTouch(makeCannotTouchQuery("ann", "left"));
   EXPECT_FALSE(said.never());
   EXPECT_TRUE(said.proved());
   EXPECT_GT(said.before(), 0);
   EXPECT_EQ(said.look_again(), said.before());
-  EXPECT_TRUE(ann.cannotTouch(apart("left", "end")).never());
-  EXPECT_EQ(ann.cannotTouch(apart("left", "end", 2)).look_again(), 2);
-  EXPECT_EQ(ann.cannotTouch(apart("left", "floor")).before(), 0) << "they touch";
-  const v1::CannotTouchReply later = ann.cannotTouch(apart("ann", "left", 3000));
+  EXPECT_TRUE(ann.cannotTouch(makeCannotTouchQuery("left", "end")).never());
+  EXPECT_EQ(ann.cannotTouch(makeCannotTouchQuery("left", "end", 2)).look_again(), 2);
+  EXPECT_EQ(ann.cannotTouch(makeCannotTouchQuery("left", "floor")).before(), 0) << "they touch";
+  const v1::CannotTouchReply later = ann.cannotTouch(makeCannotTouchQuery("ann", "left", 3000));
   EXPECT_EQ(later.look_again(), 3000);
   EXPECT_FALSE(later.proved());
-  v1::CannotTouchQuery any = apart("ann", "left");
+  v1::CannotTouchQuery any = makeCannotTouchQuery("ann", "left");
   any.set_assume(v1::CannotTouchQuery::ASSUME_ANY_COMMAND);
   EXPECT_LT(ann.cannotTouch(any).before(), said.before());
   EXPECT_GT(ann.cannotTouch(any).before(), 0);
-  any = apart("crate", "floor");
+  any = makeCannotTouchQuery("crate", "floor");
   any.set_assume(v1::CannotTouchQuery::ASSUME_ANY_COMMAND);
   EXPECT_EQ(ann.cannotTouch(any).before(), 0) << "of free bodies nothing is known";
 }
@@ -176,8 +177,8 @@ TEST_F(Pairs, AnAvatarTouchesTheWallAtTheReportedTime) {
 TEST_F(Pairs, InvalidQueriesAreRefusedByTheirField) {
   ServerLimits limits;
   limits.pairs = 2;
-  serve(limits, bodyRoom());
-  protocol::Client ann = inTheRoom();
+  serve(limits, makeBodyRoom());
+  protocol::Client ann = enterTheRoom();
   const auto distance = [&](const v1::DistanceQuery& query) {
     return catchRefusal([&] { ann.distances(query); });
   };
@@ -187,36 +188,41 @@ TEST_F(Pairs, InvalidQueriesAreRefusedByTheirField) {
     EXPECT_EQ(error.field, field) << error.what();
   };
   expect(distance({}), v1::ERROR_BAD_MESSAGE, "distances.pairs");
-  expect(distance(between("window", "floor")), v1::ERROR_UNKNOWN_ENTITY, "distances.pairs[0].a");
-  expect(distance(between("floor", 0u)), v1::ERROR_UNKNOWN_ENTITY, "distances.pairs[0].b");
-  expect(distance(between("floor", kRoomFloor)), v1::ERROR_BAD_MESSAGE, "distances.pairs[0].b");
-  v1::DistanceQuery query = between("floor", "left");
+  expect(distance(makeDistanceQuery("window", "floor")), v1::ERROR_UNKNOWN_ENTITY,
+         "distances.pairs[0].a");
+  expect(distance(makeDistanceQuery("floor", 0u)), v1::ERROR_UNKNOWN_ENTITY,
+         "distances.pairs[0].b");
+  expect(distance(makeDistanceQuery("floor", kRoomFloor)), v1::ERROR_BAD_MESSAGE,
+         "distances.pairs[0].b");
+  v1::DistanceQuery query = makeDistanceQuery("floor", "left");
   query.mutable_pairs(0)->clear_b();
   expect(distance(query), v1::ERROR_BAD_MESSAGE, "distances.pairs[0].b");
-  query = between("floor", "left");
+  query = makeDistanceQuery("floor", "left");
   for (int i = 0; i < 2; ++i) *query.add_pairs() = query.pairs(0);
   expect(distance(query), v1::ERROR_TOO_LARGE, "distances.pairs");
-  query = between("floor", "left");
+  query = makeDistanceQuery("floor", "left");
   query.set_tick(7);
   expect(distance(query), v1::ERROR_TICK_GONE, "distances.tick");
   for (const double within : {-1.0, std::nan(""), 1001.0, std::numeric_limits<double>::infinity()})
-    expect(catchRefusal([&] { ann.touching(near("ann", within)); }), v1::ERROR_BAD_MESSAGE,
-           "touching.within");
+    expect(catchRefusal([&] { ann.touching(makeTouchingQuery("ann", within)); }),
+           v1::ERROR_BAD_MESSAGE, "touching.within");
   for (const double minWait : {-1.0, std::nan(""), 3601.0})
-    expect(catchRefusal([&] { ann.cannotTouch(apart("ann", "left", minWait)); }),
+    expect(catchRefusal([&] { ann.cannotTouch(makeCannotTouchQuery("ann", "left", minWait)); }),
            v1::ERROR_BAD_MESSAGE, "cannot_touch.least");
-  EXPECT_EQ(ann.distances(between("left", "end")).pairs_size(), 1) << "the connection continues";
+  EXPECT_EQ(ann.distances(makeDistanceQuery("left", "end")).pairs_size(), 1)
+      << "the connection continues";
 }
 
 TEST_F(Pairs, AnAvatarThatLeftIsUnknown) {
-  protocol::Client ann = inTheRoom();
-  const std::uint32_t id = ann.distances(between("ann", "floor")).pairs(0).a();
+  protocol::Client ann = enterTheRoom();
+  const std::uint32_t id = ann.distances(makeDistanceQuery("ann", "floor")).pairs(0).a();
   v1::Command leave;
   leave.set_avatar("ann");
   leave.mutable_leave();
   ASSERT_FALSE(ann.command(leave));
   ann.step(2);
-  for (const v1::DistanceQuery& query : {between("ann", "floor"), between(id, "floor")}) {
+  for (const v1::DistanceQuery& query :
+       {makeDistanceQuery("ann", "floor"), makeDistanceQuery(id, "floor")}) {
     const auto refusal = catchRefusal([&] { ann.distances(query); });
     EXPECT_EQ(refusal.code, v1::ERROR_UNKNOWN_ENTITY);
   }
@@ -229,7 +235,7 @@ TEST_F(Pairs, TheWelcomeHasTheLimits) {
   limits.pendingRequestBytes = 9000;
   limits.requestsPerSecond = 10'000;
   serve(limits);
-  const v1::Limits sent = client("ann").welcome().limits();
+  const v1::Limits sent = makeClient("ann").welcome().limits();
   EXPECT_EQ(sent.max_pairs(), 7u);
   EXPECT_EQ(sent.max_requests_under_way(), 8u);
   EXPECT_EQ(sent.max_bytes_under_way(), 9000u);

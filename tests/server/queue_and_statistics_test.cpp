@@ -13,7 +13,7 @@
 namespace enfilade::server::testing {
 namespace {
 
-Buffer bytes(std::size_t count) {
+Buffer makeBytes(std::size_t count) {
   return std::make_shared<const std::vector<std::uint8_t>>(count);
 }
 
@@ -45,13 +45,13 @@ TEST(OutgoingQueues, ShareABudgetAndGiveItBack) {
 
 TEST(OutgoingQueue, KeepsRepliesInOrderAndOnlyTheLatestState) {
   int woken = 0;
-  OutgoingQueue queue({1000, 2}, bytes(1), [&] { ++woken; });
-  queue.push(bytes(10));
-  queue.pushLatest(bytes(20));
+  OutgoingQueue queue({1000, 2}, makeBytes(1), [&] { ++woken; });
+  queue.push(makeBytes(10));
+  queue.pushLatest(makeBytes(20));
   EXPECT_TRUE(queue.dropLatest());
   EXPECT_FALSE(queue.dropLatest());
-  queue.pushLatest(bytes(21));
-  queue.push(bytes(11));
+  queue.pushLatest(makeBytes(21));
+  queue.push(makeBytes(11));
   EXPECT_EQ(queue.pop().message.size(), 10u);
   EXPECT_EQ(queue.pop().message.size(), 21u);
   EXPECT_EQ(queue.pop().message.size(), 11u);
@@ -60,45 +60,45 @@ TEST(OutgoingQueue, KeepsRepliesInOrderAndOnlyTheLatestState) {
 }
 
 TEST(OutgoingQueue, AboveItsBoundOnlyTheFinalMessageIsLeft) {
-  OutgoingQueue queue({100, 2}, bytes(7), [] {});
-  queue.push({bytes(10), bytes(50)});
-  queue.push(bytes(40));
+  OutgoingQueue queue({100, 2}, makeBytes(7), [] {});
+  queue.push({makeBytes(10), makeBytes(50)});
+  queue.push(makeBytes(40));
   EXPECT_FALSE(queue.overflowed());
   EXPECT_EQ(queue.pop().message.size(), 60u);
-  queue.push(bytes(61));
+  queue.push(makeBytes(61));
   EXPECT_TRUE(queue.overflowed());
   const OutgoingQueue::Next next = queue.pop();
   EXPECT_EQ(next.message.size(), 7u);
   EXPECT_TRUE(next.last);
-  queue.push(bytes(1));
+  queue.push(makeBytes(1));
   EXPECT_FALSE(queue.pop().message) << "nothing is said after the last words";
 }
 
 TEST(OutgoingQueue, CountsBothPiecesOfPictures) {
-  OutgoingQueue queue({100, 9, 150}, bytes(7), [] {});
-  queue.pushFrame({bytes(1), bytes(100)});
+  OutgoingQueue queue({100, 9, 150}, makeBytes(7), [] {});
+  queue.pushFrame({makeBytes(1), makeBytes(100)});
   EXPECT_FALSE(queue.overflowed());
-  queue.pushFrame({bytes(1), bytes(100)});
+  queue.pushFrame({makeBytes(1), makeBytes(100)});
   EXPECT_TRUE(queue.overflowed());
 }
 
 TEST(OutgoingQueue, CountsPicturesAndNotTheirBytes) {
-  OutgoingQueue queue({100, 2}, bytes(7), [] {});
-  queue.pushFrame(bytes(5000));
-  queue.pushFrame(bytes(5000));
+  OutgoingQueue queue({100, 2}, makeBytes(7), [] {});
+  queue.pushFrame(makeBytes(5000));
+  queue.pushFrame(makeBytes(5000));
   EXPECT_FALSE(queue.overflowed());
   queue.pop();
-  queue.pushFrame(bytes(5000));
+  queue.pushFrame(makeBytes(5000));
   EXPECT_FALSE(queue.overflowed());
-  queue.pushFrame(bytes(5000));
+  queue.pushFrame(makeBytes(5000));
   EXPECT_TRUE(queue.overflowed());
 }
 
 TEST(OutgoingQueue, FinishingSendsPendingMessagesFirst) {
-  OutgoingQueue queue({100, 2}, bytes(7), [] {});
-  queue.push(bytes(1));
-  queue.finish(bytes(2));
-  queue.finish(bytes(3));
+  OutgoingQueue queue({100, 2}, makeBytes(7), [] {});
+  queue.push(makeBytes(1));
+  queue.finish(makeBytes(2));
+  queue.finish(makeBytes(3));
   EXPECT_FALSE(queue.pop().last);
   const OutgoingQueue::Next next = queue.pop();
   EXPECT_EQ(next.message.size(), 2u);
@@ -150,8 +150,8 @@ scene::Model makeDenseRoomWithATurningBody() {
     boxes.push_back(
         {"bar" + std::to_string(i), Vec3(0.3 * i, 10, 0), Vec3(0.3 * i + 0.2, 10.1, 1)});
   boxes.push_back({"post", Vec3(0, 9.5, 1.06), Vec3(0.2, 10.5, 1.3)});
-  boxes.push_back(scene::testing::floorBox());
-  scene::Model model = scene::testing::boxModel(boxes);
+  boxes.push_back(scene::testing::makeFloorBox());
+  scene::Model model = scene::testing::makeBoxModel(boxes);
   model.meshes.push_back(makeDenseSheet());
   model.objects.push_back({"sheet",
                            "",

@@ -15,7 +15,7 @@ class Rays : public ServedRoom {
   void SetUp() override { serve(); }
 };
 
-v1::RayQuery oneRay(const v1::Vec3& origin, const v1::Vec3& direction, double reach = 0) {
+v1::RayQuery makeRayQuery(const v1::Vec3& origin, const v1::Vec3& direction, double reach = 0) {
   v1::RayQuery query;
   v1::Ray& ray = *query.add_rays();
   *ray.mutable_origin() = origin;
@@ -35,8 +35,8 @@ protocol::ProtocolError catchRefusal(protocol::Client& client, const v1::RayQuer
 }
 
 TEST_F(Rays, ReportTheHitEntityAndPoint) {
-  protocol::Client ann = client("ann");
-  const v1::RayReply reply = ann.rays(oneRay(vec(0, 1, 0), vec(2, 0, 0)));
+  protocol::Client ann = makeClient("ann");
+  const v1::RayReply reply = ann.rays(makeRayQuery(makeVec(0, 1, 0), makeVec(2, 0, 0)));
   ASSERT_EQ(reply.hits_size(), 1);
   const v1::RayHit& hit = reply.hits(0);
   EXPECT_TRUE(hit.met());
@@ -45,14 +45,14 @@ TEST_F(Rays, ReportTheHitEntityAndPoint) {
   EXPECT_DOUBLE_EQ(hit.distance(), 5);
   EXPECT_DOUBLE_EQ(hit.point().x(), 5);
   EXPECT_DOUBLE_EQ(hit.normal().x(), -1);
-  EXPECT_FALSE(ann.rays(oneRay(vec(0, 1, 0), vec(2, 0, 0), 4.9)).hits(0).met());
+  EXPECT_FALSE(ann.rays(makeRayQuery(makeVec(0, 1, 0), makeVec(2, 0, 0), 4.9)).hits(0).met());
 }
 
 TEST_F(Rays, HitAnAvatarAtItsPoseButNotTheObserver) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   const v1::StepReply step = ann.step(1);
-  v1::RayQuery query = oneRay(vec(-2, 1, 0), vec(1, 0, 0), 20);
+  v1::RayQuery query = makeRayQuery(makeVec(-2, 1, 0), makeVec(1, 0, 0), 20);
   query.set_tick(step.tick());
   const v1::RayHit hit = ann.rays(query).hits(0);
   EXPECT_EQ(hit.name(), "ann");
@@ -67,7 +67,7 @@ TEST_F(Rays, HitAnAvatarAtItsPoseButNotTheObserver) {
 }
 
 TEST_F(Rays, AScanFromTheEyesGivesDistancesAndEntitiesRowByRow) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(1);
   v1::RayQuery query;
@@ -93,15 +93,15 @@ TEST_F(Rays, AScanFromTheEyesGivesDistancesAndEntitiesRowByRow) {
 }
 
 TEST_F(Rays, PackedRaysEqualUnpackedOnes) {
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 2, 0.001, 0)));
   ann.step(1);
   const auto capabilities = ann.welcome().capabilities();
   EXPECT_EQ(std::count(capabilities.begin(), capabilities.end(), "packed_rays"), 1);
-  v1::RayQuery query = oneRay(vec(0, 1, 0), vec(2, 0, 0));
-  *query.add_rays() = oneRay(vec(0, 1, 0), vec(0, 1, 0)).rays(0);
-  *query.add_rays() = oneRay(vec(0, 1, 2), vec(1, -0.25, 0.125)).rays(0);
-  *query.add_rays() = oneRay(vec(0, 1, 2), vec(1, -0.25, 0.25)).rays(0);
+  v1::RayQuery query = makeRayQuery(makeVec(0, 1, 0), makeVec(2, 0, 0));
+  *query.add_rays() = makeRayQuery(makeVec(0, 1, 0), makeVec(0, 1, 0)).rays(0);
+  *query.add_rays() = makeRayQuery(makeVec(0, 1, 2), makeVec(1, -0.25, 0.125)).rays(0);
+  *query.add_rays() = makeRayQuery(makeVec(0, 1, 2), makeVec(1, -0.25, 0.25)).rays(0);
   const v1::RayReply plain = ann.rays(query);
   query.set_packed(true);
   v1::ClientMessage asked;
@@ -141,13 +141,15 @@ TEST_F(Rays, InvalidRaysAreRefusedByTheirField) {
   limits.rays = 2;
   limits.scanRays = 100;
   serve(limits);
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   EXPECT_EQ(catchRefusal(ann, {}).field, "rays");
-  v1::RayQuery query = oneRay(vec(0, std::nan(""), 0), vec(1, 0, 0));
+  v1::RayQuery query = makeRayQuery(makeVec(0, std::nan(""), 0), makeVec(1, 0, 0));
   EXPECT_EQ(catchRefusal(ann, query).field, "rays.rays[0].origin");
-  EXPECT_EQ(catchRefusal(ann, oneRay(vec(0, 1, 0), vec(0, 0, 0))).field, "rays.rays[0].direction");
-  EXPECT_EQ(catchRefusal(ann, oneRay(vec(0, 1, 0), vec(1, 0, 0), -1)).field, "rays.rays[0].reach");
-  query = oneRay(vec(0, 1, 0), vec(1, 0, 0));
+  EXPECT_EQ(catchRefusal(ann, makeRayQuery(makeVec(0, 1, 0), makeVec(0, 0, 0))).field,
+            "rays.rays[0].direction");
+  EXPECT_EQ(catchRefusal(ann, makeRayQuery(makeVec(0, 1, 0), makeVec(1, 0, 0), -1)).field,
+            "rays.rays[0].reach");
+  query = makeRayQuery(makeVec(0, 1, 0), makeVec(1, 0, 0));
   query.set_tick(7);
   EXPECT_EQ(catchRefusal(ann, query).code, v1::ERROR_TICK_GONE);
   query.clear_tick();
@@ -158,14 +160,14 @@ TEST_F(Rays, InvalidRaysAreRefusedByTheirField) {
   v1::RayQuery scan;
   scan.mutable_scan()->set_columns(1);
   EXPECT_EQ(catchRefusal(ann, scan).field, "rays.scan");
-  *scan.mutable_scan()->mutable_at() = vec(0, 1, 0);
-  *scan.mutable_scan()->mutable_up() = vec(3, 0, 0);
+  *scan.mutable_scan()->mutable_at() = makeVec(0, 1, 0);
+  *scan.mutable_scan()->mutable_up() = makeVec(3, 0, 0);
   EXPECT_EQ(catchRefusal(ann, scan).field, "rays.scan.up");
   scan.mutable_scan()->clear_up();
   scan.mutable_scan()->set_columns(4'000'000'000u);
   scan.mutable_scan()->set_rows(4'000'000'000u);
   EXPECT_EQ(catchRefusal(ann, scan).code, v1::ERROR_TOO_LARGE);
-  EXPECT_EQ(ann.rays(oneRay(vec(0, 1, 0), vec(1, 0, 0))).hits(0).entity(), kWall)
+  EXPECT_EQ(ann.rays(makeRayQuery(makeVec(0, 1, 0), makeVec(1, 0, 0))).hits(0).entity(), kWall)
       << "still answers";
 }
 

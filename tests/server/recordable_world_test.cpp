@@ -14,11 +14,11 @@
 namespace enfilade::server::testing {
 namespace {
 
-std::filesystem::path fileFor(const std::string& name) {
-  return tests::ownFile(name + ".mcap");
+std::filesystem::path makeRecordingFile(const std::string& name) {
+  return tests::makeOwnFile(name + ".mcap");
 }
 
-RecordingOptions optionsFor(const std::filesystem::path& file) {
+RecordingOptions makeRecordingOptions(const std::filesystem::path& file) {
   RecordingOptions options;
   options.choice.file = file;
   options.model.file = "room.obj";
@@ -54,13 +54,13 @@ Items readItems(const std::filesystem::path& file) {
 
 /// Walks about in the small room, restarts, and closes.
 void recordWalk(const std::filesystem::path& file) {
-  RecordableWorld world{scene::World(smallRoom())};
-  world.record(optionsFor(file));
+  RecordableWorld world{scene::World(makeSmallRoom())};
+  world.record(makeRecordingOptions(file));
   world.submit(spawn("ann", 0, 0, 0));
   world.submit(walkTo("ann", 8, 0, 0));
   for (int i = 0; i < 60; ++i) world.tick();
   world.endContacts(v1::ContactEvent::REASON_RESTART, "again");
-  world.reset(scene::World(smallRoom()));
+  world.reset(scene::World(makeSmallRoom()));
   world.submit(spawn("bob", 4, 0, 0));
   world.submit(walkTo("bob", 9, 0, 0));
   for (int i = 0; i < 60; ++i) world.tick();
@@ -69,9 +69,9 @@ void recordWalk(const std::filesystem::path& file) {
 }
 
 TEST(RecordableWorld, TheFileHasAcceptedCommandsOnly) {
-  const auto file = fileFor("taken");
-  RecordableWorld world{scene::World(smallRoom())};
-  world.record(optionsFor(file));
+  const auto file = makeRecordingFile("taken");
+  RecordableWorld world{scene::World(makeSmallRoom())};
+  world.record(makeRecordingOptions(file));
   EXPECT_TRUE(world.submit(spawn("ann", std::nan(""), 0, 0)));
   EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
   world.tick();
@@ -88,9 +88,9 @@ TEST(RecordableWorld, TheFileHasAcceptedCommandsOnly) {
 }
 
 TEST(RecordableWorld, TheFileHasTheCommandsOfAFailedTick) {
-  const auto file = fileFor("failed");
-  RecordableWorld world{scene::World(smallRoom())};
-  world.record(optionsFor(file));
+  const auto file = makeRecordingFile("failed");
+  RecordableWorld world{scene::World(makeSmallRoom())};
+  world.record(makeRecordingOptions(file));
   world.tick();
   EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
   world.recorder()->onTickFailed(world);
@@ -102,12 +102,12 @@ TEST(RecordableWorld, TheFileHasTheCommandsOfAFailedTick) {
 }
 
 TEST(RecordableWorld, ARestartDropsPendingCommands) {
-  const auto file = fileFor("void");
-  RecordableWorld world{scene::World(smallRoom())};
-  world.record(optionsFor(file));
+  const auto file = makeRecordingFile("void");
+  RecordableWorld world{scene::World(makeSmallRoom())};
+  world.record(makeRecordingOptions(file));
   world.tick();
   EXPECT_FALSE(world.submit(spawn("ann", 0, 0, 0)));
-  world.reset(scene::World(smallRoom()));
+  world.reset(scene::World(makeSmallRoom()));
   world.tick();
   ASSERT_FALSE(world.recorder()->close());
   protocol::RecordingReader reader(file);
@@ -117,7 +117,7 @@ TEST(RecordableWorld, ARestartDropsPendingCommands) {
 
 /// ENFILADE_FLIPS sets a larger number of flips.
 TEST(RecordableWorld, AFlippedBitIsReportedOrHarmless) {
-  const auto file = fileFor("whole"), spoilt = fileFor("spoilt");
+  const auto file = makeRecordingFile("whole"), spoilt = makeRecordingFile("spoilt");
   recordWalk(file);
   const std::string bytes = readBytes(file);
   const Items whole = readItems(file);
@@ -146,8 +146,8 @@ TEST(RecordableWorld, AFlippedBitIsReportedOrHarmless) {
 }
 
 TEST(RecordableWorld, WithoutARecorderItIsTheSameWorld) {
-  RecordableWorld bare{scene::World(smallRoom())}, recorded{scene::World(smallRoom())};
-  recorded.record(optionsFor(fileFor("same")));
+  RecordableWorld bare{scene::World(makeSmallRoom())}, recorded{scene::World(makeSmallRoom())};
+  recorded.record(makeRecordingOptions(makeRecordingFile("same")));
   for (RecordableWorld* world : {&bare, &recorded}) {
     world->submit(spawn("ann", 0, 0, 0));
     world->submit(walkTo("ann", 8, 0, 0));

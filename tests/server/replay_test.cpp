@@ -35,7 +35,7 @@ void follow(Live& live, const v1::TickEvents& events) {
 struct Walked {
   std::vector<std::uint64_t> hashes;
   std::vector<Live> live;
-  std::uint64_t last() const { return hashes.size() - 1; }
+  std::uint64_t getLastTick() const { return hashes.size() - 1; }
 };
 
 constexpr std::uint64_t kTicks = 1600, kCyComes = 300, kCyLeaves = 900;
@@ -52,7 +52,7 @@ void commandWalkers(RecordableWorld& world, std::uint64_t tick) {
 
 /// Ann and bob walk to and fro and into wall and column; cy comes and goes.
 Walked recordWalk(const std::filesystem::path& file) {
-  RecordableWorld world{scene::World(smallRoom())};
+  RecordableWorld world{scene::World(makeSmallRoom())};
   RecordingOptions options;
   options.choice.file = file;
   options.model.file = "room.obj";
@@ -66,8 +66,8 @@ Walked recordWalk(const std::filesystem::path& file) {
     world.submit(walkTo("bob", -4, 0, 1));
   }
   Walked walked{{world.snapshot()->stateHash}, {{}}};
-  while (walked.last() < kTicks) {
-    commandWalkers(world, walked.last());
+  while (walked.getLastTick() < kTicks) {
+    commandWalkers(world, walked.getLastTick());
     const auto ticked = world.tick();
     walked.hashes.push_back(world.snapshot()->stateHash);
     walked.live.push_back(walked.live.back());
@@ -104,24 +104,25 @@ struct Listener {
 
 class Replays : public ServedRoom {
  protected:
-  void SetUp() override { walked_ = recordWalk(file("walk")); }
+  void SetUp() override { walked_ = recordWalk(getFile("walk")); }
   void TearDown() override { server_.reset(); }
-  std::filesystem::path file(const std::string& name) const {
-    return folder_.path() / (name + ".mcap");
+  std::filesystem::path getFile(const std::string& name) const {
+    return folder_.getPath() / (name + ".mcap");
   }
 
   void play(const std::string& name = "walk", std::uint64_t from = 0,
             const std::string& branch = {}, Access access = {}) {
     ServerOptions options;
-    options.world.replay = {file(name), from};
+    options.world.replay = {getFile(name), from};
     options.access = std::move(access);
     if (!branch.empty()) {
       options.world.record.emplace();
-      options.world.record->choice.file = file(branch);
+      options.world.record->choice.file = getFile(branch);
       options.world.record->model.file = "room.obj";
       options.world.record->overwrite = false;
     }
-    server_ = std::make_unique<Server>(smallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
+    server_ =
+        std::make_unique<Server>(makeSmallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   }
 
   tests::TemporaryFolder folder_;
@@ -129,7 +130,7 @@ class Replays : public ServedRoom {
 };
 
 /// The error of a request; ERROR_UNSPECIFIED if it succeeded.
-v1::Error errorOfRequest(const std::function<void()>& request) {
+v1::Error catchRequestError(const std::function<void()>& request) {
   v1::Error error;
   try {
     request();
@@ -141,9 +142,9 @@ v1::Error errorOfRequest(const std::function<void()>& request) {
 }
 
 /// Plays a whole recording with verification; returns its last hash.
-std::uint64_t verified(const std::filesystem::path& file, std::uint32_t run = 1) {
+std::uint64_t verifyRecording(const std::filesystem::path& file, std::uint32_t run = 1) {
   server::Playback playback(file, run);
-  scene::World world = playback.restoreWorldAfter(playback.firstTick(), smallRoom());
+  scene::World world = playback.restoreWorldAfter(playback.firstTick(), makeSmallRoom());
   try {
     while (playback.step(world)) {
     }
@@ -156,42 +157,42 @@ std::uint64_t verified(const std::filesystem::path& file, std::uint32_t run = 1)
 
 TEST_F(Replays, EveryTickEqualsTheRecordedOneAndTheEndIsReported) {
   play();
-  Listener ann{client("ann")};
+  Listener ann{makeClient("ann")};
   EXPECT_EQ(ann.replay.file(), "walk.mcap");
-  EXPECT_EQ(ann.replay.last_tick(), walked_.last());
+  EXPECT_EQ(ann.replay.last_tick(), walked_.getLastTick());
   for (std::uint64_t tick = 1; tick <= 1000; ++tick)
     ASSERT_EQ(ann.client.step().state_hash(), walked_.hashes[tick]) << tick;
   const v1::StepReply rest = ann.client.step(10'000);
-  EXPECT_EQ(rest.tick(), walked_.last()) << "a Step ends where the recording does";
+  EXPECT_EQ(rest.tick(), walked_.getLastTick()) << "a Step ends where the recording does";
   EXPECT_EQ(rest.state_hash(), walked_.hashes.back());
   ann.hear();
   EXPECT_TRUE(ann.replay.at_end());
   EXPECT_EQ(ann.live, walked_.live.back());
-  const v1::Error ended = errorOfRequest([&] { ann.client.step(); });
+  const v1::Error ended = catchRequestError([&] { ann.client.step(); });
   EXPECT_EQ(ended.code(), v1::ERROR_REPLAY_ENDED);
   EXPECT_NE(ended.message().find("TakeOver"), std::string::npos) << ended.message();
 }
 
 TEST_F(Replays, AFreeRunPausesAtTheEnd) {
-  play("walk", walked_.last() - 60);
-  Listener ann{client("ann")};
+  play("walk", walked_.getLastTick() - 60);
+  Listener ann{makeClient("ann")};
   v1::SetClock clock;
   clock.mutable_free_run()->set_speed(100);
-  EXPECT_EQ(ann.client.setClock(clock).tick(), walked_.last() - 60);
+  EXPECT_EQ(ann.client.setClock(clock).tick(), walked_.getLastTick() - 60);
   ASSERT_TRUE(becomesTrue([&] {
     ann.hear();
     return ann.replay.at_end();
   }));
   EXPECT_EQ(ann.replay.clock().mode(), v1::Clock::MODE_PAUSED);
-  EXPECT_EQ(ann.replay.tick(), walked_.last());
+  EXPECT_EQ(ann.replay.tick(), walked_.getLastTick());
 }
 
 TEST_F(Replays, AnyTickIsSoughtInAnyOrderAndContactsPairForAll) {
-  server::Playback playback(file("walk"));
-  playback.restoreWorldAfter(1500, smallRoom());
+  server::Playback playback(getFile("walk"));
+  playback.restoreWorldAfter(1500, makeSmallRoom());
   ASSERT_GT(playback.startTick(), 0u) << "without a checkpoint this tests less than it says";
   play();
-  Listener driver{client("driver")}, other{client("other")};
+  Listener driver{makeClient("driver")}, other{makeClient("other")};
   std::mt19937 random(7);
   for (int i = 0; i < 20; ++i) {
     const std::uint64_t tick = random() % walked_.hashes.size();
@@ -205,24 +206,25 @@ TEST_F(Replays, AnyTickIsSoughtInAnyOrderAndContactsPairForAll) {
       driver.client.takeOver();
       EXPECT_FALSE(driver.client.command(spawn("dee", -6, 0.01, -6)));
       EXPECT_NE(driver.client.step(20).state_hash(),
-                walked_.hashes[std::min(tick + 20, walked_.last())]);
-    } else if (tick + 30 <= walked_.last()) {
+                walked_.hashes[std::min(tick + 20, walked_.getLastTick())]);
+    } else if (tick + 30 <= walked_.getLastTick()) {
       ASSERT_EQ(driver.client.step(30).state_hash(), walked_.hashes[tick + 30]) << tick;
     }
   }
-  const v1::Error beyond = errorOfRequest([&] { driver.client.seek(walked_.last() + 1); });
+  const v1::Error beyond =
+      catchRequestError([&] { driver.client.seek(walked_.getLastTick() + 1); });
   EXPECT_EQ(beyond.code(), v1::ERROR_BAD_MESSAGE);
 }
 
 TEST_F(Replays, ASeekIsDoneInEveryModeOfTheClockAndByTheDriverAlone) {
   play();
-  Listener driver{client("driver")}, other{client("other")};
+  Listener driver{makeClient("driver")}, other{makeClient("other")};
   v1::SetClock clock;
   clock.mutable_pause();
   driver.client.setClock(clock);
   EXPECT_EQ(driver.client.seek(700).tick(), 700u);
-  EXPECT_EQ(errorOfRequest([&] { other.client.seek(10); }).code(), v1::ERROR_NOT_ALLOWED);
-  EXPECT_EQ(errorOfRequest([&] { other.client.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchRequestError([&] { other.client.seek(10); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchRequestError([&] { other.client.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
   clock.mutable_free_run()->set_speed(1000);
   driver.client.setClock(clock);
   for (const std::uint64_t tick : {1200u, 100u})
@@ -231,7 +233,7 @@ TEST_F(Replays, ASeekIsDoneInEveryModeOfTheClockAndByTheDriverAlone) {
 
 TEST_F(Replays, SubscribersGetTheStateOfTheSoughtTick) {
   play();
-  protocol::Client driver = client("driver");
+  protocol::Client driver = makeClient("driver");
   v1::Subscribe states;
   states.set_state(true);
   driver.subscribe(states);
@@ -249,7 +251,7 @@ TEST_F(Replays, SubscribersGetTheStateOfTheSoughtTick) {
 TEST_F(Replays, AWatchContinuesWithAnImageOfTheSoughtTick) {
   play("walk", 1000);
   ENFILADE_NEED_PICTURES(*server_);
-  protocol::Client driver = client("driver");
+  protocol::Client driver = makeClient("driver");
   v1::ClientMessage message;
   v1::WatchFrames& watch = *message.mutable_watch_frames();
   watch.set_watch(1);
@@ -273,10 +275,10 @@ TEST_F(Replays, AWatchContinuesWithAnImageOfTheSoughtTick) {
 
 TEST_F(Replays, ALateClientGetsTheStateOfTheReplay) {
   play("walk", 500);
-  Listener driver{client("driver")};
+  Listener driver{makeClient("driver")};
   EXPECT_EQ(driver.live, walked_.live[500]);
   driver.client.step(150);
-  Listener late{client("late")};
+  Listener late{makeClient("late")};
   EXPECT_EQ(late.client.welcome().tick(), 650u);
   EXPECT_EQ(late.replay.tick(), 650u);
   EXPECT_FALSE(late.replay.branched());
@@ -288,11 +290,11 @@ TEST_F(Replays, ALateClientGetsTheStateOfTheReplay) {
   late.hear();
   EXPECT_EQ(late.live, walked_.live[1050]);
   driver.client.seek(1200);
-  EXPECT_EQ(Listener{client("later")}.live, walked_.live[1200]);
+  EXPECT_EQ(Listener{makeClient("later")}.live, walked_.live[1200]);
 }
 
 /// The persisting contacts among the received events, all of tick `tick`.
-std::set<Pair> persisting(protocol::Client& client, std::uint64_t tick) {
+std::set<Pair> takePersisting(protocol::Client& client, std::uint64_t tick) {
   std::set<Pair> persists;
   for (const v1::ServerMessage& message : client.takeEvents()) {
     for (const v1::ContactEvent& event : message.events().contacts()) {
@@ -305,7 +307,7 @@ std::set<Pair> persisting(protocol::Client& client, std::uint64_t tick) {
 }
 
 /// The contacts that are active after the tick and began before it.
-std::set<Pair> lasting(const Live& live, std::uint64_t tick) {
+std::set<Pair> findLasting(const Live& live, std::uint64_t tick) {
   std::set<Pair> pairs;
   for (const auto& [pair, begun] : live)
     if (begun < tick) pairs.insert(pair);
@@ -314,48 +316,49 @@ std::set<Pair> lasting(const Live& live, std::uint64_t tick) {
 
 TEST_F(Replays, ContactsPersistInTheRecordedTicks) {
   play("walk", 200);
-  protocol::Client driver = client("driver");
+  protocol::Client driver = makeClient("driver");
   v1::Subscribe persists;
   persists.set_persists(true);
   driver.subscribe(persists);
   std::size_t persisted = 0;
   for (const std::uint64_t from : {200u, 1000u, 100u}) {
     driver.seek(from);
-    EXPECT_EQ(persisting(driver, from), std::set<Pair>()) << "a seek is no tick";
+    EXPECT_EQ(takePersisting(driver, from), std::set<Pair>()) << "a seek is no tick";
     for (std::uint64_t tick = from + 1; tick <= from + 300; ++tick) {
       driver.step();
-      const std::set<Pair> pairs = persisting(driver, tick);
-      EXPECT_EQ(pairs, lasting(walked_.live[tick], tick)) << tick;
+      const std::set<Pair> pairs = takePersisting(driver, tick);
+      EXPECT_EQ(pairs, findLasting(walked_.live[tick], tick)) << tick;
       persisted += pairs.size();
     }
   }
   EXPECT_GT(persisted, 900u);
   driver.takeOver();
   driver.step();
-  EXPECT_FALSE(persisting(driver, 401).empty()) << "in a branch, too";
+  EXPECT_FALSE(takePersisting(driver, 401).empty()) << "in a branch, too";
 }
 
 TEST_F(Replays, CommandsAreRefusedUntilAClientTakesOver) {
   play("walk", 400);
-  protocol::Client driver = client("driver"), other = client("other");
+  protocol::Client driver = makeClient("driver"), other = makeClient("other");
   v1::BodyCommand door;
   door.set_body("door");
   v1::ClientMessage restart;
   restart.mutable_restart();
   for (const auto& refused : {driver.command(spawn("dee", -6, 0.01, -6)), driver.bodyCommand(door),
-                              std::optional(errorOfRequest([&] { driver.request(restart); }))}) {
+                              std::optional(catchRequestError([&] { driver.request(restart); }))}) {
     ASSERT_TRUE(refused);
     EXPECT_EQ(refused->code(), v1::ERROR_NOT_ALLOWED);
     EXPECT_NE(refused->message().find("TakeOver"), std::string::npos);
   }
   driver.step();
-  EXPECT_EQ(errorOfRequest([&] { driver.takeOver("unknown"); }).code(), v1::ERROR_UNKNOWN_AVATAR);
+  EXPECT_EQ(catchRequestError([&] { driver.takeOver("unknown"); }).code(),
+            v1::ERROR_UNKNOWN_AVATAR);
   EXPECT_EQ(driver.takeOver("ann").tick(), 401u);
   EXPECT_FALSE(driver.command(walkTo("ann", -9, 0, -9)));
   EXPECT_TRUE(other.command(walkTo("ann", 0, 0, 0))) << "she is the driver's";
   EXPECT_TRUE(other.command(walkTo("bob", 0, 0, 0))) << "bob has no owner";
   EXPECT_TRUE(other.command(spawn("bob", -9, 0.01, 9))) << "nor can he be had by a spawn";
-  EXPECT_EQ(errorOfRequest([&] { other.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchRequestError([&] { other.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
   other.takeOver("bob");
   EXPECT_FALSE(other.command(walkTo("bob", 0, 0, 0)));
   EXPECT_FALSE(other.command(spawn("dee", -6, 0.01, -6)));
@@ -367,7 +370,7 @@ TEST_F(Replays, CommandsAreRefusedUntilAClientTakesOver) {
 
 TEST_F(Replays, AvatarsThatAreNotTakenOverFinishTheirOrders) {
   play("walk", 400);
-  protocol::Client driver = client("driver");
+  protocol::Client driver = makeClient("driver");
   driver.takeOver();
   // No more is recorded for ann and bob; cy would have received the command to leave.
   EXPECT_EQ(driver.step(kCyLeaves - 400).state_hash(), walked_.hashes[kCyLeaves]);
@@ -394,9 +397,9 @@ TEST_F(Replays, BranchesAreRecordingsOfTheirOwn) {
   play("walk", 0, "branch");
   std::uint64_t first = 0, second = 0;
   {
-    protocol::Client driver = client("driver");
+    protocol::Client driver = makeClient("driver");
     driver.seek(1000);
-    EXPECT_FALSE(std::filesystem::exists(file("branch"))) << "nothing has branched yet";
+    EXPECT_FALSE(std::filesystem::exists(getFile("branch"))) << "nothing has branched yet";
     driver.takeOver("ann");
     EXPECT_FALSE(driver.command(walkTo("ann", -9, 0, -9)));
     first = driver.step(300).state_hash();
@@ -408,13 +411,13 @@ TEST_F(Replays, BranchesAreRecordingsOfTheirOwn) {
     second = driver.step(200).state_hash();
   }
   server_->stop();
-  EXPECT_EQ(verified(file("branch")), first);
-  EXPECT_EQ(verified(file("branch-2")), second);
-  EXPECT_EQ(readBeginning(file("branch")), walked_.live[1000]);
-  EXPECT_EQ(readBeginning(file("branch-2")), walked_.live[640]);
+  EXPECT_EQ(verifyRecording(getFile("branch")), first);
+  EXPECT_EQ(verifyRecording(getFile("branch-2")), second);
+  EXPECT_EQ(readBeginning(getFile("branch")), walked_.live[1000]);
+  EXPECT_EQ(readBeginning(getFile("branch-2")), walked_.live[640]);
   EXPECT_TRUE(server_->isRecordingComplete());
-  const server::Playback branch(file("branch"));
-  EXPECT_EQ(branch.start().parent().file(), std::filesystem::absolute(file("walk")));
+  const server::Playback branch(getFile("branch"));
+  EXPECT_EQ(branch.start().parent().file(), std::filesystem::absolute(getFile("walk")));
   EXPECT_EQ(branch.firstTick(), 1000u);
 }
 
@@ -422,7 +425,7 @@ TEST_F(Replays, ARestartDirectlyAfterTakeOverIsARunOfItsOwn) {
   play("walk", 1000, "branch");
   std::uint64_t last = 0;
   {
-    protocol::Client driver = client("driver");
+    protocol::Client driver = makeClient("driver");
     driver.takeOver();
     v1::ClientMessage restart;
     restart.mutable_restart();
@@ -431,14 +434,14 @@ TEST_F(Replays, ARestartDirectlyAfterTakeOverIsARunOfItsOwn) {
   }
   server_->stop();
   EXPECT_TRUE(server_->isRecordingComplete());
-  EXPECT_EQ(server::Playback(file("branch"), 1).firstTick(), 1000u);
-  EXPECT_EQ(verified(file("branch"), 2), last);
+  EXPECT_EQ(server::Playback(getFile("branch"), 1).firstTick(), 1000u);
+  EXPECT_EQ(verifyRecording(getFile("branch"), 2), last);
 }
 
 TEST_F(Replays, ABranchIsPlayedAndLeftInItsTurn) {
   play("walk", 1000, "branch");
   {
-    protocol::Client driver = client("driver");
+    protocol::Client driver = makeClient("driver");
     driver.takeOver("ann");
     EXPECT_FALSE(driver.command(walkTo("ann", -9, 0, -9)));
     driver.step(300);
@@ -447,16 +450,16 @@ TEST_F(Replays, ABranchIsPlayedAndLeftInItsTurn) {
   play("branch", 1000, "again");
   std::uint64_t last = 0;
   {
-    Listener driver{client("driver")};
+    Listener driver{makeClient("driver")};
     EXPECT_EQ(driver.replay.first_tick(), 1000u);
     EXPECT_EQ(driver.live, walked_.live[1000]);
-    EXPECT_EQ(errorOfRequest([&] { driver.client.seek(999); }).code(), v1::ERROR_BAD_MESSAGE);
+    EXPECT_EQ(catchRequestError([&] { driver.client.seek(999); }).code(), v1::ERROR_BAD_MESSAGE);
     driver.client.seek(driver.replay.last_tick());
     driver.client.takeOver("bob");
     last = driver.client.step(50).state_hash();
   }
   server_->stop();
-  EXPECT_EQ(verified(file("again")), last);
+  EXPECT_EQ(verifyRecording(getFile("again")), last);
 }
 
 /// Copies a recording with a changed state at tick `tick`.
@@ -481,9 +484,9 @@ void falsify(const std::filesystem::path& from, const std::filesystem::path& to,
 }
 
 TEST_F(Replays, AReplayThatDivergesStopsBeforeIt) {
-  falsify(file("walk"), file("false"), 40);
+  falsify(getFile("walk"), getFile("false"), 40);
   play("false");
-  Listener driver{client("driver")};
+  Listener driver{makeClient("driver")};
   const v1::StepReply reply = driver.client.step(100);
   EXPECT_EQ(reply.tick(), 39u);
   EXPECT_EQ(reply.state_hash(), walked_.hashes[39]);
@@ -491,15 +494,15 @@ TEST_F(Replays, AReplayThatDivergesStopsBeforeIt) {
   EXPECT_EQ(driver.replay.diverged().rfind("tick 40: ann: feet.x: recorded 1, replayed ", 0), 0u)
       << driver.replay.diverged();
   EXPECT_EQ(driver.live, walked_.live[39]);
-  EXPECT_EQ(errorOfRequest([&] { driver.client.step(); }).code(), v1::ERROR_REPLAY_ENDED);
-  EXPECT_EQ(errorOfRequest([&] { driver.client.seek(41); }).code(), v1::ERROR_REPLAY_ENDED);
+  EXPECT_EQ(catchRequestError([&] { driver.client.step(); }).code(), v1::ERROR_REPLAY_ENDED);
+  EXPECT_EQ(catchRequestError([&] { driver.client.seek(41); }).code(), v1::ERROR_REPLAY_ENDED);
   EXPECT_EQ(driver.client.metrics().ticks(), 39u) << "a wrong tick is not sent";
   EXPECT_EQ(driver.client.seek(10).state_hash(), walked_.hashes[10]);
   driver.hear();
   EXPECT_EQ(driver.replay.diverged(), "");
-  EXPECT_EQ(errorOfRequest([&] { driver.client.seek(41); }).code(), v1::ERROR_REPLAY_ENDED);
+  EXPECT_EQ(catchRequestError([&] { driver.client.seek(41); }).code(), v1::ERROR_REPLAY_ENDED);
   EXPECT_EQ(driver.client.step(29).state_hash(), walked_.hashes[39]) << "it stands where it stood";
-  EXPECT_EQ(errorOfRequest([&] { driver.client.step(); }).code(), v1::ERROR_REPLAY_ENDED);
+  EXPECT_EQ(catchRequestError([&] { driver.client.step(); }).code(), v1::ERROR_REPLAY_ENDED);
   driver.client.takeOver();
   EXPECT_EQ(driver.client.step().tick(), 40u);
   driver.hear();
@@ -508,8 +511,8 @@ TEST_F(Replays, AReplayThatDivergesStopsBeforeIt) {
 
 TEST_F(Replays, AnotherSceneIsNotPlayed) {
   ServerOptions options;
-  options.world.replay = {file("walk"), 0};
-  scene::Model empty = smallRoom()->model();
+  options.world.replay = {getFile("walk"), 0};
+  scene::Model empty = makeSmallRoom()->model();
   empty.objects.pop_back();
   EXPECT_THROW(Server(std::make_shared<const scene::Scene>(std::move(empty)),
                       HostPort{"127.0.0.1", 0}, std::move(options)),
@@ -517,12 +520,13 @@ TEST_F(Replays, AnotherSceneIsNotPlayed) {
 }
 
 TEST_F(Replays, ACutOffRecordingIsPlayedToItsLastTick) {
-  std::filesystem::resize_file(file("walk"), std::filesystem::file_size(file("walk")) * 4 / 10);
+  std::filesystem::resize_file(getFile("walk"),
+                               std::filesystem::file_size(getFile("walk")) * 4 / 10);
   play();
-  Listener driver{client("driver")};
+  Listener driver{makeClient("driver")};
   const std::uint64_t last = driver.replay.last_tick();
   EXPECT_GT(last, 100u);
-  EXPECT_LT(last, walked_.last());
+  EXPECT_LT(last, walked_.getLastTick());
   EXPECT_EQ(driver.client.step(10'000).state_hash(), walked_.hashes[last]);
   driver.hear();
   EXPECT_EQ(driver.live, walked_.live[last]);
@@ -531,7 +535,7 @@ TEST_F(Replays, ACutOffRecordingIsPlayedToItsLastTick) {
 
 /// Walks through the zone while the door opens; returns the tick of entering the zone.
 std::uint64_t recordVisit(const std::filesystem::path& file, std::vector<std::uint64_t>& hashes) {
-  RecordableWorld world{scene::World(bodyRoom())};
+  RecordableWorld world{scene::World(makeBodyRoom())};
   RecordingOptions options;
   options.choice.file = file;
   options.model.file = "room.obj";
@@ -555,7 +559,7 @@ std::uint64_t recordVisit(const std::filesystem::path& file, std::vector<std::ui
 }
 
 /// The trigger events among the received ones: kind, reason, tick.
-std::vector<std::tuple<v1::ContactEvent::Kind, v1::ContactEvent::Reason, std::uint64_t>> visits(
+std::vector<std::tuple<v1::ContactEvent::Kind, v1::ContactEvent::Reason, std::uint64_t>> takeVisits(
     protocol::Client& client) {
   std::vector<std::tuple<v1::ContactEvent::Kind, v1::ContactEvent::Reason, std::uint64_t>> found;
   for (const v1::ServerMessage& message : client.takeEvents())
@@ -567,18 +571,18 @@ std::vector<std::tuple<v1::ContactEvent::Kind, v1::ContactEvent::Reason, std::ui
 TEST_F(Replays, DoorsAreOpenedAgainAndTriggersPairLikeContacts) {
   using Event = v1::ContactEvent;
   std::vector<std::uint64_t> hashes;
-  const std::uint64_t entered = recordVisit(file("visit"), hashes);
+  const std::uint64_t entered = recordVisit(getFile("visit"), hashes);
   ASSERT_GT(entered, 10u);
   ServerOptions options;
-  options.world.replay = {file("visit"), entered + 5};
-  server_ = std::make_unique<Server>(bodyRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
-  protocol::Client driver = client("driver");
-  driver.subscribe(everything());
+  options.world.replay = {getFile("visit"), entered + 5};
+  server_ = std::make_unique<Server>(makeBodyRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
+  protocol::Client driver = makeClient("driver");
+  driver.subscribe(makeFullSubscription());
   driver.seek(entered - 5);
-  using Visits = decltype(visits(driver));
-  EXPECT_EQ(visits(driver), (Visits{{Event::KIND_LEAVE, Event::REASON_SEEK, entered + 5}}));
+  using Visits = decltype(takeVisits(driver));
+  EXPECT_EQ(takeVisits(driver), (Visits{{Event::KIND_LEAVE, Event::REASON_SEEK, entered + 5}}));
   driver.seek(entered + 3);
-  EXPECT_EQ(visits(driver), (Visits{{Event::KIND_ENTER, Event::REASON_UNSPECIFIED, entered}}));
+  EXPECT_EQ(takeVisits(driver), (Visits{{Event::KIND_ENTER, Event::REASON_UNSPECIFIED, entered}}));
   driver.seek(2);
   EXPECT_EQ(driver.step(238).state_hash(), hashes[240]);
 }
@@ -587,24 +591,24 @@ TEST_F(Replays, ObserversMayNotSeekOrTakeOver) {
   Access access;
   access.tokens = {{Role::observe, "observer-0123456789"}, {Role::drive, "driver-0123456789"}};
   play("walk", 0, "", access);
-  protocol::Client observer = client("observer", "observer-0123456789");
-  EXPECT_EQ(errorOfRequest([&] { observer.seek(10); }).code(), v1::ERROR_NOT_ALLOWED);
-  EXPECT_EQ(errorOfRequest([&] { observer.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
-  EXPECT_EQ(client("driver", "driver-0123456789").seek(10).tick(), 10u);
+  protocol::Client observer = makeClient("observer", "observer-0123456789");
+  EXPECT_EQ(catchRequestError([&] { observer.seek(10); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchRequestError([&] { observer.takeOver("ann"); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(makeClient("driver", "driver-0123456789").seek(10).tick(), 10u);
 }
 
 TEST_F(Replays, OtherWorldsOfTheServerAreLive) {
   play();
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   v1::ClientMessage create;
   create.mutable_create_world()->set_name("live");
   main.request(create);
-  protocol::Client live = client("ann", "", "live");
+  protocol::Client live = makeClient("ann", "", "live");
   EXPECT_FALSE(live.welcome().has_replay());
   EXPECT_FALSE(live.command(spawn("ann", 0, 0.01, 0)));
   EXPECT_EQ(live.step(1, true).avatars_size(), 1);
-  EXPECT_EQ(errorOfRequest([&] { live.seek(1); }).code(), v1::ERROR_NOT_ALLOWED);
-  EXPECT_EQ(errorOfRequest([&] { live.takeOver(); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchRequestError([&] { live.seek(1); }).code(), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchRequestError([&] { live.takeOver(); }).code(), v1::ERROR_NOT_ALLOWED);
 }
 
 }  // namespace

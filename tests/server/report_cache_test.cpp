@@ -15,49 +15,49 @@ namespace fs = std::filesystem;
 
 class ReportCache : public ::testing::Test {
  protected:
-  std::vector<fs::path> kept() const {
+  std::vector<fs::path> listKept() const {
     std::vector<fs::path> files;
     if (!fs::exists(cache_->folder)) return files;
     for (const auto& entry : fs::directory_iterator(cache_->folder)) files.push_back(entry);
     return files;
   }
-  static scene::Model modelWithProblem() {
-    scene::Model model = smallRoom()->model();
+  static scene::Model makeModelWithProblem() {
+    scene::Model model = makeSmallRoom()->model();
     model.diagnostics.push_back({"missing_texture", 3, "a \"quoted\" name, with a line\nbreak"});
     return model;
   }
 
   tests::TemporaryFolder folder_;
-  std::optional<scene::ModelCache> cache_{{folder_.path() / "cache"}};
+  std::optional<scene::ModelCache> cache_{{folder_.getPath() / "cache"}};
 };
 
 TEST_F(ReportCache, EqualsTheComputedReport) {
-  const scene::Scene scene(modelWithProblem());
+  const scene::Scene scene(makeModelWithProblem());
   const std::string worked = serializeReport(scene::makeSceneReport(scene));
   EXPECT_EQ(serializeReport(loadOrMakeReport(scene, std::nullopt)), worked);
-  EXPECT_TRUE(kept().empty());
+  EXPECT_TRUE(listKept().empty());
   EXPECT_EQ(serializeReport(loadOrMakeReport(scene, cache_)), worked);
-  ASSERT_EQ(kept().size(), 1u);
+  ASSERT_EQ(listKept().size(), 1u);
   const scene::SceneReport again = loadOrMakeReport(scene, cache_);
   EXPECT_EQ(serializeReport(again), worked);
   EXPECT_EQ(again.shells.exact, 3u);
-  EXPECT_EQ(again.diagnostics.at(0).example, modelWithProblem().diagnostics[0].example);
+  EXPECT_EQ(again.diagnostics.at(0).example, makeModelWithProblem().diagnostics[0].example);
 }
 
 TEST_F(ReportCache, IsNotUsedForAnotherSceneOrOtherDiagnostics) {
-  loadOrMakeReport(scene::Scene(modelWithProblem()), cache_);
-  scene::Model other = modelWithProblem();
+  loadOrMakeReport(scene::Scene(makeModelWithProblem()), cache_);
+  scene::Model other = makeModelWithProblem();
   other.diagnostics[0].count = 4;
   EXPECT_EQ(loadOrMakeReport(scene::Scene(other), cache_).diagnostics.at(0).count, 4u);
   other.meshes[0].positions[0].x() += 1;
   EXPECT_EQ(loadOrMakeReport(scene::Scene(other), cache_).shells.exact, 2u);
-  EXPECT_EQ(kept().size(), 3u);
+  EXPECT_EQ(listKept().size(), 3u);
 }
 
 TEST_F(ReportCache, ADamagedTextIsRecomputed) {
-  const scene::Scene scene(modelWithProblem());
+  const scene::Scene scene(makeModelWithProblem());
   const std::string worked = serializeReport(loadOrMakeReport(scene, cache_));
-  const fs::path file = kept().at(0);
+  const fs::path file = listKept().at(0);
   std::ifstream in(file, std::ios::binary);
   const std::string whole((std::istreambuf_iterator<char>(in)), {});
   for (std::size_t at = 0; at < whole.size(); at += 7) {

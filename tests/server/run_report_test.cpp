@@ -34,7 +34,7 @@ TEST(EventNames, AreThoseOfThePagesForEachValueOfTheSchema) {
 
 TEST(RunReport, WalksNameTheirObstacleAndItsGlobalId) {
   const tests::TemporaryFolder folder;
-  RunReport report(folder.path());
+  RunReport report(folder.getPath());
   protocol::StepOutcome outcome;
   v1::Notice& blocked = outcome.notices.emplace_back();
   blocked.set_kind(v1::Notice::KIND_BLOCKED);
@@ -52,7 +52,7 @@ TEST(RunReport, WalksNameTheirObstacleAndItsGlobalId) {
 
 TEST(RunReport, TheSummaryContainsTheWorkOfTheTicksAndTheCostliestAvatar) {
   const tests::TemporaryFolder folder;
-  RunReport report(folder.path());
+  RunReport report(folder.getPath());
   RunSummary run;
   run.metrics.set_narrow_queries(101);
   run.metrics.set_vertices_looked_at(102);
@@ -75,12 +75,12 @@ TEST(RunReport, TheSummaryContainsTheWorkOfTheTicksAndTheCostliestAvatar) {
   EXPECT_EQ(summary.at("costliest_avatar"),
             nlohmann::json::parse(R"({"id": 7, "tick": 8, "narrow_queries": 9,
                                       "parts_looked_at": 10, "position": [1.5, 0.0, -2.0]})"));
-  EXPECT_EQ(nlohmann::json::parse(tests::readContent(folder.path() / "summary.json")), summary);
+  EXPECT_EQ(nlohmann::json::parse(tests::readContent(folder.getPath() / "summary.json")), summary);
 }
 
 TEST(RunReport, TheMapShowsBlockedWalksAndRefusedOrders) {
   const tests::TemporaryFolder folder;
-  RunReport report(folder.path());
+  RunReport report(folder.getPath());
   protocol::StepOutcome outcome;
   outcome.avatars.emplace_back().set_name("ann");
   for (const auto kind : {v1::Notice::KIND_BLOCKED, v1::Notice::KIND_REFUSED,

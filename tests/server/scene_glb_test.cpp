@@ -18,42 +18,43 @@ using scene::Vec3;
 
 constexpr double kFloatError = 1e-6;  // relative, of a coordinate in single precision
 
-Model boxes(std::size_t count) {
+Model makeBoxes(std::size_t count) {
   std::vector<scene::testing::NamedBox> named;
   for (std::size_t i = 0; i < count; ++i) {
     const double x = 2.0 * static_cast<double>(i);
     named.push_back({"box" + std::to_string(i), {x, 0, 0}, {x + 1, 1, 1}});
   }
-  return scene::testing::boxModel(named);
+  return scene::testing::makeBoxModel(named);
 }
 
-Eigen::Affine3d placement(int i) {
+Eigen::Affine3d makePlacement(int i) {
   return Eigen::Translation3d(1.5 * i, 0.25 * i, -3) *
          Eigen::AngleAxisd(0.4 * i, Vec3(1, 2, 3).normalized()) *
          Eigen::Scaling(Vec3(1, 1 + 0.1 * i, 0.5));
 }
 
-Eigen::Affine3d shear() {
+Eigen::Affine3d makeShear() {
   Eigen::Affine3d transform = Eigen::Affine3d::Identity();
   transform.linear()(0, 1) = 0.5;
   return transform;
 }
 
 /// One mesh at ten placements, then mirrored, sheared and as in the model.
-Model repeatedBox() {
-  Model model = boxes(1);
+Model makeRepeatedBox() {
+  Model model = makeBoxes(1);
   model.objects.clear();
   for (int i = 0; i < 10; ++i)
-    model.objects.push_back({"copy" + std::to_string(i), "", {0}, placement(i)});
+    model.objects.push_back({"copy" + std::to_string(i), "", {0}, makePlacement(i)});
   model.objects.push_back({"mirrored", "", {0}, Eigen::Affine3d(Eigen::Scaling(-1.0, 1.0, 1.0))});
-  model.objects.push_back({"sheared", "", {0}, shear()});
+  model.objects.push_back({"sheared", "", {0}, makeShear()});
   return model;
 }
 
 /// Compares the drawn triangles of each entity with the model's, corner by corner.
 void expectTheModelsTriangles(const GlbReader& file, const Model& model) {
   std::map<std::uint32_t, std::vector<GlbReader::Triangle>> drawn;
-  for (const auto& triangle : file.drawnTriangles()) drawn[triangle.entity].push_back(triangle);
+  for (const auto& triangle : file.collectDrawnTriangles())
+    drawn[triangle.entity].push_back(triangle);
   const std::vector<bool> isDrawn = findDrawnObjects(model);
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
     const scene::Object& object = model.objects[i];
@@ -77,7 +78,7 @@ void expectTheModelsTriangles(const GlbReader& file, const Model& model) {
 }
 
 /// Ids of all static objects in the extras of the nodes, with repetitions.
-std::vector<std::uint32_t> listedEntities(const GlbReader& file) {
+std::vector<std::uint32_t> listEntities(const GlbReader& file) {
   std::vector<std::uint32_t> ids;
   for (const auto& node : file.json.at("nodes")) {
     const auto& extras = node.at("extras");
@@ -89,7 +90,7 @@ std::vector<std::uint32_t> listedEntities(const GlbReader& file) {
 }
 
 TEST(SceneGlb, StaticObjectsAreMergedByMaterial) {
-  Model model = boxes(30);
+  Model model = makeBoxes(30);
   model.materials.resize(3);
   model.materials[1].baseColour.x() = 0.1f;
   model.materials[2].name = "looks like the first";
@@ -103,13 +104,13 @@ TEST(SceneGlb, StaticObjectsAreMergedByMaterial) {
   expectTheModelsTriangles(file, model);
   std::vector<std::uint32_t> all(30);
   for (std::uint32_t i = 0; i < 30; ++i) all[i] = i + 1;
-  EXPECT_EQ(listedEntities(file), all);
+  EXPECT_EQ(listEntities(file), all);
   for (const auto& node : file.json.at("nodes"))
     EXPECT_EQ(node.at("extras").at("entities").size(), node.at("extras").at("triangles").size());
 }
 
 TEST(SceneGlb, TheTableHasEveryObjectOnceWithWhatIsKnown) {
-  Model model = boxes(3);
+  Model model = makeBoxes(3);
   model.objects[1].globalId = "2O2Fr$t4X7Zf8NOew3FLOH";
   model.objects[1].ifcClass = "IfcDoor";
   model.objects[2].partOf = 1;
@@ -122,14 +123,13 @@ TEST(SceneGlb, TheTableHasEveryObjectOnceWithWhatIsKnown) {
   EXPECT_EQ(table[1].at("class"), "IfcDoor");
   EXPECT_EQ(table[2].at("partOf"), 2);
   EXPECT_EQ(table[2].at("only"), "solid");
-  EXPECT_EQ(listedEntities(file), (std::vector<std::uint32_t>{1, 2}))
-      << "solid shapes are not drawn";
+  EXPECT_EQ(listEntities(file), (std::vector<std::uint32_t>{1, 2})) << "solid shapes are not drawn";
 }
 
 TEST(SceneGlb, TheTableHasTheRanksOfSurfacesInOnePlane) {
-  const Model model = scene::testing::boxModel({{"wall", {0, 0, 0}, {4, 3, 0.3}},
-                                                {"panel", {1, 1, 0.1}, {2, 2, 0.3}},
-                                                {"far", {9, 0, 0}, {10, 1, 1}}});
+  const Model model = scene::testing::makeBoxModel({{"wall", {0, 0, 0}, {4, 3, 0.3}},
+                                                    {"panel", {1, 1, 0.1}, {2, 2, 0.3}},
+                                                    {"far", {9, 0, 0}, {10, 1, 1}}});
   const GlbReader file(writeSceneGlb(Scene(model)).bytes);
   const auto& table = file.json.at("scenes").at(0).at("extras").at("entities");
   EXPECT_EQ(table.at(0).at("coplanarRank"), 1) << "the panel is smaller, and visible";
@@ -138,13 +138,13 @@ TEST(SceneGlb, TheTableHasTheRanksOfSurfacesInOnePlane) {
 }
 
 TEST(SceneGlb, RepeatedMeshesAreInstancedUnlessMirroredOrSheared) {
-  const Model model = repeatedBox();
+  const Model model = makeRepeatedBox();
   const SceneGlb glb = writeSceneGlb(Scene(model));
   const GlbReader file(glb.bytes);
   EXPECT_EQ(glb.drawGroups, 2u);
   EXPECT_EQ(file.json.at("extensionsRequired"), nlohmann::json({"EXT_mesh_gpu_instancing"}));
   const auto& node = file.json.at("nodes").at(1);
-  const auto instances = file.instances(node);
+  const auto instances = file.readInstances(node);
   ASSERT_EQ(instances.size(), 10u);
   EXPECT_EQ(node.at("extras").at("entities").size(), 10u);
   for (const auto& [entity, transform] : instances) {
@@ -153,13 +153,13 @@ TEST(SceneGlb, RepeatedMeshesAreInstancedUnlessMirroredOrSheared) {
     EXPECT_LE((transform.matrix() - wanted.matrix()).cwiseAbs().maxCoeff(), kFloatError * size);
   }
   expectTheModelsTriangles(file, model);
-  EXPECT_EQ(listedEntities(file).size(), 12u);
+  EXPECT_EQ(listEntities(file).size(), 12u);
 }
 
 TEST(SceneGlb, MirroredObjectsKeepTheirOutside) {
-  const GlbReader file(writeSceneGlb(Scene(repeatedBox())).bytes);
+  const GlbReader file(writeSceneGlb(Scene(makeRepeatedBox())).bytes);
   std::map<std::uint32_t, double> volumes;
-  for (const auto& t : file.drawnTriangles())
+  for (const auto& t : file.collectDrawnTriangles())
     volumes[t.entity] += t.corners[0].dot(t.corners[1].cross(t.corners[2])) / 6;
   EXPECT_NEAR(volumes.at(11), 1, 1e-5) << "mirrored";
   EXPECT_NEAR(volumes.at(12), 1, 1e-5) << "sheared";
@@ -167,7 +167,7 @@ TEST(SceneGlb, MirroredObjectsKeepTheirOutside) {
 }
 
 TEST(SceneGlb, DrawCallsDoNotGrowWithObjects) {
-  Model model = boxes(400);
+  Model model = makeBoxes(400);
   const std::vector<scene::Object> originals = model.objects;
   for (int copy = 1; copy < 9; ++copy)
     for (scene::Object object : originals) {
@@ -179,11 +179,11 @@ TEST(SceneGlb, DrawCallsDoNotGrowWithObjects) {
   EXPECT_EQ(glb.entities, 3600u);
   EXPECT_EQ(glb.drawGroups, kMaxInstancedPrimitives + 1);
   EXPECT_EQ(glb.triangles, 3600u * 12u);
-  EXPECT_EQ(GlbReader(glb.bytes).drawnTriangles().size(), glb.triangles);
+  EXPECT_EQ(GlbReader(glb.bytes).collectDrawnTriangles().size(), glb.triangles);
 }
 
 TEST(SceneGlb, BodiesAreNodesAtTheirInitialPose) {
-  const Model model = bodyRoomModel();
+  const Model model = makeBodyRoomModel();
   const Scene scene(model);
   const GlbReader file(writeSceneGlb(scene).bytes);
   std::map<std::string, nlohmann::json> bodies;
@@ -202,7 +202,7 @@ TEST(SceneGlb, BodiesAreNodesAtTheirInitialPose) {
 }
 
 TEST(SceneGlb, TexturesAndTransparencyAreKept) {
-  Model model = boxes(2);
+  Model model = makeBoxes(2);
   model.textures.push_back({"leaf", 2, 1, {10, 20, 30, 255, 40, 50, 60, 128}});
   model.materials[0].baseColourTexture = 0;
   model.materials[0].alpha = scene::Material::Alpha::mask;
@@ -214,16 +214,16 @@ TEST(SceneGlb, TexturesAndTransparencyAreKept) {
   EXPECT_EQ(material.at("doubleSided"), true);
   EXPECT_EQ(material.at("pbrMetallicRoughness").at("baseColorTexture").at("index"), 0);
   EXPECT_EQ(file.json.at("images").at(0).at("mimeType"), "image/png");
-  EXPECT_EQ(file.view(file.json.at("images").at(0).at("bufferView")).substr(1, 3), "PNG");
+  EXPECT_EQ(file.readView(file.json.at("images").at(0).at("bufferView")).substr(1, 3), "PNG");
   const auto& attributes = file.json.at("meshes").at(0).at("primitives").at(0).at("attributes");
-  const auto uvs = file.numbers<float>(attributes.at("TEXCOORD_0"));
+  const auto uvs = file.readNumbers<float>(attributes.at("TEXCOORD_0"));
   ASSERT_EQ(uvs.size(), 32u);
   EXPECT_EQ(uvs[1], 0.75f);
   EXPECT_EQ(uvs[17], 0) << "a mesh without coordinates shows the first texel";
 }
 
 TEST(SceneGlb, VertexColoursAreLinearAndOnlyWhereMeshesHaveThem) {
-  Model model = boxes(2);
+  Model model = makeBoxes(2);
   model.meshes[0].colours.assign(8, {255, 188, 0, 51});
   const GlbReader file(writeSceneGlb(Scene(model)).bytes);
   const auto& meshes = file.json.at("meshes");
@@ -236,7 +236,7 @@ TEST(SceneGlb, VertexColoursAreLinearAndOnlyWhereMeshesHaveThem) {
     EXPECT_EQ(
         file.json.at("accessors").at(attributes.at("COLOR_0").get<std::size_t>()).at("normalized"),
         true);
-    const auto colours = file.numbers<std::uint16_t>(attributes.at("COLOR_0"));
+    const auto colours = file.readNumbers<std::uint16_t>(attributes.at("COLOR_0"));
     ASSERT_EQ(colours.size(), 32u);
     EXPECT_EQ(colours[0], 65535);
     EXPECT_NEAR(colours[1], 0.5 * 65535, 400) << "188 in sRGB is one half";
@@ -247,7 +247,7 @@ TEST(SceneGlb, VertexColoursAreLinearAndOnlyWhereMeshesHaveThem) {
 }
 
 TEST(SceneGlb, EqualTexturesAreStoredOnce) {
-  Model model = boxes(3);
+  Model model = makeBoxes(3);
   model.textures.assign(3, {"", 1, 1, {1, 2, 3, 255}});
   model.textures[2].rgba[0] = 9;
   model.materials.resize(4);
@@ -263,13 +263,13 @@ TEST(SceneGlb, EqualTexturesAreStoredOnce) {
 }
 
 TEST(SceneGlb, NormalsAreUnitVectorsAfterScalingAndWithoutADirection) {
-  Model model = boxes(1);
+  Model model = makeBoxes(1);
   model.meshes[0].normals.assign(8, Eigen::Vector3f(0.6f, 0.8f, 0));
   model.meshes[0].normals[3] = Eigen::Vector3f::Zero();
   model.objects[0].worldFromMesh = Eigen::Scaling(1.0, 4.0, 1.0);
   const GlbReader file(writeSceneGlb(Scene(model)).bytes);
   const auto& attributes = file.json.at("meshes").at(0).at("primitives").at(0).at("attributes");
-  const auto normals = file.numbers<float>(attributes.at("NORMAL"));
+  const auto normals = file.readNumbers<float>(attributes.at("NORMAL"));
   for (std::size_t i = 0; i < 8; ++i) {
     const Eigen::Vector3f normal(normals[3 * i], normals[3 * i + 1], normals[3 * i + 2]);
     EXPECT_NEAR(normal.norm(), 1, 1e-6);
@@ -278,29 +278,30 @@ TEST(SceneGlb, NormalsAreUnitVectorsAfterScalingAndWithoutADirection) {
 }
 
 TEST(SceneGlb, ManyVerticesHaveWideIndices) {
-  const SceneGlb glb = writeSceneGlb(Scene(boxes(8192)));  // 65,536 vertices
+  const SceneGlb glb = writeSceneGlb(Scene(makeBoxes(8192)));  // 65,536 vertices
   const GlbReader file(glb.bytes);
   const auto& primitive = file.json.at("meshes").at(0).at("primitives").at(0);
   EXPECT_EQ(
       file.json.at("accessors").at(primitive.at("indices").get<std::size_t>()).at("componentType"),
       5125);
-  EXPECT_EQ(file.drawnTriangles().size(), 8192u * 12u);
+  EXPECT_EQ(file.collectDrawnTriangles().size(), 8192u * 12u);
 }
 
 TEST(SceneGlb, EqualScenesGiveEqualBytes) {
-  EXPECT_EQ(writeSceneGlb(Scene(repeatedBox())).bytes, writeSceneGlb(Scene(repeatedBox())).bytes);
-  EXPECT_EQ(writeSceneGlb(*bodyRoom()).bytes, writeSceneGlb(*bodyRoom()).bytes);
+  EXPECT_EQ(writeSceneGlb(Scene(makeRepeatedBox())).bytes,
+            writeSceneGlb(Scene(makeRepeatedBox())).bytes);
+  EXPECT_EQ(writeSceneGlb(*makeBodyRoom()).bytes, writeSceneGlb(*makeBodyRoom()).bytes);
 }
 
 TEST(DrawGroups, TransformsAreDecomposed) {
   for (int i = 0; i < 10; ++i) {
-    const auto trs = decomposeTrs(placement(i));
+    const auto trs = decomposeTrs(makePlacement(i));
     ASSERT_TRUE(trs);
     const Eigen::Affine3d again =
         Eigen::Translation3d(trs->translation) * trs->rotation * Eigen::Scaling(trs->scale);
-    EXPECT_LE((again.matrix() - placement(i).matrix()).norm(), 1e-12);
+    EXPECT_LE((again.matrix() - makePlacement(i).matrix()).norm(), 1e-12);
   }
-  EXPECT_FALSE(decomposeTrs(shear()));
+  EXPECT_FALSE(decomposeTrs(makeShear()));
   EXPECT_FALSE(decomposeTrs(Eigen::Affine3d(Eigen::Scaling(-1.0, 1.0, 1.0))));
   EXPECT_FALSE(decomposeTrs(Eigen::Affine3d(Eigen::Scaling(0.0, 1.0, 1.0))));
 }

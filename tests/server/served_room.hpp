@@ -16,15 +16,15 @@ namespace enfilade::server::testing {
 class ServedRoom : public ::testing::Test {
  protected:
   void serve(const ServerLimits& limits = {},
-             std::shared_ptr<const scene::Scene> scene = smallRoom(), Access access = {}) {
+             std::shared_ptr<const scene::Scene> scene = makeSmallRoom(), Access access = {}) {
     ServerOptions options;
     options.world.limits = limits;
     options.access = std::move(access);
     server_ =
         std::make_unique<Server>(std::move(scene), HostPort{"127.0.0.1", 0}, std::move(options));
   }
-  protocol::Client client(const std::string& name, const std::string& token = "",
-                          const std::string& world = "") {
+  protocol::Client makeClient(const std::string& name, const std::string& token = "",
+                              const std::string& world = "") {
     protocol::ClientOptions options;
     options.name = name;
     options.token = token;
@@ -50,7 +50,7 @@ inline bool drawsPictures(const Server& server) {
 #define ENFILADE_NEED_PICTURES(server) \
   if (!drawsPictures(server)) GTEST_SKIP() << "no EGL device: install libegl-mesa0"
 
-inline v1::Vec3 vec(double x, double y, double z) {
+inline v1::Vec3 makeVec(double x, double y, double z) {
   v1::Vec3 v;
   v.set_x(x);
   v.set_y(y);
@@ -61,18 +61,18 @@ inline v1::Vec3 vec(double x, double y, double z) {
 inline v1::Command spawn(const std::string& avatar, double x, double y, double z) {
   v1::Command command;
   command.set_avatar(avatar);
-  *command.mutable_spawn()->mutable_at() = vec(x, y, z);
+  *command.mutable_spawn()->mutable_at() = makeVec(x, y, z);
   return command;
 }
 
 inline v1::Command walkTo(const std::string& avatar, double x, double y, double z) {
   v1::Command command;
   command.set_avatar(avatar);
-  *command.mutable_walk()->add_along() = vec(x, y, z);
+  *command.mutable_walk()->add_along() = makeVec(x, y, z);
   return command;
 }
 
-inline v1::Subscribe everything() {
+inline v1::Subscribe makeFullSubscription() {
   v1::Subscribe subscription;
   subscription.set_contacts(true);
   subscription.set_notices(true);

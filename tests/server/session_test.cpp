@@ -19,7 +19,7 @@ namespace {
 class Sessions : public ServedRoom {};
 
 /// The code of the ProtocolError that `request` throws; ERROR_UNSPECIFIED if it throws none.
-v1::ErrorCode codeThrown(const std::function<void()>& request) {
+v1::ErrorCode catchErrorCode(const std::function<void()>& request) {
   try {
     request();
   } catch (const protocol::ProtocolError& error) {
@@ -30,12 +30,12 @@ v1::ErrorCode codeThrown(const std::function<void()>& request) {
 
 TEST_F(Sessions, WelcomeHasTheSceneAndItsPolicies) {
   serve();
-  const protocol::Client ann = client("ann");
+  const protocol::Client ann = makeClient("ann");
   const v1::Welcome& welcome = ann.welcome();
   EXPECT_EQ(welcome.protocol_version(), protocol::kVersion);
   EXPECT_EQ(welcome.scene().source(), "small_room");
   EXPECT_EQ(welcome.scene().objects(), 3u);
-  EXPECT_EQ(welcome.scene().hash(), smallRoom()->hash());
+  EXPECT_EQ(welcome.scene().hash(), makeSmallRoom()->hash());
   EXPECT_DOUBLE_EQ(welcome.scene().bounds().max().x(), 10);
   EXPECT_DOUBLE_EQ(welcome.policies().tick(), scene::WorldSettings{}.tickDuration);
   EXPECT_NEAR(welcome.policies().walkable_slope(), 50 * 3.14159265358979 / 180, 1e-9);
@@ -47,7 +47,7 @@ TEST_F(Sessions, WelcomeHasTheSceneAndItsPolicies) {
 
 TEST_F(Sessions, ASubscriberToStatesGetsThePresentOneAtOnce) {
   serve();
-  protocol::Client driver = client("driver");
+  protocol::Client driver = makeClient("driver");
   ASSERT_FALSE(driver.command(spawn("ann", 0, 0.01, 0)));
   driver.step(5);
   RawConnection late(server_->port());
@@ -76,14 +76,14 @@ TEST_F(Sessions, ChangesOfTheClockArePushedAndItsDriverMayHandItBack) {
   watcher.send(subscribe);
   ASSERT_TRUE(watcher.receive()->has_subscribe());
 
-  protocol::Client first = client("first"), second = client("second");
+  protocol::Client first = makeClient("first"), second = makeClient("second");
   v1::ClientMessage pause;
   pause.mutable_set_clock()->mutable_pause();
   first.request(pause);
-  EXPECT_EQ(codeThrown([&] { second.request(pause); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchErrorCode([&] { second.request(pause); }), v1::ERROR_NOT_ALLOWED);
   v1::ClientMessage release;
   release.mutable_set_clock()->set_release(true);
-  EXPECT_EQ(codeThrown([&] { second.request(release); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchErrorCode([&] { second.request(release); }), v1::ERROR_NOT_ALLOWED);
   EXPECT_FALSE(first.request(release).set_clock().clock().has_driver());
   second.request(pause);
 
@@ -102,7 +102,7 @@ TEST_F(Sessions, ChangesOfTheClockArePushedAndItsDriverMayHandItBack) {
 
 TEST_F(Sessions, UnknownEnumValuesAreRefusedByTheirPath) {
   serve();
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const auto fieldThrown = [&](const v1::ClientMessage& message) -> std::string {
     try {
       ann.request(message);
@@ -131,7 +131,7 @@ TEST_F(Sessions, UnknownEnumValuesAreRefusedByTheirPath) {
 
 TEST_F(Sessions, ALongNameIsNotEchoedInFull) {
   serve();
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   v1::ClientMessage message;
   message.mutable_touching()->mutable_entity()->set_name(std::string(100'000, 'x'));
   try {
@@ -144,9 +144,9 @@ TEST_F(Sessions, ALongNameIsNotEchoedInFull) {
 
 TEST_F(Sessions, TwoClientsHearTheSameContacts) {
   serve();
-  protocol::Client ann = client("ann"), bob = client("bob");
-  bob.subscribe(everything());
-  ann.subscribe(everything());
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
+  bob.subscribe(makeFullSubscription());
+  ann.subscribe(makeFullSubscription());
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   ASSERT_FALSE(ann.command(walkTo("ann", 8, 0, 0)));
   ReceivedEvents annEvents, bobEvents;
@@ -170,32 +170,32 @@ TEST_F(Sessions, TwoClientsHearTheSameContacts) {
 
 TEST_F(Sessions, OnlyTheDriverStepsAndTheNextOneMayWhenItLeft) {
   serve();
-  protocol::Client bob = client("bob");
+  protocol::Client bob = makeClient("bob");
   {
-    protocol::Client ann = client("ann");
+    protocol::Client ann = makeClient("ann");
     ann.step();
-    EXPECT_EQ(codeThrown([&] { bob.step(); }), v1::ERROR_NOT_ALLOWED);
+    EXPECT_EQ(catchErrorCode([&] { bob.step(); }), v1::ERROR_NOT_ALLOWED);
     v1::SetClock pause;
     pause.mutable_pause();
-    EXPECT_EQ(codeThrown([&] { bob.setClock(pause); }), v1::ERROR_NOT_ALLOWED);
+    EXPECT_EQ(catchErrorCode([&] { bob.setClock(pause); }), v1::ERROR_NOT_ALLOWED);
     EXPECT_EQ(ann.step().tick(), 2u) << "the refused step made no tick";
   }
   EXPECT_TRUE(
-      becomesTrue([&] { return codeThrown([&] { bob.step(); }) == v1::ERROR_UNSPECIFIED; }));
+      becomesTrue([&] { return catchErrorCode([&] { bob.step(); }) == v1::ERROR_UNSPECIFIED; }));
 }
 
 TEST_F(Sessions, StepsBeyondTheLimitAreRefused) {
   serve();
-  protocol::Client ann = client("ann");
-  EXPECT_EQ(codeThrown([&] { ann.step(0); }), v1::ERROR_BAD_MESSAGE);
-  EXPECT_EQ(codeThrown([&] { ann.step(ann.welcome().limits().max_ticks_per_step() + 1); }),
+  protocol::Client ann = makeClient("ann");
+  EXPECT_EQ(catchErrorCode([&] { ann.step(0); }), v1::ERROR_BAD_MESSAGE);
+  EXPECT_EQ(catchErrorCode([&] { ann.step(ann.welcome().limits().max_ticks_per_step() + 1); }),
             v1::ERROR_BAD_MESSAGE);
   EXPECT_EQ(ann.step(50).tick(), 50u);
 }
 
 TEST_F(Sessions, AnAvatarObeysOnlyItsOwner) {
   serve();
-  protocol::Client ann = client("ann"), bob = client("bob");
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   const auto error = bob.command(walkTo("ann", 1, 0, 0));
   ASSERT_TRUE(error);
@@ -207,7 +207,7 @@ TEST_F(Sessions, AnAvatarObeysOnlyItsOwner) {
 
 TEST_F(Sessions, ALeftAvatarsNameIsFreeAgain) {
   serve();
-  protocol::Client ann = client("ann"), bob = client("bob");
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
   ASSERT_FALSE(ann.command(spawn("guest", 0, 0.01, 0)));
   ann.step();
   v1::Command leave;
@@ -221,7 +221,7 @@ TEST_F(Sessions, ALeftAvatarsNameIsFreeAgain) {
 
 TEST_F(Sessions, ANameIsFreeAlsoAfterItsSpawnWasRefused) {
   serve();
-  protocol::Client ann = client("ann"), bob = client("bob");
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
   v1::Command leave;
   leave.set_avatar("guest");
   leave.mutable_leave();
@@ -239,11 +239,11 @@ TEST_F(Sessions, ANameIsFreeAlsoAfterItsSpawnWasRefused) {
 
 TEST_F(Sessions, AVanishedClientsAvatarLeavesAndItsContactsEnd) {
   serve();
-  protocol::Client bob = client("bob");
-  bob.subscribe(everything());
+  protocol::Client bob = makeClient("bob");
+  bob.subscribe(makeFullSubscription());
   ReceivedEvents received;
   {
-    protocol::Client ann = client("ann");
+    protocol::Client ann = makeClient("ann");
     ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
     ASSERT_FALSE(ann.command(walkTo("ann", 9, 0, 6)));
     bob.step(30);
@@ -262,10 +262,10 @@ TEST_F(Sessions, AVanishedClientsAvatarLeavesAndItsContactsEnd) {
 
 TEST_F(Sessions, ALateSubscriberGetsTheActiveContacts) {
   serve();
-  protocol::Client ann = client("ann"), bob = client("bob");
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   ann.step(60);
-  const v1::SubscribeReply reply = bob.subscribe(everything());
+  const v1::SubscribeReply reply = bob.subscribe(makeFullSubscription());
   ASSERT_EQ(reply.live_size(), 1);
   EXPECT_EQ(reply.live(0).b(), kFloor);
   EXPECT_EQ(reply.live(0).b_name(), "room_floor");
@@ -299,7 +299,7 @@ struct Followed {
   }
 };
 
-v1::Subscribe withPersists(v1::Subscribe subscription) {
+v1::Subscribe addPersists(v1::Subscribe subscription) {
   subscription.set_persists(true);
   return subscription;
 }
@@ -321,10 +321,10 @@ void expectAsItIsNow(protocol::Client& client, const v1::ContactEvent& event) {
 
 TEST_F(Sessions, AContactPersistsInEachTickBetweenBeginAndEnd) {
   serve();
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const auto& offers = ann.welcome().capabilities();
   EXPECT_NE(std::find(offers.begin(), offers.end(), "persists"), offers.end());
-  ann.subscribe(withPersists(everything()));
+  ann.subscribe(addPersists(makeFullSubscription()));
   ASSERT_FALSE(ann.command(spawn("ann", 4, 0.01, 0)));
   ASSERT_FALSE(ann.command(walkTo("ann", 8, 0, 0)));
   ASSERT_FALSE(ann.command(walkTo("ann", 3, 0, 0)));
@@ -353,10 +353,10 @@ TEST_F(Sessions, AContactPersistsInEachTickBetweenBeginAndEnd) {
 
 TEST_F(Sessions, PersistsReachOnlySubscribers) {
   serve();
-  protocol::Client ann = client("ann"), bob = client("bob"), cy = client("cy");
-  ann.subscribe(withPersists(everything()));
-  bob.subscribe(everything());
-  EXPECT_EQ(cy.subscribe(withPersists({})).live_size(), 0);
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob"), cy = makeClient("cy");
+  ann.subscribe(addPersists(makeFullSubscription()));
+  bob.subscribe(makeFullSubscription());
+  EXPECT_EQ(cy.subscribe(addPersists({})).live_size(), 0);
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   ann.step(60);
   ReceivedEvents annEvents, bobEvents, cyEvents;
@@ -375,8 +375,8 @@ TEST_F(Sessions, PersistsReachOnlySubscribers) {
   EXPECT_EQ(messages.size(), persists) << "no tick without one";
   for (std::size_t i = 0; i < messages.size(); ++i)
     EXPECT_EQ(messages[i].events().sequence(), i + 1);
-  EXPECT_EQ(bob.subscribe(withPersists(everything())).live_size(), 1);
-  ann.subscribe(everything());
+  EXPECT_EQ(bob.subscribe(addPersists(makeFullSubscription())).live_size(), 1);
+  ann.subscribe(makeFullSubscription());
   ann.step(3);
   ReceivedEvents annThen, bobThen;
   annThen.add(ann.takeEvents());
@@ -388,14 +388,14 @@ TEST_F(Sessions, PersistsReachOnlySubscribers) {
 
 TEST_F(Sessions, ANonFiniteNumberIsRefusedByItsField) {
   serve();
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const auto spawned = ann.command(spawn("ann", 0, nan, 0));
   ASSERT_TRUE(spawned);
   EXPECT_EQ(spawned->code(), v1::ERROR_REFUSED_COMMAND);
   EXPECT_EQ(spawned->field(), "spawn.at.y");
   v1::Command far = walkTo("ann", 1, 0, 0);
-  *far.mutable_walk()->add_along() = vec(0, 0, 1e300);
+  *far.mutable_walk()->add_along() = makeVec(0, 0, 1e300);
   EXPECT_EQ(ann.command(far)->field(), "walk.along[1].z");
   EXPECT_NE(ann.command(far)->message().find("is 1e+300 m; give -10000000 to 10000000 m"),
             std::string::npos);
@@ -406,7 +406,7 @@ TEST_F(Sessions, ANonFiniteNumberIsRefusedByItsField) {
   EXPECT_EQ(ann.command(empty)->field(), "spawn.at");
   v1::Command chain = spawn("arm", 0, 0.01, 0);
   v1::Joint& joint = *chain.mutable_spawn()->add_links()->mutable_joint();
-  *joint.mutable_axis() = vec(0, 1, 0);
+  *joint.mutable_axis() = makeVec(0, 1, 0);
   joint.set_kind(static_cast<v1::Joint::Kind>(7));
   EXPECT_EQ(ann.command(chain)->field(), "spawn.links[0].joint.kind");
   EXPECT_EQ(ann.step(1, true).avatars_size(), 0);
@@ -414,25 +414,25 @@ TEST_F(Sessions, ANonFiniteNumberIsRefusedByItsField) {
 
 TEST_F(Sessions, TheFreeRunningClockTicksByItselfUntilItIsPaused) {
   serve();
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   v1::SetClock clock;
   clock.mutable_free_run()->set_speed(100);
   EXPECT_EQ(ann.setClock(clock).clock().mode(), v1::Clock::MODE_FREE_RUN);
   EXPECT_TRUE(becomesTrue([&] { return ann.metrics().ticks() > 20; }));
-  EXPECT_EQ(codeThrown([&] { ann.step(); }), v1::ERROR_NOT_ALLOWED);
+  EXPECT_EQ(catchErrorCode([&] { ann.step(); }), v1::ERROR_NOT_ALLOWED);
   clock.mutable_pause();
   const std::uint64_t tick = ann.setClock(clock).tick();
   std::this_thread::sleep_for(std::chrono::milliseconds(20));
   EXPECT_EQ(ann.metrics().ticks(), tick);
   for (const double speed : {-1.0, 1e-300, 1001.0, std::nan("")}) {
     clock.mutable_free_run()->set_speed(speed);
-    EXPECT_EQ(codeThrown([&] { ann.setClock(clock); }), v1::ERROR_BAD_MESSAGE) << speed;
+    EXPECT_EQ(catchErrorCode([&] { ann.setClock(clock); }), v1::ERROR_BAD_MESSAGE) << speed;
   }
 }
 
 TEST_F(Sessions, MetricsCountTheEvents) {
   serve();
-  protocol::Client ann = client("ann"), bob = client("bob");
+  protocol::Client ann = makeClient("ann"), bob = makeClient("bob");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   ann.step(60);
   const v1::Metrics metrics = ann.metrics();
@@ -450,7 +450,7 @@ TEST_F(Sessions, MetricsCountTheEvents) {
 
 TEST_F(Sessions, EntitiesAreDescribedByNameAndKind) {
   serve();
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   const std::uint32_t id = ann.step(1, true).avatars(0).id();
   const std::vector<std::uint32_t> wanted{kColumn, id, 99};
@@ -465,11 +465,11 @@ TEST_F(Sessions, EntitiesAreDescribedByNameAndKind) {
 }
 
 TEST_F(Sessions, AnIfcProductIsDescribedWithItsGlobalIdAndItsOperation) {
-  scene::Model model = smallRoom()->model();
+  scene::Model model = makeSmallRoom()->model();
   model.objects[kWall - 1].globalId = "2O2Fr$t4X7Zf8NOew3FNtn";
   model.objects[kWall - 1].operationType = "SINGLE_SWING_LEFT";
   serve({}, std::make_shared<const scene::Scene>(std::move(model)));
-  const auto entities = client("ann").describe({});
+  const auto entities = makeClient("ann").describe({});
   ASSERT_EQ(entities.size(), 3u);
   EXPECT_EQ(entities[kWall - 1].global_id(), "2O2Fr$t4X7Zf8NOew3FNtn");
   EXPECT_EQ(entities[kWall - 1].operation(), "SINGLE_SWING_LEFT");
@@ -481,7 +481,7 @@ TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
   limits.describedIds = 3;
   limits.replyBytes = 60;  // two of the room's objects
   serve(limits);
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   const auto refusal = [&](std::vector<std::uint32_t> ids) {
     try {
       ann.describe(ids);
@@ -501,8 +501,8 @@ TEST_F(Sessions, EntitiesAreDescribedInPagesOfBoundedSize) {
 
 TEST_F(Sessions, OrdersDroppedByADriveAreReportedWithTagAndReason) {
   serve();
-  protocol::Client ann = client("ann");
-  ann.subscribe(everything());
+  protocol::Client ann = makeClient("ann");
+  ann.subscribe(makeFullSubscription());
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.001, 0)));
   ann.step(1);
   v1::Command walk = walkTo("ann", 3, 0, 0), wait, drive;
@@ -529,7 +529,7 @@ TEST_F(Sessions, OrdersDroppedByADriveAreReportedWithTagAndReason) {
 
 TEST_F(Sessions, MissingEntitiesAreReportedByKind) {
   serve();
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   v1::Command command;
   command.set_avatar("ann");
   command.mutable_drive();
@@ -560,7 +560,7 @@ TEST_F(Sessions, WelcomeHasEachLimitOfTheServer) {
   limits.helloTimeout = std::chrono::milliseconds(2700);
   limits.messageTimeout = std::chrono::milliseconds(2800);
   serve(limits);
-  const v1::Limits sent = client("ann").welcome().limits();
+  const v1::Limits sent = makeClient("ann").welcome().limits();
   EXPECT_EQ(sent.max_unread_bytes(), 2300'000u);
   EXPECT_EQ(sent.max_unread_pictures(), 24u);
   EXPECT_EQ(sent.max_connections(), 25u);
@@ -584,9 +584,9 @@ TEST_F(Sessions, WelcomeHasEachLimitOfTheServer) {
 }
 
 TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
-  FrameService frames(smallRoom());
-  QueryService questions(smallRoom());
-  TickLoop loop(smallRoom(), frames, questions);
+  FrameService frames(makeSmallRoom());
+  QueryService questions(makeSmallRoom());
+  TickLoop loop(makeSmallRoom(), frames, questions);
   const auto out = std::make_shared<OutgoingQueue>(OutgoingLimits{std::size_t{1} << 30, 2},
                                                    encodeShared(v1::Bye()), [] {});
   const ClientId ann = loop.join("ann", Role::admin, out, 1);
@@ -615,9 +615,9 @@ TEST(Requests, AFloodDoesNotHoldUpTheTicksOfAFreeRunningWorld) {
 }
 
 TEST(Requests, AnInternalErrorIsReportedAndTheNextRequestSucceeds) {
-  FrameService frames(smallRoom());
-  QueryService questions(smallRoom());
-  HostedWorld served(smallRoom(), frames, questions);
+  FrameService frames(makeSmallRoom());
+  QueryService questions(makeSmallRoom());
+  HostedWorld served(makeSmallRoom(), frames, questions);
   bool faulty = true;  // the first message sent throws
   const auto wake = [&] {
     if (std::exchange(faulty, false)) throw std::length_error("too long");
@@ -646,8 +646,8 @@ TEST(Requests, AnInternalErrorIsReportedAndTheNextRequestSucceeds) {
 
 TEST_F(Sessions, AtShutdownContactsEndAndClientsGetBye) {
   serve();
-  protocol::Client ann = client("ann");
-  ann.subscribe(everything());
+  protocol::Client ann = makeClient("ann");
+  ann.subscribe(makeFullSubscription());
   ASSERT_FALSE(ann.command(spawn("ann", 0, 0.01, 0)));
   ann.step(60);
   ReceivedEvents received;
@@ -672,14 +672,14 @@ TEST_F(Sessions, AtShutdownContactsEndAndClientsGetBye) {
 
 TEST(Serving, RefusesPublicAddresses) {
   for (const char* address : {"0.0.0.0", "192.0.2.1", "::", "example.invalid"}) {
-    EXPECT_THROW(Server(smallRoom(), {address, 0}), ServerError) << address;
+    EXPECT_THROW(Server(makeSmallRoom(), {address, 0}), ServerError) << address;
   }
 }
 
 TEST(Serving, ReportsAPortInUse) {
-  const Server first(smallRoom(), {"127.0.0.1", 0});
+  const Server first(makeSmallRoom(), {"127.0.0.1", 0});
   try {
-    const Server second(smallRoom(), {"127.0.0.1", first.port()});
+    const Server second(makeSmallRoom(), {"127.0.0.1", first.port()});
     FAIL() << "two servers on one port";
   } catch (const ServerError& error) {
     EXPECT_NE(std::string(error.what()).find(std::to_string(first.port())), std::string::npos);

@@ -17,7 +17,7 @@ const std::array<NamedBox, 3> kBoxes{
      {"room_column", {scene::Vec3(-0.25, 0, 5.75), scene::Vec3(0.25, 3, 6.25)}}}};
 
 /// Corner i of a box: bit 0 chooses x, bit 1 y, bit 2 z.
-scene::Vec3 corner(const scene::Aabb& box, unsigned i) {
+scene::Vec3 getCorner(const scene::Aabb& box, unsigned i) {
   return {i & 1 ? box.max.x() : box.min.x(), i & 2 ? box.max.y() : box.min.y(),
           i & 4 ? box.max.z() : box.min.z()};
 }
@@ -28,14 +28,15 @@ constexpr std::array<std::uint32_t, 36> kTriangles{0, 4, 6, 0, 6, 2, 1, 3, 7, 1,
 
 }  // namespace
 
-std::shared_ptr<const scene::Scene> smallRoom() {
+std::shared_ptr<const scene::Scene> makeSmallRoom() {
   scene::Model model;
   model.source = "small_room";
   model.materials.emplace_back();
   for (const NamedBox& named : kBoxes) {
     scene::Mesh mesh;
     mesh.name = named.name;
-    for (unsigned i = 0; i < 8; ++i) mesh.positions.push_back(corner(named.box, i).cast<float>());
+    for (unsigned i = 0; i < 8; ++i)
+      mesh.positions.push_back(getCorner(named.box, i).cast<float>());
     mesh.indices.assign(kTriangles.begin(), kTriangles.end());
     scene::Object object;
     object.path = named.name;
@@ -46,12 +47,12 @@ std::shared_ptr<const scene::Scene> smallRoom() {
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-std::string smallRoomObj() {
+std::string makeSmallRoomObj() {
   std::ostringstream text;
   std::uint32_t first = 1;
   for (const NamedBox& named : kBoxes) {
     text << "o " << named.name << "\n";
-    for (unsigned i = 0; i < 8; ++i) text << "v " << corner(named.box, i).transpose() << "\n";
+    for (unsigned i = 0; i < 8; ++i) text << "v " << getCorner(named.box, i).transpose() << "\n";
     for (std::size_t t = 0; t < kTriangles.size(); t += 3) {
       text << "f " << first + kTriangles[t] << " " << first + kTriangles[t + 1] << " "
            << first + kTriangles[t + 2] << "\n";

@@ -12,7 +12,7 @@
 namespace enfilade::server::testing {
 namespace {
 
-v1::ClientMessage driveRequest(double x) {
+v1::ClientMessage makeDriveRequest(double x) {
   v1::ClientMessage message;
   message.mutable_command()->set_avatar("ann");
   message.mutable_command()->mutable_drive()->mutable_velocity()->set_x(x);
@@ -43,14 +43,14 @@ class StepMany : public ServedRoom {
     *message.mutable_step_many() = many;
     return by.request(std::move(message), attachment).step_many();
   }
-  static v1::ClientMessage spawnRequest(double z) {
+  static v1::ClientMessage makeSpawnRequest(double z) {
     v1::ClientMessage message;
     message.mutable_command()->set_avatar("ann");
     v1::Spawn& spawn = *message.mutable_command()->mutable_spawn();
     spawn.mutable_at()->set_z(z);
     return message;
   }
-  static v1::ClientMessage stepRequest(std::uint32_t ticks) {
+  static v1::ClientMessage makeStepRequest(std::uint32_t ticks) {
     v1::ClientMessage message;
     message.mutable_step()->set_ticks(ticks);
     message.mutable_step()->set_avatars(true);
@@ -69,11 +69,11 @@ class StepMany : public ServedRoom {
 
 TEST_F(StepMany, EachWorldAnswersItsRequestsInOrderAndWelcomesAtFirst) {
   constexpr int kWorlds = 6;
-  protocol::Client maker = client("maker");
+  protocol::Client maker = makeClient("maker");
   for (int i = 0; i < kWorlds; ++i) create(maker, "w" + std::to_string(i));
   v1::ClientMessage subscribe;
   subscribe.mutable_subscribe()->set_notices(true);
-  v1::StepMany many = makeStepMany(kWorlds, {subscribe, spawnRequest(0), stepRequest(3)});
+  v1::StepMany many = makeStepMany(kWorlds, {subscribe, makeSpawnRequest(0), makeStepRequest(3)});
   many.mutable_worlds(2)
       ->mutable_requests(1)
       ->mutable_command()
@@ -96,17 +96,17 @@ TEST_F(StepMany, EachWorldAnswersItsRequestsInOrderAndWelcomesAtFirst) {
     EXPECT_EQ(messages[4].step().state_hash() == first.worlds(0).messages(4).step().state_hash(),
               i != 2);
   }
-  const v1::StepManyReply second = request(maker, makeStepMany(kWorlds, {stepRequest(1)}));
+  const v1::StepManyReply second = request(maker, makeStepMany(kWorlds, {makeStepRequest(1)}));
   for (const auto& world : second.worlds()) EXPECT_EQ(world.messages(0).step().tick(), 4u);
 }
 
 TEST_F(StepMany, PackedStepsReplaceRepliesToCommandsAndSteps) {
-  protocol::Client maker = client("maker");
+  protocol::Client maker = makeClient("maker");
   for (int i = 0; i < 4; ++i) create(maker, "w" + std::to_string(i));
-  v1::StepMany spawn = makeStepMany(4, {spawnRequest(0), stepRequest(1)});
+  v1::StepMany spawn = makeStepMany(4, {makeSpawnRequest(0), makeStepRequest(1)});
   spawn.mutable_worlds(2)->clear_requests();
   request(maker, spawn);
-  v1::StepMany many = makeStepMany(4, {driveRequest(1), stepRequest(60)});
+  v1::StepMany many = makeStepMany(4, {makeDriveRequest(1), makeStepRequest(60)});
   for (const int i : {0, 2, 3}) many.mutable_worlds(i)->set_packed_avatar("ann");
   many.mutable_worlds(3)->mutable_requests(0)->mutable_command()->set_avatar("a name");
   const v1::StepManyReply reply = request(maker, many);
@@ -128,17 +128,17 @@ TEST_F(StepMany, PackedStepsReplaceRepliesToCommandsAndSteps) {
   EXPECT_GT(steps.feet(0), 0.9);
   EXPECT_TRUE(std::isnan(steps.feet(6)));
   EXPECT_LT(steps.feet(9), 0.1) << "its Drive was refused";
-  const v1::StepManyReply next = request(maker, makeStepMany(4, {stepRequest(1)}));
+  const v1::StepManyReply next = request(maker, makeStepMany(4, {makeStepRequest(1)}));
   EXPECT_FALSE(next.has_steps());
   EXPECT_EQ(next.worlds(0).messages(0).step().tick(), 62u);
 }
 
 TEST_F(StepMany, AClockThatItSetsRunsOn) {
-  protocol::Client maker = client("maker");
+  protocol::Client maker = makeClient("maker");
   create(maker, "w0");
   v1::ClientMessage freeRun;
   freeRun.mutable_set_clock()->mutable_free_run()->set_speed(100);
-  request(maker, makeStepMany(1, {stepRequest(1)}));
+  request(maker, makeStepMany(1, {makeStepRequest(1)}));
   request(maker, makeStepMany(1, {freeRun}));
   EXPECT_TRUE(becomesTrue([&] {
     v1::ClientMessage message;
@@ -151,7 +151,7 @@ TEST_F(StepMany, AClockThatItSetsRunsOn) {
 }
 
 TEST_F(StepMany, AttachmentsFollowOneAnotherOnMultiplesOf64) {
-  protocol::Client maker = client("maker");
+  protocol::Client maker = makeClient("maker");
   for (int i = 0; i < 3; ++i) create(maker, "w" + std::to_string(i));
   v1::ClientMessage scan;
   v1::RangeScan& rays = *scan.mutable_rays()->mutable_scan();
@@ -161,7 +161,7 @@ TEST_F(StepMany, AttachmentsFollowOneAnotherOnMultiplesOf64) {
   rays.set_rows(1);
   std::vector<std::uint8_t> attachment, alone;
   const v1::StepManyReply reply =
-      request(maker, makeStepMany(3, {scan, stepRequest(1), scan}), &attachment);
+      request(maker, makeStepMany(3, {scan, makeStepRequest(1), scan}), &attachment);
   maker.request(scan, &alone);
   ASSERT_EQ(alone.size(), 56u);
   std::uint64_t before = 0;
@@ -186,15 +186,15 @@ TEST_F(StepMany, AttachmentsFollowOneAnotherOnMultiplesOf64) {
 }
 
 TEST_F(StepMany, AConnectionLeavesItsWorldsByRequestAndAtItsEnd) {
-  protocol::Client watcher = client("watcher");
+  protocol::Client watcher = makeClient("watcher");
   {
-    protocol::Client maker = client("maker");
+    protocol::Client maker = makeClient("maker");
     for (int i = 0; i < 3; ++i) create(maker, "w" + std::to_string(i));
-    v1::StepMany many = makeStepMany(3, {stepRequest(1)});
+    v1::StepMany many = makeStepMany(3, {makeStepRequest(1)});
     many.mutable_worlds(1)->set_leave(true);
     request(maker, many);
     EXPECT_TRUE(becomesTrue([&] { return countWorlds(watcher) == 3; }));
-    const v1::StepManyReply gone = request(maker, makeStepMany(3, {stepRequest(1)}));
+    const v1::StepManyReply gone = request(maker, makeStepMany(3, {makeStepRequest(1)}));
     EXPECT_EQ(gone.worlds(1).messages(0).error().code(), v1::ERROR_UNKNOWN_WORLD);
     EXPECT_EQ(gone.worlds(2).messages(0).step().tick(), 2u);
   }
@@ -202,18 +202,18 @@ TEST_F(StepMany, AConnectionLeavesItsWorldsByRequestAndAtItsEnd) {
 }
 
 TEST_F(StepMany, WorldsThatAreDroppedMeanwhileAnswerWithErrors) {
-  protocol::Client maker = client("maker");
+  protocol::Client maker = makeClient("maker");
   for (int round = 0; round < (tests::kSanitized ? 3 : 10); ++round) {
     for (int i = 0; i < 4; ++i) create(maker, "w" + std::to_string(i));
-    request(maker, makeStepMany(4, {stepRequest(1)}));
+    request(maker, makeStepMany(4, {makeStepRequest(1)}));
     std::thread dropper([&] {
-      protocol::Client other = client("dropper");
+      protocol::Client other = makeClient("dropper");
       v1::ClientMessage message;
       message.mutable_drop_world()->set_name("w1");
       other.request(std::move(message));
     });
     const v1::StepManyReply reply =
-        request(maker, makeStepMany(4, {stepRequest(2000), stepRequest(1)}));
+        request(maker, makeStepMany(4, {makeStepRequest(2000), makeStepRequest(1)}));
     dropper.join();
     for (int i = 0; i < 4; ++i) {
       int replies = 0;
@@ -234,11 +234,11 @@ TEST_F(StepMany, WorldsThatAreDroppedMeanwhileAnswerWithErrors) {
 }
 
 TEST_F(StepMany, AServerEndsInTheMiddleOfOne) {
-  protocol::Client maker = client("maker");
+  protocol::Client maker = makeClient("maker");
   for (int i = 0; i < 4; ++i) create(maker, "w" + std::to_string(i));
-  request(maker, makeStepMany(4, {stepRequest(1)}));
+  request(maker, makeStepMany(4, {makeStepRequest(1)}));
   {
-    v1::StepMany many = makeStepMany(4, {stepRequest(30'000)});
+    v1::StepMany many = makeStepMany(4, {makeStepRequest(30'000)});
     std::thread stepper([&] {
       try {
         request(maker, many);

@@ -7,18 +7,18 @@
 namespace enfilade::server {
 namespace {
 
-using scene::testing::boxScene;
+using scene::testing::makeBoxScene;
+using scene::testing::makeRoofedRooms;
 using scene::testing::NamedBox;
-using scene::testing::roofedRooms;
 
 TEST(StoreyPlans, ASolidOnTheRoofMakesNoStorey) {
   const auto findHeights = [](const std::vector<NamedBox>& boxes) {
     std::vector<double> heights;
-    for (const StoreyFloor& storey : findStoreys(*boxScene(boxes)))
+    for (const StoreyFloor& storey : findStoreys(*makeBoxScene(boxes)))
       heights.push_back(storey.height);
     return heights;
   };
-  std::vector<NamedBox> boxes = roofedRooms(1);
+  std::vector<NamedBox> boxes = makeRoofedRooms(1);
   boxes.push_back({"parapet", {0, 3.2, -3}, {0.2, 5, 3}});  // walls above the roof: a storey
   ASSERT_EQ(findHeights(boxes).size(), 2u);
   EXPECT_NEAR(findHeights(boxes)[1], 3.2, 1e-6);
@@ -28,11 +28,11 @@ TEST(StoreyPlans, ASolidOnTheRoofMakesNoStorey) {
 
 TEST(StoreyPlans, AHouseOnALargeLawnIsCutAboveItsOwnFloor) {
   const auto findHeight = [](const std::vector<NamedBox>& boxes) {
-    const std::vector<StoreyFloor> storeys = findStoreys(*boxScene(boxes));
+    const std::vector<StoreyFloor> storeys = findStoreys(*makeBoxScene(boxes));
     EXPECT_EQ(storeys.size(), 1u);
     return storeys.at(0).height;
   };
-  std::vector<NamedBox> boxes = roofedRooms(1);
+  std::vector<NamedBox> boxes = makeRoofedRooms(1);
   boxes[0].min.y() = -0.45;
   boxes.push_back({"lawn", {-30, -0.6, -30}, {40, -0.45, 30}});
   boxes.push_back({"tree", {20, -0.45, 20}, {20.3, 4, 20.3}});
@@ -52,9 +52,9 @@ TEST(StoreyPlans, AHouseOnALargeLawnIsCutAboveItsOwnFloor) {
 
 TEST(StoreyPlans, NamesComeFromPathsWithoutGlobalIdsAndPlaceholders) {
   const auto findName = [](const std::string& storey) {
-    std::vector<NamedBox> boxes = roofedRooms(1);
+    std::vector<NamedBox> boxes = makeRoofedRooms(1);
     for (NamedBox& box : boxes) box.path = storey + "/" + box.path;
-    return findStoreys(*boxScene(boxes)).at(0).name;
+    return findStoreys(*makeBoxScene(boxes)).at(0).name;
   };
   EXPECT_EQ(findName("IfcBuildingStorey_Ebene:2_0hEsDgzvbFtOVSvLpJ1fVP_node"), "Ebene:2");
   EXPECT_EQ(findName("IfcBuildingStorey_Undefined_0hEsDgzvbFtOVSvLpJ1fVP_node"), "");

@@ -32,7 +32,7 @@ class WalkBodies : public ProgramFixture {
     write(folder_ / "room.walk.json", kSidecar);
     write(folder_ / "walk.jsonl", kWalkToBodies);
   }
-  std::vector<nlohmann::json> contacts(const std::string& out) const {
+  std::vector<nlohmann::json> readContacts(const std::string& out) const {
     std::vector<nlohmann::json> all;
     std::ifstream lines(folder_ / out / "contacts.jsonl");
     for (std::string line; std::getline(lines, line);) all.push_back(nlohmann::json::parse(line));
@@ -48,9 +48,10 @@ std::uint64_t findTick(const std::vector<nlohmann::json>& contacts, const std::s
 }
 
 TEST_F(WalkBodies, AreInTheContactsAndEqualOverTheSocket) {
-  const Ended replayed = run({"replay", path("room.obj"), path("walk.jsonl"), "--out", path("a")});
+  const Ended replayed =
+      run({"replay", getPath("room.obj"), getPath("walk.jsonl"), "--out", getPath("a")});
   ASSERT_EQ(replayed.code, 0) << replayed.err;
-  const auto events = contacts("a");
+  const auto events = readContacts("a");
   const std::uint64_t enters = findTick(events, "enter", "ann", "door mat");
   const std::uint64_t leaves = findTick(events, "leave", "ann", "door mat");
   EXPECT_GT(enters, 30u) << "she waits until the gate is open";
@@ -63,25 +64,25 @@ TEST_F(WalkBodies, AreInTheContactsAndEqualOverTheSocket) {
   EXPECT_NE(replayed.err.find("walk.jsonl:7"), std::string::npos) << replayed.err;
   EXPECT_NE(replayed.err.find("dragon"), std::string::npos) << replayed.err;
 
-  std::filesystem::remove(path("stdout"));
-  const pid_t server = start({"serve", path("room.obj"), "--listen", "127.0.0.1:0"});
+  std::filesystem::remove(getPath("stdout"));
+  const pid_t server = start({"serve", getPath("room.obj"), "--listen", "127.0.0.1:0"});
   const std::string port = std::to_string(awaitReady());
   const Ended walked =
-      run({"walk", path("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--out", path("b")});
+      run({"walk", getPath("walk.jsonl"), "--connect", "127.0.0.1:" + port, "--out", getPath("b")});
   kill(server, SIGTERM);
   EXPECT_EQ(awaitExitCode(server), 0);
   ASSERT_EQ(walked.code, 0) << walked.err;
   const auto over = nlohmann::json::parse(walked.out);
   for (const char* key : {"ticks", "state_hash", "contacts", "refused", "arrived", "outcomes"})
     EXPECT_EQ(summary.at(key), over.at(key)) << key;
-  EXPECT_EQ(findTick(contacts("b"), "enter", "ann", "door mat"), enters);
-  EXPECT_EQ(findTick(contacts("b"), "leave", "ann", "door mat"), leaves);
+  EXPECT_EQ(findTick(readContacts("b"), "enter", "ann", "door mat"), enters);
+  EXPECT_EQ(findTick(readContacts("b"), "leave", "ann", "door mat"), leaves);
 }
 
 TEST_F(WalkBodies, AnInvalidSidecarIsReportedWithItsPlaceAndNothingIsServed) {
   write(folder_ / "room.walk.json", R"({"walk": 1, "bodies": [{"name": "g", "kind": "hinged",
     "objects": ["room_wall"], "anchor": [0, 0, null]}]})");
-  const Ended ended = run({"inspect", path("room.obj")});
+  const Ended ended = run({"inspect", getPath("room.obj")});
   EXPECT_EQ(ended.code, 1);
   EXPECT_EQ(ended.out, "");
   EXPECT_NE(ended.err.find("room.walk.json.bodies[0].anchor"), std::string::npos) << ended.err;

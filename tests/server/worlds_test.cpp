@@ -21,8 +21,8 @@ namespace {
 
 class HostedWorlds : public ServedRoom {
  protected:
-  protocol::Client clientIn(const std::string& world, const std::string& name = "ann") {
-    return client(name, "", world);
+  protocol::Client makeClientIn(const std::string& world, const std::string& name = "ann") {
+    return makeClient(name, "", world);
   }
 };
 
@@ -65,7 +65,7 @@ std::vector<std::string> getNames(const std::vector<v1::World>& worlds) {
 }
 
 /// The state hashes of a walk to the wall.
-std::vector<std::uint64_t> hashesOfWalk(protocol::Client& walker) {
+std::vector<std::uint64_t> collectWalkHashes(protocol::Client& walker) {
   EXPECT_FALSE(walker.command(spawn("ann", 0, 0.001, 0)));
   EXPECT_FALSE(walker.command(walkTo("ann", 8, 0, 1)));
   std::vector<std::uint64_t> hashes;
@@ -73,14 +73,14 @@ std::vector<std::uint64_t> hashesOfWalk(protocol::Client& walker) {
   return hashes;
 }
 
-v1::SetClock freeRun(double speed) {
+v1::SetClock makeFreeRun(double speed) {
   v1::SetClock clock;
   clock.mutable_free_run()->set_speed(speed);
   return clock;
 }
 
 /// The Bye of a client that waits in a world.
-v1::Bye lastWordsTo(protocol::Client& client) {
+v1::Bye awaitBye(protocol::Client& client) {
   while (const auto event = client.nextEvent(std::chrono::seconds(20)))
     if (event->has_bye()) return event->bye();
   return {};
@@ -88,18 +88,18 @@ v1::Bye lastWordsTo(protocol::Client& client) {
 
 TEST_F(HostedWorlds, TheSameCommandsGiveTheSameBitsWhateverHappensInOtherWorlds) {
   serve();
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   create(main, "calm");
   create(main, "busy");
   constexpr int kCrowd = 15;
-  protocol::Client crowd = clientIn("busy", "crowd");
+  protocol::Client crowd = makeClientIn("busy", "crowd");
   for (int i = 0; i < kCrowd; ++i)
     ASSERT_FALSE(crowd.command(spawn("a" + std::to_string(i), -9 + 0.9 * i, 0.001, 3)));
   for (int i = 0; i < kCrowd; ++i)
     ASSERT_FALSE(crowd.command(walkTo("a" + std::to_string(i), 9 - 0.9 * i, 0, -3)));
-  crowd.setClock(freeRun(1000));
-  protocol::Client calm = clientIn("calm");
-  EXPECT_EQ(hashesOfWalk(main), hashesOfWalk(calm));
+  crowd.setClock(makeFreeRun(1000));
+  protocol::Client calm = makeClientIn("calm");
+  EXPECT_EQ(collectWalkHashes(main), collectWalkHashes(calm));
   EXPECT_GT(crowd.metrics().ticks(), 0u);
   EXPECT_EQ(calm.metrics().avatars(), 1u);
   EXPECT_EQ(crowd.metrics().avatars(), kCrowd + 0u);
@@ -107,13 +107,13 @@ TEST_F(HostedWorlds, TheSameCommandsGiveTheSameBitsWhateverHappensInOtherWorlds)
 
 TEST_F(HostedWorlds, EachIsListedWithItsOwnTicksAndClients) {
   serve();
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   EXPECT_EQ(main.welcome().world(), "main");
   ASSERT_EQ(main.welcome().scenes_size(), 1);
   EXPECT_EQ(main.welcome().scenes(0), "small_room");
   EXPECT_EQ(create(main, "b").scene(), "small_room");
   const std::string chosen = create(main, "").name();
-  protocol::Client bob = clientIn("b", "bob");
+  protocol::Client bob = makeClientIn("b", "bob");
   EXPECT_EQ(bob.welcome().world(), "b");
   EXPECT_FALSE(bob.welcome().clock().has_driver()) << "each has a driver of its own";
   main.step(5);
@@ -132,7 +132,7 @@ TEST_F(HostedWorlds, NamesAreValidated) {
   ServerLimits limits;
   limits.worlds = 3;
   serve(limits);
-  protocol::Client ann = client("ann");
+  protocol::Client ann = makeClient("ann");
   EXPECT_EQ(ann.welcome().limits().max_worlds(), 3u);
   for (const char* bad : {"a b", "../a", ".a", "a/b", "\xc3\xa9"})
     EXPECT_EQ(catchCode([&] { create(ann, bad); }), v1::ERROR_BAD_MESSAGE) << bad;
@@ -145,29 +145,29 @@ TEST_F(HostedWorlds, NamesAreValidated) {
   EXPECT_EQ(catchCode([&] { create(ann, "d"); }), v1::ERROR_TOO_LARGE);
   EXPECT_EQ(catchCode([&] { drop(ann, "d"); }), v1::ERROR_UNKNOWN_WORLD);
   EXPECT_EQ(catchCode([&] { drop(ann, "main"); }), v1::ERROR_NOT_ALLOWED);
-  EXPECT_EQ(catchCode([&] { clientIn("d"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(catchCode([&] { makeClientIn("d"); }), v1::ERROR_UNKNOWN_WORLD);
 }
 
 TEST_F(HostedWorlds, OnlyAnAdminMakesAndDropsThem) {
   Access access;
   access.tokens = {{Role::drive, "driver-0123456789"}, {Role::admin, "admin-0123456789"}};
-  serve({}, smallRoom(), access);
-  protocol::Client driver = client("driver", "driver-0123456789");
-  protocol::Client admin = client("admin", "admin-0123456789");
+  serve({}, makeSmallRoom(), access);
+  protocol::Client driver = makeClient("driver", "driver-0123456789");
+  protocol::Client admin = makeClient("admin", "admin-0123456789");
   EXPECT_EQ(catchCode([&] { create(driver, "b"); }), v1::ERROR_NOT_ALLOWED);
   create(admin, "b");
   EXPECT_EQ(catchCode([&] { drop(driver, "b"); }), v1::ERROR_NOT_ALLOWED);
   EXPECT_EQ(list(driver).size(), 2u);
-  EXPECT_EQ(client("in b", "driver-0123456789", "b").welcome().role(), v1::ROLE_DRIVE);
+  EXPECT_EQ(makeClient("in b", "driver-0123456789", "b").welcome().role(), v1::ROLE_DRIVE);
   drop(admin, "b");
 }
 
 TEST_F(HostedWorlds, ClientsOfADroppedWorldAreNotifiedAndTheirContactsEnd) {
   serve();
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   create(main, "b");
-  protocol::Client bob = clientIn("b");
-  bob.subscribe(everything());
+  protocol::Client bob = makeClientIn("b");
+  bob.subscribe(makeFullSubscription());
   ASSERT_FALSE(bob.command(spawn("bob", 0, 0.001, 0)));
   bob.step(10);
   drop(main, "b");
@@ -184,15 +184,15 @@ TEST_F(HostedWorlds, ClientsOfADroppedWorldAreNotifiedAndTheirContactsEnd) {
   EXPECT_EQ(bye.reason(), "the world 'b' was dropped");
   EXPECT_EQ(received.count(v1::ContactEvent::KIND_END), 1u);
   EXPECT_EQ(main.step().tick(), 1u) << "the others go on";
-  EXPECT_EQ(catchCode([&] { clientIn("b"); }), v1::ERROR_UNKNOWN_WORLD);
+  EXPECT_EQ(catchCode([&] { makeClientIn("b"); }), v1::ERROR_UNKNOWN_WORLD);
   EXPECT_EQ(create(main, "b").tick(), 0u) << "the name is free";
 }
 
 TEST_F(HostedWorlds, OneIsDroppedUnderAWaitingStep) {
   serve();
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   create(main, "b");
-  protocol::Client bob = clientIn("b");
+  protocol::Client bob = makeClientIn("b");
   ASSERT_FALSE(bob.command(spawn("bob", 0, 0.001, 0)));
   bob.step(1);
   auto stepping = std::async(std::launch::async, [&] {
@@ -208,10 +208,10 @@ TEST_F(HostedWorlds, OneIsDroppedUnderAWaitingStep) {
 TEST_F(HostedWorlds, OneIsDroppedWhileItsPicturesAreDrawn) {
   serve();
   ENFILADE_NEED_PICTURES(*server_);
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   v1::FrameRequest request;
-  *request.mutable_free()->mutable_eye() = vec(0, 1, 0);
-  *request.mutable_free()->mutable_forward() = vec(1, 0, 0);
+  *request.mutable_free()->mutable_eye() = makeVec(0, 1, 0);
+  *request.mutable_free()->mutable_forward() = makeVec(1, 0, 0);
   request.set_width(1000);
   request.set_height(1000);
   for (int round = 0; round < 5; ++round) {
@@ -245,24 +245,24 @@ TEST_F(HostedWorlds, OneIsDroppedWhileItsPicturesAreDrawn) {
 
 TEST_F(HostedWorlds, AClientThatDropsItsOwnWorldGetsTheReplyFirst) {
   serve();
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   create(main, "b");
-  protocol::Client bob = clientIn("b");
+  protocol::Client bob = makeClientIn("b");
   drop(bob, "b");
-  EXPECT_EQ(lastWordsTo(bob).code(), v1::ERROR_WORLD_DROPPED);
+  EXPECT_EQ(awaitBye(bob).code(), v1::ERROR_WORLD_DROPPED);
   EXPECT_EQ(list(main).size(), 1u);
 }
 
 TEST_F(HostedWorlds, ADropWhenEmptyWorldEndsWithItsLastClient) {
   serve();
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   EXPECT_TRUE(create(main, "b", "", true).drop_when_empty());
   RawConnection http(server_->port());
   http.send("GET /metrics HTTP/1.1\r\nHost: localhost\r\n\r\n");
   EXPECT_NE(http.readText().find("{world=\"b\"}"), std::string::npos);
   EXPECT_EQ(list(main).size(), 2u) << "no client has entered it yet";
   {
-    protocol::Client first = clientIn("b"), second = clientIn("b");
+    protocol::Client first = makeClientIn("b"), second = makeClientIn("b");
     { const protocol::Client leaves = std::move(first); }
     ASSERT_TRUE(becomesTrue([&] { return list(main)[1].clients() == 1; }));
     EXPECT_EQ(second.step().tick(), 1u);
@@ -274,10 +274,10 @@ TEST_F(HostedWorlds, AnUnusedWorldIsDroppedAfterAWhile) {
   ServerLimits limits;
   limits.emptyWorldTimeout = std::chrono::milliseconds(300);
   serve(limits);
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   create(main, "stays");
   create(main, "entered", "", true);
-  const protocol::Client inside = clientIn("entered");
+  const protocol::Client inside = makeClientIn("entered");
   create(main, "forgotten", "", true);
   EXPECT_EQ(list(main).size(), 4u);
   ASSERT_TRUE(becomesTrue([&] { return list(main).size() == 3; }));
@@ -289,7 +289,7 @@ TEST_F(HostedWorlds, AClientThatDisconnectsWhileUnreadIsNoticed) {
   limits.pendingRequests = 4;
   limits.ticksPerStep = 1'000'000'000;  // days
   serve(limits);
-  protocol::Client watch = client("watch");
+  protocol::Client watch = makeClient("watch");
   create(watch, "b");
   {
     RawConnection bob(server_->port());
@@ -314,8 +314,8 @@ TEST_F(HostedWorlds, AClientThatDisconnectsWhileUnreadIsNoticed) {
 }
 
 /// A hall 100 m wide with the requested number of posts.
-std::shared_ptr<const scene::Scene> hall(std::size_t posts) {
-  scene::Model model = smallRoom()->model();
+std::shared_ptr<const scene::Scene> makeHall(std::size_t posts) {
+  scene::Model model = makeSmallRoom()->model();
   model.source = "halls/hall.glb";
   for (std::size_t i = 0; i < posts; ++i) {
     scene::Object post = model.objects[kColumn - 1];
@@ -329,26 +329,26 @@ std::shared_ptr<const scene::Scene> hall(std::size_t posts) {
 
 TEST_F(HostedWorlds, ScenesThatAServerBeginsWithHaveAWorldEach) {
   ServerOptions options;
-  options.additionalScenes = {hall(4), hall(5), smallRoom()};
-  server_ = std::make_unique<Server>(smallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
+  options.additionalScenes = {makeHall(4), makeHall(5), makeSmallRoom()};
+  server_ = std::make_unique<Server>(makeSmallRoom(), HostPort{"127.0.0.1", 0}, std::move(options));
   EXPECT_EQ(server_->worldNames(),
             (std::vector<std::string>{"main", "hall", "hall-2", "small_room-2"}));
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   EXPECT_EQ(main.welcome().scene().objects(), 3u);
   EXPECT_EQ(main.welcome().scenes(1), "hall");
-  EXPECT_EQ(clientIn("hall").welcome().scene().objects(), 7u);
-  EXPECT_EQ(clientIn("hall-2").welcome().scene().objects(), 8u);
+  EXPECT_EQ(makeClientIn("hall").welcome().scene().objects(), 7u);
+  EXPECT_EQ(makeClientIn("hall-2").welcome().scene().objects(), 8u);
   create(main, "more", "hall-2");
-  EXPECT_EQ(clientIn("more").welcome().scene().objects(), 8u);
-  protocol::Client inHall = clientIn("hall");
+  EXPECT_EQ(makeClientIn("more").welcome().scene().objects(), 8u);
+  protocol::Client inHall = makeClientIn("hall");
   EXPECT_EQ(create(inHall, "own").scene(), "hall") << "its own where none is named";
 }
 
 TEST_F(HostedWorlds, MetricsAndHealthCoverAllOfThem) {
   serve();
-  protocol::Client main = client("main");
+  protocol::Client main = makeClient("main");
   create(main, "b");
-  protocol::Client bob = clientIn("b");
+  protocol::Client bob = makeClientIn("b");
   main.step(3);
   bob.step(4);
   const auto get = [&](const std::string& target) {
@@ -368,7 +368,7 @@ TEST_F(HostedWorlds, MetricsAndHealthCoverAllOfThem) {
 
 TEST(Listening, AClientThatConnectsDuringTheShutdownIsNotified) {
   boost::asio::io_context context{1};
-  WorldRegistry worlds({smallRoom()}, {}, {});
+  WorldRegistry worlds({makeSmallRoom()}, {}, {});
   Listener listener(context, {"127.0.0.1", 0}, worlds, {}, {}, {});
   listener.start();
   std::thread network([&] { context.run(); });
@@ -384,21 +384,21 @@ TEST(Listening, AClientThatConnectsDuringTheShutdownIsNotified) {
 // ---- without sockets ----------------------------------------------------------------------------
 
 /// The result of a request for a world.
-std::variant<v1::World, v1::Error> made(WorldRegistry& worlds, const std::string& name) {
+std::variant<v1::World, v1::Error> createWorld(WorldRegistry& worlds, const std::string& name) {
   std::promise<std::variant<v1::World, v1::Error>> promise;
   worlds.create({name, "small_room", false}, [&](auto world) { promise.set_value(world); });
   return promise.get_future().get();
 }
 
-std::optional<v1::Error> dropped(WorldRegistry& worlds, const std::string& name) {
+std::optional<v1::Error> dropWorld(WorldRegistry& worlds, const std::string& name) {
   std::promise<std::optional<v1::Error>> promise;
   worlds.drop(name, "main", [&](auto problem) { promise.set_value(problem); });
   return promise.get_future().get();
 }
 
 TEST(WorldRegistry, AFailedWorldIsReportedAndTheOthersContinue) {
-  WorldRegistry worlds({smallRoom()}, {}, {});
-  ASSERT_TRUE(std::holds_alternative<v1::World>(made(worlds, "b")));
+  WorldRegistry worlds({makeSmallRoom()}, {}, {});
+  ASSERT_TRUE(std::holds_alternative<v1::World>(createWorld(worlds, "b")));
   const auto world = worlds.find("b");
   const auto out = std::make_shared<OutgoingQueue>(OutgoingLimits{1u << 20, 2}, Buffer(), [] {});
   ASSERT_NE(world->join("bob", Role::admin, out, 1), 0u);
@@ -408,19 +408,19 @@ TEST(WorldRegistry, AFailedWorldIsReportedAndTheOthersContinue) {
   EXPECT_EQ(world->join("late", Role::admin, out, 1), 0u) << "no client can enter it";
   EXPECT_FALSE(worlds.mainWorld().failure());
   EXPECT_TRUE(worlds.mainWorld().post([](HostedWorld&) {}));
-  EXPECT_FALSE(dropped(worlds, "b"));
+  EXPECT_FALSE(dropWorld(worlds, "b"));
   EXPECT_EQ(worlds.allWorlds().size(), 1u);
 }
 
 TEST(WorldRegistry, RequestsAfterTheEndAreRefused) {
-  WorldRegistry worlds({smallRoom()}, {}, {});
+  WorldRegistry worlds({makeSmallRoom()}, {}, {});
   worlds.stop();
-  EXPECT_EQ(std::get<v1::Error>(made(worlds, "b")).code(), v1::ERROR_SHUTTING_DOWN);
-  EXPECT_EQ(dropped(worlds, "b")->code(), v1::ERROR_SHUTTING_DOWN);
+  EXPECT_EQ(std::get<v1::Error>(createWorld(worlds, "b")).code(), v1::ERROR_SHUTTING_DOWN);
+  EXPECT_EQ(dropWorld(worlds, "b")->code(), v1::ERROR_SHUTTING_DOWN);
 }
 
 /// Resident memory that only this process uses, in bytes.
-std::size_t residentBytes() {
+std::size_t readResidentBytes() {
   std::ifstream file("/proc/self/statm");
   std::size_t all = 0, resident = 0;
   file >> all >> resident;
@@ -431,16 +431,16 @@ constexpr std::size_t kMiB = 1u << 20;
 
 TEST(WorldRegistry, AllAreCreatedAndDroppedRepeatedlyInConstantMemory) {
   const std::uint32_t maxWorlds = ServerLimits().worlds;
-  WorldRegistry worlds({smallRoom()}, {}, {});
+  WorldRegistry worlds({makeSmallRoom()}, {}, {});
   std::vector<std::size_t> after;
   for (int round = 0; round < 8; ++round) {
     for (std::uint32_t i = 1; i < maxWorlds; ++i)
-      ASSERT_TRUE(std::holds_alternative<v1::World>(made(worlds, "w" + std::to_string(i))));
+      ASSERT_TRUE(std::holds_alternative<v1::World>(createWorld(worlds, "w" + std::to_string(i))));
     EXPECT_EQ(worlds.allWorlds().size(), maxWorlds);
-    EXPECT_EQ(std::get<v1::Error>(made(worlds, "one-more")).code(), v1::ERROR_TOO_LARGE);
+    EXPECT_EQ(std::get<v1::Error>(createWorld(worlds, "one-more")).code(), v1::ERROR_TOO_LARGE);
     for (std::uint32_t i = 1; i < maxWorlds; ++i)
-      ASSERT_FALSE(dropped(worlds, "w" + std::to_string(i)));
-    after.push_back(residentBytes());
+      ASSERT_FALSE(dropWorld(worlds, "w" + std::to_string(i)));
+    after.push_back(readResidentBytes());
   }
   EXPECT_EQ(worlds.allWorlds().size(), 1u);
   if (!tests::kSanitized) {
@@ -451,17 +451,17 @@ TEST(WorldRegistry, AllAreCreatedAndDroppedRepeatedlyInConstantMemory) {
 /// The scene's meshes, parts and names are shared, so they do not count.
 TEST(WorldRegistry, AnotherWorldOfASceneAddsOnlyBoxesOfStaticObjects) {
   constexpr std::size_t kPosts = 30'000, kMaxBytesPerBox = 100, kWorlds = 20;
-  const auto before = residentBytes();
-  const auto scene = hall(kPosts);
+  const auto before = readResidentBytes();
+  const auto scene = makeHall(kPosts);
   WorldRegistry worlds({scene}, {}, {});
   static_cast<void>(worlds.rendererName());  // waits for the renderer, which allocates memory, too
-  const auto one = residentBytes();
+  const auto one = readResidentBytes();
   for (std::size_t i = 0; i < kWorlds; ++i) {
     std::promise<void> ready;
     worlds.create({"w" + std::to_string(i), "hall", false}, [&](auto) { ready.set_value(); });
     ready.get_future().get();
   }
-  const std::size_t each = (residentBytes() - one) / kWorlds;
+  const std::size_t each = (readResidentBytes() - one) / kWorlds;
   EXPECT_EQ(worlds.allWorlds().size(), kWorlds + 1);
   if (!tests::kSanitized) {
     EXPECT_LT(each, kPosts * kMaxBytesPerBox + kMiB / 2) << one - before << " for the first";

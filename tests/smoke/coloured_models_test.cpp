@@ -75,7 +75,7 @@ std::string makeGltf() {
 "bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":96},
 {"buffer":0,"byteOffset":96,"byteLength":64},{"buffer":0,"byteOffset":160,"byteLength":24}],
 "buffers":[{"byteLength":184,"uri":"data:application/octet-stream;base64,)" +
-         tests::base64(bytes) + R"("}]})";
+         tests::encodeBase64(bytes) + R"("}]})";
 }
 
 ScenePtr importColoured(const std::string& name, const std::string& text) {

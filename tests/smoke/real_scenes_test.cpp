@@ -31,7 +31,7 @@ void PrintTo(const RealScene& scene, std::ostream* out) {
 
 class RealScenes : public ::testing::TestWithParam<RealScene> {};
 
-double uniform(std::mt19937_64& random, double low, double high) {
+double drawUniform(std::mt19937_64& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
 }
 
@@ -58,9 +58,9 @@ struct Balance {
 bool standSomewhere(scene::World& world, std::mt19937_64& random, Balance& balance) {
   const scene::Aabb& b = world.scene().bounds();
   for (int attempt = 0; attempt < 400; ++attempt) {
-    const double x = uniform(random, b.min.x(), b.max.x());
-    const double z = uniform(random, b.min.z(), b.max.z());
-    const double y = uniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
+    const double x = drawUniform(random, b.min.x(), b.max.x());
+    const double z = drawUniform(random, b.min.z(), b.max.z());
+    const double y = drawUniform(random, b.min.y(), b.min.y() + 0.7 * b.size().y());
     EXPECT_FALSE(submitAvatarCommand(world, {"ann", scene::Spawn{{x, y, z}}, 0}));
     balance.take(tickWorld(world).contacts);
     if (world.snapshot()->avatars.empty()) continue;
@@ -99,8 +99,8 @@ TEST_P(RealScenes, AnAvatarWalksAndNeverPenetrates) {
   double worst = 0, walked = 0;  // metres
   for (int i = 0; i < kTicks; ++i) {
     if (i % 120 == 0 && !world.snapshot()->avatars.empty()) {
-      const Vec3 goal(uniform(random, b.min.x(), b.max.x()), 0,
-                      uniform(random, b.min.z(), b.max.z()));
+      const Vec3 goal(drawUniform(random, b.min.x(), b.max.x()), 0,
+                      drawUniform(random, b.min.z(), b.max.z()));
       const Vec3 way = goal - world.snapshot()->avatars[0].footPosition;
       const Vec3 velocity = 1.5 * Vec3(way.x(), 0, way.z()).normalized();
       EXPECT_FALSE(submitAvatarCommand(world, {"ann", scene::Drive{velocity}, 0}));

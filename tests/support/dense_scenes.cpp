@@ -67,15 +67,15 @@ void addCushion(Mesh& mesh, const Vec3& centre, const Vec3& halfSize, int steps)
   });
 }
 
-std::vector<Vec3> straight(const Vec3& from, const Vec3& to, int steps) {
+std::vector<Vec3> makeStraightLine(const Vec3& from, const Vec3& to, int steps) {
   std::vector<Vec3> line;
   for (int i = 0; i <= steps; ++i) line.push_back(from + (to - from) * (double(i) / steps));
   return line;
 }
 
 /// A cable that sags between two points.
-std::vector<Vec3> sagging(const Vec3& from, const Vec3& to, double sag, int steps) {
-  std::vector<Vec3> line = straight(from, to, steps);
+std::vector<Vec3> makeSaggingLine(const Vec3& from, const Vec3& to, double sag, int steps) {
+  std::vector<Vec3> line = makeStraightLine(from, to, steps);
   for (int i = 0; i <= steps; ++i)
     line[static_cast<std::size_t>(i)].y() -= sag * std::sin(std::numbers::pi * i / steps);
   return line;
@@ -86,11 +86,11 @@ Mesh makeChair(int n) {
   Mesh mesh;
   for (int foot = 0; foot < 5; ++foot) {
     const Vec3 out(std::cos(kTurn * foot / 5), 0, std::sin(kTurn * foot / 5));
-    addTube(mesh, straight(0.05 * out + Vec3(0, 0.09, 0), 0.3 * out + Vec3(0, 0.05, 0), n), 0.02,
-            n);
+    addTube(mesh, makeStraightLine(0.05 * out + Vec3(0, 0.09, 0), 0.3 * out + Vec3(0, 0.05, 0), n),
+            0.02, n);
     addCushion(mesh, 0.3 * out + Vec3(0, 0.03, 0), {0.025, 0.03, 0.025}, n / 2);
   }
-  addTube(mesh, straight({0, 0.08, 0}, {0, 0.44, 0}, n), 0.03, n);
+  addTube(mesh, makeStraightLine({0, 0.08, 0}, {0, 0.44, 0}, n), 0.03, n);
   addCushion(mesh, {0, 0.47, 0}, {0.24, 0.04, 0.24}, n);
   addSurface(mesh, 2 * n, 2 * n, [](double u, double v) {
     const double x = 0.42 * (v - 0.5);
@@ -107,8 +107,8 @@ Mesh makePlant(int n, Random& random) {
     return Vec3(radius * std::cos(angle), 0.35 * u, radius * std::sin(angle));
   });
   for (int leaf = 0; leaf < 2 * n; ++leaf) {
-    const double around = random.uniform(0, kTurn), length = random.uniform(0.2, 0.5);
-    const double rise = random.uniform(0.2, 1.0), width = random.uniform(0.02, 0.05);
+    const double around = random.drawUniform(0, kTurn), length = random.drawUniform(0.2, 0.5);
+    const double rise = random.drawUniform(0.2, 1.0), width = random.drawUniform(0.02, 0.05);
     const Vec3 out(std::cos(around), 0, std::sin(around)), side(-out.z(), 0, out.x());
     addSurface(mesh, std::max(2, n / 2), 2, [&](double u, double v) {
       const double half = width * std::sin(std::numbers::pi * std::min(u, 0.999));
@@ -132,11 +132,11 @@ std::uint32_t addMesh(Model& model, Mesh mesh) {
 }
 
 void addRoom(scene::testing::Builder& builder, double width, double depth) {
-  builder.box("floor", {0, -0.2, 0}, {width, 0, depth});
-  builder.box("wall west", {-0.2, 0, 0}, {0, 3, depth});
-  builder.box("wall east", {width, 0, 0}, {width + 0.2, 3, depth});
-  builder.box("wall north", {0, 0, -0.2}, {width, 3, 0});
-  builder.box("wall south", {0, 0, depth}, {width, 3, depth + 0.2});
+  builder.addBox("floor", {0, -0.2, 0}, {width, 0, depth});
+  builder.addBox("wall west", {-0.2, 0, 0}, {0, 3, depth});
+  builder.addBox("wall east", {width, 0, 0}, {width + 0.2, 3, depth});
+  builder.addBox("wall north", {0, 0, -0.2}, {width, 3, 0});
+  builder.addBox("wall south", {0, 0, depth}, {width, 3, depth + 0.2});
 }
 
 /// A room of 10 x 11 m: rows of desks with chairs, plants, and cables on desks and floor.
@@ -157,16 +157,17 @@ Model makeOffice(std::size_t triangles) {
     for (int desk = 0; desk < kDesks; ++desk) {
       const std::string name = std::to_string(row) + "." + std::to_string(desk);
       const Vec3 at(1.2 + 2.1 * desk, 0, 1.0 + 2.1 * row);
-      builder.box("desk " + name, at + Vec3(0, 0.70, 0), at + Vec3(1.5, 0.74, 0.7));
-      builder.box("leg " + name, at + Vec3(0.02, 0, 0.3), at + Vec3(0.06, 0.7, 0.4));
-      builder.box("leg2 " + name, at + Vec3(1.44, 0, 0.3), at + Vec3(1.48, 0.7, 0.4));
-      const Vec3 seat(random.uniform(0.5, 1.0), 0.0, random.uniform(0.95, 1.2));
-      place(model, "chair " + name, chair, at + seat, random.uniform(0, kTurn));
+      builder.addBox("desk " + name, at + Vec3(0, 0.70, 0), at + Vec3(1.5, 0.74, 0.7));
+      builder.addBox("leg " + name, at + Vec3(0.02, 0, 0.3), at + Vec3(0.06, 0.7, 0.4));
+      builder.addBox("leg2 " + name, at + Vec3(1.44, 0, 0.3), at + Vec3(1.48, 0.7, 0.4));
+      const Vec3 seat(random.drawUniform(0.5, 1.0), 0.0, random.drawUniform(0.95, 1.2));
+      place(model, "chair " + name, chair, at + seat, random.drawUniform(0, kTurn));
       for (int cable = 0; cable < 2; ++cable) {
-        const Vec3 from = at + Vec3(random.uniform(0.1, 1.4), 0.76, 0.35);
-        const Vec3 to = at + Vec3(random.uniform(0.1, 1.4), 0.01, random.uniform(0.2, 1.1));
+        const Vec3 from = at + Vec3(random.drawUniform(0.1, 1.4), 0.76, 0.35);
+        const Vec3 to = at + Vec3(random.drawUniform(0.1, 1.4), 0.01, random.drawUniform(0.2, 1.1));
         Mesh mesh;
-        addTube(mesh, sagging(from, to, random.uniform(-0.1, 0.005), cableSteps), 0.004, 6);
+        addTube(mesh, makeSaggingLine(from, to, random.drawUniform(-0.1, 0.005), cableSteps), 0.004,
+                6);
         builder.add("cable " + name + "." + std::to_string(cable), std::move(mesh));
       }
     }
@@ -174,14 +175,14 @@ Model makeOffice(std::size_t triangles) {
   for (int i = 0; i < 12; ++i) {
     const std::uint32_t plant = addMesh(model, makePlant(plantSteps, random));
     place(model, "plant " + std::to_string(i), plant,
-          {i % 2 == 0 ? 0.5 : 9.5, 0, 0.6 + 1.9 * (i / 2)}, random.uniform(0, kTurn));
+          {i % 2 == 0 ? 0.5 : 9.5, 0, 0.6 + 1.9 * (i / 2)}, random.drawUniform(0, kTurn));
   }
   return builder.model;
 }
 
 /// An open thing of 60 triangles: a vase, a bowl, a folded sheet or a bent strip.
 Mesh makeThing(int kind, Random& random) {
-  const double size = random.uniform(0.03, 0.1), bend = random.uniform(0.2, 0.6);
+  const double size = random.drawUniform(0.03, 0.1), bend = random.drawUniform(0.2, 0.6);
   Mesh mesh;
   addSurface(mesh, 5, 6, [&](double u, double v) {
     const double angle = v == 1 ? 0 : kTurn * v;
@@ -213,8 +214,8 @@ Model makeShop(std::size_t triangles) {
   for (int rack = 0; rack < kRacks; ++rack)
     for (int board = 0; board < kBoards; ++board) {
       const Vec3 at(1 + 2.4 * rack, 0.1 + 0.4 * board, 1);
-      builder.box("board " + std::to_string(rack) + "." + std::to_string(board), at,
-                  at + Vec3(0.5, 0.02, 9));
+      builder.addBox("board " + std::to_string(rack) + "." + std::to_string(board), at,
+                     at + Vec3(0.5, 0.02, 9));
     }
   std::array<std::uint32_t, kKinds> kinds{};
   for (int kind = 0; kind < kKinds; ++kind)
@@ -222,13 +223,14 @@ Model makeShop(std::size_t triangles) {
   const int count = std::max(1, static_cast<int>(triangles / 60));
   for (int i = 0; i < count; ++i) {
     const bool isOnFloor = i % 50 == 0;
-    const double board = std::floor(random.uniform(0, kBoards));
+    const double board = std::floor(random.drawUniform(0, kBoards));
     const Vec3 at =
-        isOnFloor ? Vec3(random.uniform(0.2, 9.8), 0.001, random.uniform(0.2, 10.8))
-                  : Vec3(1 + 2.4 * std::floor(random.uniform(0, kRacks)) + random.uniform(0, 0.5),
-                         0.121 + 0.4 * board, random.uniform(1, 10));
+        isOnFloor
+            ? Vec3(random.drawUniform(0.2, 9.8), 0.001, random.drawUniform(0.2, 10.8))
+            : Vec3(1 + 2.4 * std::floor(random.drawUniform(0, kRacks)) + random.drawUniform(0, 0.5),
+                   0.121 + 0.4 * board, random.drawUniform(1, 10));
     place(model, "thing " + std::to_string(i), kinds[static_cast<std::size_t>(i % kKinds)], at,
-          random.uniform(0, kTurn));
+          random.drawUniform(0, kTurn));
   }
   return builder.model;
 }
@@ -242,20 +244,22 @@ Model makePlantRoom(std::size_t triangles) {
   constexpr int kPipes = 60, kSides = 24;
   const int steps = std::max(4, static_cast<int>(double(triangles) / (kPipes * 2 * kSides * 3)));
   for (int i = 0; i < kPipes; ++i) {
-    const double radius = random.uniform(0.02, 0.12), bend = 3 * radius;
-    const Vec3 corner(random.uniform(1, 11), random.uniform(radius, 2.8), random.uniform(1, 11));
+    const double radius = random.drawUniform(0.02, 0.12), bend = 3 * radius;
+    const Vec3 corner(random.drawUniform(1, 11), random.drawUniform(radius, 2.8),
+                      random.drawUniform(1, 11));
     const bool isUpright = i % 3 == 0;
     const Vec3 one = i % 2 == 0 ? Vec3::UnitX() : Vec3::UnitZ();
     const Vec3 two = isUpright ? Vec3(-Vec3::UnitY()) : Vec3(one.z(), 0, one.x());
-    const double second = isUpright ? std::max(0.0, corner.y() - bend) : random.uniform(0.5, 3);
+    const double second = isUpright ? std::max(0.0, corner.y() - bend) : random.drawUniform(0.5, 3);
     std::vector<Vec3> line =
-        straight(corner - one * random.uniform(1, 4), corner - bend * one, steps);
+        makeStraightLine(corner - one * random.drawUniform(1, 4), corner - bend * one, steps);
     for (int k = 1; k < steps; ++k) {
       const double angle = 0.5 * std::numbers::pi * k / steps;
       line.push_back(corner - bend * one +
                      bend * (std::sin(angle) * one + (1 - std::cos(angle)) * two));
     }
-    for (const Vec3& point : straight(corner + bend * two, corner + (bend + second) * two, steps))
+    for (const Vec3& point :
+         makeStraightLine(corner + bend * two, corner + (bend + second) * two, steps))
       line.push_back(point);
     Mesh mesh;
     addTube(mesh, line, radius, kSides);
@@ -268,12 +272,12 @@ Model makePlantRoom(std::size_t triangles) {
 Model makeScan(std::size_t triangles) {
   constexpr double kEdge = 10, kHeight = 2.5, kRoughness = 0.01;
   Random random(5);
-  const auto rough = [&] { return random.uniform(-kRoughness, kRoughness); };
+  const auto rough = [&] { return random.drawUniform(-kRoughness, kRoughness); };
   const int steps = static_cast<int>(std::sqrt(static_cast<double>(triangles) / 10));  // 5 surfaces
   Mesh mesh;
   const auto addSheet = [&](const Surface& pointAt, double holes) {
     addSurface(mesh, steps, steps, pointAt,
-               [&](int, int) { return holes > 0 && random.uniform(0, 1) < holes; });
+               [&](int, int) { return holes > 0 && random.drawUniform(0, 1) < holes; });
   };
   addSheet(
       [&](double u, double v) {
@@ -311,8 +315,8 @@ Model makeTerrain(std::size_t triangles) {
   const int boulderSteps =
       std::max(4, static_cast<int>(std::sqrt(0.3 * double(triangles) / (4 * kBoulders))));
   for (int i = 0; i < kBoulders; ++i) {
-    const double x = random.uniform(1, kEdge - 1), z = random.uniform(1, kEdge - 1);
-    const double size = random.uniform(0.1, 0.6);
+    const double x = random.drawUniform(1, kEdge - 1), z = random.drawUniform(1, kEdge - 1);
+    const double size = random.drawUniform(0.1, 0.6);
     Mesh boulder;
     addCushion(boulder, {x, heightAt(x, z), z}, {size, 0.6 * size, 0.8 * size}, boulderSteps);
     builder.add("boulder " + std::to_string(i), std::move(boulder));
@@ -322,7 +326,7 @@ Model makeTerrain(std::size_t triangles) {
 
 }  // namespace
 
-const std::vector<DenseScene>& denseScenes() {
+const std::vector<DenseScene>& listDenseScenes() {
   static const std::vector<DenseScene> scenes{
       {"scan", "a scanned room of 10 m, one mesh with holes", makeScan},
       {"office", "an office of 10 x 11 m: 20 chairs, 12 plants, 40 cables", makeOffice},
@@ -333,7 +337,7 @@ const std::vector<DenseScene>& denseScenes() {
 }
 
 const DenseScene* findDenseScene(const std::string& name) {
-  for (const DenseScene& scene : denseScenes())
+  for (const DenseScene& scene : listDenseScenes())
     if (scene.name == name) return &scene;
   return nullptr;
 }

@@ -17,7 +17,7 @@ struct DenseScene {
 };
 
 /// scan, office, shop, plant_room and terrain.
-const std::vector<DenseScene>& denseScenes();
+const std::vector<DenseScene>& listDenseScenes();
 
 /// Null if no scene has this name.
 const DenseScene* findDenseScene(const std::string& name);

@@ -29,11 +29,11 @@ inline ExactVec3 operator-(const ExactVec3& a, const ExactVec3& b) {
   return {a[0] - b[0], a[1] - b[1], a[2] - b[2]};
 }
 
-inline ExactVec3 cross(const ExactVec3& a, const ExactVec3& b) {
+inline ExactVec3 computeExactCross(const ExactVec3& a, const ExactVec3& b) {
   return {a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]};
 }
 
-inline mpq_class dot(const ExactVec3& a, const ExactVec3& b) {
+inline mpq_class computeExactDot(const ExactVec3& a, const ExactVec3& b) {
   return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
 }
 
@@ -48,7 +48,7 @@ inline ExactVec3 computeExactPosition(const Vec3& vertex, const Vec3& translatio
 struct ExactBody {
   const MovingBody& body;
 
-  ExactVec3 at(std::size_t i, const mpq_class& time) const {
+  ExactVec3 computePosition(std::size_t i, const mpq_class& time) const {
     return computeExactPosition(body.body.vertices[i], body.body.translation, body.motion.velocity,
                                 time);
   }
@@ -64,7 +64,8 @@ inline std::optional<mpq_class> findZero(const mpq_class& atZero, const mpq_clas
 inline bool isInside(const ExactVec3& p, const std::array<ExactVec3, 3>& t,
                      const ExactVec3& normal) {
   for (int k = 0; k < 3; ++k)
-    if (dot(cross(t[(k + 1) % 3] - t[k], p - t[k]), normal) < 0) return false;
+    if (computeExactDot(computeExactCross(t[(k + 1) % 3] - t[k], p - t[k]), normal) < 0)
+      return false;
   return true;
 }
 
@@ -74,13 +75,14 @@ inline void addVertexTimes(const ExactBody& triangle, const ExactBody& points, T
   if (triangle.size() < 3) return;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto cornersAt = [&](const mpq_class& time) {
-      return std::array{triangle.at(0, time), triangle.at(1, time), triangle.at(2, time)};
+      return std::array{triangle.computePosition(0, time), triangle.computePosition(1, time),
+                        triangle.computePosition(2, time)};
     };
     const auto start = cornersAt(0), end = cornersAt(1);
-    const ExactVec3 normal = cross(start[1] - start[0], start[2] - start[0]);
-    const auto time =
-        findZero(dot(points.at(i, 0) - start[0], normal), dot(points.at(i, 1) - end[0], normal));
-    if (time && *time >= 0 && isInside(points.at(i, *time), cornersAt(*time), normal))
+    const ExactVec3 normal = computeExactCross(start[1] - start[0], start[2] - start[0]);
+    const auto time = findZero(computeExactDot(points.computePosition(i, 0) - start[0], normal),
+                               computeExactDot(points.computePosition(i, 1) - end[0], normal));
+    if (time && *time >= 0 && isInside(points.computePosition(i, *time), cornersAt(*time), normal))
       times.insert(*time);
   }
 }
@@ -89,15 +91,18 @@ inline void addEdgeTimes(const ExactBody& a, const ExactBody& b, Times& times) {
   for (std::size_t i = 0; i < a.size(); ++i) {
     for (std::size_t j = 0; j < b.size(); ++j) {
       const std::size_t nextA = (i + 1) % a.size(), nextB = (j + 1) % b.size();
-      const ExactVec3 u = a.at(nextA, 0) - a.at(i, 0), v = b.at(nextB, 0) - b.at(j, 0);
-      const ExactVec3 normal = cross(u, v);
+      const ExactVec3 u = a.computePosition(nextA, 0) - a.computePosition(i, 0),
+                      v = b.computePosition(nextB, 0) - b.computePosition(j, 0);
+      const ExactVec3 normal = computeExactCross(u, v);
       const auto time =
-          findZero(dot(b.at(j, 0) - a.at(i, 0), normal), dot(b.at(j, 1) - a.at(i, 1), normal));
+          findZero(computeExactDot(b.computePosition(j, 0) - a.computePosition(i, 0), normal),
+                   computeExactDot(b.computePosition(j, 1) - a.computePosition(i, 1), normal));
       if (!time || *time < 0) continue;
-      const ExactVec3 q = b.at(j, *time) - a.at(i, *time);
+      const ExactVec3 q = b.computePosition(j, *time) - a.computePosition(i, *time);
       // a + s u = b + r v: s and r in 0..1.
-      const mpq_class size = dot(normal, normal);
-      const mpq_class s = dot(cross(q, v), normal) / size, r = dot(cross(q, u), normal) / size;
+      const mpq_class size = computeExactDot(normal, normal);
+      const mpq_class s = computeExactDot(computeExactCross(q, v), normal) / size,
+                      r = computeExactDot(computeExactCross(q, u), normal) / size;
       if (s >= 0 && s <= 1 && r >= 0 && r <= 1) times.insert(*time);
     }
   }
@@ -115,10 +120,10 @@ inline std::optional<mpq_class> findFirstTime(const MovingBody& a, const MovingB
 /// Two bodies of one to three vertices that approach each other.
 inline void makeThinPair(Random& random, int sizeA, int sizeB,
                          std::array<std::vector<Vec3>, 2>& points, MovingBody& a, MovingBody& b) {
-  points = {randomPoints(random, sizeA, 0.5), randomPoints(random, sizeB, 0.5)};
-  const Vec3 start = randomPoint(random, 1).normalized() * uniform(random, 1.8, 4);
-  a = {{points[0], start}, translate(randomPoint(random, 0.4) - start)};
-  b = {{points[1], randomPoint(random, 0.1)}, translate(randomPoint(random, 0.2))};
+  points = {makeRandomPoints(random, sizeA, 0.5), makeRandomPoints(random, sizeB, 0.5)};
+  const Vec3 start = makeRandomPoint(random, 1).normalized() * drawUniform(random, 1.8, 4);
+  a = {{points[0], start}, translate(makeRandomPoint(random, 0.4) - start)};
+  b = {{points[1], makeRandomPoint(random, 0.1)}, translate(makeRandomPoint(random, 0.2))};
 }
 
 }  // namespace enfilade::collision::testing

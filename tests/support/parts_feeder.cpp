@@ -21,7 +21,7 @@ constexpr double kSpareReach = 5e-3;
 constexpr std::size_t kBoxBlock = 32;  // parts that a thread processes at a time
 constexpr double kSpareBox = 8e-3;     // metres by which a new box is inflated
 
-std::vector<Vec3> boxCorners(const Vec3& half) {
+std::vector<Vec3> makeBoxCorners(const Vec3& half) {
   std::vector<Vec3> corners;
   for (int i = 0; i < 8; ++i)
     corners.emplace_back((i & 1) ? half.x() : -half.x(), (i & 2) ? half.y() : -half.y(),
@@ -30,7 +30,7 @@ std::vector<Vec3> boxCorners(const Vec3& half) {
 }
 
 /// A prism with `sides` sides along y; tapered to `top` of its radius.
-std::vector<Vec3> prism(int sides, double radius, double halfHeight, double top) {
+std::vector<Vec3> makePrismCorners(int sides, double radius, double halfHeight, double top) {
   std::vector<Vec3> corners;
   for (int i = 0; i < sides; ++i) {
     const double angle = 2 * 3.14159265358979 * i / sides;
@@ -41,7 +41,7 @@ std::vector<Vec3> prism(int sides, double radius, double halfHeight, double top)
   return corners;
 }
 
-Quat anyRotation(std::mt19937& random) {
+Quat drawRotation(std::mt19937& random) {
   std::normal_distribution<double> number;
   Quat q;  // separate statements: the evaluation order of arguments is unspecified
   for (double* part : {&q.z(), &q.y(), &q.x(), &q.w()}) *part = number(random);
@@ -58,8 +58,8 @@ void layTray(FeederPlan& plan) {
   plan.tray.push_back({Vec3(-in, 0, in), Vec3(in, high, out)});
 }
 
-Hull boxHull(const std::array<Vec3, 2>& box) {
-  std::vector<Vec3> corners = boxCorners(0.5 * (box[1] - box[0]));
+Hull makeHullOfBox(const std::array<Vec3, 2>& box) {
+  std::vector<Vec3> corners = makeBoxCorners(0.5 * (box[1] - box[0]));
   for (Vec3& corner : corners) corner += 0.5 * (box[0] + box[1]);
   return collision::buildHull(corners);
 }
@@ -69,9 +69,9 @@ Hull boxHull(const std::array<Vec3, 2>& box) {
 FeederPlan planFeeder(std::size_t count, unsigned seed) {
   std::mt19937 random(seed);
   FeederPlan plan;
-  plan.kinds = {boxCorners({0.010, 0.005, 0.007}), prism(6, 0.009, 0.004, 1),
-                prism(3, 0.010, 0.006, 0.6), prism(8, 0.006, 0.010, 0.7),
-                prism(4, 0.010, 0.003, 0.5)};
+  plan.kinds = {makeBoxCorners({0.010, 0.005, 0.007}), makePrismCorners(6, 0.009, 0.004, 1),
+                makePrismCorners(3, 0.010, 0.006, 0.6), makePrismCorners(8, 0.006, 0.010, 0.7),
+                makePrismCorners(4, 0.010, 0.003, 0.5)};
   const double spacing = 0.026;
   const auto across =
       static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(count) / 4)));
@@ -83,12 +83,12 @@ FeederPlan planFeeder(std::size_t count, unsigned seed) {
     const Vec3 cell(static_cast<double>(row) + 0.5, static_cast<double>(layer) + 0.7,
                     static_cast<double>(column) + 0.5);
     plan.parts.push_back({i % plan.kinds.size(), spacing * cell - Vec3(plan.inner, 0, plan.inner),
-                          anyRotation(random)});
+                          drawRotation(random)});
   }
   return plan;
 }
 
-Vec3 trayAt(const FeederPlan& plan, double time, bool driven) {
+Vec3 computeTrayPosition(const FeederPlan& plan, double time, bool driven) {
   if (!driven) return Vec3::Zero();
   const double sine = std::sin(2 * 3.14159265358979 * plan.frequency * time);
   return sine * Vec3(plan.sidewards, plan.amplitude, 0);
@@ -98,7 +98,7 @@ Vec3 trayAt(const FeederPlan& plan, double time, bool driven) {
 
 FeederCheck::FeederCheck(const FeederPlan& plan) : plan_(plan) {
   for (const auto& corners : plan.kinds) kinds_.push_back(collision::buildHull(corners));
-  for (const auto& box : plan.tray) tray_.push_back(boxHull(box));
+  for (const auto& box : plan.tray) tray_.push_back(makeHullOfBox(box));
 }
 
 FeederFindings FeederCheck::evaluate(const std::vector<PlacedPart>& parts, const Vec3& tray) const {
@@ -151,7 +151,7 @@ Feeder::Feeder(const FeederPlan& plan, int threads)
   settings_.solver.iterations = 4;
   std::vector<const Hull*> trayHulls, kinds;
   for (const auto& box : plan.tray)
-    hulls_.push_back(boxHull(box)), trayHulls.push_back(&hulls_.back());
+    hulls_.push_back(makeHullOfBox(box)), trayHulls.push_back(&hulls_.back());
   for (const auto& corners : plan.kinds)
     hulls_.push_back(collision::buildHull(corners)), kinds.push_back(&hulls_.back());
   dynamics_.bodies.push_back(scene::makeKinematicBody(trayHulls, {}));
@@ -243,7 +243,7 @@ void Feeder::tick(bool driven) {
     Vec3 at = tray.motion.centre;
     tray.substepVelocities.clear();
     for (int n = 1; driven && n <= settings_.solver.substeps; ++n) {
-      const Vec3 next = trayAt(plan_, time_ + n * substep, driven);
+      const Vec3 next = computeTrayPosition(plan_, time_ + n * substep, driven);
       tray.substepVelocities.push_back({(next - at) / substep, Vec3::Zero()});
       at = next;
     }
@@ -262,18 +262,18 @@ void Feeder::tick(bool driven) {
   }
 }
 
-std::vector<PlacedPart> Feeder::parts() const {
+std::vector<PlacedPart> Feeder::getParts() const {
   std::vector<PlacedPart> placed;
   for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i)
     placed.push_back({dynamics_.bodies[i].position, dynamics_.bodies[i].motion.rotation});
   return placed;
 }
 
-Vec3 Feeder::tray() const {
+Vec3 Feeder::getTrayPosition() const {
   return dynamics_.bodies[0].position;
 }
 
-double Feeder::energy() const {
+double Feeder::computeEnergy() const {
   double sum = 0;
   for (const scene::PhysicsBody& solid : dynamics_.bodies)
     if (solid.isDynamic())

@@ -45,7 +45,7 @@ struct FeederPlan {
 FeederPlan planFeeder(std::size_t count, unsigned seed);
 
 /// The tray's displacement from its rest position at a time; 0 with the drive off.
-Vec3 trayAt(const FeederPlan& plan, double time, bool driven);
+Vec3 computeTrayPosition(const FeederPlan& plan, double time, bool driven);
 
 /// Maximum penetration over all parts and the tray's boxes in metres, by the exact verdict.
 struct FeederFindings {
@@ -72,12 +72,13 @@ class Feeder {
  public:
   explicit Feeder(const FeederPlan& plan, int threads = 1);
   void tick(bool driven);
-  std::vector<PlacedPart> parts() const;
-  Vec3 tray() const;
-  double energy() const;  ///< energy of the parts, J; potential energy is relative to height 0
-  const scene::StepReport& report() const { return report_; }  ///< counts summed over substeps
-  scene::PhysicsWorld& dynamics() { return dynamics_; }
-  scene::StepSettings& settings() { return settings_; }
+  std::vector<PlacedPart> getParts() const;
+  Vec3 getTrayPosition() const;
+  double computeEnergy()
+      const;  ///< energy of the parts, J; potential energy is relative to height 0
+  const scene::StepReport& getReport() const { return report_; }  ///< counts summed over substeps
+  scene::PhysicsWorld& getDynamics() { return dynamics_; }
+  scene::StepSettings& getSettings() { return settings_; }
 
  private:
   void moveBoxes(double lookout);

@@ -30,7 +30,7 @@ class SeededWalk {
   bool begin(int companions) {
     if (!standSomewhere("ann", 400)) return false;
     for (int i = 0; i < companions; ++i) standSomewhere("friend" + std::to_string(i), 5);
-    heading_ = uniform(0, 2 * std::numbers::pi);
+    heading_ = drawUniform(0, 2 * std::numbers::pi);
     return true;
   }
 
@@ -47,7 +47,7 @@ class SeededWalk {
     const int goalEvery = static_cast<int>(goalEverySeconds * 60);
     for (int i = 0; i < ticks; ++i) {
       if (i % goalEvery == 0) {
-        wanted_ = uniform(0, 2 * std::numbers::pi);
+        wanted_ = drawUniform(0, 2 * std::numbers::pi);
         const collision::Vec3 way(std::cos(wanted_), 0, std::sin(wanted_));
         for (const scene::AvatarSnapshot& avatar : world_.snapshot()->avatars)
           submitAvatarCommand(world_, {avatar.name, scene::Drive{1.5 * way}, 0});
@@ -67,7 +67,7 @@ class SeededWalk {
   }
 
  private:
-  double uniform(double low, double high) {
+  double drawUniform(double low, double high) {
     return low + (high - low) * (static_cast<double>(random_() >> 11) * 0x1p-53);
   }
 
@@ -90,9 +90,9 @@ class SeededWalk {
   bool standSomewhere(const std::string& name, int attempts) {
     const scene::Aabb& b = world_.scene().bounds();
     for (int i = 0; i < attempts; ++i) {
-      const double x = uniform(b.min.x() + 0.2 * b.size().x(), b.max.x() - 0.2 * b.size().x());
-      const double z = uniform(b.min.z() + 0.2 * b.size().z(), b.max.z() - 0.2 * b.size().z());
-      const double y = uniform(b.min.y(), b.min.y() + 0.7 * b.size().y());
+      const double x = drawUniform(b.min.x() + 0.2 * b.size().x(), b.max.x() - 0.2 * b.size().x());
+      const double z = drawUniform(b.min.z() + 0.2 * b.size().z(), b.max.z() - 0.2 * b.size().z());
+      const double y = drawUniform(b.min.y(), b.min.y() + 0.7 * b.size().y());
       if (stand(name, {x, y, z})) return true;
     }
     return false;

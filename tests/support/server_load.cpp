@@ -26,23 +26,23 @@ using Clock = std::chrono::steady_clock;
 
 namespace {
 
-double uniform(std::mt19937_64& random, double low, double high) {
+double drawUniform(std::mt19937_64& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);
 }
 
 }  // namespace
 
-std::vector<Vec3> standingPlaces(std::shared_ptr<const scene::Scene> still, int count,
-                                 unsigned seed) {
+std::vector<Vec3> findStandingPlaces(std::shared_ptr<const scene::Scene> still, int count,
+                                     unsigned seed) {
   constexpr int kTries = 400;  // for each place
   const scene::Aabb bounds = still->bounds();
   scene::World world(std::move(still));
   std::mt19937_64 random(seed);
   std::vector<Vec3> places;
   for (int i = 0; i < kTries * count && static_cast<int>(places.size()) < count; ++i) {
-    const double x = uniform(random, bounds.min.x(), bounds.max.x());
-    const double y = uniform(random, bounds.min.y(), bounds.min.y() + 0.7 * bounds.size().y());
-    const double z = uniform(random, bounds.min.z(), bounds.max.z());
+    const double x = drawUniform(random, bounds.min.x(), bounds.max.x());
+    const double y = drawUniform(random, bounds.min.y(), bounds.min.y() + 0.7 * bounds.size().y());
+    const double z = drawUniform(random, bounds.min.z(), bounds.max.z());
     scene::submitAvatarCommand(world, {"p" + std::to_string(i), scene::Spawn{Vec3(x, y, z)}, 0});
     const scene::TickReport report = scene::tickWorld(world);
     for (const scene::Notice& notice : report.notices) {
@@ -73,17 +73,17 @@ class Visitor {
         watches_(number % options.watchEvery == 0),
         name_("load" + std::to_string(number)),
         random_(number + 1),
-        client_("127.0.0.1", options.port, handlers(), clientOptions()) {
+        client_("127.0.0.1", options.port, makeHandlers(), makeClientOptions()) {
     subscribe();
     spawn(options.places[number]);
   }
   Visitor(const Visitor&) = delete;
 
-  protocol::AsyncClient& client() { return client_; }
-  bool ready() const { return present_; }
-  bool over() const { return over_; }
-  bool answered() const { return client_.pendingRequests() == 0; }
-  std::uint64_t heardTick() const { return heardTick_; }
+  protocol::AsyncClient& getClient() { return client_; }
+  bool isReady() const { return present_; }
+  bool isOver() const { return over_; }
+  bool isAnswered() const { return client_.pendingRequests() == 0; }
+  std::uint64_t getHeardTick() const { return heardTick_; }
 
   void runClock() {
     v1::ClientMessage message;
@@ -93,8 +93,8 @@ class Visitor {
 
   /// Drives in a new direction each time, so that a State identifies the command in effect.
   void drive() {
-    const double angle = uniform(random_, 0, 2 * std::numbers::pi);
-    const double speed = uniform(random_, 0.5, 1.5);
+    const double angle = drawUniform(random_, 0, 2 * std::numbers::pi);
+    const double speed = drawUniform(random_, 0.5, 1.5);
     DriveCommand command{0, heardTick_, speed * Vec3(std::cos(angle), 0, std::sin(angle))};
     v1::ClientMessage message;
     message.mutable_command()->set_avatar(name_);
@@ -114,18 +114,18 @@ class Visitor {
   }
 
   void checkEnd() {
-    if (!open_.empty()) fault(std::to_string(open_.size()) + " contacts never ended");
-    if (lost_ > 0) fault(std::to_string(lost_) + " requests were not answered");
+    if (!open_.empty()) recordFault(std::to_string(open_.size()) + " contacts never ended");
+    if (lost_ > 0) recordFault(std::to_string(lost_) + " requests were not answered");
   }
 
  private:
-  protocol::AsyncOptions clientOptions() const {
+  protocol::AsyncOptions makeClientOptions() const {
     protocol::AsyncOptions options;
     options.name = name_;
     return options;
   }
 
-  protocol::AsyncHandlers handlers() {
+  protocol::AsyncHandlers makeHandlers() {
     protocol::AsyncHandlers handlers;
     handlers.welcome = [this](const v1::Welcome& welcome) {
       ++result_.welcomed;
@@ -135,7 +135,7 @@ class Visitor {
     handlers.state = [this](const v1::State& state) { see(state); };
     handlers.closed = [this](const v1::Error& why) {
       over_ = true;
-      if (why.code() != v1::ERROR_SHUTTING_DOWN) return fault("cut off: " + why.message());
+      if (why.code() != v1::ERROR_SHUTTING_DOWN) return recordFault("cut off: " + why.message());
       ++result_.closedInPeace;
     };
     return handlers;
@@ -145,7 +145,7 @@ class Visitor {
     client_.request(std::move(message), [this, onReply](protocol::Reply reply) {
       const bool closing = reply.message.error().code() == v1::ERROR_SHUTTING_DOWN;
       if (reply.lost && !closing) ++lost_;
-      if (reply.message.has_error() && !closing) fault(reply.message.error().message());
+      if (reply.message.has_error() && !closing) recordFault(reply.message.error().message());
       onReply(std::move(reply));
     });
   }
@@ -178,18 +178,18 @@ class Visitor {
   void hear(const v1::TickEvents& events) {
     ++result_.tickEvents;
     if (events.sequence() != ++sequence_) {
-      fault("TickEvents " + std::to_string(events.sequence()) + " came in the place of " +
-            std::to_string(sequence_));
+      recordFault("TickEvents " + std::to_string(events.sequence()) + " came in the place of " +
+                  std::to_string(sequence_));
       sequence_ = events.sequence();
     }
     for (const v1::ContactEvent& event : events.contacts()) {
       const std::pair pair{event.a(), event.b()};
       if (event.kind() == v1::ContactEvent::KIND_BEGIN) {
         ++result_.begins;
-        if (!open_.insert(pair).second) fault("a contact began twice");
+        if (!open_.insert(pair).second) recordFault("a contact began twice");
       } else if (event.kind() == v1::ContactEvent::KIND_END) {
         ++result_.ends;
-        if (open_.erase(pair) == 0) fault("a contact ended that had not begun");
+        if (open_.erase(pair) == 0) recordFault("a contact ended that had not begun");
       }
     }
     for (const v1::Notice& notice : events.notices()) {
@@ -198,14 +198,14 @@ class Visitor {
         present_ = true;
         ++result_.spawned;
       }
-      if (notice.kind() == v1::Notice::KIND_REFUSED) fault("refused: " + notice.text());
+      if (notice.kind() == v1::Notice::KIND_REFUSED) recordFault("refused: " + notice.text());
     }
   }
 
   void see(const v1::State& state) {
     ++result_.states;
     result_.droppedStates += state.dropped();
-    if (state.tick() <= heardTick_ && heardTick_ != 0) fault("a State came out of order");
+    if (state.tick() <= heardTick_ && heardTick_ != 0) recordFault("a State came out of order");
     heardTick_ = state.tick();
     if (pending_.empty()) return;
     for (const v1::AvatarState& avatar : state.avatars()) {
@@ -227,7 +227,7 @@ class Visitor {
     }
   }
 
-  void fault(const std::string& text) {
+  void recordFault(const std::string& text) {
     if (faults_++ < kMaxFaults) result_.faults.push_back(name_ + ": " + text);
   }
 
@@ -251,12 +251,12 @@ using Visitors = std::vector<std::unique_ptr<Visitor>>;
 void turn(Visitors& visitors, std::chrono::milliseconds patience) {
   std::vector<pollfd> sockets;
   for (const auto& visitor : visitors) {
-    sockets.push_back({visitor->client().descriptor(), visitor->client().pollEvents(), 0});
+    sockets.push_back({visitor->getClient().descriptor(), visitor->getClient().pollEvents(), 0});
   }
   ::poll(sockets.data(), sockets.size(), static_cast<int>(patience.count()));
   for (std::size_t i = 0; i < visitors.size(); ++i) {
-    if (sockets[i].revents != 0 || (sockets[i].fd < 0 && !visitors[i]->over())) {
-      visitors[i]->client().advance();
+    if (sockets[i].revents != 0 || (sockets[i].fd < 0 && !visitors[i]->isOver())) {
+      visitors[i]->getClient().advance();
     }
   }
 }
@@ -290,7 +290,7 @@ void driveAll(Visitors& visitors, const LoadOptions& options, LoadResult& result
     std::this_thread::sleep_until(look);
     for (; step < steps && due(step) <= look; ++step) {
       Visitor& visitor = *visitors[step % visitors.size()];
-      if (!visitor.over()) visitor.drive();
+      if (!visitor.isOver()) visitor.drive();
     }
     turn(visitors, std::chrono::milliseconds(0));
   }
@@ -309,19 +309,19 @@ LoadResult runLoad(const LoadOptions& options, const std::function<void()>& befo
     turn(visitors, std::chrono::milliseconds(0));
   }
   visitors.front()->runClock();
-  if (!turnUntil(visitors, [](const Visitor& one) { return one.ready() || one.over(); })) {
+  if (!turnUntil(visitors, [](const Visitor& one) { return one.isReady() || one.isOver(); })) {
     result.faults.push_back("not everyone was spawned in time");
   }
   const auto begin = Clock::now();
-  const std::uint64_t firstTick = visitors.front()->heardTick();
+  const std::uint64_t firstTick = visitors.front()->getHeardTick();
   driveAll(visitors, options, result);
   result.wallSeconds = std::chrono::duration<double>(Clock::now() - begin).count();
-  result.ticks = visitors.front()->heardTick() - firstTick;
-  const auto settled = [](const Visitor& one) { return one.over() || one.answered(); };
+  result.ticks = visitors.front()->getHeardTick() - firstTick;
+  const auto settled = [](const Visitor& one) { return one.isOver() || one.isAnswered(); };
   if (!turnUntil(visitors, settled)) result.faults.push_back("requests wait for their answers");
   beforeStop();
   stop();
-  if (!turnUntil(visitors, [](const Visitor& one) { return one.over(); })) {
+  if (!turnUntil(visitors, [](const Visitor& one) { return one.isOver(); })) {
     result.faults.push_back("not every client received a Bye");
   }
   for (const auto& visitor : visitors) visitor->checkEnd();
@@ -368,7 +368,7 @@ void visitRudely(std::uint16_t port, int count, unsigned seed) {
   }
 }
 
-Footprint footprint() {
+Footprint measureFootprint() {
   const auto entries = [](const char* folder) {
     std::uint64_t count = 0;
     for ([[maybe_unused]] const auto& entry : std::filesystem::directory_iterator(folder)) ++count;

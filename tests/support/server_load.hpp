@@ -15,8 +15,8 @@ namespace enfilade::tests {
 
 /// Finds `count` places with ground where avatars can stand next to one another; fewer if there are
 /// not enough.
-std::vector<collision::Vec3> standingPlaces(std::shared_ptr<const scene::Scene> scene, int count,
-                                            unsigned seed);
+std::vector<collision::Vec3> findStandingPlaces(std::shared_ptr<const scene::Scene> scene,
+                                                int count, unsigned seed);
 
 struct LoadOptions {
   std::uint16_t port = 0;
@@ -55,6 +55,6 @@ struct Footprint {
   std::uint64_t residentBytes = 0;
   std::uint64_t descriptors = 0, threads = 0;
 };
-Footprint footprint();
+Footprint measureFootprint();
 
 }  // namespace enfilade::tests

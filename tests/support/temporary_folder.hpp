@@ -32,7 +32,7 @@ class TemporaryFolder {
   TemporaryFolder(const TemporaryFolder&) = delete;
   TemporaryFolder& operator=(const TemporaryFolder&) = delete;
 
-  const std::filesystem::path& path() const { return path_; }
+  const std::filesystem::path& getPath() const { return path_; }
   std::filesystem::path write(const std::string& name, const std::string& content) const {
     std::ofstream(path_ / name, std::ios::binary) << content;
     return path_ / name;
@@ -44,9 +44,9 @@ class TemporaryFolder {
 };
 
 /// A file of this process alone, deleted at exit.
-inline std::filesystem::path ownFile(const std::string& name) {
+inline std::filesystem::path makeOwnFile(const std::string& name) {
   static const TemporaryFolder folder;
-  return folder.path() / name;
+  return folder.getPath() / name;
 }
 
 }  // namespace enfilade::tests

@@ -21,13 +21,13 @@ inline bool hasWebIfc() {
 }
 
 /// The readers of IFC that this machine can run.
-inline std::vector<scene::IfcReader> readersHere() {
+inline std::vector<scene::IfcReader> listReadersHere() {
   std::vector<scene::IfcReader> readers{scene::IfcReader::ifcPlusPlus};
   if (hasWebIfc()) readers.push_back(scene::IfcReader::webIfc);
   return readers;
 }
 
-inline scene::ImportOptions by(scene::IfcReader reader) {
+inline scene::ImportOptions makeReaderOptions(scene::IfcReader reader) {
   scene::ImportOptions options;
   options.ifcReader = reader;
   return options;

@@ -9,7 +9,7 @@ class BruteForce : public BroadPhase {
  public:
   explicit BruteForce(std::span<const Aabb> staticBoxes) : staticBoxes_(staticBoxes) {}
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     for (std::uint32_t a = 0; a < dynamicBoxes.size(); ++a) {
       for (std::uint32_t s = 0; s < staticBoxes_.size(); ++s) {
         if (collision::overlaps(dynamicBoxes[a], staticBoxes_[s])) tally.addStaticPair(a, s);
@@ -26,9 +26,9 @@ class BruteForce : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod bruteForce() {
+BroadPhaseMethod makeBruteForce() {
   return {"brute force", BroadPhaseMethod::Kind::approach, 100000, "a tick takes seconds",
-          maker<BruteForce>()};
+          bindMaker<BruteForce>()};
 }
 
 }  // namespace enfilade::benchmarks

@@ -23,7 +23,7 @@ class BspTree : public BroadPhase {
     build(0, std::move(all), 0);
   }
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
       ++now_;
       ask(0, dynamicBoxes[id], id, tally);
@@ -96,9 +96,9 @@ class BspTree : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod bspTree() {
+BroadPhaseMethod makeBspTree() {
   return {"BSP of the static scene", BroadPhaseMethod::Kind::approach, SIZE_MAX, "",
-          maker<BspTree>()};
+          bindMaker<BspTree>()};
 }
 
 }  // namespace enfilade::benchmarks

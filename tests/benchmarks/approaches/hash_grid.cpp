@@ -104,7 +104,7 @@ class HashGrid : public BroadPhase {
     }
   }
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     dynamicCells_.clear();
     for (auto& list : dynamicLists_) list.clear();
     for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
@@ -153,8 +153,9 @@ class HashGrid : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod hashGrid() {
-  return {"uniform hash grid", BroadPhaseMethod::Kind::approach, SIZE_MAX, "", maker<HashGrid>()};
+BroadPhaseMethod makeHashGrid() {
+  return {"uniform hash grid", BroadPhaseMethod::Kind::approach, SIZE_MAX, "",
+          bindMaker<HashGrid>()};
 }
 
 }  // namespace enfilade::benchmarks

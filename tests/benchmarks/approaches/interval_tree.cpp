@@ -91,24 +91,24 @@ class IntervalSweep : public BroadPhase {
  public:
   explicit IntervalSweep(std::span<const Aabb> staticBoxes)
       : staticBoxes_(staticBoxes),
-        splits_(sampledSplits(staticBoxes)),
+        splits_(sampleSplits(staticBoxes)),
         staticTree_(splits_, staticBoxes.size()) {
     for (std::uint32_t s = 0; s < staticBoxes.size(); ++s) {
       addEnds({staticBoxes[s].min.x(), s, false, false}, staticBoxes[s].max.x(), staticEnds_);
     }
-    std::sort(staticEnds_.begin(), staticEnds_.end(), before);
+    std::sort(staticEnds_.begin(), staticEnds_.end(), isBefore);
   }
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     if (!dynamicTree_) dynamicTree_ = std::make_unique<IntervalTree>(splits_, dynamicBoxes.size());
     dynamicEnds_.clear();
     for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
       addEnds({dynamicBoxes[id].min.x(), id, true, false}, dynamicBoxes[id].max.x(), dynamicEnds_);
     }
-    std::sort(dynamicEnds_.begin(), dynamicEnds_.end(), before);
+    std::sort(dynamicEnds_.begin(), dynamicEnds_.end(), isBefore);
     auto staticBoxes = staticEnds_.begin();
     for (const End& end : dynamicEnds_) {
-      for (; staticBoxes != staticEnds_.end() && before(*staticBoxes, end); ++staticBoxes)
+      for (; staticBoxes != staticEnds_.end() && isBefore(*staticBoxes, end); ++staticBoxes)
         meet(*staticBoxes, dynamicBoxes, tally);
       meet(end, dynamicBoxes, tally);
     }
@@ -122,7 +122,7 @@ class IntervalSweep : public BroadPhase {
     bool moves, upper;
   };
   /// At equal positions lower ends come first: closed intervals that touch overlap.
-  static bool before(const End& a, const End& b) {
+  static bool isBefore(const End& a, const End& b) {
     return a.at != b.at ? a.at < b.at : a.upper < b.upper;
   }
   static void addEnds(End lower, double upperAt, std::vector<End>& ends) {
@@ -130,7 +130,7 @@ class IntervalSweep : public BroadPhase {
     ends.push_back({upperAt, lower.id, lower.moves, true});
   }
 
-  static std::vector<double> sampledSplits(std::span<const Aabb> staticBoxes) {
+  static std::vector<double> sampleSplits(std::span<const Aabb> staticBoxes) {
     std::vector<double> all;
     for (const Aabb& box : staticBoxes) all.insert(all.end(), {box.min.z(), box.max.z()});
     std::sort(all.begin(), all.end());
@@ -170,9 +170,9 @@ class IntervalSweep : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod intervalTree() {
+BroadPhaseMethod makeIntervalTree() {
   return {"2-D interval tree", BroadPhaseMethod::Kind::approach, 100000,
-          "every tick sweeps over all static boxes", maker<IntervalSweep>()};
+          "every tick sweeps over all static boxes", bindMaker<IntervalSweep>()};
 }
 
 }  // namespace enfilade::benchmarks

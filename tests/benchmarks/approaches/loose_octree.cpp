@@ -25,16 +25,16 @@ class LooseOctree : public BroadPhase {
     nodes_.emplace_back();
     std::vector<std::uint32_t> nodeOfStatic(staticBoxes.size());
     for (std::uint32_t s = 0; s < staticBoxes.size(); ++s)
-      nodeOfStatic[s] = nodeFor(staticBoxes[s]);
+      nodeOfStatic[s] = findOrCreateNode(staticBoxes[s]);
     listStatic(nodeOfStatic);
   }
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     for (const std::uint32_t node : used_) nodes_[node].dynamicBoxes.clear();
     used_.clear();
     for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
       ask(0, rootCentre_, rootEdge_, id, dynamicBoxes, tally);
-      const std::uint32_t node = nodeFor(dynamicBoxes[id]);
+      const std::uint32_t node = findOrCreateNode(dynamicBoxes[id]);
       if (nodes_[node].dynamicBoxes.empty()) used_.push_back(node);
       nodes_[node].dynamicBoxes.push_back(id);
     }
@@ -49,7 +49,7 @@ class LooseOctree : public BroadPhase {
 
   /// Finds or creates the smallest node whose edge is at least the box's size. A box with its
   /// centre outside the root's cube stays at the root, which every query visits.
-  std::uint32_t nodeFor(const Aabb& box) {
+  std::uint32_t findOrCreateNode(const Aabb& box) {
     const double size = std::max(box.size().maxCoeff(), kMinEdge);
     const Vec3 at = box.centre();
     Vec3 centre = rootCentre_;
@@ -124,8 +124,9 @@ class LooseOctree : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod looseOctree() {
-  return {"octree (loose)", BroadPhaseMethod::Kind::approach, SIZE_MAX, "", maker<LooseOctree>()};
+BroadPhaseMethod makeLooseOctree() {
+  return {"octree (loose)", BroadPhaseMethod::Kind::approach, SIZE_MAX, "",
+          bindMaker<LooseOctree>()};
 }
 
 }  // namespace enfilade::benchmarks

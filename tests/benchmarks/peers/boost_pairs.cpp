@@ -12,12 +12,12 @@ namespace bgi = boost::geometry::index;
 
 class BoostRtree : public BroadPhase {
  public:
-  explicit BoostRtree(std::span<const Aabb> staticBoxes) : staticBoxes_(values(staticBoxes)) {}
+  explicit BoostRtree(std::span<const Aabb> staticBoxes) : staticBoxes_(makeValues(staticBoxes)) {}
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
-    const Tree moving(values(dynamicBoxes));
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+    const Tree moving(makeValues(dynamicBoxes));
     for (std::uint32_t id = 0; id < dynamicBoxes.size(); ++id) {
-      const BoostBox box = boostBox(dynamicBoxes[id]);
+      const BoostBox box = toBoostBox(dynamicBoxes[id]);
       for (auto hit = staticBoxes_.qbegin(bgi::intersects(box)); hit != staticBoxes_.qend();
            ++hit) {
         tally.addStaticPair(id, hit->second);
@@ -35,12 +35,12 @@ class BoostRtree : public BroadPhase {
   using Value = std::pair<BoostBox, std::uint32_t>;
   using Tree = bgi::rtree<Value, bgi::rstar<16>>;
 
-  static BoostBox boostBox(const Aabb& b) {
+  static BoostBox toBoostBox(const Aabb& b) {
     return {Point(b.min.x(), b.min.y(), b.min.z()), Point(b.max.x(), b.max.y(), b.max.z())};
   }
-  static std::vector<Value> values(std::span<const Aabb> boxes) {
+  static std::vector<Value> makeValues(std::span<const Aabb> boxes) {
     std::vector<Value> result;
-    for (std::uint32_t k = 0; k < boxes.size(); ++k) result.emplace_back(boostBox(boxes[k]), k);
+    for (std::uint32_t k = 0; k < boxes.size(); ++k) result.emplace_back(toBoostBox(boxes[k]), k);
     return result;
   }
 
@@ -49,8 +49,8 @@ class BoostRtree : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod boostRtree() {
-  return {"Boost R-tree", BroadPhaseMethod::Kind::peer, SIZE_MAX, "", maker<BoostRtree>()};
+BroadPhaseMethod makeBoostRtree() {
+  return {"Boost R-tree", BroadPhaseMethod::Kind::peer, SIZE_MAX, "", bindMaker<BoostRtree>()};
 }
 
 }  // namespace enfilade::benchmarks

@@ -32,7 +32,7 @@ class BulletBoxUpdate : public BoxUpdate {
 
 }  // namespace
 
-BoxMethod bulletBoxes() {
+BoxMethod makeBulletBoxes() {
   return {"Bullet",
           [](const Hull& hull, std::size_t) { return std::make_unique<BulletBoxUpdate>(hull); }};
 }

@@ -41,7 +41,7 @@ class BulletPair : public PairOfBodies {
     btGjkEpaSolver2::sResults result{};
     if (btGjkEpaSolver2::Distance(&a_, atA, &b_, atB, guess, result)) {
       keep(result.witnesses[0] - result.witnesses[1]);
-      return apart(result.distance);
+      return makeApart(result.distance);
     }
     known_ = false;
     if (!depth_) return collides();
@@ -62,7 +62,7 @@ class BulletPair : public PairOfBodies {
   btVector3 guess_{1, 0, 0};
 };
 
-auto maker(bool depth) {
+auto bindBulletMaker(bool depth) {
   return [depth](const Points& a, const Points& b) -> std::unique_ptr<PairOfBodies> {
     return std::make_unique<BulletPair>(a, b, depth);
   };
@@ -70,9 +70,10 @@ auto maker(bool depth) {
 
 }  // namespace
 
-std::vector<NarrowPhaseMethod> bulletConvex() {
-  return {{"Bullet GjkEpa2", false, "distance", true, true, false, maker(false)},
-          {"Bullet GjkEpa2 with depth", false, "distance or depth", true, true, true, maker(true)}};
+std::vector<NarrowPhaseMethod> makeBulletConvexMethods() {
+  return {{"Bullet GjkEpa2", false, "distance", true, true, false, bindBulletMaker(false)},
+          {"Bullet GjkEpa2 with depth", false, "distance or depth", true, true, true,
+           bindBulletMaker(true)}};
 }
 
 }  // namespace enfilade::benchmarks

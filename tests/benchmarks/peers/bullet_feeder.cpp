@@ -39,17 +39,17 @@ class BulletFeeder : public FeederEngine {
     for (const auto& body : bodies_) world_.removeRigidBody(body.get());
   }
 
-  void tick(bool driven) override {
+  void runTick(bool driven) override {
     const double seconds = 1.0 / 60 / plan_.substeps;
     for (int i = 0; i < plan_.substeps; ++i) {
       time_ += seconds;
       btTransform at = btTransform::getIdentity();
-      at.setOrigin(toBullet(testing::trayAt(plan_, time_, driven)));
+      at.setOrigin(toBullet(testing::computeTrayPosition(plan_, time_, driven)));
       trayMotion_.setWorldTransform(at);
       world_.stepSimulation(seconds, 0);
     }
   }
-  std::vector<PlacedPart> parts() const override {
+  std::vector<PlacedPart> getParts() const override {
     std::vector<PlacedPart> placed;
     for (std::size_t i = 1; i < bodies_.size(); ++i) {
       const btTransform& at = bodies_[i]->getWorldTransform();
@@ -58,7 +58,7 @@ class BulletFeeder : public FeederEngine {
     }
     return placed;
   }
-  Vec3 tray() const override { return fromBullet(bodies_[0]->getWorldTransform().getOrigin()); }
+  Vec3 getTray() const override { return fromBullet(bodies_[0]->getWorldTransform().getOrigin()); }
 
  private:
   void addTray() {
@@ -75,7 +75,7 @@ class BulletFeeder : public FeederEngine {
   }
   void addPart(const FeederPlan::Part& part) {
     btCollisionShape* shape = kinds_[part.kind].get();
-    const double volume = collisionVolume(part.kind);
+    const double volume = computeCollisionVolume(part.kind);
     btVector3 inertia;
     shape->calculateLocalInertia(plan_.density * volume, inertia);
     addBody(plan_.density * volume, nullptr, shape, inertia);
@@ -91,7 +91,7 @@ class BulletFeeder : public FeederEngine {
                                                              // pair
     world_.addRigidBody(bodies_.back().get());
   }
-  double collisionVolume(std::size_t kind) const {
+  double computeCollisionVolume(std::size_t kind) const {
     return scene::computeHullMass(collision::buildHull(plan_.kinds[kind]), 1).volume;
   }
 

@@ -17,7 +17,7 @@ namespace {
 constexpr double kFirstReach = 0.5;  // metres
 constexpr int kMaxDoublings = 20;
 
-btVector3 bulletVector(const Vec3& v) {
+btVector3 toBulletVector(const Vec3& v) {
   return {v.x(), v.y(), v.z()};
 }
 
@@ -50,16 +50,16 @@ class EachTriangle : public btTriangleCallback {
 class BulletMeshQuery : public MeshQuery {
  public:
   BulletMeshQuery(const Points& body, const Triangles& mesh) {
-    for (const Vec3& p : body) body_.addPoint(bulletVector(p), false);
+    for (const Vec3& p : body) body_.addPoint(toBulletVector(p), false);
     body_.setMargin(0);
     body_.recalcLocalAabb();
     for (const Triangle& t : mesh) {
-      triangles_.addTriangle(bulletVector(t[0]), bulletVector(t[1]), bulletVector(t[2]));
+      triangles_.addTriangle(toBulletVector(t[0]), toBulletVector(t[1]), toBulletVector(t[2]));
     }
     mesh_ = std::make_unique<btBvhTriangleMeshShape>(&triangles_, true);
   }
 
-  double distance(const RigidTransform& body) override {
+  double computeDistance(const RigidTransform& body) override {
     double reach = last_ > 0 ? 1.1 * last_ : kFirstReach;
     for (int k = 0; k < kMaxDoublings; ++k, reach *= 2) {
       const double found = ask(body, reach).nearest;
@@ -70,7 +70,7 @@ class BulletMeshQuery : public MeshQuery {
     }
     return std::numeric_limits<double>::quiet_NaN();
   }
-  void contacts(const RigidTransform& body, std::vector<std::uint32_t>& triangles) override {
+  void findContacts(const RigidTransform& body, std::vector<std::uint32_t>& triangles) override {
     triangles = ask(body, 0).met;
   }
   void forget() override { last_ = 0; }
@@ -80,7 +80,7 @@ class BulletMeshQuery : public MeshQuery {
     const Mat3& r = body.rotation;
     const btTransform at(btMatrix3x3(r(0, 0), r(0, 1), r(0, 2), r(1, 0), r(1, 1), r(1, 2), r(2, 0),
                                      r(2, 1), r(2, 2)),
-                         bulletVector(body.translation));
+                         toBulletVector(body.translation));
     btVector3 low, high;
     body_.getAabb(at, low, high);
     const btVector3 grown(reach, reach, reach);
@@ -97,7 +97,7 @@ class BulletMeshQuery : public MeshQuery {
 
 }  // namespace
 
-std::vector<MeshMethod> bulletMesh() {
+std::vector<MeshMethod> makeBulletMeshMethods() {
   return {{"Bullet bvh", false, true, [](const Points& body, const Triangles& mesh) {
              return std::make_unique<BulletMeshQuery>(body, mesh);
            }}};

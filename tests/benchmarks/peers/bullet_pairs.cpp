@@ -62,7 +62,7 @@ class BulletPairs : public BroadPhase {
   BulletPairs(const BulletPairs&) = delete;
   BulletPairs& operator=(const BulletPairs&) = delete;
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     if (proxies_.size() == staticBoxes_.size()) {
       for (std::size_t k = 0; k < dynamicBoxes.size(); ++k) {
         add(dynamicBoxes[k], 2 * k + 1, kDynamicGroup, kStaticGroup | kDynamicGroup);
@@ -110,7 +110,7 @@ class BulletPairs : public BroadPhase {
 }  // namespace
 
 #ifdef BT_USE_DOUBLE_PRECISION
-std::vector<BroadPhaseMethod> bulletBroadPhases() {
+std::vector<BroadPhaseMethod> makeBulletBroadPhases() {
   const std::string precision;
 #else
 extern "C" __attribute__((visibility("default"))) std::vector<BroadPhaseMethod>*
@@ -119,9 +119,9 @@ makeBulletFloatBroadPhases() {
 #endif
   const std::vector<BroadPhaseMethod> methods{
       {"Bullet Dbvt" + precision, BroadPhaseMethod::Kind::peer, SIZE_MAX, "",
-       maker<BulletPairs>(false)},
+       bindMaker<BulletPairs>(false)},
       {"Bullet axis sweep" + precision, BroadPhaseMethod::Kind::peer, 10000, "minutes to build",
-       maker<BulletPairs>(true), 20000}};
+       bindMaker<BulletPairs>(true), 20000}};
 #ifdef BT_USE_DOUBLE_PRECISION
   return methods;
 #else

@@ -8,7 +8,7 @@
 
 namespace enfilade::benchmarks {
 
-std::vector<BroadPhaseMethod> bulletFloatBroadPhases() {
+std::vector<BroadPhaseMethod> makeFloatBulletBroadPhases() {
   void* module = dlopen(BENCH_BULLET_FLOAT_MODULE, RTLD_NOW | RTLD_LOCAL | RTLD_DEEPBIND);
   if (!module) throw std::runtime_error(dlerror());
   using Make = std::vector<BroadPhaseMethod>*();

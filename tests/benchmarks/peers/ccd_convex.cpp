@@ -20,7 +20,7 @@ Vec3 toVector(const ccd_vec3_t& v) {
   return {ccdVec3X(&v), ccdVec3Y(&v), ccdVec3Z(&v)};
 }
 
-void support(const void* object, const ccd_vec3_t* direction, ccd_vec3_t* result) {
+void findSupport(const void* object, const ccd_vec3_t* direction, ccd_vec3_t* result) {
   const Shape& shape = *static_cast<const Shape*>(object);
   const Vec3 local = shape.at->rotation.transpose() * toVector(*direction);
   const Vec3* best = &shape.vertices.front();
@@ -36,7 +36,7 @@ void support(const void* object, const ccd_vec3_t* direction, ccd_vec3_t* result
   ccdVec3Set(result, world.x(), world.y(), world.z());
 }
 
-void centre(const void* object, ccd_vec3_t* result) {
+void computeCentre(const void* object, ccd_vec3_t* result) {
   const Shape& shape = *static_cast<const Shape*>(object);
   const Vec3 world = shape.at->rotation * shape.centre + shape.at->translation;
   ccdVec3Set(result, world.x(), world.y(), world.z());
@@ -55,23 +55,23 @@ class CcdPair : public PairOfBodies {
   CcdPair(const Points& a, const Points& b, bool depth)
       : a_(makeShape(a)), b_(makeShape(b)), depth_(depth) {
     CCD_INIT(&ccd_);
-    ccd_.support1 = ccd_.support2 = support;
-    ccd_.center1 = ccd_.center2 = centre;
+    ccd_.support1 = ccd_.support2 = findSupport;
+    ccd_.center1 = ccd_.center2 = computeCentre;
     ccd_.max_iterations = kMaxIterations;
   }
 
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     a_.at = &a;
     b_.at = &b;
-    if (!depth_) return ccdMPRIntersect(&a_, &b_, &ccd_) != 0 ? collides() : undistanced();
+    if (!depth_) return ccdMPRIntersect(&a_, &b_, &ccd_) != 0 ? collides() : makeUndistanced();
     double depth = 0;
     ccd_vec3_t direction, position;
     const int parted = ccdMPRPenetration(&a_, &b_, &ccd_, &depth, &direction, &position);
-    return parted == 0 ? collides(depth) : undistanced();
+    return parted == 0 ? collides(depth) : makeUndistanced();
   }
 
  private:
-  static Answer undistanced() {
+  static Answer makeUndistanced() {
     Answer answer;
     answer.verdict = Answer::Verdict::apart;
     return answer;
@@ -82,7 +82,7 @@ class CcdPair : public PairOfBodies {
   ccd_t ccd_;
 };
 
-auto maker(bool depth) {
+auto bindCcdMaker(bool depth) {
   return [depth](const Points& a, const Points& b) -> std::unique_ptr<PairOfBodies> {
     return std::make_unique<CcdPair>(a, b, depth);
   };
@@ -90,9 +90,10 @@ auto maker(bool depth) {
 
 }  // namespace
 
-std::vector<NarrowPhaseMethod> ccdConvex() {
-  return {{"libccd MPR", false, "verdict", false, false, false, maker(false)},
-          {"libccd MPR with depth", false, "verdict and depth", false, false, true, maker(true)}};
+std::vector<NarrowPhaseMethod> makeCcdConvexMethods() {
+  return {{"libccd MPR", false, "verdict", false, false, false, bindCcdMaker(false)},
+          {"libccd MPR with depth", false, "verdict and depth", false, false, true,
+           bindCcdMaker(true)}};
 }
 
 }  // namespace enfilade::benchmarks

@@ -15,7 +15,7 @@ using Kernel = CGAL::Cartesian<double>;
 using Traits = CGAL::Polytope_distance_d_traits_3<Kernel, CGAL::Gmpzf, double>;
 using Distance = CGAL::Polytope_distance_d<Traits>;
 
-std::vector<Kernel::Point_3> placed(const Points& vertices, const RigidTransform& at) {
+std::vector<Kernel::Point_3> placePoints(const Points& vertices, const RigidTransform& at) {
   std::vector<Kernel::Point_3> result;
   for (const Vec3& vertex : vertices) {
     const Vec3 world = at.rotation * vertex + at.translation;
@@ -30,12 +30,12 @@ class CgalPair : public PairOfBodies {
       : a_(collision::buildHull(a).vertices), b_(collision::buildHull(b).vertices) {}
 
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
-    const auto pointsA = placed(a_, a);
-    const auto pointsB = placed(b_, b);
+    const auto pointsA = placePoints(a_, a);
+    const auto pointsB = placePoints(b_, b);
     const Distance distance(pointsA.begin(), pointsA.end(), pointsB.begin(), pointsB.end());
     if (distance.is_zero()) return collides();
-    return apart(std::sqrt(CGAL::to_double(distance.squared_distance_numerator()) /
-                           CGAL::to_double(distance.squared_distance_denominator())));
+    return makeApart(std::sqrt(CGAL::to_double(distance.squared_distance_numerator()) /
+                               CGAL::to_double(distance.squared_distance_denominator())));
   }
 
  private:
@@ -44,7 +44,7 @@ class CgalPair : public PairOfBodies {
 
 }  // namespace
 
-std::vector<NarrowPhaseMethod> cgalConvex() {
+std::vector<NarrowPhaseMethod> makeCgalConvexMethods() {
   return {{"CGAL polytope distance", false, "distance", false, true, false,
            [](const Points& a, const Points& b) -> std::unique_ptr<PairOfBodies> {
              return std::make_unique<CgalPair>(a, b);

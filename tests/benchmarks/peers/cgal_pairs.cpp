@@ -11,7 +11,7 @@ class CgalBoxes : public BroadPhase {
  public:
   explicit CgalBoxes(std::span<const Aabb> staticBoxes) { fill(staticBoxes, staticBoxes_); }
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     dynamicBoxes_.clear();
     fill(dynamicBoxes, dynamicBoxes_);
     CGAL::box_intersection_d(
@@ -43,9 +43,9 @@ class CgalBoxes : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod cgalBoxes() {
+BroadPhaseMethod makeCgalBoxes() {
   return {"CGAL box intersection", BroadPhaseMethod::Kind::peer, 100000,
-          "every tick goes over all static boxes", maker<CgalBoxes>()};
+          "every tick goes over all static boxes", bindMaker<CgalBoxes>()};
 }
 
 }  // namespace enfilade::benchmarks

@@ -11,25 +11,25 @@
 namespace enfilade::benchmarks {
 namespace {
 
-float below(double x) {
+float roundToFloatBelow(double x) {
   const auto f = static_cast<float>(x);
   return static_cast<double>(f) <= x ? f
                                      : std::nextafter(f, -std::numeric_limits<float>::infinity());
 }
-float above(double x) {
-  return -below(-x);
+float roundToFloatAbove(double x) {
+  return -roundToFloatBelow(-x);
 }
 
 void writeBounds(const RTCBoundsFunctionArguments* args) {
   const Aabb& box =
       static_cast<const std::span<const Aabb>*>(args->geometryUserPtr)->data()[args->primID];
   RTCBounds& b = *args->bounds_o;
-  b.lower_x = below(box.min.x());
-  b.lower_y = below(box.min.y());
-  b.lower_z = below(box.min.z());
-  b.upper_x = above(box.max.x());
-  b.upper_y = above(box.max.y());
-  b.upper_z = above(box.max.z());
+  b.lower_x = roundToFloatBelow(box.min.x());
+  b.lower_y = roundToFloatBelow(box.min.y());
+  b.lower_z = roundToFloatBelow(box.min.z());
+  b.upper_x = roundToFloatAbove(box.max.x());
+  b.upper_y = roundToFloatAbove(box.max.y());
+  b.upper_z = roundToFloatAbove(box.max.z());
 }
 
 class EmbreeBvh : public BroadPhase {
@@ -49,7 +49,7 @@ class EmbreeBvh : public BroadPhase {
   EmbreeBvh(const EmbreeBvh&) = delete;
   EmbreeBvh& operator=(const EmbreeBvh&) = delete;
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     dynamicBoxes_ = dynamicBoxes;
     if (dynamicScene_ == nullptr) {
       dynamicScene_ = makeScene(&dynamicBoxes_, RTC_BUILD_QUALITY_LOW, dynamicGeometry_);
@@ -61,7 +61,7 @@ class EmbreeBvh : public BroadPhase {
     rtcCollide(dynamicScene_, staticScene_, reportStatic, this);
     rtcCollide(dynamicScene_, dynamicScene_, reportDynamic, this);
   }
-  std::size_t hiddenBytes() const override { return static_cast<std::size_t>(bytes_); }
+  std::size_t countHiddenBytes() const override { return static_cast<std::size_t>(bytes_); }
 
  private:
   RTCScene makeScene(std::span<const Aabb>* boxes, RTCBuildQuality quality, RTCGeometry& geometry) {
@@ -113,8 +113,8 @@ class EmbreeBvh : public BroadPhase {
 
 }  // namespace
 
-BroadPhaseMethod embreeBvh() {
-  return {"Embree BVH", BroadPhaseMethod::Kind::peer, SIZE_MAX, "", maker<EmbreeBvh>()};
+BroadPhaseMethod makeEmbreeBvh() {
+  return {"Embree BVH", BroadPhaseMethod::Kind::peer, SIZE_MAX, "", bindMaker<EmbreeBvh>()};
 }
 
 }  // namespace enfilade::benchmarks

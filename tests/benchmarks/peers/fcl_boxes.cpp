@@ -36,7 +36,7 @@ class FclBoxUpdate : public BoxUpdate {
 
 }  // namespace
 
-BoxMethod fclBoxes() {
+BoxMethod makeFclBoxes() {
   return {"FCL", [](const Hull& hull, std::size_t bodies) {
             return std::make_unique<FclBoxUpdate>(hull, bodies);
           }};

@@ -20,11 +20,11 @@ class FclPair : public PairOfBodies {
     try {
       if (depth_) {
         solver_.shapeSignedDistance(*a_, toFcl(a), *b_, toFcl(b), &distance, &onA, &onB);
-        return distance > 0 ? apart(distance) : collides(-distance);
+        return distance > 0 ? makeApart(distance) : collides(-distance);
       }
       const bool parted =
           solver_.shapeDistance(*a_, toFcl(a), *b_, toFcl(b), &distance, &onA, &onB);
-      return parted && distance > 0 ? apart(distance) : collides();
+      return parted && distance > 0 ? makeApart(distance) : collides();
     } catch (const std::exception&) {
       return {};
     }
@@ -37,7 +37,7 @@ class FclPair : public PairOfBodies {
 };
 
 template <typename Solver>
-auto maker(const Solver& solver, bool depth) {
+auto bindFclMaker(const Solver& solver, bool depth) {
   return [=](const Points& a, const Points& b) -> std::unique_ptr<PairOfBodies> {
     return std::make_unique<FclPair<Solver>>(a, b, solver, depth);
   };
@@ -45,13 +45,14 @@ auto maker(const Solver& solver, bool depth) {
 
 }  // namespace
 
-std::vector<NarrowPhaseMethod> fclConvex() {
+std::vector<NarrowPhaseMethod> makeFclConvexMethods() {
   const fcl::detail::GJKSolver_libccd<double> ccd;
   fcl::detail::GJKSolver_indep<double> tight;
   tight.gjk_tolerance = 1e-14;
-  return {{"FCL libccd", false, "distance", false, true, false, maker(ccd, false)},
-          {"FCL libccd signed", false, "distance or depth", false, true, true, maker(ccd, true)},
-          {"FCL indep 1e-14", false, "distance", false, true, false, maker(tight, false)}};
+  return {
+      {"FCL libccd", false, "distance", false, true, false, bindFclMaker(ccd, false)},
+      {"FCL libccd signed", false, "distance or depth", false, true, true, bindFclMaker(ccd, true)},
+      {"FCL indep 1e-14", false, "distance", false, true, false, bindFclMaker(tight, false)}};
 }
 
 }  // namespace enfilade::benchmarks

@@ -22,13 +22,13 @@ class FclMeshQuery : public MeshQuery {
     model_.computeLocalAABB();
   }
 
-  double distance(const RigidTransform& body) override {
+  double computeDistance(const RigidTransform& body) override {
     fcl::DistanceRequestd request;
     fcl::DistanceResultd result;
     fcl::distance(&model_, fcl::Transform3d::Identity(), body_.get(), toFcl(body), request, result);
     return std::max(0.0, result.min_distance);
   }
-  void contacts(const RigidTransform& body, std::vector<std::uint32_t>& triangles) override {
+  void findContacts(const RigidTransform& body, std::vector<std::uint32_t>& triangles) override {
     fcl::CollisionRequestd request(model_.num_tris);
     fcl::CollisionResultd result;
     fcl::collide(&model_, fcl::Transform3d::Identity(), body_.get(), toFcl(body), request, result);
@@ -44,7 +44,7 @@ class FclMeshQuery : public MeshQuery {
 
 }  // namespace
 
-std::vector<MeshMethod> fclMesh() {
+std::vector<MeshMethod> makeFclMeshMethods() {
   return {{"FCL OBBRSS", false, false, [](const Points& body, const Triangles& mesh) {
              return std::make_unique<FclMeshQuery>(body, mesh);
            }}};

@@ -51,15 +51,15 @@ class FclPairs : public BroadPhase {
   explicit FclPairs(std::span<const Aabb> staticBoxes)
       : staticBoxes_(staticBoxes), shape_(std::make_shared<fcl::Boxd>(1, 1, 1)) {
     for (std::size_t k = 0; k < staticBoxes.size(); ++k) add(staticBoxes[k], 2 * k, staticObjects_);
-    staticManager_.registerObjects(pointers(staticObjects_));
+    staticManager_.registerObjects(getPointers(staticObjects_));
     staticManager_.setup();
   }
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     if (dynamicObjects_.empty()) {
       for (std::size_t k = 0; k < dynamicBoxes.size(); ++k)
         add(dynamicBoxes[k], 2 * k + 1, dynamicObjects_);
-      dynamicManager_.registerObjects(pointers(dynamicObjects_));
+      dynamicManager_.registerObjects(getPointers(dynamicObjects_));
       dynamicManager_.setup();
     } else {
       for (std::size_t k = 0; k < dynamicBoxes.size(); ++k)
@@ -79,7 +79,7 @@ class FclPairs : public BroadPhase {
     objects.back()->setUserData(reinterpret_cast<void*>(tag));
     setBox(*objects.back(), box);
   }
-  static std::vector<Object*> pointers(const Objects& objects) {
+  static std::vector<Object*> getPointers(const Objects& objects) {
     std::vector<Object*> result;
     for (const auto& object : objects) result.push_back(object.get());
     return result;
@@ -93,12 +93,12 @@ class FclPairs : public BroadPhase {
 
 }  // namespace
 
-std::vector<BroadPhaseMethod> fclBroadPhases() {
+std::vector<BroadPhaseMethod> makeFclBroadPhases() {
   return {{"FCL dynamic tree", BroadPhaseMethod::Kind::peer, SIZE_MAX, "",
-           maker<FclPairs<fcl::DynamicAABBTreeCollisionManagerd>>()},
+           bindMaker<FclPairs<fcl::DynamicAABBTreeCollisionManagerd>>()},
           {"FCL SSaP", BroadPhaseMethod::Kind::peer, 10000,
            "a dynamic box is compared with all that begins near it on one axis",
-           maker<FclPairs<fcl::SSaPCollisionManagerd>>()}};
+           bindMaker<FclPairs<fcl::SSaPCollisionManagerd>>()}};
 }
 
 }  // namespace enfilade::benchmarks

@@ -41,7 +41,7 @@ class Shape {
     dGeomSetRotation(geom_, rotation);
     dGeomSetPosition(geom_, at.translation.x(), at.translation.y(), at.translation.z());
   }
-  dGeomID geom() const { return geom_; }
+  dGeomID getGeom() const { return geom_; }
 
  private:
   void addFace(const collision::Hull& hull, const std::vector<std::uint32_t>& face) {
@@ -63,11 +63,11 @@ class OdePair : public PairOfBodies {
   OdePair(const Points& a, const Points& b) : a_(a), b_(b) {}
 
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
-    if (a_.geom() == nullptr || b_.geom() == nullptr) return {};
+    if (a_.getGeom() == nullptr || b_.getGeom() == nullptr) return {};
     a_.place(a);
     b_.place(b);
     std::array<dContactGeom, kMaxContacts> contacts;
-    const int count = dCollide(a_.geom(), b_.geom(), kMaxContacts, contacts.data(),
+    const int count = dCollide(a_.getGeom(), b_.getGeom(), kMaxContacts, contacts.data(),
                                static_cast<int>(sizeof(dContactGeom)));
     if (count == 0) {
       Answer answer;
@@ -87,7 +87,7 @@ class OdePair : public PairOfBodies {
 
 }  // namespace
 
-std::vector<NarrowPhaseMethod> odeConvex() {
+std::vector<NarrowPhaseMethod> makeOdeConvexMethods() {
   static const int started = dInitODE2(0);
   (void)started;
   return {{"ODE convex", false, "contacts", false, false, true,

@@ -65,10 +65,11 @@ class OdeFeeder : public FeederEngine {
     dCloseODE();
   }
 
-  void tick(bool driven) override {
+  void runTick(bool driven) override {
     const double seconds = 1.0 / 60 / plan_.substeps;
     for (int i = 0; i < plan_.substeps; ++i) {
-      const Vec3 velocity = (testing::trayAt(plan_, time_ + seconds, driven) - tray()) / seconds;
+      const Vec3 velocity =
+          (testing::computeTrayPosition(plan_, time_ + seconds, driven) - getTray()) / seconds;
       dBodySetLinearVel(tray_, velocity.x(), velocity.y(), velocity.z());
       dSpaceCollide(space_, this, &OdeFeeder::meet);
       dWorldQuickStep(world_, seconds);
@@ -76,7 +77,7 @@ class OdeFeeder : public FeederEngine {
       time_ += seconds;
     }
   }
-  std::vector<PlacedPart> parts() const override {
+  std::vector<PlacedPart> getParts() const override {
     std::vector<PlacedPart> placed;
     for (std::size_t i = 0; i < bodies_.size(); ++i) {
       const dReal *p = dBodyGetPosition(bodies_[i]), *q = dBodyGetQuaternion(bodies_[i]);
@@ -86,7 +87,7 @@ class OdeFeeder : public FeederEngine {
     }
     return placed;
   }
-  Vec3 tray() const override {
+  Vec3 getTray() const override {
     const dReal* p = dBodyGetPosition(tray_);
     return {p[0], p[1], p[2]};
   }

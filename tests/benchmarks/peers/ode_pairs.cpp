@@ -45,7 +45,7 @@ class OdeSpace : public BroadPhase {
   OdeSpace(const OdeSpace&) = delete;
   OdeSpace& operator=(const OdeSpace&) = delete;
 
-  void tick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
+  void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) override {
     for (std::size_t k = 0; k < dynamicBoxes.size(); ++k) {
       if (dynamicBoxes_.size() < dynamicBoxes.size()) {
         dynamicBoxes_.push_back(add(dynamicBoxes[k], 2 * k + 1, 2, 3));
@@ -81,11 +81,12 @@ class OdeSpace : public BroadPhase {
 
 }  // namespace
 
-std::vector<BroadPhaseMethod> odeSpaces() {
+std::vector<BroadPhaseMethod> makeOdeSpaces() {
   const std::string reason = "every tick goes over all static boxes";
   return {
-      {"ODE sweep and prune", BroadPhaseMethod::Kind::peer, 10000, reason, maker<OdeSpace>(false)},
-      {"ODE hash space", BroadPhaseMethod::Kind::peer, 10000, reason, maker<OdeSpace>(true)}};
+      {"ODE sweep and prune", BroadPhaseMethod::Kind::peer, 10000, reason,
+       bindMaker<OdeSpace>(false)},
+      {"ODE hash space", BroadPhaseMethod::Kind::peer, 10000, reason, bindMaker<OdeSpace>(true)}};
 }
 
 }  // namespace enfilade::benchmarks
