@@ -11,7 +11,7 @@
 namespace enfilade::render {
 namespace {
 
-constexpr std::uint32_t kWhite = 65535;  // of linear light
+constexpr std::uint32_t kFullLight = 65535;  // of linear light
 
 /// The standard patterns of Direct3D 11 for 4 and 16 samples, in sixteenths of a pixel. No two
 /// samples share a row or a column, so that edges near the axes have as many steps as samples. The
@@ -44,13 +44,13 @@ std::vector<Eigen::Vector2d> makePattern(int samples) {
 
 using LinearTable = std::array<std::uint32_t, 256>;
 
-/// Linear light of sRGB bytes, 0..kWhite.
+/// Linear light of sRGB bytes, 0..kFullLight.
 const LinearTable& getDecodingTable() {
   static const LinearTable table = [] {
     LinearTable values{};
     for (std::size_t i = 0; i < values.size(); ++i) {
       const float linear = scene::srgbToLinear(static_cast<float>(i) / 255);
-      values[i] = static_cast<std::uint32_t>(std::lround(kWhite * static_cast<double>(linear)));
+      values[i] = static_cast<std::uint32_t>(std::lround(kFullLight * static_cast<double>(linear)));
     }
     return values;
   }();
@@ -62,7 +62,7 @@ const std::vector<std::uint8_t>& getEncodingTable() {
   static const std::vector<std::uint8_t> table = [] {
     const LinearTable& linear = getDecodingTable();
     std::vector<std::uint8_t> bytes;
-    for (std::uint32_t value = 0; value <= kWhite; ++value) {
+    for (std::uint32_t value = 0; value <= kFullLight; ++value) {
       const std::size_t previous = bytes.empty() ? 0 : bytes.back();
       const bool nearer = previous < 255 && linear[previous + 1] + linear[previous] < 2 * value + 1;
       bytes.push_back(static_cast<std::uint8_t>(previous + (nearer ? 1 : 0)));

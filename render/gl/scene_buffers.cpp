@@ -68,8 +68,8 @@ GlTexture uploadTexture(const scene::Texture& texture, GLint maxSize) {
   const auto height = static_cast<GLsizei>(texture.height);
   const bool usable = width > 0 && height > 0 && width <= maxSize && height <= maxSize &&
                       texture.rgba.size() == std::size_t{4} * texture.width * texture.height;
-  constexpr std::uint32_t kWhite = 0xFFFFFFFFu;
-  const void* pixels = usable ? static_cast<const void*>(texture.rgba.data()) : &kWhite;
+  constexpr std::uint32_t kWhiteTexel = 0xFFFFFFFFu;
+  const void* pixels = usable ? static_cast<const void*>(texture.rgba.data()) : &kWhiteTexel;
   const GLsizei w = usable ? width : 1;
   const GLsizei h = usable ? height : 1;
   const auto levels = static_cast<GLsizei>(std::bit_width(static_cast<unsigned>(std::max(w, h))));

@@ -21,14 +21,14 @@ constexpr double kEdgeDepthFraction = 1e-3;                      // see Referenc
 // distances. Triangles seen edge on have larger errors; see the header's first comment.
 constexpr double kFloatError = 2e-4, kFloatErrorFraction = 1e-5;  // metres; fraction of the depth
 
-struct Surface {
+struct SeenSurface {
   scene::EntityId id;
   double z;
   PlaneDepth plane;
 };
 
 /// The exact hit of a pixel's ray with a triangle; nullopt: it misses.
-std::optional<Surface> intersectExactly(const TraceContext& trace, HitKey key, int x, int y) {
+std::optional<SeenSurface> intersectExactly(const TraceContext& trace, HitKey key, int x, int y) {
   const BatchTriangle triangle = findTriangle(trace, key);
   const EyeSpaceCorners corners = triangle.corners(trace.rays.eye);
   const auto w = computeWeights(corners, trace.rays).at(x, y);
@@ -44,7 +44,7 @@ std::optional<Surface> intersectExactly(const TraceContext& trace, HitKey key, i
     const float alpha = trace.shading.computeAlbedo(shaded, x, y)[3];
     if (alpha < material.alphaCutoff) return std::nullopt;
   }
-  return Surface{triangle.batch->id, z, plane};
+  return SeenSurface{triangle.batch->id, z, plane};
 }
 
 /// Builds one reference frame; several threads may resolve rows.
@@ -111,19 +111,19 @@ class ReferenceFrameBuilder {
 
   bool chooseNearest(const std::vector<HitKey>& keys, int x, int y,
                      std::vector<ReferenceFrame::Tie>& ties) {
-    std::vector<Surface> surfaces;
+    std::vector<SeenSurface> surfaces;
     for (const HitKey key : keys)
       if (const auto surface = intersectExactly(trace_, key, x, y)) surfaces.push_back(*surface);
     if (surfaces.empty()) return false;
-    const auto first =
-        std::min_element(surfaces.begin(), surfaces.end(), [](const Surface& a, const Surface& b) {
-          return std::pair(a.z, a.id) < std::pair(b.z, b.id);
-        });
+    const auto first = std::min_element(surfaces.begin(), surfaces.end(),
+                                        [](const SeenSurface& a, const SeenSurface& b) {
+                                          return std::pair(a.z, a.id) < std::pair(b.z, b.id);
+                                        });
     const std::size_t pixel = rays_.pixelIndex(x, y);
     frame.ids[pixel] = first->id;
     frame.depth[pixel] = first->z;
     planes_[pixel] = first->plane;
-    for (const Surface& other : surfaces) {
+    for (const SeenSurface& other : surfaces) {
       if (other.id != first->id &&
           other.z - first->z <= kTieDistance + kTieDepthFraction * first->z)
         ties.push_back({static_cast<std::uint32_t>(pixel), other.id});

@@ -10,7 +10,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kMaxCoordinate = 1e6;          // metres or radians; a larger value is a mistake
+constexpr double kMaxSpecNumber = 1e6;          // metres or radians; a larger value is a mistake
 constexpr double kMaxSpeed = 1e4;               // per second
 constexpr double kMaxDuration = 1e6;            // seconds
 constexpr double kAxisLengthTolerance = 1e-9;   // tolerance of an axis' length
@@ -28,7 +28,7 @@ OptionalError validateFieldRange(const char* field, double value, double min, do
 
 OptionalError validateFieldVector(const char* field, const Vec3& value) {
   for (int i = 0; i < 3; ++i)
-    if (auto error = validateFieldRange(field, value[i], -kMaxCoordinate, kMaxCoordinate, "m"))
+    if (auto error = validateFieldRange(field, value[i], -kMaxSpecNumber, kMaxSpecNumber, "m"))
       return error;
   return std::nullopt;
 }
@@ -44,7 +44,7 @@ OptionalError validateLimits(const BodySpec& body) {
   if (!(body.low <= 0 && body.high >= 0))
     return field + ": 0, the authored position, must lie between the smallest and the largest";
   if (!(body.low < body.high)) return field + ": both are 0: it could not move";
-  if (!(body.low >= -kMaxCoordinate && body.high <= kMaxCoordinate))
+  if (!(body.low >= -kMaxSpecNumber && body.high <= kMaxSpecNumber))
     return field + ": farther than 1000 km";
   for (const double stop : body.stops)
     if (auto error = validateFieldRange("stops", stop, body.low, body.high, "m")) return error;
@@ -66,7 +66,7 @@ OptionalError validatePath(const BodySpec& body) {
     if (auto error = validateFieldRange("time", key.time, 0, kMaxDuration, "s")) return error;
     if (auto error = validateFieldVector("offset", key.offset)) return error;
     if (auto error =
-            validateFieldRange("turn", key.angle, -kMaxCoordinate, kMaxCoordinate, "radians"))
+            validateFieldRange("turn", key.angle, -kMaxSpecNumber, kMaxSpecNumber, "radians"))
       return error;
   }
   const PathKey &first = body.keys.front(), &end = body.keys.back();
@@ -154,7 +154,7 @@ std::optional<std::string> validateBody(const BodySpec& body) {
   if (!(std::abs(body.axis.norm() - 1) <= kAxisLengthTolerance))
     return "axis must have unit length";
   if (auto error = validateSpeed(body.speed)) return error;
-  if (auto error = validateFieldRange("acceleration", body.acceleration, 0, kMaxCoordinate))
+  if (auto error = validateFieldRange("acceleration", body.acceleration, 0, kMaxSpecNumber))
     return error;
   return getTraits(body.kind).takesKeys ? validatePath(body) : validateLimits(body);
 }

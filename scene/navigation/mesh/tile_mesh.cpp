@@ -46,7 +46,7 @@ using PolyMesh = std::unique_ptr<rcPolyMesh, FreeBy<rcFreePolyMesh>>;
 using DetailMesh = std::unique_ptr<rcPolyMeshDetail, FreeBy<rcFreePolyMeshDetail>>;
 
 /// Polygons have heights at their corners alone; the detail mesh has those of the floor within.
-struct Polygons {
+struct TilePolygons {
   PolyMesh flat;
   DetailMesh heights;
 };
@@ -111,7 +111,7 @@ Heightfield rasterize(TileBuild& build, const std::vector<float>& triangles) {
   return field;
 }
 
-Polygons buildPolygons(TileBuild& build, rcHeightfield& field, const CellSizes& sizes) {
+TilePolygons buildPolygons(TileBuild& build, rcHeightfield& field, const CellSizes& sizes) {
   rcContext* context = &build.context;
   CompactHeightfield compact(rcAllocCompactHeightfield());
   build.require(
@@ -172,7 +172,7 @@ void setFlags(const rcHeightfield& field, rcPolyMesh& mesh) {
   }
 }
 
-std::vector<std::uint8_t> serialize(TileBuild& build, const Polygons& polygons) {
+std::vector<std::uint8_t> serialize(TileBuild& build, const TilePolygons& polygons) {
   const rcPolyMesh& mesh = *polygons.flat;
   if (mesh.npolys == 0) return {};
   dtNavMeshCreateParams params{};
@@ -319,7 +319,7 @@ TileMesh buildTileMesh(const WorldData& world, const NavigationAgent& agent, con
   if (clearance == Clearance::ample)
     rcFilterLedgeSpans(&build.context, sizes.height, sizes.climb, *field);
   rcFilterWalkableLowHeightSpans(&build.context, sizes.height, *field);
-  const Polygons polygons = buildPolygons(build, *field, sizes);
+  const TilePolygons polygons = buildPolygons(build, *field, sizes);
   setFlags(*field, *polygons.flat);
   return serialize(build, polygons);
 }

@@ -21,9 +21,9 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kMinProgress = 0.01;         // metres; less for slow walks
-constexpr double kMaxDepthBelowScene = 10;    // metres below the lowest point of the scene
-constexpr double kMaxDistanceOutside = 1000;  // metres beyond the scene's bounds
+constexpr double kMinProgress = 0.01;        // metres; less for slow walks
+constexpr double kMaxAvatarDepth = 10;       // metres below the lowest point of the scene
+constexpr double kMaxAvatarDistance = 1000;  // metres beyond the scene's bounds
 
 /// Distance to `goal`, metres: horizontal, or in space for a flying avatar.
 double computeRemainingDistance(const Avatar& avatar, const Vec3& goal) {
@@ -340,10 +340,9 @@ void reportBlockedDrives(WorldData& world, TickReport& report, QueryCount& count
 /// Reason to remove an avatar from the world; "" if it is inside its limits.
 std::string describeOutOfScene(const WorldData& world, const Avatar& avatar) {
   const Aabb& bounds = world.scene->bounds();
-  if (avatar.footPosition.y() < bounds.min.y() - kMaxDepthBelowScene)
-    return "fell out of the scene";
-  if (!contains(inflated(bounds, kMaxDistanceOutside), {avatar.footPosition, avatar.footPosition}))
-    return "is " + formatShortNumber(kMaxDistanceOutside) + " m out of the scene";
+  if (avatar.footPosition.y() < bounds.min.y() - kMaxAvatarDepth) return "fell out of the scene";
+  if (!contains(inflated(bounds, kMaxAvatarDistance), {avatar.footPosition, avatar.footPosition}))
+    return "is " + formatShortNumber(kMaxAvatarDistance) + " m out of the scene";
   return "";
 }
 

@@ -11,7 +11,6 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kMaxCoordinate = 1e7;  // metres: doubles still resolve 2 nm there
 constexpr double kMaxWait = 86400;      // seconds
 constexpr std::size_t kMaxWaypoints = 100000;
 constexpr double kMaxJointAngle = 1000;  // radians: magnitude of a joint's limits

@@ -9,6 +9,9 @@
 
 namespace enfilade::scene {
 
+/// Metres: maximum absolute coordinate in commands and queries. Doubles still resolve 2 nm there.
+inline constexpr double kMaxCoordinate = 1e7;
+
 /// Error of a command, naming the field and the value; nullopt if it is valid.
 std::optional<std::string> validateCommandFields(const Command& command,
                                                  const WorldSettings& settings);

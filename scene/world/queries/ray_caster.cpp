@@ -11,6 +11,7 @@
 
 #include "collision/shapes/triangle_tree.hpp"
 #include "collision/sine_cosine.hpp"
+#include "scene/world/data/validation.hpp"
 #include "scene/world/queries/scene_trees.hpp"
 
 namespace enfilade::scene {
@@ -18,7 +19,6 @@ namespace {
 
 using collision::Triangle;
 
-constexpr double kMaxCoordinate = 1e7;  // metres, as for commands
 // Relative error of Embree's float distance. If the double-precision distance differs by more, the
 // ray meets the plane at a grazing angle, and Embree's distance is the better one.
 constexpr double kFloatError = 1e-4;
