@@ -3,9 +3,9 @@
 # scene/physics/ do too: what the compiler inlines there, and so their speed, must not depend on
 # neighbouring files. So do small test programs, where a new test may use any name.
 
-# enfilade_unity_build(TARGET SIZE [FOLDER..]): groups the sources of each folder of TARGET, at most
-# SIZE in one group. The folders listed last are small and share a group. An edit of a source then
-# compiles at most SIZE of them.
+# enfilade_unity_build(TARGET SIZE [FOLDERS..]): groups the sources of each folder of TARGET, at most
+# SIZE in one group. Each of FOLDERS is a list "base,log" of folders that share groups. An edit of a
+# source then compiles at most SIZE of them.
 function(enfilade_unity_build target size)
   if(NOT ENFILADE_UNITY)
     return()
@@ -15,9 +15,13 @@ function(enfilade_unity_build target size)
   set(rooms "")
   foreach(source ${sources})
     get_filename_component(folder ${source} DIRECTORY)
-    if(folder IN_LIST ARGN)
-      set(folder small)
-    endif()
+    foreach(folders ${ARGN})
+      string(REPLACE "," ";" listed "${folders}")
+      if(folder IN_LIST listed)
+        list(GET listed 0 folder)
+        string(APPEND folder "_and_others")
+      endif()
+    endforeach()
     string(MAKE_C_IDENTIFIER "room_${folder}" room)
     list(APPEND ${room} ${source})
     list(APPEND rooms ${room})

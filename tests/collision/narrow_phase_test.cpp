@@ -16,9 +16,6 @@ namespace {
 
 using namespace testing;
 
-const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
-                                  {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
-
 SeparationResult computeSeparationCold(const PlacedConvex& a, const PlacedConvex& b) {
   FeatureCache cache;
   return computeSeparation(a, b, cache);

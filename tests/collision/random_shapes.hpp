@@ -11,6 +11,9 @@ namespace enfilade::collision::testing {
 
 using Random = std::mt19937_64;
 
+inline const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
+                                         {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
+
 /// Uniform in [low, high); written out because std's distributions differ between libraries.
 inline double drawUniform(Random& random, double low, double high) {
   return low + (high - low) * (static_cast<double>(random() >> 11) * 0x1p-53);

@@ -10,7 +10,7 @@
 namespace enfilade::collision {
 namespace {
 
-constexpr ContactOffset kBand{0.875e-3, 1.03125e-3};
+constexpr ContactOffset kRotationBand{0.875e-3, 1.03125e-3};
 
 std::vector<Vec3> makeBoxPoints(const Vec3& min, const Vec3& max) {
   std::vector<Vec3> points;
@@ -34,12 +34,12 @@ TEST(RotationalShapeCast, ARodStopsEpsilonBeforeTheWallItsTipComesTo) {
   const auto wall = makeBoxPoints({-2, -1, -0.6}, {2, 1, -0.55});  // +Y rotation: towards -Z
   FeatureCache cache;
   const AxisRotation turn{Vec3::Zero(), Vec3::UnitY(), 2};
-  const MotionResult swept = castShape({rod}, turn, {wall}, kBand, cache);
+  const MotionResult swept = castShape({rod}, turn, {wall}, kRotationBand, cache);
   ASSERT_FALSE(swept.isClear());
   // The corner (1, 0.05) is at -sin(phi) - 0.05 cos(phi), and must be at -0.55 + 1.03 mm.
   const double far = std::hypot(1, 0.05), start = std::atan2(0.05, 1);
-  EXPECT_NEAR(swept.lo * turn.angle, std::asin((0.55 - kBand.rest) / far) - start, 1e-5);
-  EXPECT_NEAR(computeDistanceAfter({rod}, turn, swept.lo, {wall}), kBand.rest, 1e-5);
+  EXPECT_NEAR(swept.lo * turn.angle, std::asin((0.55 - kRotationBand.rest) / far) - start, 1e-5);
+  EXPECT_NEAR(computeDistanceAfter({rod}, turn, swept.lo, {wall}), kRotationBand.rest, 1e-5);
   EXPECT_LT(swept.queries, 12u);
 }
 
@@ -48,23 +48,24 @@ TEST(RotationalShapeCast, APostNearThePivotIsReachedInFewStepsThoughTheTipIsFast
   const auto post = makeBoxPoints({0.1, -1, -0.2}, {0.12, 1, -0.1});
   FeatureCache cache;
   const AxisRotation turn{Vec3::Zero(), Vec3::UnitY(), 3};
-  const MotionResult swept = castShape({rod}, turn, {post}, kBand, cache);
+  const MotionResult swept = castShape({rod}, turn, {post}, kRotationBand, cache);
   ASSERT_FALSE(swept.isClear());
   EXPECT_NE(swept.outcome, MotionOutcome::unproved);
   EXPECT_LT(swept.queries, 20u);
-  EXPECT_NEAR(computeDistanceAfter({rod}, turn, swept.lo, {post}), kBand.rest, 1e-5);
+  EXPECT_NEAR(computeDistanceAfter({rod}, turn, swept.lo, {post}), kRotationBand.rest, 1e-5);
 }
 
 TEST(RotationalShapeCast, ATurnAlongATableIsFreeAndOneAwayFromItToo) {
   const auto rod = makeBoxPoints({0, 0.001, -0.05}, {1, 0.1, 0.05});
   const auto table = makeBoxPoints({-2, -0.1, -2}, {2, 0, 2});
   FeatureCache cache;
-  EXPECT_TRUE(castShape({rod}, AxisRotation{Vec3::Zero(), Vec3::UnitY(), 6}, {table}, kBand, cache)
-                  .isClear());
+  EXPECT_TRUE(
+      castShape({rod}, AxisRotation{Vec3::Zero(), Vec3::UnitY(), 6}, {table}, kRotationBand, cache)
+          .isClear());
   const AxisRotation up{{-0.5, 0, 0}, Vec3::UnitZ(), 1};
-  EXPECT_TRUE(castShape({rod}, up, {table}, kBand, cache).isClear());
+  EXPECT_TRUE(castShape({rod}, up, {table}, kRotationBand, cache).isClear());
   const AxisRotation down{{-0.5, 0, 0}, Vec3::UnitZ(), -1};
-  EXPECT_EQ(castShape({rod}, down, {table}, kBand, cache).lo, 0);
+  EXPECT_EQ(castShape({rod}, down, {table}, kRotationBand, cache).lo, 0);
 }
 
 TEST(RotationalShapeCast, NothingIsCrossedOnTheWayOfRandomTurns) {
@@ -85,16 +86,17 @@ TEST(RotationalShapeCast, NothingIsCrossedOnTheWayOfRandomTurns) {
     for (Vec3& v : b) v += away;
     const Vec3 direction = point(1);
     const AxisRotation turn{point(1), direction.normalized(), uniform(-4, 4)};
-    if (!(computeDistanceAfter({a}, turn, 0, {b}) > kBand.rest)) continue;
+    if (!(computeDistanceAfter({a}, turn, 0, {b}) > kRotationBand.rest)) continue;
     FeatureCache cache;
-    const MotionResult swept = castShape({a}, turn, {b}, kBand, cache);
+    const MotionResult swept = castShape({a}, turn, {b}, kRotationBand, cache);
     ++queryCount, stopped += !swept.isClear();
     EXPECT_NE(swept.outcome, MotionOutcome::unproved) << k;
     for (int i = 0; i <= 100; ++i)
-      ASSERT_GT(computeDistanceAfter({a}, turn, swept.lo * i / 100, {b}), kBand.min * (1 - 1e-9))
+      ASSERT_GT(computeDistanceAfter({a}, turn, swept.lo * i / 100, {b}),
+                kRotationBand.min * (1 - 1e-9))
           << k << " at " << i;
     if (swept.isClear()) continue;
-    EXPECT_LT(computeDistanceAfter({a}, turn, swept.lo, {b}), kBand.rest * 1.01) << k;
+    EXPECT_LT(computeDistanceAfter({a}, turn, swept.lo, {b}), kRotationBand.rest * 1.01) << k;
   }
   EXPECT_GT(stopped, queryCount / 20);
   EXPECT_LT(stopped, queryCount / 2);

@@ -10,9 +10,6 @@ namespace {
 
 using namespace testing;
 
-const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
-                                  {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
-
 Aabb computeBox(const PlacedConvex& body) {
   Aabb box;
   for (const Vec3& vertex : body.vertices) box.include(vertex + body.translation);

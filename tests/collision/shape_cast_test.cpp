@@ -9,8 +9,6 @@ namespace {
 
 using namespace testing;
 
-const std::vector<Vec3> kUnitCube{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0},
-                                  {0, 0, 1}, {1, 0, 1}, {0, 1, 1}, {1, 1, 1}};
 constexpr ContactOffset kBand{0.0004375, 0.000515625};
 
 MotionResult castShapeCold(const PlacedConvex& a, const Vec3& by, const PlacedConvex& b) {

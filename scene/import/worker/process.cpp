@@ -27,7 +27,7 @@ namespace {
 
 using Clock = std::chrono::steady_clock;
 
-constexpr std::size_t kReadSize = 1 << 18;  // bytes per read from the pipe, at least
+constexpr std::size_t kPipeReadSize = 1 << 18;  // bytes per read from the pipe, at least
 constexpr int kPipeSize = 1 << 20;          // bytes; the writer waits less often than at 64 KiB
 constexpr double kExitTimeout = 10;    // seconds between the end of the pipe and of the process
 constexpr double kMaxPollWait = 3600;  // seconds; poll() counts milliseconds in an int
@@ -224,14 +224,14 @@ class MessageBuffer {
   MessageBuffer(const MessageBuffer&) = delete;
   MessageBuffer& operator=(const MessageBuffer&) = delete;
 
-  /// Room for the next bytes. Its size is at least kReadSize.
+  /// Room for the next bytes. Its size is at least kPipeReadSize.
   std::span<std::byte> reserve() {
-    if (begin_ > 0 && (begin_ == end_ || capacity_ - end_ < kReadSize)) {
+    if (begin_ > 0 && (begin_ == end_ || capacity_ - end_ < kPipeReadSize)) {
       std::memmove(bytes_, bytes_ + begin_, end_ - begin_);
       end_ -= std::exchange(begin_, 0);
     }
-    if (capacity_ - end_ < kReadSize) {
-      const std::size_t capacity = std::max(2 * capacity_, end_ + kReadSize);
+    if (capacity_ - end_ < kPipeReadSize) {
+      const std::size_t capacity = std::max(2 * capacity_, end_ + kPipeReadSize);
       void* const grown = std::realloc(bytes_, capacity);
       if (grown == nullptr) throw std::bad_alloc();
       bytes_ = static_cast<std::byte*>(grown);
