@@ -74,6 +74,7 @@ OrderOrError walkFromProto(const v1::Walk& message) {
   if (message.has_speed()) walk.speed = message.speed();
   walk.opens.assign(message.opens().begin(), message.opens().end());
   walk.opensFrom = message.opens_from();
+  walk.fromFloor = message.from_floor();
   for (const v1::Walk::Ride& ride : message.rides())
     walk.rides.push_back({ride.waypoint(), ride.lift(), ride.level()});
   return scene::Order(std::move(walk));

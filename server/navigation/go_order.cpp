@@ -71,6 +71,7 @@ std::variant<v1::Command, v1::Error> makeGoOrder(
   if (!path.found()) return makeError(v1::ERROR_REFUSED_COMMAND, "go: " + path.reason(), "go.to");
   v1::Command order = command;
   v1::Walk& walk = *order.mutable_walk();
+  walk.set_from_floor(true);  // as the proof of the path does
   const int skipped = std::min(1, path.points_size() - 1);
   for (int i = skipped; i < path.points_size(); ++i) *walk.add_along() = path.points(i);
   addBodies(path, command.go().doors() == v1::NavigationQuery::DOORS_OPEN, skipped, walk);

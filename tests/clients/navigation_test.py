@@ -62,7 +62,7 @@ class NavigationTest(RoomCase):
         self.assertGreater(path.length, 2 * math.hypot(3, 4))
         self.assertLess(path.length, 2 * math.hypot(3, 4.3) + 1)
         ann = self.client.spawn("ann", at=path.points[0])
-        ann.walk(*path.points[1:])
+        ann.walk(*path.points[1:], from_floor=True)
         self.client.run_until_idle()
         self.assertEqual([one.kind for one in self.client.notices()][-1], "arrived")
 

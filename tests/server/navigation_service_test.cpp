@@ -159,6 +159,7 @@ TEST(NavigationService, ADoorAsItIsIsAReasonOrALeg) {
     go.mutable_go()->set_doors(doors);
     const auto order = std::get<v1::Command>(makeGoOrder(go, reply));
     EXPECT_EQ(order.walk().opens_size(), doors == v1::NavigationQuery::DOORS_OPEN ? 1 : 0);
+    EXPECT_TRUE(order.walk().from_floor());
   }
 }
 

@@ -112,6 +112,12 @@ Vec3 clipOnNonWalkable(const Vec3& remainder, MoveMode mode, Sliding sliding) {
   return mode == MoveMode::fall ? Vec3(0, std::min(0.0, remainder.y()), 0) : Vec3(Vec3::Zero());
 }
 
+/// True if a move up a non-walkable surface is a climb: the avatar falls, but has ceased to sink.
+bool isClimbInFall(const AvatarMover& m, const Vec3& remainder, const Vec3& move, MoveMode mode) {
+  return mode == MoveMode::fall && remainder.y() <= 0 && m.avatar.lastDisplacement.y() >= 0 &&
+         move.y() > kMinMoveFraction * m.settings.contactOffset;
+}
+
 /// Collide and slide by `desired`. Projects the remaining *desired* displacement onto the planes,
 /// not the clipped one; otherwise an avatar in a notch oscillates.
 SlideResult collideAndSlide(AvatarMover& m, const Vec3& desired, MoveMode mode) {
@@ -132,6 +138,10 @@ SlideResult collideAndSlide(AvatarMover& m, const Vec3& desired, MoveMode mode) 
     }
     planes.push_back(mode == MoveMode::walk ? makeWalkingPlane(m, hit.normal) : hit.normal);
     move = projectOntoPlanes(remainder, planes);
+    if (isClimbInFall(m, remainder, move, mode)) {
+      planes.back() = makeWalkingPlane(m, hit.normal);
+      move = projectOntoPlanes(remainder, planes);
+    }
     // Restore the contact offset where grazing moves came closer.
     move += std::max(0.0, m.settings.contactOffset - hit.distance) * planes.back();
   }

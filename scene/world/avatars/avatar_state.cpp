@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/world/avatars/order_context.hpp"
+
 namespace enfilade::scene {
 namespace {
 
@@ -90,6 +92,12 @@ AvatarSnapshot makeAvatarSnapshot(const Avatar& avatar) {
   snapshot.teleports = avatar.teleports;
   snapshot.lastStoppedTick = avatar.lastStoppedTick;
   return snapshot;
+}
+
+bool updateStalledInAir(Avatar& avatar, const WorldSettings& settings) {
+  const bool moved = avatar.lastDisplacement.norm() > settings.contactOffset;
+  avatar.stalledInAirTime = moved ? 0 : avatar.stalledInAirTime + settings.tickDuration;
+  return avatar.stalledInAirTime >= settings.stuckTimeout - kTimeTolerance;
 }
 
 }  // namespace enfilade::scene

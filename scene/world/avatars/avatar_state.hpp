@@ -13,4 +13,8 @@ AvatarSnapshot makeAvatarSnapshot(const Avatar& avatar);
 /// the joints; metres. 0 for a mere prism.
 double computeTurnRadius(const Avatar& avatar);
 
+/// Updates stalledInAirTime. True if the avatar made no progress in the air for stuckTimeout: it is
+/// held by non-walkable surfaces.
+bool updateStalledInAir(Avatar& avatar, const WorldSettings& settings);
+
 }  // namespace enfilade::scene

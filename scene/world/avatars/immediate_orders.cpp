@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "scene/world/avatars/avatar_state.hpp"
 #include "scene/world/bodies/physics_bodies.hpp"
 #include "scene/world/contacts/obstacles.hpp"
 
@@ -21,14 +22,6 @@ void startJump(Avatar& avatar, const Jump& jump, const WorldSettings& settings) 
   avatar.fallSpeed = -std::sqrt(2 * settings.gravity * jump.height);
   avatar.walk = {};
   avatar.stalledInAirTime = 0;
-}
-
-/// Updates stalledInAirTime. True if the avatar made no progress in the air for stuckTimeout: it is
-/// held by non-walkable surfaces.
-bool updateStalledInAir(Avatar& avatar, const WorldSettings& settings) {
-  const bool moved = avatar.lastDisplacement.norm() > settings.contactOffset;
-  avatar.stalledInAirTime = moved ? 0 : avatar.stalledInAirTime + settings.tickDuration;
-  return avatar.stalledInAirTime >= settings.stuckTimeout - kTimeTolerance;
 }
 
 void setPrismHeight(WorldData& world, Avatar& avatar, std::shared_ptr<const AvatarShape> shape,

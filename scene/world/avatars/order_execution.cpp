@@ -8,6 +8,7 @@
 
 #include "scene/model/rotation.hpp"
 #include "scene/world/avatars/avatar_motion.hpp"
+#include "scene/world/avatars/avatar_state.hpp"
 #include "scene/world/avatars/immediate_orders.hpp"
 #include "scene/world/avatars/order_context.hpp"
 #include "scene/world/avatars/spawn.hpp"
@@ -21,9 +22,9 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kMinProgress = 0.01;        // metres; less for slow walks
-constexpr double kMaxAvatarDepth = 10;       // metres below the lowest point of the scene
-constexpr double kMaxAvatarDistance = 1000;  // metres beyond the scene's bounds
+constexpr double kMinProgress = 0.01;               // metres; less for slow walks
+constexpr double kMaxAvatarDepthBelowScene = 10;    // metres below the lowest point of the scene
+constexpr double kMaxAvatarDistanceOutside = 1000;  // metres beyond the scene's bounds
 
 /// Distance to `goal`, metres: horizontal, or in space for a flying avatar.
 double computeRemainingDistance(const Avatar& avatar, const Vec3& goal) {
@@ -102,7 +103,13 @@ OrderStatus executeOrder(const Walk& walk, OrderContext& context) {
   Avatar& avatar = *context.findAvatar();
   avatar.driveVelocity = Vec3::Zero();
   avatar.viewHeld = false;
-  if (avatar.walk.minDistance < 0) startWaypoint(context.world, walk, avatar);
+  if (avatar.walk.minDistance < 0) {
+    if (walk.fromFloor && !avatar.flying && !avatar.grounded) {
+      if (!updateStalledInAir(avatar, context.world.settings)) return OrderStatus::running;
+      avatar.stalledInAirTime = 0;
+    }
+    startWaypoint(context.world, walk, avatar);
+  }
   commandWalkBodies(context.world, walk, avatar);
   return OrderStatus::running;
 }
@@ -340,9 +347,11 @@ void reportBlockedDrives(WorldData& world, TickReport& report, QueryCount& count
 /// Reason to remove an avatar from the world; "" if it is inside its limits.
 std::string describeOutOfScene(const WorldData& world, const Avatar& avatar) {
   const Aabb& bounds = world.scene->bounds();
-  if (avatar.footPosition.y() < bounds.min.y() - kMaxAvatarDepth) return "fell out of the scene";
-  if (!contains(inflated(bounds, kMaxAvatarDistance), {avatar.footPosition, avatar.footPosition}))
-    return "is " + formatShortNumber(kMaxAvatarDistance) + " m out of the scene";
+  if (avatar.footPosition.y() < bounds.min.y() - kMaxAvatarDepthBelowScene)
+    return "fell out of the scene";
+  if (!contains(inflated(bounds, kMaxAvatarDistanceOutside),
+                {avatar.footPosition, avatar.footPosition}))
+    return "is " + formatShortNumber(kMaxAvatarDistanceOutside) + " m out of the scene";
   return "";
 }
 

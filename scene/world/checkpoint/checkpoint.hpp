@@ -16,7 +16,7 @@
 namespace enfilade::scene {
 
 /// Increases with every change of the layout.
-inline constexpr std::uint32_t kCheckpointVersion = 9;
+inline constexpr std::uint32_t kCheckpointVersion = 10;
 
 /// Call between two ticks. Auditing and the number of threads are not part of a checkpoint.
 std::vector<std::uint8_t> makeCheckpoint(const World& world);

@@ -39,8 +39,8 @@ void archiveMembers(A& a, MaybeConst<A, Ride>& ride) {
 }
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, Walk>& walk) {
-  auto& [waypoints, speed, opens, rides, opensFrom] = walk;
-  a(waypoints, speed, opens, rides, opensFrom);
+  auto& [waypoints, speed, opens, rides, opensFrom, fromFloor] = walk;
+  a(waypoints, speed, opens, rides, opensFrom, fromFloor);
 }
 template <class A>
 void archiveMembers(A& a, MaybeConst<A, Look>& look) {

@@ -76,6 +76,7 @@ struct Walk {
   std::vector<BodyHandle> opens = {};  ///< doors
   std::vector<Ride> rides = {};        ///< ascending waypoints
   std::size_t opensFrom = 0;           ///< waypoints to reach before it opens any door
+  bool fromFloor = false;              ///< if the avatar falls, begins when it stands
 };
 /// Limits of a Walk order.
 inline constexpr std::size_t kMaxWalkDoors = 256, kMaxRides = 256;

@@ -43,12 +43,14 @@ class Avatar:
                           "another call set the clock or drop its spawn?")
 
     def walk(self, *along: Point, speed: Optional[float] = None, opens: Sequence[str] = (),
-             opens_from: int = 0, rides: Sequence[Tuple[int, str, int]] = ()) -> int:
+             opens_from: int = 0, rides: Sequence[Tuple[int, str, int]] = (),
+             from_floor: bool = False) -> int:
         """Walks to each of the points in turn. Opens the doors `opens` when they are in its way, after it has
         reached `opens_from` points. `rides`: before point number WAYPOINT a LIFT must stand at a LEVEL; it
-        is called."""
+        is called. `from_floor`: if the avatar falls, the walk begins when it stands, as that of go() does."""
         order = messages.Walk(
             along=[vec(point) for point in along], opens=opens, opens_from=whole(opens_from, "opens_from"),
+            from_floor=from_floor,
             rides=[messages.Walk.Ride(waypoint=whole(waypoint, "rides: the waypoint"), lift=lift,
                                       level=whole(level, "rides: the level"))
                    for waypoint, lift, level in rides])
