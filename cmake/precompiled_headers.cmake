@@ -66,7 +66,7 @@ function(enfilade_precompile_headers root)
   endif()
   set(with_messages enfilade_server enfilade_protocol protocol_tests server_tests replay_tests
                     difference_tests export_tests
-                    enfilade_import)  # it has no messages, but the optimisation of code with them
+                    enfilade_import)  # no messages, but equal flags, which a precompiled header needs
   foreach(target ${targets})
     get_target_property(type ${target} TYPE)
     if(type STREQUAL "UTILITY" OR target STREQUAL "enfilade_messages")

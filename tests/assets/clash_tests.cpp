@@ -30,7 +30,7 @@ TEST(BuildingClashes, DoorsAndLiftTouchNothingOnTheirWays) {
       run.submit(command);
       ++driven;
     }
-    run.waitUntilIdle();
+    run.runUntilIdle();
   }
   EXPECT_GT(driven, 50u);
   for (const scene::ContactEvent& event : run.events) {

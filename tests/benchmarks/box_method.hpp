@@ -28,7 +28,7 @@ class BoxUpdate {
   virtual ~BoxUpdate() = default;
   virtual void update(const std::vector<TurnedPose>& poses, std::vector<Aabb>& boxes) = 0;
   /// Vertices that all updates so far looked at; 0 if unknown.
-  virtual std::uint64_t countLooked() const { return 0; }
+  virtual std::uint64_t getExaminedVertices() const { return 0; }
 };
 
 struct BoxMethod {

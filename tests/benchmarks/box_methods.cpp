@@ -20,7 +20,7 @@ class OurBoxUpdate : public BoxUpdate {
       boxes[k] = collision::computeAabb(hull_, table_, poses[k].rotation, poses[k].translation,
                                         last_[k], looked_);
   }
-  std::uint64_t countLooked() const override { return looked_; }
+  std::uint64_t getExaminedVertices() const override { return looked_; }
 
  private:
   const Hull& hull_;
@@ -44,7 +44,7 @@ class RecomputeUpdate : public BoxUpdate {
     }
     looked_ += poses.size() * hull_.vertices.size();
   }
-  std::uint64_t countLooked() const override { return looked_; }
+  std::uint64_t getExaminedVertices() const override { return looked_; }
 
  private:
   const Hull& hull_;

@@ -153,7 +153,7 @@ std::size_t measure(std::size_t vertices, double degrees, const Arguments& argum
   std::size_t wrong = 0;
   for (const Contestant& one : all) {
     const double boxes = static_cast<double>(ticks * bodies);
-    const double looked = static_cast<double>(one.update->countLooked()) / boxes;
+    const double looked = static_cast<double>(one.update->getExaminedVertices()) / boxes;
     const double time = computeQuantile(one.nanoseconds, 0.5);
     if (isOurs(one.name)) wrong += one.notConservative;
     std::printf(

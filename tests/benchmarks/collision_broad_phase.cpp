@@ -3,7 +3,7 @@
 //   collision_broad_phase [--quick] [--out FILE] [--only PART_OF_A_NAME]
 //   collision_broad_phase --ours OBJECTS DYNAMIC [TICKS]
 //      ours alone, unchecked: for callgrind, with valgrind --tool=callgrind --collect-atstart=no
-//      --toggle-collect='*oursTick*'
+//      --toggle-collect='*tickOurs*'
 //
 // The workload is that of building_workload.hpp, the way of measuring that of broad_phase_runs.hpp.
 // The pairs of every tick are checked against an independent method (PairTruth).

@@ -13,7 +13,7 @@ constexpr double kTowerHeight = 3;   // widths
 constexpr double kRebound = 0.4;     // of the speed
 constexpr double kHeapSpeed = 6;     // metres per second at the heap's surface
 
-Vec3 drawUniform3(Random& random, const Vec3& low, const Vec3& high) {
+Vec3 drawVector(Random& random, const Vec3& low, const Vec3& high) {
   const double x = drawUniform(random, low.x(), high.x());
   const double y = drawUniform(random, low.y(), high.y());
   const double z = drawUniform(random, low.z(), high.z());
@@ -46,7 +46,7 @@ MovingCubes::MovingCubes(CubeMotion motion, std::size_t count)
       centres_.push_back(width_ * std::cbrt(drawUniform(random_, 0, 1)) * drawDirection(random_));
       velocities_[k] = kHeapSpeed * drawUniform(random_, 0, 1) * drawDirection(random_);
     } else {
-      centres_.push_back(drawUniform3(random_, Vec3::Zero(), Vec3(width_, height, width_)));
+      centres_.push_back(drawVector(random_, Vec3::Zero(), Vec3(width_, height, width_)));
     }
   }
 }
@@ -94,7 +94,7 @@ void MovingCubes::swirl() {
 WalkingBoxes::WalkingBoxes(std::size_t count, const Vec3& corner)
     : corner_(corner), width_(4 * std::sqrt(static_cast<double>(count))), boxes_(count) {
   for (std::size_t k = 0; k < count; ++k) {
-    feet_.push_back(drawUniform3(random_, Vec3::Zero(), Vec3(width_, 0, width_)));
+    feet_.push_back(drawVector(random_, Vec3::Zero(), Vec3(width_, 0, width_)));
     const Vec3 towards = drawDirection(random_);
     velocities_.push_back(1.4 * Vec3(towards.x(), 0, towards.z()));
   }

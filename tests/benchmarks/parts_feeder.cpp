@@ -38,7 +38,7 @@ class OurFeeder : public FeederEngine {
   void runTick(bool driven) override { feeder_.tick(driven); }
   std::vector<testing::PlacedPart> getParts() const override { return feeder_.getParts(); }
   testing::Vec3 getTray() const override { return feeder_.getTrayPosition(); }
-  double getEnergy() const { return feeder_.computeEnergy(); }
+  double computeEnergy() const { return feeder_.computeEnergy(); }
   const scene::StepReport& getReport() const { return feeder_.getReport(); }
   double getEpsilon() { return feeder_.getSettings().solver.contactOffset; }
 
@@ -52,12 +52,12 @@ struct Row {
   FeederFindings worst;
 };
 
-FeederFindings chooseWorse(const FeederFindings& a, const FeederFindings& b) {
+FeederFindings mergeWorst(const FeederFindings& a, const FeederFindings& b) {
   return {std::max(a.deepest, b.deepest), std::max(a.penetrating, b.penetrating),
           std::max(a.outside, b.outside)};
 }
 
-double readCpuSeconds() {
+double readProcessSeconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
@@ -68,13 +68,13 @@ Row run(FeederEngine& engine, const FeederCheck& feederCheck, int ticks, bool dr
   Row row;
   for (int i = 1; i <= ticks; ++i) {
     const auto start = std::chrono::steady_clock::now();
-    const double cpu = readCpuSeconds();
+    const double cpu = readProcessSeconds();
     engine.runTick(driven);
-    row.cpu += readCpuSeconds() - cpu;
+    row.cpu += readProcessSeconds() - cpu;
     row.seconds += std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     if (afterTick) afterTick();
     if (i % kJudgeEvery != 0) continue;
-    row.worst = chooseWorse(row.worst, feederCheck.evaluate(engine.getParts(), engine.getTray()));
+    row.worst = mergeWorst(row.worst, feederCheck.evaluate(engine.getParts(), engine.getTray()));
   }
   return row;
 }
@@ -82,7 +82,7 @@ Row run(FeederEngine& engine, const FeederCheck& feederCheck, int ticks, bool dr
 /// Concatenates two measured intervals.
 Row joinRows(const Row& first, const Row& second) {
   return {first.seconds + second.seconds, first.cpu + second.cpu,
-          chooseWorse(first.worst, second.worst)};
+          mergeWorst(first.worst, second.worst)};
 }
 
 void print(const char* name, const Row& row, int ticks) {
@@ -98,14 +98,14 @@ bool check(bool holds, const char* what) {
 
 bool checkOurs(const FeederPlan& plan, const FeederCheck& feederCheck, int ticks) {
   OurFeeder still(plan, kThreads);
-  const double start = still.getEnergy();
+  const double start = still.computeEnergy();
   double maxEnergy = start;
-  const auto watchEnergy = [&] { maxEnergy = std::max(maxEnergy, still.getEnergy()); };
+  const auto watchEnergy = [&] { maxEnergy = std::max(maxEnergy, still.computeEnergy()); };
   Row off = run(still, feederCheck, ticks, false, watchEnergy);
   int asleepAfter = ticks;  // the run continues untimed until the whole heap sleeps
   for (; asleepAfter < kMaxTicksToSleep && still.getReport().awake > 0; asleepAfter += kJudgeEvery)
     off.worst =
-        chooseWorse(off.worst, run(still, feederCheck, kJudgeEvery, false, watchEnergy).worst);
+        mergeWorst(off.worst, run(still, feederCheck, kJudgeEvery, false, watchEnergy).worst);
   OurFeeder driven(plan, kThreads), alone(plan, 1);
   std::uint64_t shortened = 0, crushed = 0, solids = 0;
   const auto count = [&] {
@@ -149,15 +149,15 @@ bool checkScene(const FeederPlan& plan, int ticks) {
   const auto go = [&](int tickCount) {
     Row row;
     for (int i = 0; i < tickCount; ++i) {
-      const double cpu = readCpuSeconds();
+      const double cpu = readProcessSeconds();
       const auto start = std::chrono::steady_clock::now();
       const scene::TickReport report = tickWorld(world);
       const std::chrono::duration<double> took = std::chrono::steady_clock::now() - start;
-      row.seconds += took.count(), row.cpu += readCpuSeconds() - cpu;
+      row.seconds += took.count(), row.cpu += readProcessSeconds() - cpu;
       FeederFindings now{report.maxPenetration, report.crushedBodies, 0};
       for (const scene::BodySnapshot& body : *report.snapshot->bodies)
         if (!isInside(body)) ++now.outside;
-      row.worst = chooseWorse(row.worst, now);
+      row.worst = mergeWorst(row.worst, now);
     }
     return row;
   };

@@ -76,7 +76,7 @@ bool areSame(const render::Frame& a, const render::Frame& b) {
          std::memcmp(a.depth.data(), b.depth.data(), a.depth.size() * sizeof(float)) == 0;
 }
 
-double readProcessorSeconds() {
+double readProcessSeconds() {
   std::timespec now{};
   ::clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
@@ -93,12 +93,12 @@ render::Frame draw(render::GlRenderer& renderer, const tests::WalkStop& stop, Si
   render::Camera camera = stop.camera;
   camera.width = size.width;
   camera.height = size.height;
-  const double busy = readProcessorSeconds();
+  const double busy = readProcessSeconds();
   const auto begin = Clock::now();
   render::Frame frame =
       renderer.render(*stop.snapshot, camera, {.hiddenEntity = stop.walker, .culling = culling});
   result.seconds += std::chrono::duration<double>(Clock::now() - begin).count();
-  result.processor += readProcessorSeconds() - busy;
+  result.processor += readProcessSeconds() - busy;
   ++result.frames;
   result.statistics.drawn += frame.statistics.drawn;
   result.statistics.occluded += frame.statistics.occluded;

@@ -33,7 +33,7 @@ using render::Camera;
 using render::Frame;
 using scene::Vec3;
 
-double readProcessorSeconds() {
+double readProcessSeconds() {
   timespec now{};
   clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &now);
   return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
@@ -132,9 +132,9 @@ void take(Method& method, const Camera& camera, const render::ReferenceFrame& tr
   render::mergeReports(method.report, render::compareWithReference(method.draw(camera), truth));
   for (int i = 0; i < times; ++i) {
     const auto start = Clock::now();
-    const double begun = readProcessorSeconds();
+    const double begun = readProcessSeconds();
     method.draw(camera);
-    method.processor.push_back(1e3 * (readProcessorSeconds() - begun));
+    method.processor.push_back(1e3 * (readProcessSeconds() - begun));
     method.milliseconds.push_back(1e3 * measureSecondsSince(start));
   }
 }

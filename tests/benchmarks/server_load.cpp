@@ -33,7 +33,7 @@ std::uint64_t computeQuantile(const std::vector<std::uint64_t>& sorted, double q
   return sorted.empty() ? 0 : sorted[static_cast<std::size_t>(q * double(sorted.size() - 1))];
 }
 
-double readProcessorSeconds() {
+double readProcessSeconds() {
   rusage usage{};
   ::getrusage(RUSAGE_SELF, &usage);
   const auto seconds = [](const timeval& time) {
@@ -81,7 +81,7 @@ void printRow(const tests::LoadResult& result, double processor) {
   for (const std::string& fault : result.faults) std::printf("FAULT %s\n", fault.c_str());
 }
 
-server::ServerOptions makeRoomForMany() {
+server::ServerOptions makeCrowdOptions() {
   server::ServerOptions options;
   options.world.limits.connections = 4096;
   return options;
@@ -89,18 +89,18 @@ server::ServerOptions makeRoomForMany() {
 
 bool load(const std::shared_ptr<const scene::Scene>& scene, int clients, double seconds,
           double stateRate, std::size_t watchEvery) {
-  server::Server server(scene, {"127.0.0.1", 0}, makeRoomForMany());
+  server::Server server(scene, {"127.0.0.1", 0}, makeCrowdOptions());
   tests::LoadOptions options;
   options.port = server.port();
   options.places = tests::findStandingPlaces(scene, clients, 1);
   options.seconds = seconds;
   options.stateRate = stateRate;
   options.watchEvery = watchEvery;
-  const double before = readProcessorSeconds();
+  const double before = readProcessSeconds();
   double used = 0;
   v1::Metrics metrics;
   const auto atEnd = [&] {
-    used = readProcessorSeconds() - before;
+    used = readProcessSeconds() - before;
     metrics = protocol::Client("127.0.0.1", server.port()).metrics();
   };
   const tests::LoadResult result = tests::runLoad(options, atEnd, [&] { server.stop(); });
@@ -133,7 +133,7 @@ bool waitUntilSettled(protocol::Client& client) {
 
 bool visit(const std::shared_ptr<const scene::Scene>& scene, int visits) {
   constexpr double kGrowth = 2e6;  // bytes; 2,000 sessions hold over 100 MB
-  server::Server server(scene, {"127.0.0.1", 0}, makeRoomForMany());
+  server::Server server(scene, {"127.0.0.1", 0}, makeCrowdOptions());
   protocol::Client stays("127.0.0.1", server.port());
   v1::SetClock freely;  // so that avatars spawn, and leave with their clients
   freely.mutable_free_run()->set_speed(10);

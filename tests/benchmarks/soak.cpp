@@ -57,7 +57,7 @@ class Soak {
     notices_ += report.notices.size();
   }
 
-  bool isRight() const { return audit_.isClean() && worst_ == 0; }
+  bool hasPassed() const { return audit_.isClean() && worst_ == 0; }
   void printRow() const {
     std::printf(
         "%llu ticks audited, %llu pairs, %llu missed, %llu extra; worst penetration %g m; "
@@ -154,5 +154,5 @@ int main(int argc, char** argv) {
   soak.printRow();
   const bool flat = maxResident <= afterWarmUp + kGrowthAllowed;
   std::printf("memory after the warm-up: %+.1f MB\n", 1e-6 * (maxResident - afterWarmUp));
-  return soak.isRight() && flat ? 0 : 3;
+  return soak.hasPassed() && flat ? 0 : 3;
 }

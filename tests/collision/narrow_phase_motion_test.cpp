@@ -11,13 +11,13 @@ namespace {
 
 using namespace testing;
 
-Vec3 makeRandomDirection(Random& random) {
+Vec3 drawDirection(Random& random) {
   return makeRandomPoint(random, 1).normalized();
 }
 
 Hull makeRoundHull(Random& random, int count) {
   std::vector<Vec3> points;
-  for (int i = 0; i < count; ++i) points.push_back(makeRandomDirection(random));
+  for (int i = 0; i < count; ++i) points.push_back(drawDirection(random));
   return buildHull(points);
 }
 
@@ -32,9 +32,9 @@ struct Motion {
   Motion(Random& random, int vertices, double initialDistance)
       : hullA(makeRoundHull(random, vertices)),
         hullB(makeRoundHull(random, vertices)),
-        axisA(makeRandomDirection(random)),
-        axisB(makeRandomDirection(random)),
-        away(makeRandomDirection(random)),
+        axisA(drawDirection(random)),
+        axisB(drawDirection(random)),
+        away(drawDirection(random)),
         distance(initialDistance) {}
   void step(int k) {
     rotationA = Eigen::AngleAxisd(0.02 * k, axisA).toRotationMatrix();

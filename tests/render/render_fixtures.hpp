@@ -52,7 +52,8 @@ inline scene::AvatarSnapshot makeAvatarAt(scene::EntityId id, const Vec3& feet) 
   return avatar;
 }
 
-/// A square two metres ahead of squareCamera(); its left half is opaque, its right half cut out.
+/// A square two metres ahead of makeSquareCamera(); its left half is opaque, its right half cut
+/// out.
 inline std::shared_ptr<const scene::Scene> makeMaskedSquare() {
   scene::Model model;
   scene::Material leaf;
@@ -70,7 +71,7 @@ inline std::shared_ptr<const scene::Scene> makeMaskedSquare() {
   return std::make_shared<const scene::Scene>(std::move(model));
 }
 
-/// A floor with a repeated chequered texture, in front of squareCamera(), and a mirrored box.
+/// A floor with a repeated chequered texture, in front of makeSquareCamera(), and a mirrored box.
 inline std::shared_ptr<const scene::Scene> makeTexturedRoom() {
   scene::Model model;
   scene::Material tiles;

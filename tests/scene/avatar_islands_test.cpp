@@ -31,7 +31,7 @@ TEST(AvatarIslands, UniteAllWhoseBoundsOverlapInAChainAndLeaveOutTheIdle) {
   const std::vector<std::pair<std::string, double>> places{{"a", 0},  {"b", 20},  {"c", 0.65},
                                                            {"d", 30}, {"e", 1.3}, {"f", 20.65}};
   for (const auto& [name, x] : places) run.order(name, Spawn{{x, 0, 5}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   run.runTicks(5);
   run.order("a", Drive{{0.6, 0, 0}});
   run.order("f", Drive{{0.6, 0, 0}});

@@ -41,7 +41,7 @@ TEST(Chain, JointsComeExactlyToTheirTargets) {
   WorldFixture run({makeFloorBox()});
   run.order("arm", makeArmAt({0, 0, 0}));
   run.order("arm", makeDriveJoints({1.0, 0.7, {}, 0.25}));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::done), 1);
   const auto view = run.getView("arm");
   ASSERT_EQ(view.joints.size(), 4u);
@@ -59,7 +59,7 @@ TEST(Chain, JointsComeExactlyToTheirTargets) {
 TEST(Chain, TheDurationOfARotationFollowsFromItsSpeed) {
   WorldFixture run({makeFloorBox()});
   run.order("arm", makeArmAt({0, 0, 0}));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   run.order("arm", makeDriveJoints({1.5}, 3));
   run.runTicks(29);
   EXPECT_NEAR(run.getView("arm").joints[0].value, 1.45, 1e-9);
@@ -71,7 +71,7 @@ TEST(Chain, AWallStopsTheArmAtEpsilonAndIsNamed) {
   run.order("arm", makeArmAt({0, 0, 0}));
   run.order("arm", makeDriveJoints({0, 0}));
   run.order("arm", makeDriveJoints({1.5}, 2));  // towards -Z
-  run.waitUntilIdle();
+  run.runUntilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "wall");
   const double value = run.getView("arm").joints[0].value;
@@ -100,7 +100,7 @@ TEST(Chain, AtAnySpeedAPaneOfNoThicknessIsNotCrossed) {
     run.order("arm", makeArmAt({0, 0, 0}));
     run.order("arm", makeDriveJoints({0, 0}, speed));
     run.order("arm", makeDriveJoints({3}, speed));
-    run.waitUntilIdle();
+    run.runUntilIdle();
     EXPECT_EQ(run.count(Kind::blocked), 1) << speed;
     EXPECT_NEAR(run.getView("arm").joints[0].value, 0.69, 0.05) << speed;
     EXPECT_EQ(run.worstPenetration, 0);
@@ -145,7 +145,7 @@ TEST(Chain, TheOtherJointsContinueIfOneIsStopped) {
   run.order("arm", makeArmAt({0, 0, 0}));
   run.order("arm", makeDriveJoints({0, 0}));
   run.order("arm", makeDriveJoints({1.5, 0.4, {}, 0.1}));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.getView("arm").joints[1].value, 0.4);
   EXPECT_LT(run.getView("arm").joints[0].value, 1.5);
 }
@@ -155,11 +155,11 @@ TEST(Chain, AHandSlidesAlongATableAndPushesOntoIt) {
   run.order("arm", makeArmAt({0, 0, 0}));
   run.order("arm", makeDriveJoints({-0.5, 0.3}));
   run.order("arm", makeDriveJoints({{}, -0.5}));  // down onto the table
-  run.waitUntilIdle();
+  run.runUntilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
   EXPECT_TRUE(run.hasTouched("table"));
   run.order("arm", makeDriveJoints({0.5}));  // along the table
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.getView("arm").joints[0].value, 0.5);
   EXPECT_EQ(run.worstPenetration, 0);
 }
@@ -169,15 +169,15 @@ TEST(Chain, AnAvatarStopsTheArmAndTheArmStopsAnAvatar) {
   run.order("arm", makeArmAt({0, 0, 0}));
   run.order("arm", makeDriveJoints({-1.2, 0.2}));
   run.order("bob", Spawn{{1.2, 0, 0}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   run.order("arm", makeDriveJoints({1.2}));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   ASSERT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "bob");
   run.order("ann", Spawn{{-2, 0, 1.2}});
   run.order("ann", makeWalkTo(4, 1.2));
   run.order("ann", makeWalkTo(4, 0.5));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.worstPenetration, 0);
 }
 
@@ -189,7 +189,7 @@ TEST(Chain, NonNeighbourLinksStopEachOtherIfRequested) {
     run.order("arm", arm);
     run.order("arm", makeDriveJoints({{}, 2.6}));
     run.order("arm", makeDriveJoints({{}, {}, 2.8}));  // would move the hand down into the base
-    run.waitUntilIdle();
+    run.runUntilIdle();
     EXPECT_EQ(run.count(Kind::blocked) > 0, selfContact);
   }
 }
@@ -199,7 +199,7 @@ TEST(Chain, AnArmOnABaseThatWalksIsSweptWhole) {
   run.order("arm", makeArmAt({0, 0, 0}));
   run.order("arm", makeDriveJoints({-1.5, 0}));  // the arm points towards +Z
   run.order("arm", makeWalkTo(6, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "post");
   EXPECT_LT(run.getFeet("arm").x(), 3);
@@ -259,7 +259,7 @@ TEST(Chain, AbsurdLinksAndTargetsAreRefusedAndChangeNothing) {
   run.order("arm", makeDriveJoints({3.5}));
   run.order("arm", makeDriveJoints({0, 0, 0, 0, 0}));
   run.order("arm", Crouch{1});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::refused), 3);
 }
 
@@ -269,7 +269,7 @@ TEST(Chain, PartsTurnAsTheSpawnFaces) {
   spawn.facing = 90;
   spawn.parts = {makeBoxPoints({0, 0, -0.1}, {1, 1, 0.1})};
   run.order("box", spawn);
-  run.waitUntilIdle();
+  run.runUntilIdle();
   const Aabb box = run.getView("box").shape->box;
   EXPECT_NEAR(box.min.z(), -1, 1e-12);
   EXPECT_NEAR(box.max.z(), 0, 1e-12);

@@ -63,7 +63,7 @@ inline bool areSame(const BodySnapshot& a, const BodySnapshot& b) {
          a.blockedBy == b.blockedBy;
 }
 template <class List>
-bool areSameLists(const List& a, const List& b) {
+bool areListsSame(const List& a, const List& b) {
   bool all = a.size() == b.size();
   for (std::size_t i = 0; all && i < a.size(); ++i) all = areSame(a[i], b[i]);
   return all;
@@ -72,10 +72,10 @@ bool areSameLists(const List& a, const List& b) {
 /// The first difference between two tick reports; "" if they are equal.
 inline std::string findDifference(const TickReport& a, const TickReport& b) {
   if (a.snapshot->stateHash != b.snapshot->stateHash) return "state hash";
-  if (!areSameLists(a.contacts, b.contacts)) return "contacts";
-  if (!areSameLists(a.notices, b.notices)) return "notices";
-  if (!areSameLists(a.snapshot->avatars, b.snapshot->avatars)) return "avatars";
-  if (!areSameLists(*a.snapshot->bodies, *b.snapshot->bodies)) return "bodies";
+  if (!areListsSame(a.contacts, b.contacts)) return "contacts";
+  if (!areListsSame(a.notices, b.notices)) return "notices";
+  if (!areListsSame(a.snapshot->avatars, b.snapshot->avatars)) return "avatars";
+  if (!areListsSame(*a.snapshot->bodies, *b.snapshot->bodies)) return "bodies";
   if (a.pairs != b.pairs) return "pairs";
   if (a.narrowQueries != b.narrowQueries) return "narrow queries";
   if (a.rationalQueries != b.rationalQueries) return "rational queries";
@@ -109,7 +109,7 @@ inline void compareCopies(const std::shared_ptr<const Scene>& scene, const World
       copies.push_back({t, restoreWorld(scene, bytes)});
       ASSERT_EQ(makeCheckpoint(copies.back().world), bytes) << "tick " << t;
       ASSERT_EQ(copies.back().world.snapshot()->stateHash, world.snapshot()->stateHash);
-      ASSERT_TRUE(areSameLists(*copies.back().world.snapshot()->bodies, *world.snapshot()->bodies));
+      ASSERT_TRUE(areListsSame(*copies.back().world.snapshot()->bodies, *world.snapshot()->bodies));
       for (Copy& copy : copies)
         if (now != commands.end() && &copy != &copies.back()) give(copy.world, now->second);
       if (!waiting && now != commands.end())

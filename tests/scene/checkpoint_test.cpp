@@ -168,7 +168,7 @@ TEST(Checkpoint, ACopyFromAnyTickOfABusyRoomIsBitEqual) {
   }
 }
 
-/// The busy room after some ticks, with motions and contacts in progress.
+/// The lively room after some ticks, with motions and contacts in progress.
 World makeLivelyWorld(std::uint64_t ticks = 200) {
   World world(makeLivelyRoom(), makeWatchfulSettings());
   const auto commands = makeRoomCommands(7, ticks);

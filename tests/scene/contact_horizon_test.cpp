@@ -39,8 +39,8 @@ class Checker {
 
   explicit Checker(const World& world, const ContactHorizons::Options& options = {})
       : world_(world),
-        index_(shareScene(world)),
-        horizons(shareScene(world), world.settings(), options) {
+        index_(borrowScene(world)),
+        horizons(borrowScene(world), world.settings(), options) {
     horizons.select(std::nullopt);
   }
 
@@ -219,8 +219,8 @@ TEST(ContactHorizon, FewerPairsAreExaminedThanThoseNearTheAvatars) {
   ContactHorizons::Options everything;
   everything.examineAll = true;
   everything.maxWork = 100'000'000;
-  ContactHorizons lazy(shareScene(crowds.run.world), crowds.run.world.settings()),
-      eager(shareScene(crowds.run.world), crowds.run.world.settings(), everything);
+  ContactHorizons lazy(borrowScene(crowds.run.world), crowds.run.world.settings()),
+      eager(borrowScene(crowds.run.world), crowds.run.world.settings(), everything);
   for (ContactHorizons* one : {&lazy, &eager}) one->select(std::nullopt);
   for (int i = 0; i < 300; ++i) {
     if (i % 120 == 0) crowds.turn();
@@ -235,8 +235,8 @@ TEST(ContactHorizon, FewerPairsAreExaminedThanThoseNearTheAvatars) {
 TEST(ContactHorizon, IsInTheFutureWhereTheWayIsClear) {
   TwoCrowds crowds(4);
   World& world = crowds.run.world;
-  EntityIndex index(shareScene(world));
-  ContactHorizons horizons(shareScene(world), world.settings());
+  EntityIndex index(borrowScene(world));
+  ContactHorizons horizons(borrowScene(world), world.settings());
   horizons.select(std::nullopt);
   int clear = 0;
   for (int i = 0; i < 200; ++i) {
@@ -342,7 +342,7 @@ TEST(ContactHorizon, ADistantAvatarIsOneSimpleQuotient) {
   run.order("ann", Spawn{Vec3(0, 0.001, 0)});
   run.order("bob", Spawn{Vec3(5.6, 0.001, 0)});
   run.runTicks(20);
-  ContactHorizons horizons(shareScene(run.world), run.world.settings());
+  ContactHorizons horizons(borrowScene(run.world), run.world.settings());
   const EntityId ann = run.getView("ann").id, bob = run.getView("bob").id;
   horizons.select(std::set{ann});
   horizons.update(run.world.snapshot());
@@ -360,7 +360,7 @@ TEST(ContactHorizon, NewAvatarsAreIncludedAndLeftOnesAreNot) {
   WorldFixture run({makeFloorBox()}, makeWalkingSettings());
   run.order("ann", Spawn{Vec3(0, 0.001, 0)});
   run.runTicks(20);
-  ContactHorizons horizons(shareScene(run.world), run.world.settings());
+  ContactHorizons horizons(borrowScene(run.world), run.world.settings());
   const EntityId ann = run.getView("ann").id;
   horizons.select(std::set{ann});  // without the new one
   horizons.update(run.world.snapshot());
@@ -387,7 +387,7 @@ TEST(ContactHorizon, RestingAvatarsCostNoExamination) {
   run.order("ann", Spawn{Vec3(0, 0.001, 0)});
   run.order("bob", Spawn{Vec3(0, 0.001, 0.7)});
   run.runTicks(30);
-  ContactHorizons horizons(shareScene(run.world), run.world.settings());
+  ContactHorizons horizons(borrowScene(run.world), run.world.settings());
   horizons.select(std::nullopt);
   std::uint64_t first = 0;
   for (int i = 0; i < 130; ++i) {
@@ -410,7 +410,7 @@ TEST(ContactHorizon, NamesTheNearestDynamicBodyAndProvesNothingOfIt) {
   BodyFixture t(std::move(model), makeWalkingSettings());
   t.order("ann", Spawn{Vec3(0, 0.001, 0)});
   t.runTicks(20);
-  ContactHorizons horizons(shareScene(t.world), t.world.settings());
+  ContactHorizons horizons(borrowScene(t.world), t.world.settings());
   horizons.select(std::nullopt);
   horizons.update(t.world.snapshot());
   ASSERT_EQ(horizons.horizons().size(), 1u);
@@ -424,14 +424,14 @@ TEST(ContactHorizon, NamesTheNearestDynamicBodyAndProvesNothingOfIt) {
 TEST(ContactHorizon, StartsOverAfterAGapOfTicksAndForOtherAvatars) {
   TwoCrowds crowds(3);
   World& world = crowds.run.world;
-  ContactHorizons horizons(shareScene(world), world.settings());
+  ContactHorizons horizons(borrowScene(world), world.settings());
   horizons.select(std::nullopt);
   horizons.update(world.snapshot());
   EXPECT_GE(horizons.horizons().size(), 4u);
   crowds.turn();
   crowds.run.runTicks(200);
   horizons.update(world.snapshot());
-  ContactHorizons fresh(shareScene(world), world.settings());
+  ContactHorizons fresh(borrowScene(world), world.settings());
   fresh.select(std::nullopt);
   fresh.update(world.snapshot());
   for (const auto& [id, horizon] : fresh.horizons()) {

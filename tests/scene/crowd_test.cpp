@@ -27,7 +27,7 @@ TEST(Crowd, TwoAvatarsThatMeetHeadOnStandBitExactlyStill) {
     WorldFixture run(makeCorridorBoxes(1.0, 10));
     run.order("ann", Spawn{{-2, 0, -0.1}});
     run.order("bob", Spawn{{2, 0, -0.1 + (aside > 0.19 ? 0.19 : aside)}});
-    run.waitUntilIdle();
+    run.runUntilIdle();
     run.order("ann", Drive{{1.3, 0, 0.1 * aside}});
     run.order("bob", Drive{{-1.4, 0, 0.2 * aside}});
     run.runTicks(400);
@@ -46,7 +46,7 @@ TEST(Crowd, AvatarDrivenIntoCornerStands) {
   for (const double angle : {0.1, 0.5, 0.9}) {
     WorldFixture run(makeCorridorBoxes(1.0, 10));
     run.order("ann", Spawn{{9, 0, 0}});
-    run.waitUntilIdle();
+    run.runUntilIdle();
     run.order("ann", Drive{{1 - angle, 0, angle}});
     run.runTicks(900);
     const Vec3 feet = run.getFeet("ann");
@@ -88,7 +88,7 @@ TEST(Crowd, AvatarDrivenIntoTooNarrowGapStands) {
                       {"left", {2, 0, -6}, {2.05, 3, -0.5 * gap}},
                       {"right", {2, 0, 0.5 * gap}, {2.05, 3, 6}}});
     run.order("ann", Spawn{{0, 0, 0.003 * i}});
-    run.waitUntilIdle();
+    run.runUntilIdle();
     run.order("ann", Drive{{1.3, 0, 0.1 * turn}});
     run.runTicks(1200);
     const Vec3 feet = run.getFeet("ann");

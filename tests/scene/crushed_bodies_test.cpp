@@ -11,14 +11,6 @@ using namespace testing;
 using Action = BodyCommand::Action;
 using Event = ContactEvent::Kind;
 
-std::vector<Vec3> makeCornersOfBox(const Vec3& min, const Vec3& max) {
-  std::vector<Vec3> points;
-  for (int i = 0; i < 8; ++i)
-    points.emplace_back(i & 1 ? max.x() : min.x(), i & 2 ? max.y() : min.y(),
-                        i & 4 ? max.z() : min.z());
-  return points;
-}
-
 /// An avatar that is crushed: how it enters, and its orders before the body approaches.
 struct Victim {
   const char* name;
@@ -35,22 +27,22 @@ void PrintTo(const Victim& victim, std::ostream* to) {
 /// A trolley: a plate with a post at its end.
 Spawn makeTrolley() {
   Spawn spawn;
-  spawn.parts = {makeCornersOfBox({-0.25, 0.02, -0.2}, {0.25, 0.25, 0.2}),
-                 makeCornersOfBox({-0.25, 0.25, -0.05}, {-0.15, 1.1, 0.05})};
+  spawn.parts = {makeBoxPoints({-0.25, 0.02, -0.2}, {0.25, 0.25, 0.2}),
+                 makeBoxPoints({-0.25, 0.25, -0.05}, {-0.15, 1.1, 0.05})};
   return spawn;
 }
 
 /// A base with an arm that points forward and upward.
 Spawn makeArm() {
   Spawn spawn;
-  spawn.parts = {makeCornersOfBox({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
+  spawn.parts = {makeBoxPoints({-0.2, 0, -0.2}, {0.2, 0.5, 0.2})};
   spawn.links = {{-1,
                   {LinkJoint::Kind::revolute, {0, 0.6, 0}, {0, 0, 1}, -0.4, 1.8},
-                  makeCornersOfBox({-0.05, -0.05, -0.05}, {0.4, 0.05, 0.05}),
+                  makeBoxPoints({-0.05, -0.05, -0.05}, {0.4, 0.05, 0.05}),
                   0.9},
                  {0,
                   {LinkJoint::Kind::revolute, {0.45, 0, 0}, {0, 0, 1}, -2, 2},
-                  makeCornersOfBox({0, -0.04, -0.04}, {0.35, 0.04, 0.04}),
+                  makeBoxPoints({0, -0.04, -0.04}, {0.35, 0.04, 0.04}),
                   -0.9}};
   return spawn;
 }

@@ -55,7 +55,7 @@ TickCommands makeCommands(const Scene& scene, int avatars, int tick, Seeded& ran
     if (tick % 20 != i % 20) continue;
     const double speed = random.drawUniform(0.5, 4);
     commands.avatars.push_back(
-        {makeName(i), Drive{speed * makeRandomVelocity(random, i % 4 == 3).normalized()}, 0});
+        {makeName(i), Drive{speed * drawVelocity(random, i % 4 == 3).normalized()}, 0});
     if (i % 4 == 2)
       commands.avatars.push_back(
           {makeName(i), DriveJoints{{random.drawUniform(-3, 3)}, 2, true}, 0});

@@ -73,7 +73,7 @@ TEST(DynamicBodies, ABoxThatRestsKeepsItsContactHoweverFarNearMissesAreLookedFor
     WorldSettings settings;
     settings.nearMissDistance = nearMiss;
     BodyFixture t(makeLooseModel({{"box", {-0.2, 0.7, -0.2}, {0.2, 1.1, 0.2}}}), settings);
-    t.waitUntilIdle();
+    t.runUntilIdle();
     t.runTicks(10);
     EXPECT_TRUE(t.getBody("box").asleep);
     EXPECT_FALSE(t.getBody("box").moved) << nearMiss;
@@ -473,7 +473,7 @@ TEST(DynamicBodies, BodiesThatALoopingPathShakesDoNotDelayIdle) {
   EXPECT_FALSE(t.getBody("box").asleep);
   t.submit({"tray", BodyCommand::Action::stop, 0, 0, {}});
   EXPECT_FALSE(t.step().idle);
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_TRUE(t.getBody("box").asleep);
 }
 
@@ -501,7 +501,7 @@ TEST(DynamicBodies, ABoxBetweenAnAvatarAndAWallComesToRestInContact) {
   BodyFixture t(std::move(model));
   t.order("ann", Spawn{.position = {0, 0.001, 0}});
   t.order("ann", Walk{{{3, 0, 0}}, 1.3});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_TRUE(t.getBody("box").asleep);
   ASSERT_GE(t.countEvents(Event::begin, "ann", "box"), 1);
   const auto hit = std::find_if(t.events.begin(), t.events.end(), [&](const ContactEvent& e) {
@@ -517,7 +517,7 @@ TEST(DynamicBodies, ABoxThatSleepsOnSomeonesHeadFallsWhenHeGoesOrLeavesOrCrouche
     Model model = makeLooseModel({{"box", {-0.4, 1.76, -0.4}, {0.4, 2.0, 0.4}}});
     BodyFixture t(std::move(model));
     t.order("ann", Spawn{.position = {0, 0.001, 0}});
-    t.waitUntilIdle();
+    t.runUntilIdle();
     const double height = t.getBody("box").position.y();
     ASSERT_TRUE(t.getBody("box").asleep) << how << " " << t.getBody("box").position.transpose();
     ASSERT_GT(height, 1.7) << how;

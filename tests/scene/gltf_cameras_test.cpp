@@ -10,25 +10,13 @@
 #include <nlohmann/json.hpp>
 
 #include "scene/import/import_model.hpp"
+#include "tests/scene/hand_made_files.hpp"
 #include "tests/support/temporary_folder.hpp"
 
 namespace enfilade::scene {
 namespace {
 
 using Json = nlohmann::json;
-
-std::string toBase64(const std::string& bytes) {
-  static const char* letters = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
-  std::string text;
-  for (std::size_t i = 0; i < bytes.size(); i += 3) {
-    unsigned group = 0;
-    for (std::size_t k = 0; k < 3; ++k)
-      group = group << 8U | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0U);
-    for (std::size_t k = 0; k < 4; ++k)
-      text += i + k <= bytes.size() ? letters[group >> (18U - 6U * k) & 63U] : '=';
-  }
-  return text;
-}
 
 /// A glTF file with one camera below one node that can be animated.
 class GltfFile {
@@ -71,8 +59,9 @@ class GltfFile {
   GltfCameraPath sample(double fps, const std::string& name = "") const {
     const auto file = tests::makeOwnFile("camera.gltf");
     Json whole = json_;
-    whole["buffers"] = {{{"byteLength", bytes_.size()},
-                         {"uri", "data:application/octet-stream;base64," + toBase64(bytes_)}}};
+    whole["buffers"] = {
+        {{"byteLength", bytes_.size()},
+         {"uri", "data:application/octet-stream;base64," + tests::encodeBase64(bytes_)}}};
     std::ofstream(file) << whole.dump();
     return sampleGltfCamera(file, name, fps);
   }

@@ -31,8 +31,8 @@ struct IfcHouse {
            "=IFCSHAPEREPRESENTATION(#20,'Body','SweptSolid',(" + n(3) + "));\n" + n(5) +
            "=IFCPRODUCTDEFINITIONSHAPE($,$,(" + n(4) + "));\n";
   }
-  /// A prism over an outline of x and y at its placement, as box(): its product shape is id + 5.
-  /// Uses the numbers id .. id + 9 + corners.
+  /// A prism over an outline of x and y at its placement, as makeBox(): its product shape is id
+  /// + 5. Uses the numbers id .. id + 9 + corners.
   std::string makePrism(int id, const std::vector<std::array<double, 2>>& outline,
                         double height) const {
     const auto n = [&](std::size_t k) {

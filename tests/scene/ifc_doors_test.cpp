@@ -86,7 +86,7 @@ Model collectDoors(Model model, IfcDoors doors = IfcDoors::movable) {
 Vec3 computeOpenPosition(const Model& model, const std::string& name, const Vec3& point) {
   BodyFixture run{Model(model)};
   run.submit({name, BodyCommand::Action::open, 0, 0, {}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   const Body& body = run.getBody(name);
   return body.rotation * (point - body.shape->origin) + body.position;
 }

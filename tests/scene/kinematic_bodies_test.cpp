@@ -40,7 +40,7 @@ TEST(KinematicBodies, ADoorOpensAtItsSpeedAndStandsThere) {
   t.runTicks(30);
   EXPECT_NEAR(t.getBody("door").drive.jointPosition, kQuarter / 2, 1e-12);
   EXPECT_NEAR(t.getBody("door").angularVelocity.y(), kQuarter, 1e-9);
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(t.getBody("door").drive.jointPosition, kQuarter);
   EXPECT_LE(t.world.data().tick, 61u);
   const Vec3 tip = t.getBody("door").rotation * Vec3(1, 0, 0) + t.getBody("door").position;
@@ -56,7 +56,7 @@ TEST(KinematicBodies, ACloserClosesTheDoorAfterItsDelay) {
   EXPECT_EQ(t.getBody("door").drive.jointPosition, 0.3);
   t.runTicks(29);
   EXPECT_EQ(t.getBody("door").drive.jointPosition, 0.3);
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(t.getBody("door").drive.jointPosition, 0);
 }
 
@@ -65,7 +65,7 @@ TEST(KinematicBodies, ADoorPushesAnAvatarThatCanYield) {
   t.order("ann", Spawn{{0.6, 0.01, -0.5}, 0, 0.3, 1.75});
   t.runTicks(30);
   t.submit({"door", Action::open, 0, 0, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(t.getBody("door").drive.jointPosition, kQuarter);
   EXPECT_EQ(t.countEvents(Event::blocked, "door", "ann"), 0);
   EXPECT_GE(t.countEvents(Event::begin, "ann", "door"), 1);
@@ -88,7 +88,7 @@ TEST(KinematicBodies, ADoorStopsAtAnAvatarAgainstAWallAndReportsItOnce) {
   EXPECT_EQ(namePenetratingPairs(t.world), "");
   // When the avatar has left, the door continues.
   t.order("ann", Leave{});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(t.getBody("door").drive.jointPosition, kQuarter);
 }
 
@@ -152,7 +152,7 @@ TEST(KinematicBodies, ALiftCarriesItsRiderUpAndDown) {
 TEST(KinematicBodies, ALiftThatComesDownOnSomeoneStopsAtTheHead) {
   BodyFixture t(makeLift());
   t.submit({"lift", Action::moveToLevel, 0, 1, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   t.order("ann", Spawn{{0.2, 0.01, 0}, 0, 0.3, 1.75});
   t.runTicks(30);
   t.submit({"lift", Action::moveToLevel, 0, 0, 30.0});
@@ -185,7 +185,7 @@ TEST(KinematicBodies, OnABlockedLiftNoAvatarRises) {
   BodyFixture t(std::move(model));
   t.order("tall", Spawn{.position = {-0.5, 0.2, 0}});
   t.order("free", Spawn{.position = {0.5, 0.2, 0}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   for (int again = 0; again < 3; ++again) {
     t.submit({"lift", Action::moveTo, 3, 0, {}});
     t.runTicks(120);
@@ -223,7 +223,7 @@ TEST(KinematicBodies, APlatformCarriesSidewaysAndATurntableRound) {
   EXPECT_NEAR(t.getFeet("ann").x(), 4, 0.02);
   t.runTicks(60);
   EXPECT_NEAR(t.getFeet("ann").x(), 2, 0.1);
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_NEAR(t.getFeet("ann").x(), 4, 0.1);
   EXPECT_EQ(namePenetratingPairs(t.world), "");
 }
@@ -407,7 +407,7 @@ TEST(KinematicBodies, ADoorOpensAwayFromAWalkingAvatar) {
   BodyFixture t(std::move(model));
   t.order("ann", Spawn{{0.6, 0.01, 2}, 0, 0.2, 1.75});
   t.order("ann", Walk{{{0.6, 0, -2}}, 1.4});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_NEAR(t.getFeet("ann").z(), -2, 0.01);
   EXPECT_GT(t.getBody("door").drive.jointPosition, 0.5);
 }
@@ -418,7 +418,7 @@ TEST(KinematicBodies, TriggersReportEnterAndLeave) {
   BodyFixture t(std::move(model));
   t.order("ann", Spawn{{-1, 0.01, 0}, 0, 0.3, 1.75});
   t.order("ann", Walk{{{4, 0, 0}}, 2});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_NEAR(t.getFeet("ann").x(), 4, 0.01) << "not solid";
   ASSERT_EQ(t.countEvents(Event::enter, "ann", "zone"), 1);
   ASSERT_EQ(t.countEvents(Event::leave, "ann", "zone"), 1);
@@ -449,7 +449,7 @@ TEST(KinematicBodies, ANearMissBeginsIsClosestAndEnds) {
                 settings);
   t.order("ann", Spawn{{-2, 0.01, 0}, 0, 0.3, 1.75});
   t.order("ann", Walk{{{2, 0, 0}}, 1.5});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   std::vector<ContactEvent> near;
   for (const ContactEvent& e : t.events)
     if (e.kind == Event::nearMiss && findEntityName(t.world, e.b) == "pillar") near.push_back(e);

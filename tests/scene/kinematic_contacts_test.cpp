@@ -48,7 +48,7 @@ std::vector<ContactEvent> findEventsBetween(const BodyFixture& t, const std::str
 TEST(KinematicContacts, ALiftReportsAGrazedBeamButNotItsFloor) {
   BodyFixture t(makeLiftUnderABeam());
   t.submit({"lift", Action::moveToLevel, 0, 1, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   const auto up = findEventsBetween(t, "lift", "beam");
   ASSERT_EQ(up.size(), 2u);
   EXPECT_EQ(up[0].kind, Event::begin);
@@ -58,7 +58,7 @@ TEST(KinematicContacts, ALiftReportsAGrazedBeamButNotItsFloor) {
   EXPECT_EQ(up[1].separation.verdict, collision::Verdict::separated);
   EXPECT_LT(up[1].separation.normal.y(), -0.9) << "the lift is above";
   t.submit({"lift", Action::moveToLevel, 0, 0, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(findEventsBetween(t, "lift", "beam").size(), 4u);
   EXPECT_EQ(t.events.size(), 4u) << "leaving the floor and returning are not reported";
 }
@@ -66,7 +66,7 @@ TEST(KinematicContacts, ALiftReportsAGrazedBeamButNotItsFloor) {
 TEST(KinematicContacts, AContactAtRestLastsAndIsReportedOnce) {
   BodyFixture t(makeLiftUnderABeam());
   t.submit({"lift", Action::moveTo, 1.6, 0, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(t.step().activeContacts, 1u);
   t.runTicks(60);
   EXPECT_EQ(findEventsBetween(t, "lift", "beam").size(), 1u);
@@ -82,14 +82,14 @@ TEST(KinematicContacts, DoorsThatCollideAreReportedByTheLowerId) {
   model.bodies = {makeLeafSpec("right door", 0, 1.04), makeLeafSpec("left door", 1, -1.04)};
   BodyFixture t(std::move(model));
   t.submit({"left door", Action::moveTo, -kQuarter, 0, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_TRUE(t.events.empty());
   t.submit({"right door", Action::moveTo, kQuarter, 0, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(t.countEvents(Event::begin, "right door", "left door"), 1);
   EXPECT_EQ(t.countEvents(Event::end, "right door", "left door"), 0);
   t.submit({"left door", Action::moveTo, 0, 0, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(t.countEvents(Event::end, "right door", "left door"), 1);
   EXPECT_EQ(t.events.size(), 2u);
 }
@@ -105,7 +105,7 @@ TEST(KinematicContacts, APathBodyReportsAPenetratedShelf) {
   WorldSettings settings;
   settings.nearMissDistance = 0.2;
   BodyFixture t(std::move(model), settings);
-  t.waitUntilIdle();
+  t.runUntilIdle();
   std::vector<std::pair<Event, Phase>> reported;
   for (const ContactEvent& e : findEventsBetween(t, "cart", "shelf"))
     reported.emplace_back(e.kind, e.phase);
@@ -130,7 +130,7 @@ TEST(KinematicContacts, AnObjectPassedBetweenTwoTicksBeginsAndEnds) {
   settings.nearMissDistance = 0.05;
   BodyFixture t(std::move(model), settings);
   t.submit({"cart", Action::open, 0, 0, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   ASSERT_EQ(t.events.size(), 2u);
   EXPECT_EQ(findEntityName(t.world, t.events[0].b), "sheet");
   EXPECT_EQ(t.events[0].kind, Event::begin);
@@ -153,7 +153,7 @@ TEST(KinematicContacts, ALeafThatTurnsPastAPostBetweenTwoTicksTouchesIt) {
   ASSERT_EQ(t.events.size(), 2u);
   EXPECT_EQ(t.countEvents(Event::begin, "door", "post"), 1);
   EXPECT_EQ(t.countEvents(Event::end, "door", "post"), 1);
-  t.waitUntilIdle();
+  t.runUntilIdle();
   EXPECT_EQ(t.events.size(), 2u);
 }
 
@@ -241,7 +241,7 @@ BodyFixture makeTrayThatSlid(Model model, double high) {
   settings.nearMissDistance = 0.3;
   BodyFixture t(std::move(model), settings);
   t.submit({"tray", Action::open, 0, 0, {}});
-  t.waitUntilIdle();
+  t.runUntilIdle();
   return t;
 }
 
@@ -643,7 +643,7 @@ TEST(KinematicContacts, ARestoredWorldContinuesIdentically) {
         i % 3 == 0 ? makeRandomCommand(chance, scene->model()) : TickCommands{};
     give(world, commands), give(*copy, commands);
     const TickReport one = tickWorld(world), other = tickWorld(*copy);
-    ASSERT_TRUE(areSameLists(one.contacts, other.contacts)) << "tick " << i;
+    ASSERT_TRUE(areListsSame(one.contacts, other.contacts)) << "tick " << i;
     ASSERT_EQ(one.snapshot->stateHash, other.snapshot->stateHash) << "tick " << i;
     reported += one.contacts.size();
   }

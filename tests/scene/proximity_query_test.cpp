@@ -33,7 +33,7 @@ Object strewTriangles(Model& model, std::mt19937& random, const Vec3& middle, do
 struct Still {
   explicit Still(Model model) : world(std::make_shared<const Scene>(std::move(model))) {}
   World world;
-  EntityIndex index{shareScene(world)};
+  EntityIndex index{borrowScene(world)};
   SceneAt then{index, *world.snapshot()};
 };
 
@@ -179,7 +179,7 @@ TEST(PairProximity, BoxesHaveTheDistancesThatWereBuilt) {
 TEST(PairProximity, NearbyEntitiesEqualThoseOfTheTick) {
   WorldFixture run(
       {makeFloorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}, {"post", {0, 0, 2}, {0.2, 3, 2.2}}});
-  EntityIndex index(shareScene(run.world));
+  EntityIndex index(borrowScene(run.world));
   run.order("ann", Spawn{Vec3(0, 0.001, 0), 0});
   run.order("ann", Walk{{Vec3(8, 0, 0)}, 2});
   for (int i = 0; i < 240; ++i) {

@@ -22,7 +22,7 @@ std::shared_ptr<const Scene> makeWallAndPane() {
   return std::make_shared<const Scene>(std::move(model));
 }
 
-Snapshot makeSomeoneAt(const Vec3& feet) {
+Snapshot makeSnapshotWithAvatarAt(const Vec3& feet) {
   Snapshot snapshot;
   AvatarSnapshot ann;
   ann.id = 100;
@@ -81,7 +81,7 @@ TEST(RayCaster, MeetsAvatarsWhereTheyAreNow) {
   RayCaster caster(makeBoxScene({makeFloorBox()}));
   const Ray ray{{-5, 1, 0}, Vec3::UnitX()};
   EXPECT_FALSE(caster.firstHit(ray));
-  caster.update(makeSomeoneAt({3, 0, 0}));
+  caster.update(makeSnapshotWithAvatarAt({3, 0, 0}));
   const auto hit = caster.firstHit(ray);
   ASSERT_TRUE(hit);
   EXPECT_EQ(hit->entity, 100u);
@@ -89,7 +89,7 @@ TEST(RayCaster, MeetsAvatarsWhereTheyAreNow) {
   EXPECT_FALSE(caster.firstHit(ray, {100, false})) << "the querying avatar does not see itself";
   EXPECT_TRUE(caster.isBlocked(ray));
   EXPECT_FALSE(caster.isBlocked(ray, {100, false}));
-  caster.update(makeSomeoneAt({3, 0, 4}));
+  caster.update(makeSnapshotWithAvatarAt({3, 0, 4}));
   EXPECT_FALSE(caster.firstHit(ray));
   caster.update({});
   EXPECT_FALSE(caster.firstHit({{-5, 1, 4}, Vec3::UnitX()}));

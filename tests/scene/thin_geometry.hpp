@@ -133,7 +133,7 @@ inline double drawSpeed(Seeded& random) {
 }
 
 /// A velocity for an avatar, sometimes straight at a wall.
-inline Vec3 makeRandomVelocity(Seeded& random, bool flies) {
+inline Vec3 drawVelocity(Seeded& random, bool flies) {
   const double angle = random.drawBelow(4) == 0 ? 0.5 * 3.14159265358979 * random.drawBelow(4)
                                                 : random.drawUniform(0, 6.2832);
   const double speed = drawSpeed(random);
@@ -185,7 +185,7 @@ struct CellFixture {
       for (std::size_t i = 0; i < cells.size(); ++i) {
         const bool flies = i % 3 == 1;
         if (k == 0 && flies) command(i, Fly{});
-        if (k % 3 == 1) command(i, Drive{makeRandomVelocity(random, flies)});
+        if (k % 3 == 1) command(i, Drive{drawVelocity(random, flies)});
         if (i % 3 == 2 && k % 7 == 3) command(i, Jump{random.drawUniform(0.05, 2.5)});
       }
       step(k % 16 == 0);

@@ -57,7 +57,7 @@ TEST_P(ThinGeometry, AreNotCrossedByRandomMovesOfAnySpeed) {
   EXPECT_LT(run.blocked, run.moves * 19 / 20);
 }
 
-std::vector<Shut> listShut() {
+std::vector<Shut> listShutCells() {
   std::vector<Shut> all;
   for (std::uint64_t seed = 1; seed <= 3; ++seed)
     for (const char* in : {"Sheets", "Slivers", "Panes", "Gaps", "Stairs"})
@@ -66,9 +66,10 @@ std::vector<Shut> listShut() {
   return all;
 }
 
-INSTANTIATE_TEST_SUITE_P(All, ThinGeometry, ::testing::ValuesIn(listShut()), [](const auto& shut) {
-  return shut.param.in + std::to_string(shut.param.seed);
-});
+INSTANTIATE_TEST_SUITE_P(All, ThinGeometry, ::testing::ValuesIn(listShutCells()),
+                         [](const auto& shut) {
+                           return shut.param.in + std::to_string(shut.param.seed);
+                         });
 
 TEST(ThinGaps, ADoorGapAMillimetreWiderIsPassedAndOneNarrowerIsNot) {
   // Two rooms of 3 m with a gap in the wall of zero thickness between them. The prism is 0.6 m wide

@@ -22,7 +22,7 @@ TimeToContact queryTimeToContact(const World& world, EntityIndex& index, EntityI
 
 TEST(TimeToContact, AWalkerReachesTheWallWhenItWasSaid) {
   WorldFixture run({makeFloorBox(), {"wall", {5, 0, -4}, {5.2, 3, 4}}});
-  EntityIndex index(shareScene(run.world));
+  EntityIndex index(borrowScene(run.world));
   run.order("ann", Spawn{Vec3(0, 0.001, 0), 0});
   run.order("ann", Walk{{Vec3(8, 0, 3)}, 2});
   run.runTicks(30);
@@ -46,7 +46,7 @@ TEST(TimeToContact, AWalkerReachesTheWallWhenItWasSaid) {
 
 TEST(TimeToContact, ARiderGoesWithTheLift) {
   BodyFixture t(makeBusyRoom());
-  EntityIndex index(shareScene(t.world));
+  EntityIndex index(borrowScene(t.world));
   t.order("ann", Spawn{{-4, 0.11, -4}, 0});
   t.runTicks(30);
   t.submit({"lift", Action::moveToLevel, 0, 2, {}});
@@ -68,7 +68,7 @@ TEST(TimeToContact, AnAvatarOnACrateMovesWithTheLift) {
   BodySpec crate = makeBodySpec("crate", BodyKind::rigid, {3});
   model.bodies = {lift, crate};
   BodyFixture t(std::move(model));
-  EntityIndex index(shareScene(t.world));
+  EntityIndex index(borrowScene(t.world));
   t.order("ann", Spawn{Vec3(0, 1.51, 0), 0});
   t.runTicks(120);
   t.submit({"lift", Action::moveToLevel, 0, 1, {}});
@@ -95,7 +95,7 @@ TEST(TimeToContact, ASwingWithinATickCountsInFull) {
   ram.loops = true;
   model.bodies = {ram};
   BodyFixture t(std::move(model));
-  EntityIndex index(shareScene(t.world));
+  EntityIndex index(borrowScene(t.world));
   t.runTicks(3);
   EXPECT_EQ(t.countEvents(ContactEvent::Kind::begin, "ram", "post"), 3);
   const TimeToContact said =
@@ -109,7 +109,7 @@ TEST(TimeToContact, ASwingWithinATickCountsInFull) {
 
 TEST(TimeToContact, FallingAvatarsAccelerate) {
   WorldFixture run({makeFloorBox()});
-  EntityIndex index(shareScene(run.world));
+  EntityIndex index(borrowScene(run.world));
   run.order("ann", Spawn{Vec3(0, 5, 0), 0});
   run.runTicks(10);
   const EntityId ann = run.getView("ann").id;
@@ -131,7 +131,7 @@ TEST(TimeToContact, APushedAvatarMovesAsFastAsItsPusher) {
   ram.speed = 1;
   model.bodies = {ram};
   BodyFixture t(std::move(model));
-  EntityIndex index(shareScene(t.world));
+  EntityIndex index(borrowScene(t.world));
   t.order("ann", Spawn{{0, 0.001, 0}, 0});
   t.runTicks(10);
   t.submit({"ram", Action::moveTo, 6, 0, {}});
@@ -149,7 +149,7 @@ TEST(TimeToContact, APushedAvatarMovesAsFastAsItsPusher) {
 
 TEST(TimeToContact, TipsOfRotatingBodiesCount) {
   BodyFixture t(makeBusyRoom());
-  EntityIndex index(shareScene(t.world));
+  EntityIndex index(borrowScene(t.world));
   t.runTicks(1);
   const EntityId plank = 9, post = 4;
   const TimeToContact said =
@@ -170,7 +170,7 @@ TEST(TimeToContact, OfConvexShapesInUniformMotionItIsTheTimeOfImpact) {
   leaf.speed = 0.5;
   model.bodies = {leaf};
   BodyFixture t(std::move(model));
-  EntityIndex index(shareScene(t.world));
+  EntityIndex index(borrowScene(t.world));
   t.submit({"leaf", Action::open, 0, 0, {}});
   t.runTicks(10);
   const EntityId moving = 1, post = 2, pillar = 3;
@@ -192,7 +192,7 @@ TEST(TimeToContact, OfConvexShapesInUniformMotionItIsTheTimeOfImpact) {
 
 TEST(TimeToContact, OfDynamicBodiesNothingIsKnownUnderAnyCommand) {
   BodyFixture t(makeBusyRoom());
-  EntityIndex index(shareScene(t.world));
+  EntityIndex index(borrowScene(t.world));
   t.runTicks(1);
   const EntityId crate = 8, floor = 1;
   const TimeToContact any =
@@ -305,7 +305,7 @@ TEST(TimeToContact, InABusyRoomNoPairTouchesBeforeTheReportedTime) {
   Tally tally;
   for (const std::uint32_t seed : {1u, 2u, 3u}) {
     BusyRoom room(seed);
-    EntityIndex index(shareScene(room.world));
+    EntityIndex index(borrowScene(room.world));
     std::vector<Watch> watches;
     auto before = room.world.snapshot();
     for (int i = 0; i < 400; ++i) {

@@ -37,7 +37,7 @@ TEST(Turning, AViewTurnsWithTheRateAndKeepsItsElevation) {
   const double half = std::sqrt(0.5) * 0.6;
   EXPECT_LT((run.getView("ann").viewDirection - Vec3(half, -0.8, -half)).norm(), 1e-12);
   EXPECT_EQ(run.count(Kind::done), 1) << "of the Look";
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_LT((run.getView("ann").viewDirection - Vec3(0, -0.8, -0.6)).norm(), 1e-12);
   EXPECT_EQ(run.count(Kind::done), 2);
   EXPECT_NEAR(static_cast<double>(run.world.snapshot()->tick), 5 + 60 + 2, 2);
@@ -56,7 +56,7 @@ TEST(Turning, AFacingIsReachedByTheShorterWay) {
             1e-12);
   for (const double facing : {0.0, 90.0, 180.0, -90.0, 33.3}) {
     run.order("ann", Turn{facing, false, 1000});
-    run.waitUntilIdle();
+    run.runUntilIdle();
     const double radians = facing * std::numbers::pi / 180;
     EXPECT_LT(
         (run.getView("ann").viewDirection - Vec3(std::cos(radians), 0, -std::sin(radians))).norm(),
@@ -69,7 +69,7 @@ TEST(Turning, PartsTurnUpToTheFirstObstacleAndBack) {
   WorldFixture run({makeFloor(20), {"post", {-0.05, 0, -0.95}, {0.05, 2, -0.85}}});
   run.order("bar", makePlank({0, 0.002, 0}));
   run.order("bar", Turn{180, true, 90});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   const AvatarSnapshot stopped = run.getView("bar");
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "post");
@@ -81,7 +81,7 @@ TEST(Turning, PartsTurnUpToTheFirstObstacleAndBack) {
   EXPECT_GT(stopped.facing, expected - 0.2);
   EXPECT_TRUE(run.hasTouched("post"));
   run.order("bar", Turn{0, false, 90});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_NEAR(run.getView("bar").facing, 0, 1e-12);
   EXPECT_EQ(run.worstPenetration, 0);
   EXPECT_EQ(run.open.size(), 1u) << "the floor alone";
@@ -96,7 +96,7 @@ TEST(Turning, AnArmOnAPrismTurnsWithTheView) {
   spawn.links = {arm};
   run.order("ann", spawn);
   run.order("ann", Turn{150, true, 90});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "wall");
   const AvatarSnapshot ann = run.getView("ann");
@@ -179,10 +179,10 @@ TEST(Teleport, PlacesAnAvatarWhereThereIsRoomAndRefusesElsewhere) {
   WorldFixture run({makeFloor(20), {"wall", {5, 0, -5}, {5.2, 3, 5}}});
   run.order("ann", Spawn{{4.699, 0, 0}});
   run.order("ann", Walk{{{4.9, 0, 0}}, 1.0});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_TRUE(run.hasTouched("wall"));
   run.order("ann", Teleport{{5.1, 0, 0}, {}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::refused), 1);
   EXPECT_NE(run.getText(Kind::refused).find("wall"), std::string::npos)
       << run.getText(Kind::refused);
@@ -191,13 +191,13 @@ TEST(Teleport, PlacesAnAvatarWhereThereIsRoomAndRefusesElsewhere) {
   run.step();
   EXPECT_EQ(run.count(Kind::done), 1);
   EXPECT_LT((run.getView("ann").viewDirection - Vec3(-1, 0, 0)).norm(), 1e-12);
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_LT((run.getFeet("ann") - Vec3(-3, 0, 2)).norm(), 0.002);
   EXPECT_TRUE(run.getView("ann").grounded);
   EXPECT_EQ(run.open.size(), 1u) << "the contact with the wall ended";
   EXPECT_EQ(run.worstPenetration, 0);
   run.order("ann", Teleport{{60, 0, 0}, {}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_NE(run.getText(Kind::refused).find("no floor"), std::string::npos);
 }
 
@@ -220,7 +220,7 @@ TEST(Teleport, StartsTheContactHorizonsOfTheAvatarAgain) {
   run.order("ann", Spawn{{-100, 0, 0}});
   run.order("bob", Spawn{{100, 0, 0}});
   run.runTicks(5);
-  ContactHorizons horizons(shareScene(run.world), settings, {});
+  ContactHorizons horizons(borrowScene(run.world), settings, {});
   horizons.select(std::nullopt);
   const auto provedUntil = [&] {
     const ContactHorizon& ann = horizons.horizons().at(run.getView("ann").id);

@@ -21,7 +21,7 @@ class WorldControls {
     for (int i = 0; i < count; ++i) getFixture().step();
   }
   /// Steps until every queue is empty; fails after a simulated minute.
-  void waitUntilIdle() {
+  void runUntilIdle() {
     for (int i = 0; i < 3600; ++i)
       if (getFixture().step().idle) return;
     FAIL() << "not idle after a minute";

@@ -69,8 +69,8 @@ struct WorldFixture : WorldControls<WorldFixture> {
   double worstPenetration = 0;
 };
 
-/// A shared scene of a world, which outlives the queries on it.
-inline std::shared_ptr<const Scene> shareScene(const World& world) {
+/// The scene of a world, not owned: the world outlives the queries on it.
+inline std::shared_ptr<const Scene> borrowScene(const World& world) {
   return {std::shared_ptr<void>(), &world.scene()};
 }
 

@@ -19,7 +19,7 @@ const double kNaN = std::nan("");
 TEST(World, ASpawnAtTheFloorsOwnHeightComesToRestOnIt) {
   WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_GE(run.getFeet("ann").y(), run.world.settings().contactOffset);
   EXPECT_LT(run.getFeet("ann").y(), 2 * run.world.settings().contactOffset);
   EXPECT_TRUE(run.world.snapshot()->avatars[0].grounded);
@@ -31,7 +31,7 @@ TEST(World, ASpawnALittleAboveAFloorDropsOntoIt) {
   run.order("ann", Spawn{{0, 1, 0}});
   run.step();
   EXPECT_GT(run.getFeet("ann").y(), 0.9);
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_LT(run.getFeet("ann").y(), 0.001);
   EXPECT_EQ(run.count(Kind::spawned), 1);
 }
@@ -58,7 +58,7 @@ TEST(World, AWalkArrivesExactlyWhereItWasSent) {
   WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{-5, 0, 0}});
   run.order("ann", Walk{{{-2, 0, 1}, {3, 0, -2}}, 1.5});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::arrived), 1);
   EXPECT_NEAR(run.getFeet("ann").x(), 3, 1e-9);
   EXPECT_NEAR(run.getFeet("ann").z(), -2, 1e-9);
@@ -68,7 +68,7 @@ TEST(World, AWallStopsAWalkAndIsReported) {
   WorldFixture run({makeFloorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", makeWalkTo(5, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_EQ(findEntityName(run.world, run.notices.back().obstacle), "wall");
   EXPECT_TRUE(run.hasTouched("wall"));
@@ -86,7 +86,7 @@ TEST(World, ASlantedPathSlidesAlongAWall) {
   WorldFixture run({makeFloorBox(), {"wall", {2, 0, -9}, {2.2, 3, 9}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", makeWalkTo(3, 6));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_NEAR(run.getFeet("ann").z(), 6, 0.05);
   EXPECT_EQ(run.worstPenetration, 0);
@@ -97,7 +97,7 @@ TEST(World, StepsUpToTheStepHeightAreClimbedAndHigherOnesBlock) {
       {makeFloorBox(), {"low", {2, 0, -3}, {4, 0.29, 3}}, {"high", {4, 0, -3}, {6, 0.65, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", Walk{{{3, 0.29, 0}, {5, 0.65, 0}}, 1.5});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_NEAR(run.getFeet("ann").y(), 0.29, 0.001);
   EXPECT_GT(run.getFeet("ann").x(), 3.5);
@@ -120,7 +120,7 @@ double findHighestClimbedLedge(const WorldSettings& settings, const std::vector<
     run.order("of" + std::to_string(height), Walk{{{2, height, z}}, 1.5});
     z += kApart;
   }
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.worstPenetration, 0);
   double highest = 0;
   for (const double height : ledges) {
@@ -155,7 +155,7 @@ TEST(World, ASkirtingBoardIsNoStep) {
                     {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", makeWalkTo(5, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 1);
   EXPECT_LT(run.getFeet("ann").y(), 0.001);
 }
@@ -175,11 +175,11 @@ TEST(World, AStairIsWalkedUpAndDown) {
     const double top = 12 * riser, end = 12 * tread + 1;
     run.order("ann", Spawn{{-2, 0, 0}});
     run.order("ann", makeWalkTo(end, 0, 1.4, top));
-    run.waitUntilIdle();
+    run.runUntilIdle();
     EXPECT_EQ(run.count(Kind::arrived), 1) << riser;
     EXPECT_NEAR(run.getFeet("ann").y(), top, 0.001) << riser;
     run.order("ann", makeWalkTo(-2, 0));
-    run.waitUntilIdle();
+    run.runUntilIdle();
     EXPECT_EQ(run.count(Kind::arrived), 2) << riser;
     EXPECT_NEAR(run.getFeet("ann").y(), 0, 0.001) << riser;
     EXPECT_EQ(run.worstPenetration, 0) << riser;
@@ -190,7 +190,7 @@ TEST(World, ALedgeIsFallenFromAndLandedBelow) {
   WorldFixture run({makeFloorBox(), {"platform", {-3, 0, -3}, {0, 2, 3}}});
   run.order("ann", Spawn{{-1, 2, 0}});
   run.order("ann", makeWalkTo(3, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::arrived), 1);
   EXPECT_LT(run.getFeet("ann").y(), 0.001);
   EXPECT_EQ(run.worstPenetration, 0);
@@ -200,7 +200,7 @@ TEST(World, FallingOutOfTheSceneIsLeavingIt) {
   WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{9, 0, 0}});
   run.order("ann", makeWalkTo(30, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::left), 1);
   EXPECT_TRUE(run.open.empty());
 }
@@ -211,7 +211,7 @@ TEST(World, AvatarsBlockEachOtherAndTouch) {
   run.order("bob", Spawn{{3, 0, 0}});
   run.order("ann", makeWalkTo(3, 0));
   run.order("bob", makeWalkTo(-3, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 2);
   EXPECT_GE(run.getFeet("bob").x() - run.getFeet("ann").x(), 0.6);
   EXPECT_LT(run.getFeet("bob").x() - run.getFeet("ann").x(), 0.602);
@@ -225,7 +225,7 @@ TEST(World, AnAvatarBlockedByAnotherGetsDistanceAndPoint) {
   run.order("bob", Spawn{{3, 0, 0}});
   run.order("ann", makeWalkTo(3, 0));
   run.order("bob", makeWalkTo(-3, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   int blocked = 0;
   for (const ContactEvent& e : run.events) {
     if (e.kind != ContactEvent::Kind::blocked) continue;
@@ -245,7 +245,7 @@ TEST(World, AVerySlowWalkArrives) {
   WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", makeWalkTo(0.03, 0, 0.001));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::arrived), 1);
   EXPECT_EQ(run.count(Kind::blocked), 0);
 }
@@ -254,10 +254,10 @@ TEST(World, AWalkToAPlaceOverheadIsBlockedByNothingOfTheLastWalk) {
   WorldFixture run({makeFloorBox(), {"wall", {2, 0, -3}, {2.2, 3, 3}}});
   run.order("ann", Spawn{{0, 0, 0}});
   run.order("ann", makeWalkTo(5, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_NE(run.notices.back().obstacle, 0u);
   run.order("ann", makeWalkTo(run.getFeet("ann").x(), run.getFeet("ann").z(), 1.5, 3));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::blocked), 2);
   EXPECT_EQ(run.notices.back().obstacle, 0u);
 }
@@ -361,7 +361,7 @@ TEST(World, WaitsLooksAndCapturesRunInTheirOrder) {
 TEST(World, DriveActsAtOnceAndZeroStops) {
   WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   run.order("ann", Drive{{1.2, 0, 0}});
   run.runTicks(60);
   EXPECT_NEAR(run.getFeet("ann").x(), 1.2, 1e-9);
@@ -397,7 +397,7 @@ std::vector<std::uint64_t> listDroppedTags(const WorldFixture& run, const std::s
 TEST(World, OrdersDroppedByADriveAreReportedWithTheirTags) {
   WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   submitAvatarCommand(run.world, {"ann", makeWalkTo(3, 0), 7});
   submitAvatarCommand(run.world, {"ann", Wait{5}, 8});
   submitAvatarCommand(run.world, {"bob", Wait{5}, 9});
@@ -424,7 +424,7 @@ TEST(World, OrdersAfterARefusedSpawnAreReportedAsDropped) {
 TEST(World, TheLastNoticeOfManyDroppedOrdersCountsTheOthers) {
   WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   for (int i = 0; i < 10'500; ++i) run.order("ann", Wait{5});
   run.order("ann", Drive{});
   run.runTicks(1);
@@ -442,7 +442,7 @@ TEST(World, ARespawnUnderTheSameNameIsAnotherAvatar) {
   const EntityId before = run.world.snapshot()->avatars[0].id;
   run.order("ann", Leave{});
   run.order("ann", Spawn{{0, 0, 3}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   EXPECT_EQ(run.count(Kind::arrived), 1) << "bob still has contacts with the avatar that left";
   ASSERT_EQ(run.world.snapshot()->avatars.size(), 2u);
   EXPECT_GT(run.world.snapshot()->avatars[1].id, before + 1);
@@ -506,7 +506,7 @@ TEST(World, TheSameCommandsGiveTheSameHashAndOthersDoNot) {
 TEST(World, ARestingAvatarCostsNoQueries) {
   WorldFixture run({makeFloorBox()});
   run.order("ann", Spawn{{0, 0, 0}});
-  run.waitUntilIdle();
+  run.runUntilIdle();
   run.runTicks(3);
   EXPECT_EQ(run.step().narrowQueries, 0u);
   EXPECT_EQ(run.step().activeContacts, 1u);
@@ -518,7 +518,7 @@ TEST(World, NearMissesAreReportedOncePerApproach) {
   WorldFixture run({makeFloorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, settings);
   run.order("ann", Spawn{{-2, 0, 0}});
   run.order("ann", makeWalkTo(2, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   const auto nears = std::count_if(run.events.begin(), run.events.end(), [&](const auto& e) {
     return e.kind == ContactEvent::Kind::nearMiss && e.phase == ContactEvent::Phase::begin &&
            findEntityName(run.world, e.b) == "post";
@@ -533,7 +533,7 @@ TEST(World, ANearMissEndsWithItsMinimumWhenTheAvatarLeaves) {
   WorldFixture run({makeFloorBox(), {"post", {0, 0, 0.33}, {0.1, 2, 0.4}}}, settings);
   run.order("ann", Spawn{{-2, 0, 0}});
   run.order("ann", makeWalkTo(0, 0));
-  run.waitUntilIdle();
+  run.runUntilIdle();
   run.order("ann", Leave{});
   run.runTicks(2);
   std::vector<ContactEvent> nears;

@@ -74,7 +74,7 @@ v1::Command makeFullSpawn() {
   return command;
 }
 
-std::vector<v1::Command> makeEveryOrder() {
+std::vector<v1::Command> makeAllOrders() {
   std::vector<v1::Command> orders(7, makeCommand("ann"));
   orders[0] = makeFullSpawn();
   *orders[1].mutable_walk()->add_along() = makePoint();
@@ -95,7 +95,7 @@ std::vector<v1::Command> makeEveryOrder() {
   return orders;
 }
 
-std::vector<v1::RayQuery> makeEveryRayQuery() {
+std::vector<v1::RayQuery> makeAllRayQueries() {
   std::vector<v1::RayQuery> queries(2);
   v1::Ray& ray = *queries[0].add_rays();
   *ray.mutable_origin() = makePoint();
@@ -113,7 +113,7 @@ std::vector<v1::RayQuery> makeEveryRayQuery() {
   return queries;
 }
 
-std::vector<v1::NavigationQuery> makeEveryNavigationQuery() {
+std::vector<v1::NavigationQuery> makeAllNavigationQueries() {
   std::vector<v1::NavigationQuery> queries(6);
   for (v1::NavigationQuery& query : queries) {
     query.set_radius(0.3);
@@ -140,7 +140,7 @@ std::vector<v1::NavigationQuery> makeEveryNavigationQuery() {
   return queries;
 }
 
-std::vector<v1::FrameRequest> makeEveryFrameRequest() {
+std::vector<v1::FrameRequest> makeAllFrameRequests() {
   std::vector<v1::FrameRequest> requests(3);
   for (v1::FrameRequest& request : requests) {
     request.set_width(8);
@@ -166,21 +166,21 @@ std::vector<v1::FrameRequest> makeEveryFrameRequest() {
 }
 
 /// One valid request of each kind with numbers.
-std::vector<v1::ClientMessage> makeEveryRequest(bool frames) {
+std::vector<v1::ClientMessage> makeAllRequests(bool frames) {
   std::vector<v1::ClientMessage> all;
-  for (const v1::Command& order : makeEveryOrder()) *all.emplace_back().mutable_command() = order;
+  for (const v1::Command& order : makeAllOrders()) *all.emplace_back().mutable_command() = order;
   v1::BodyCommand& body = *all.emplace_back().mutable_body_command();
   body.set_body("door");
   body.set_to(0.5);
   body.set_speed(1);
-  for (const v1::RayQuery& query : makeEveryRayQuery()) *all.emplace_back().mutable_rays() = query;
-  for (const v1::NavigationQuery& query : makeEveryNavigationQuery())
+  for (const v1::RayQuery& query : makeAllRayQueries()) *all.emplace_back().mutable_rays() = query;
+  for (const v1::NavigationQuery& query : makeAllNavigationQueries())
     *all.emplace_back().mutable_navigation() = query;
   all.emplace_back().mutable_subscribe()->set_state_rate(10);
   all.emplace_back().mutable_floor_plan()->set_floor(0.125);
   all.emplace_back().mutable_set_clock()->mutable_free_run()->set_speed(1);
   if (!frames) return all;
-  for (const auto& request : makeEveryFrameRequest()) *all.emplace_back().mutable_frame() = request;
+  for (const auto& request : makeAllFrameRequests()) *all.emplace_back().mutable_frame() = request;
   return all;
 }
 
@@ -229,7 +229,7 @@ TEST_F(RefusedNumbers, OfEachRequestAreReportedByFieldAndChangeNothing) {
   const std::array<double, 6> bad{std::nan(""), inf, -inf, -std::nan(""), 1e300, -1e300};
   const auto disturbed = walk(ann, [&](int step) {
     const double number = bad.at(static_cast<std::size_t>(step));
-    for (v1::ClientMessage& request : makeEveryRequest(!server_->rendererName().empty())) {
+    for (v1::ClientMessage& request : makeAllRequests(!server_->rendererName().empty())) {
       spoilEach(request, "", number, [&](const std::string& path) {
         ++spoilt;
         const auto error = catchRefusal(ann, request);

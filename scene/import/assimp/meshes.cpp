@@ -18,12 +18,12 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr float kMaxCoordinate = 1e9f;  // file units; a greater coordinate is invalid, like NaN
+constexpr float kMaxFileCoordinate = 1e9f;  // file units; a greater coordinate is invalid, like NaN
 
 bool isValidVector(const aiVector3D& v) {
   // Comparisons with NaN are false.
-  return std::abs(v.x) <= kMaxCoordinate && std::abs(v.y) <= kMaxCoordinate &&
-         std::abs(v.z) <= kMaxCoordinate;
+  return std::abs(v.x) <= kMaxFileCoordinate && std::abs(v.y) <= kMaxFileCoordinate &&
+         std::abs(v.z) <= kMaxFileCoordinate;
 }
 
 Vec3 computeAreaVector(const Mesh& mesh, std::size_t triangle) {

@@ -28,7 +28,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 constexpr std::size_t kPipeReadSize = 1 << 18;  // bytes per read from the pipe, at least
-constexpr int kPipeSize = 1 << 20;          // bytes; the writer waits less often than at 64 KiB
+constexpr int kPipeSize = 1 << 20;              // bytes; the writer waits less often than at 64 KiB
 constexpr double kExitTimeout = 10;    // seconds between the end of the pipe and of the process
 constexpr double kMaxPollWait = 3600;  // seconds; poll() counts milliseconds in an int
 

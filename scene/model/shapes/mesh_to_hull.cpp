@@ -9,6 +9,11 @@ namespace {
 
 using collision::Vec3;
 
+// An inward-facing surface is an inside-out solid if no ball of this radius (metres) fits into it.
+// Otherwise it may be a room seen from within, and stays triangles. A convex solid of volume V and
+// area A contains no ball with a radius above 3 V / A.
+constexpr double kRoomRadius = 0.3;
+
 /// 3 V / A of the enclosed volume, metres.
 double computeThickness(const PlacedShape& placed, const Shell& shell) {
   const Vec3 origin = placed.vertexPosition(placed.shape.triangles[shell.first][0]);

@@ -1,5 +1,5 @@
-// Meshes as convex hulls: which surfaces of a placed shape are replaced by their hull, and that
-// hull. All other surfaces stay triangles.
+// Decides which surfaces of a placed shape collision replaces by their convex hull, and builds
+// these hulls. All other surfaces stay triangles.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -7,12 +7,13 @@
 #include <span>
 
 #include "collision/shapes/hull.hpp"
+#include "collision/shapes/triangle_tree.hpp"
 #include "scene/model/shapes/shape.hpp"
 
 namespace enfilade::scene {
 
-/// A shape and its placement, which must keep values finite; it may mirror and flatten. Refers to
-/// `shape`.
+/// A shape, which must outlive this, and its placement. That keeps values finite; it may mirror and
+/// flatten.
 struct PlacedShape {
   const Shape& shape;
   Eigen::Affine3d worldFromMesh;
@@ -27,11 +28,6 @@ struct PlacedShape {
     return {vertexPosition(corners[0]), vertexPosition(corners[1]), vertexPosition(corners[2])};
   }
 };
-
-/// An inward-facing surface is an inside-out solid if no ball of this radius (metres) fits into it.
-/// Otherwise it may be a room seen from within, and stays triangles. A convex solid of volume V and
-/// area A contains no ball with a radius above 3 V / A.
-inline constexpr double kRoomRadius = 0.3;
 
 /// True if collision uses the hull of this shell.
 bool isTreatedAsHull(const PlacedShape& placed, const Shell& shell);

@@ -24,7 +24,7 @@ namespace {
 constexpr std::string_view kMagic = "EnfMesh5";
 constexpr std::size_t kWordBytes = 8;
 constexpr int kMaxCount = 1 << 22;             // of anything in a tile
-constexpr float kMaxCoordinate = 1e8f;         // metres: Detour's squares do not overflow
+constexpr float kMaxMeshCoordinate = 1e8f;     // metres: Detour's squares do not overflow
 constexpr std::size_t kMaxPathPoints = 5000;   // searches for paths end before
 constexpr double kMaxReach = 1000;             // metres
 constexpr unsigned kBoundaryEdges = 0b010101;  // flags of a triangle of the detail mesh
@@ -101,7 +101,7 @@ bool isTileSafe(const TileMesh& tile, const TileGrid& grid) {
       reader.read<unsigned char>(4 * std::clamp(header.detailTriCount, -1, kMaxCount / 4));
   const auto nodes = reader.read<dtBVNode>(header.bvNodeCount);
   if (!reader.isWhole()) return false;
-  const auto isCoordinate = [](float value) { return std::abs(value) <= kMaxCoordinate; };
+  const auto isCoordinate = [](float value) { return std::abs(value) <= kMaxMeshCoordinate; };
   if (!std::ranges::all_of(vertices, isCoordinate) ||
       !std::ranges::all_of(detailVertices, isCoordinate) ||
       !std::ranges::all_of(header.bmin, isCoordinate) ||

@@ -19,7 +19,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kUnlimited = std::numeric_limits<double>::infinity();
+constexpr double kUnlimitedDistance = std::numeric_limits<double>::infinity();
 constexpr double kRounding = 1e-9;  // relative, of a motion: more than rotating and summing may err
 
 const Body* findKinematicBody(const WorldData& world, EntityId id) {
@@ -241,7 +241,7 @@ KinematicContacts findKinematicContacts(WorldData& world, const ContactDistances
     const double travel = computeMaxTravel(world, key.first) + computeMaxTravel(world, key.second);
     const double within = std::max(distances.reportLimit, distances.contact + travel);
     makePartBoxes(world, key);
-    const auto found = computeContact(world, key, lasted ? kUnlimited : within, count);
+    const auto found = computeContact(world, key, lasted ? kUnlimitedDistance : within, count);
     if (!found) continue;
     const double distance = found->separation.distance;
     std::optional<Contact> transient;

@@ -11,7 +11,7 @@
 namespace enfilade::scene {
 namespace {
 
-constexpr double kMaxWait = 86400;      // seconds
+constexpr double kMaxWait = 86400;  // seconds
 constexpr std::size_t kMaxWaypoints = 100000;
 constexpr double kMaxJointAngle = 1000;  // radians: magnitude of a joint's limits
 

@@ -13,7 +13,7 @@ namespace {
 using collision::NearestParts;
 using Outcome = NearestParts::Outcome;
 
-constexpr double kAnyDistance = std::numeric_limits<double>::infinity();
+constexpr double kUnlimitedDistance = std::numeric_limits<double>::infinity();
 
 bool spendWork(std::size_t& budget, std::size_t cost) {
   if (budget < cost) return false;
@@ -105,9 +105,9 @@ std::variant<PairProximity, QueryError> computePairProximity(const SceneAt& scen
   const auto first = findSolidParts(sceneAt, a, "a"), second = findSolidParts(sceneAt, b, "b");
   for (const auto* one : {&first, &second})
     if (const auto* error = std::get_if<QueryError>(one)) return *error;
-  const NearestParts parts =
-      collision::findNearestParts(std::get<PlacedEntity>(first).compounds,
-                                  std::get<PlacedEntity>(second).compounds, kAnyDistance, budget);
+  const NearestParts parts = collision::findNearestParts(std::get<PlacedEntity>(first).compounds,
+                                                         std::get<PlacedEntity>(second).compounds,
+                                                         kUnlimitedDistance, budget);
   if (parts.outcome != Outcome::nearest) return makeTooComplexError("b");
   PairProximity proximity{a, b, parts.separation, 0};
   if (refined && !spendWork(budget, computeRefinementWork(parts))) return makeTooComplexError("b");

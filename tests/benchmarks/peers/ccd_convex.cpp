@@ -63,15 +63,16 @@ class CcdPair : public PairOfBodies {
   Answer ask(const RigidTransform& a, const RigidTransform& b) override {
     a_.at = &a;
     b_.at = &b;
-    if (!depth_) return ccdMPRIntersect(&a_, &b_, &ccd_) != 0 ? collides() : makeUndistanced();
+    if (!depth_)
+      return ccdMPRIntersect(&a_, &b_, &ccd_) != 0 ? collides() : makeApartWithoutDistance();
     double depth = 0;
     ccd_vec3_t direction, position;
     const int parted = ccdMPRPenetration(&a_, &b_, &ccd_, &depth, &direction, &position);
-    return parted == 0 ? collides(depth) : makeUndistanced();
+    return parted == 0 ? collides(depth) : makeApartWithoutDistance();
   }
 
  private:
-  static Answer makeUndistanced() {
+  static Answer makeApartWithoutDistance() {
     Answer answer;
     answer.verdict = Answer::Verdict::apart;
     return answer;
