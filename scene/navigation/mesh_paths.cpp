@@ -260,11 +260,13 @@ NavigationPath proveCorridor(const PathFinder& finder, Clearance clearance, cons
   path.points =
       shortenPath(finder.walker, path.points, proof.isRepaired ? Shortcuts::all : Shortcuts::free);
   path.length = computeLength(path.points);
-  if (path.length < kShortPath || (proof.isRepaired && path.length > kTight * lineLength))
+  std::vector<std::vector<Vec3>> versions{path.points};
+  if (path.length < kShortPath || (proof.isRepaired && path.length > kTight * lineLength)) {
     pullTight(finder.walker, path.points);
-  path.length = computeLength(path.points);
-  if (finder.walker.takeCrossedSteps() && !walksWithoutBumps(finder.walker, path, proof)) return {};
-  return path;
+    path.length = computeLength(path.points);
+    if (path.points != versions.front()) versions.insert(versions.begin(), path.points);
+  }
+  return finder.walker.takeCrossedSteps() ? proveVersions(finder.walker, versions, proof) : path;
 }
 
 /// A path along a corridor. A repair may lead far around: then other corridors are tried whose
@@ -366,6 +368,7 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
   const double rise = std::abs(path.points.back().y() - path.points.front().y());
   double climb = walker.travel().climb - rise;
   path.length = computeLength(path.points);
+  proof.bump.reset();
   if (climb < std::max(kMinBump, kMinClimb * path.length)) return true;
   std::vector<Vec3> level = path.points;
   if (const BumpList replaced = goAroundBumps(walker, level, proof.bumps); !replaced.empty()) {
@@ -382,8 +385,25 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
     }
   }
   proof.bump = findBump(walker, path.points);
-  path.bumpClimb = proof.bump ? climb : 0;
+  path.bumpClimb = climb < std::max(kMinBump, kMinClimb * path.length) ? 0 : climb;
   return true;
+}
+
+NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> versions,
+                             Proof& proof) {
+  NavigationPath best;
+  std::optional<Vec3> bump;
+  for (const std::vector<Vec3>& points : versions) {
+    NavigationPath path;
+    path.points = points;
+    if (!walksWithoutBumps(walker, path, proof)) continue;
+    if (best.found() && path.cost() >= best.cost()) continue;
+    best = std::move(path);
+    bump = proof.bump;
+    if (best.bumpClimb == 0) break;
+  }
+  proof.bump = bump;
+  return best;
 }
 
 /// A repair that fails takes long, and the next proposal may be as short: first all are tried with

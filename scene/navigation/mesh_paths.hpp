@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "scene/navigation/path_finder.hpp"
@@ -45,6 +46,11 @@ bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof);
 /// As walksOn(). Then leads the path around low objects, where this shortens the way of the feet.
 /// Sets the length, `proof.bump` and its climb.
 bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof);
+
+/// Proves versions of a path in turn, up to the first that leads over no low object. Returns the
+/// one with the least cost; none: no version can be walked.
+NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> versions,
+                             Proof& proof);
 
 /// A path on the ample mesh, or on the scarce one; without a reason if none is found.
 NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,

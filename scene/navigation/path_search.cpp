@@ -1,6 +1,7 @@
 #include "scene/navigation/path_search.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <utility>
@@ -80,14 +81,7 @@ NavigationPath provePath(const PathFinder& finder, const std::vector<Vec3>& plac
   std::vector<Vec3> shortened = shortenPath(finder.walker, places, Shortcuts::all);
   std::vector<Vec3> tight = shortened;
   pullTight(finder.walker, tight);
-  NavigationPath path;
-  for (const std::vector<Vec3>* points :
-       {&std::as_const(tight), &std::as_const(shortened), &places}) {
-    path.points = *points;
-    if (walksWithoutBumps(finder.walker, path, proof)) break;
-    path.points.clear();
-  }
-  return path;
+  return proveVersions(finder.walker, std::array{tight, shortened, places}, proof);
 }
 
 NavigationPath findPathByConnections(const PathFinder& finder, const Vec3& start, const Vec3& goal,

@@ -540,8 +540,12 @@ void compareWithDetour(Bench& bench, const Effort& effort, nlohmann::json& row) 
     }
     const double length = scene::computeLength(*walked);
     if (length < kMinCompared) continue;
-    lengths.shares.push_back(scene::computeLength(getPoints(path)) / length);
-    printLong(starts[i], goals[i], lengths.shares.back());
+    const std::vector<Vec3> points = getPoints(path);
+    lengths.shares.push_back(scene::computeLength(points) / length);
+    const auto feet = measureWalk(bench, points), feetOnLine = measureWalk(bench, *walked);
+    if (feet && feetOnLine) lengths.feetShares.push_back(*feet / *feetOnLine);
+    printLong(starts[i], goals[i],
+              feet && feetOnLine ? lengths.feetShares.back() : lengths.shares.back());
   }
   row["detour_pairs"] = pairs;
   row["detour_found"] = found;
@@ -552,6 +556,9 @@ void compareWithDetour(Bench& bench, const Effort& effort, nlohmann::json& row) 
   row["detour_min"] = toJsonNumber(computeQuantile(lengths.shares, 0));
   row["detour_max"] = toJsonNumber(computeQuantile(lengths.shares, 1));
   row["detour_above"] = std::ranges::count_if(lengths.shares, isLong);
+  row["detour_feet_compared"] = lengths.feetShares.size();
+  row["detour_feet_max"] = toJsonNumber(computeQuantile(lengths.feetShares, 1));
+  row["detour_feet_above"] = std::ranges::count_if(lengths.feetShares, isLong);
 }
 
 void measureMeshes(Bench& bench, const Effort&, nlohmann::json& row) {

@@ -34,7 +34,8 @@ def make_fill_row(row):
 def make_length_row(row):
     return [row["scene"], f"{row['detour_pairs']:,}", f"{row['detour_found']:,}", row["detour_no_line"], row["detour_unwalkable"],
             f"{row['detour_compared']:,}", format_ratio(row["detour_min"]), format_ratio(row["detour_median"]),
-            format_ratio(row["detour_max"]), row["detour_above"]]
+            format_ratio(row["detour_max"]), row["detour_above"], format_ratio(row["detour_feet_max"]),
+            row["detour_feet_above"]]
 
 
 def make_time_row(row):
@@ -63,7 +64,8 @@ class Section:
 WALKS = ["scene", "pairs", "refused", "paths", "wrong", "silent", "penetration m", "with doors (wrong)", "with lifts", "with drops"]
 REACH = ["scene", "places of the fill", "compared", "wrong", "walked", "near", "skipped", "islands", "lengths", "median share",
          "largest", "above 1.02", "by feet: largest", "above"]
-DETOUR = ["scene", "pairs", "paths", "no line", "not walked", "compared", "smallest share", "median", "largest", "above 1.02"]
+DETOUR = ["scene", "pairs", "paths", "no line", "not walked", "compared", "smallest share", "median", "largest", "above 1.02",
+          "by feet: largest", "above"]
 TIMES = ["scene", "navigable m²", "islands", "build s", "MB", "µs on the mesh, median", "µs a path, median", "99 %",
          "µs without a path, 99 %"]
 
@@ -115,7 +117,8 @@ with its height. –: not measured.
 
 Lengths of paths as a share of Detour's string-pulled line on the mesh that proposes them, where an avatar walks that line
 to its end. *No line*: the mesh has none, as where a connection leads from one of its parts to another. *Not walked*: an
-avatar is stopped on the line. Lines of a metre and more are compared. Doors are as they are.
+avatar is stopped on the line. Lines of a metre and more are compared, along the points of both. *By feet*: an avatar
+walks both, as above. Doors are as they are.
 
 {write("Length against Detour", "lengths", DETOUR, make_length_row)}
 ## Time

@@ -5,12 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <utility>
 #include <vector>
 
 #include "scene/navigation/doors.hpp"
+#include "scene/navigation/mesh_paths.hpp"
 #include "scene/navigation/shape_separation.hpp"
 #include "scene/navigation/walk/level_detours.hpp"
 #include "tests/scene/body_fixture.hpp"
@@ -150,6 +152,23 @@ TEST(LevelDetours, AnObjectIsWalkedOverIfTheWayAroundItIsLonger) {
     EXPECT_TRUE(goAroundBumps(walker, places, search).empty());
     EXPECT_EQ(search.maxWalks, left) << "a known bump is searched again";
   }
+}
+
+TEST(LevelDetours, AVersionOfAPathThatLeadsAroundIsPreferred) {
+  const World world(std::make_shared<const Scene>(makeBedModel(0.2)));
+  Walker walker(world.data(), {});
+  const std::vector<Vec3> over{{0, 0, 0}, {6, 0, 0}};
+  const std::vector<Vec3> around{{0, 0, 0}, {2, 0, -0.15}, {4, 0, -0.15}, {6, 0, 0}};
+  const std::vector<Vec3> far{{0, 0, 0}, {3, 0, -4.5}, {6, 0, 0}};
+  Proof noSearch(0);
+  NavigationPath path = proveVersions(walker, std::array{over, around}, noSearch);
+  EXPECT_EQ(path.points, around);
+  EXPECT_EQ(path.bumpClimb, 0);
+  EXPECT_FALSE(noSearch.bump);
+  path = proveVersions(walker, std::array{over, far}, noSearch);
+  EXPECT_EQ(path.points, over) << "the way of the feet around is longer";
+  EXPECT_NEAR(path.bumpClimb, 2 * kBedHeight, 0.01);
+  EXPECT_TRUE(noSearch.bump);
 }
 
 TEST(GridSearch, AShortcutOverALowObjectIsNotTakenIfTheFeetMoveFarther) {
