@@ -10,10 +10,11 @@
 
 #include "collision/broad_phase/broad_phase_audit.hpp"
 #include "collision/broad_phase/sort_and_sweep.hpp"
+#include "tests/collision/random_shapes.hpp"
 
 namespace enfilade::collision {
 
-using Random = std::mt19937_64;
+using testing::Random;
 using Pairs = std::vector<ProxyPair>;
 
 inline double drawBetween(Random& random, double low, double high) {
