@@ -260,13 +260,12 @@ NavigationPath proveCorridor(const PathFinder& finder, Clearance clearance, cons
   path.points =
       shortenPath(finder.walker, path.points, proof.isRepaired ? Shortcuts::all : Shortcuts::free);
   path.length = computeLength(path.points);
-  std::vector<std::vector<Vec3>> versions{path.points};
-  if (path.length < kShortPath || (proof.isRepaired && path.length > kTight * lineLength)) {
+  const std::vector<Vec3> loose = path.points;
+  if (path.length < kShortPath || (proof.isRepaired && path.length > kTight * lineLength))
     pullTight(finder.walker, path.points);
-    path.length = computeLength(path.points);
-    if (path.points != versions.front()) versions.insert(versions.begin(), path.points);
-  }
-  return finder.walker.takeCrossedSteps() ? proveVersions(finder.walker, versions, proof) : path;
+  path.length = computeLength(path.points);
+  if (!finder.walker.takeCrossedSteps()) return path;
+  return proveVersions(finder.walker, std::array{path.points, loose}, proof);
 }
 
 /// A path along a corridor. A repair may lead far around: then other corridors are tried whose
@@ -369,7 +368,8 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
   double climb = walker.travel().climb - rise;
   path.length = computeLength(path.points);
   proof.bump.reset();
-  if (climb < std::max(kMinBump, kMinClimb * path.length)) return true;
+  const auto isSmall = [&] { return climb < std::max(kMinBump, kMinClimb * path.length); };
+  if (isSmall()) return true;
   std::vector<Vec3> level = path.points;
   if (const BumpList replaced = goAroundBumps(walker, level, proof.bumps); !replaced.empty()) {
     const Vec3 failedAt = proof.failedAt;
@@ -385,7 +385,7 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
     }
   }
   proof.bump = findBump(walker, path.points);
-  path.bumpClimb = climb < std::max(kMinBump, kMinClimb * path.length) ? 0 : climb;
+  path.bumpClimb = isSmall() ? 0 : climb;
   return true;
 }
 
@@ -393,9 +393,10 @@ NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> 
                              Proof& proof) {
   NavigationPath best;
   std::optional<Vec3> bump;
-  for (const std::vector<Vec3>& points : versions) {
+  for (std::size_t i = 0; i < versions.size(); ++i) {
+    if (i > 0 && versions[i] == versions[i - 1]) continue;
     NavigationPath path;
-    path.points = points;
+    path.points = versions[i];
     if (!walksWithoutBumps(walker, path, proof)) continue;
     if (best.found() && path.cost() >= best.cost()) continue;
     best = std::move(path);

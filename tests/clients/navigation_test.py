@@ -66,6 +66,18 @@ class NavigationTest(RoomCase):
         self.client.run_until_idle()
         self.assertEqual([one.kind for one in self.client.notices()][-1], "arrived")
 
+    def test_a_walk_from_the_floor_begins_after_the_fall(self):
+        ann = self.client.spawn("ann", at=(2, 0.5, 0))
+        ann.walk((4, 0, 0), from_floor=True)
+        in_the_air = 0
+        for _ in range(60):
+            feet = self.client.step(1, avatars=True).avatars["ann"].feet
+            if feet[1] > 0.01:
+                in_the_air += 1
+                self.assertEqual(feet[0], 2)
+        self.assertGreater(in_the_air, 5)
+        self.assertGreater(feet[0], 2)
+
     def test_steps_of_a_path_have_their_heights(self):
         self.assertEqual(self.navigation.path((2, 0, 0), (8, 0, 0), steps=True).steps, ())
         scene = self.folder / "kerb.obj"

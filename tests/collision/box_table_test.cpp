@@ -128,7 +128,7 @@ TEST_P(BoxTables, RoundingNeverPutsBoxesThatTouchTwoCellsApart) {
   // other.
   Random random(6);
   for (int round = 0; round < 3000; ++round) {
-    const double size = drawBetween(random, 0.01, 3);
+    const double size = drawUniform(random, 0.01, 3);
     const double far = round % 2 == 0 ? 0 : 0x1p38;  // cells away: corners are rounded, too
     const double border = size * (far + drawInteger(random, -40, 40));
     std::vector<Aabb> boxes;

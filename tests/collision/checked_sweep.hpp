@@ -14,19 +14,17 @@
 
 namespace enfilade::collision {
 
+using testing::drawUniform;
 using testing::Random;
 using Pairs = std::vector<ProxyPair>;
 
-inline double drawBetween(Random& random, double low, double high) {
-  return std::uniform_real_distribution<double>(low, high)(random);
-}
 inline int drawInteger(Random& random, int low, int high) {
   return std::uniform_int_distribution<int>(low, high)(random);
 }
 inline Vec3 drawVector(Random& random, const Vec3& low, const Vec3& high) {
-  const double x = drawBetween(random, low.x(), high.x());
-  const double y = drawBetween(random, low.y(), high.y());
-  const double z = drawBetween(random, low.z(), high.z());
+  const double x = drawUniform(random, low.x(), high.x());
+  const double y = drawUniform(random, low.y(), high.y());
+  const double z = drawUniform(random, low.z(), high.z());
   return {x, y, z};
 }
 inline Aabb makeBoxAt(const Vec3& corner, const Vec3& size) {

@@ -207,7 +207,7 @@ TEST(SortAndSweep, EqualsBruteForceOverAHugeRangeOfCoordinatesAndSizes) {
   Random random(6);
   const auto wild = [&] {
     const auto magnitude = [&] {
-      const double value = std::pow(10.0, drawBetween(random, -6, 300));
+      const double value = std::pow(10.0, drawUniform(random, -6, 300));
       return drawInteger(random, 0, 1) == 0 ? value : -value;
     };
     const double a = magnitude(), b = magnitude(), c = magnitude();

@@ -190,6 +190,7 @@ void Walker::restore(const Standing& standing) {
   avatar_.footPosition = standing.footPosition;
   avatar_.grounded = true;
   avatar_.fallSpeed = 0;
+  avatar_.lastDisplacement = Vec3::Zero();  // of no walk before
   travel_ = standing.travel;
   lastFloor_ = {standing.footPosition.y()};
 }

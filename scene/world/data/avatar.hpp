@@ -64,9 +64,8 @@ struct Avatar {
   Vec3 driveVelocity = Vec3::Zero();    ///< m/s, requested by Drive
   Vec3 desiredVelocity = Vec3::Zero();  ///< m/s, requested by its orders in this tick
   WalkProgress walk;
-  double waitTimeLeft = -1;  ///< seconds; negative: not waiting
-  double stalledInAirTime =
-      0;  ///< seconds without motion in the air, during a jump or before a jump or walk
+  double waitTimeLeft = -1;     ///< seconds; negative: not waiting
+  double stalledInAirTime = 0;  ///< seconds without motion in the air, in or before an order
 
   // Results of the last motion.
   Vec3 lastDisplacement = Vec3::Zero();
