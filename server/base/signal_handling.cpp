@@ -1,5 +1,6 @@
 #include "server/base/signal_handling.hpp"
 
+#include <atomic>
 #include <csignal>
 #include <cstdio>
 #include <exception>
@@ -7,17 +8,19 @@
 namespace enfilade::server {
 namespace {
 
-volatile std::sig_atomic_t signalReceived = 0;
+// The handler may run in any thread, so a sig_atomic_t would not do.
+std::atomic<bool> signalReceived = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
 
 }  // namespace
 
 bool isInterrupted() {
-  return signalReceived != 0;
+  return signalReceived;
 }
 
 ExitCode runInterruptible(const std::function<ExitCode()>& work, const char* message) {
   struct sigaction action {};
-  action.sa_handler = [](int) { signalReceived = 1; };
+  action.sa_handler = [](int) { signalReceived = true; };
   for (const int signal : {SIGINT, SIGTERM}) sigaction(signal, &action, nullptr);
   try {
     return work();

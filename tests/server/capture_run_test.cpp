@@ -171,7 +171,7 @@ TEST_F(Capture, AnInterruptEndsItWith130AndWholeFiles) {
     for (int i = 0; i < 3000 && !fs::exists(folder_ / "out/ids/000003.npy"); ++i)
       std::this_thread::sleep_for(std::chrono::milliseconds(10));
     kill(child, signal);
-    EXPECT_EQ(awaitExitCode(child), 130);
+    EXPECT_EQ(awaitExitCode(child), 130) << readText(getPath("stderr"));
     const auto tree = readTree(folder_ / "out");
     EXPECT_GT(tree.size(), 3 + 3 * 3U);
     EXPECT_LT(tree.size(), 3 + 3 * 4000U);
