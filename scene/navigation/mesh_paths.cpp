@@ -265,7 +265,7 @@ NavigationPath proveCorridor(const PathFinder& finder, Clearance clearance, cons
     pullTight(finder.walker, path.points);
   path.length = computeLength(path.points);
   if (!finder.walker.takeCrossedSteps()) return path;
-  return proveVersions(finder.walker, std::array{path.points, loose}, proof);
+  return proveVersions(finder.walker, std::array{path.points, loose}, Versions::untilLevel, proof);
 }
 
 /// A path along a corridor. A repair may lead far around: then other corridors are tried whose
@@ -366,6 +366,7 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
   // Of the walk over the whole path: searches reset the walker's travel.
   const double rise = std::abs(path.points.back().y() - path.points.front().y());
   double climb = walker.travel().climb - rise;
+  path.feetLength = walker.travel().length();
   path.length = computeLength(path.points);
   proof.bump.reset();
   const auto isSmall = [&] { return climb < std::max(kMinBump, kMinClimb * path.length); };
@@ -376,6 +377,7 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
     const std::vector<Obstruction> met = proof.met;
     if (walksOn(walker, level, proof)) {
       climb = walker.travel().climb - rise;
+      path.feetLength = walker.travel().length();
       path.points = std::move(level);
       path.length = computeLength(path.points);
     } else {
@@ -390,7 +392,7 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
 }
 
 NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> versions,
-                             Proof& proof) {
+                             Versions tried, Proof& proof) {
   NavigationPath best;
   std::optional<Vec3> bump;
   for (std::size_t i = 0; i < versions.size(); ++i) {
@@ -398,10 +400,10 @@ NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> 
     NavigationPath path;
     path.points = versions[i];
     if (!walksWithoutBumps(walker, path, proof)) continue;
-    if (best.found() && path.cost() >= best.cost()) continue;
+    if (best.found() && path.feetLength >= best.feetLength) continue;
     best = std::move(path);
     bump = proof.bump;
-    if (best.bumpClimb == 0) break;
+    if (tried == Versions::untilLevel && best.bumpClimb == 0) break;
   }
   proof.bump = bump;
   return best;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <optional>
 #include <span>
@@ -44,13 +45,16 @@ bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError);
 /// Walks the whole path without a stop: after a step a place may be reached at another height.
 bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof);
 /// As walksOn(). Then leads the path around low objects, where this shortens the way of the feet.
-/// Sets the length, `proof.bump` and its climb.
+/// Sets the lengths, `proof.bump` and its climb.
 bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof);
 
-/// Proves versions of a path in turn, up to the first that leads over no low object. Returns the
-/// one with the least cost; none: no version can be walked.
+/// Versions of a path that are proved: all, or up to the first that leads over no low object.
+enum class Versions : std::uint8_t { all, untilLevel };
+
+/// Proves versions of a path in turn. Returns the one on which the feet move least; none: no
+/// version can be walked.
 NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> versions,
-                             Proof& proof);
+                             Versions tried, Proof& proof);
 
 /// A path on the ample mesh, or on the scarce one; without a reason if none is found.
 NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,

@@ -43,7 +43,8 @@ struct NavigationPath {
   /// Metres up and down in excess of the difference in height of both ends, if the path leads over
   /// a low object; 0: it does not, or the excess is small.
   double bumpClimb = 0;
-  double seconds = 0;  ///< expected, without waits for doors
+  double feetLength = 0;  ///< FeetTravel::length() of the proof; 0: not measured
+  double seconds = 0;     ///< expected, without waits for doors
   std::vector<PathLeg> legs;
   std::string reason;  ///< without a path: why
   std::optional<Obstruction> obstruction;

@@ -20,7 +20,8 @@ constexpr double kOnMesh = 0.1;     // metres
 constexpr double kMinAim = 1;       // metres from where a path joins the mesh
 constexpr double kStraight = 1.01;  // of the straight line: a path is short enough
 constexpr const char* kNotFound = "no path was found within the limits of the search";
-constexpr double kMaxGridDistance = 3;  // metres between places that are connected without a mesh
+constexpr std::size_t kMaxLeftOut = 50;  // places of a path of which some may be left out
+constexpr double kMaxGridDistance = 3;   // metres between places that are connected without a mesh
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
 constexpr double kMaxExit = 5;  // metres
 constexpr GridSearch kCoarseGrid{kCoarseSpacing, kMaxExit, 4000};
@@ -76,12 +77,33 @@ std::optional<std::size_t> walkRoute(const PathFinder& finder, const ConnectionR
   return std::nullopt;
 }
 
+/// Leaves out places of a path as long as the whole of it can be walked, and the feet move less.
+NavigationPath leaveOutPlaces(Walker& walker, NavigationPath path, Proof& proof) {
+  for (std::size_t i = 1; i + 1 < path.points.size();) {
+    NavigationPath other;
+    other.points = path.points;
+    other.points.erase(other.points.begin() + static_cast<std::ptrdiff_t>(i));
+    if (walksWithoutBumps(walker, other, proof) && other.feetLength < path.feetLength)
+      path = std::move(other);
+    else
+      ++i;
+  }
+  return path;
+}
+
 /// Makes a path of places whose legs were walked, as short as it can be walked without a stop.
 NavigationPath provePath(const PathFinder& finder, const std::vector<Vec3>& places, Proof& proof) {
   std::vector<Vec3> shortened = shortenPath(finder.walker, places, Shortcuts::all);
   std::vector<Vec3> tight = shortened;
   pullTight(finder.walker, tight);
-  return proveVersions(finder.walker, std::array{tight, shortened, places}, proof);
+  const std::vector<Vec3> shortest = shortenPath(finder.walker, tight, Shortcuts::tight);
+  NavigationPath path =
+      proveVersions(finder.walker, std::array{shortest, tight, shortened}, Versions::all, proof);
+  if (path.found()) return path;
+  // A fall from a step may lead past places where the feet would have stood.
+  path = proveVersions(finder.walker, std::array{places}, Versions::all, proof);
+  if (!path.found() || path.points.size() > kMaxLeftOut) return path;
+  return leaveOutPlaces(finder.walker, std::move(path), proof);
 }
 
 NavigationPath findPathByConnections(const PathFinder& finder, const Vec3& start, const Vec3& goal,
@@ -260,7 +282,7 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
     if (best.found() && best.cost() <= kStraight * (goal - start).norm()) break;
     NavigationPath path = findPathOverMesh(finder, start, goal, exits, proof);
     if (!path.found()) break;
-    if (!best.found() || path.cost() < best.cost()) best = std::move(path);
+    if (!best.found() || path.feetLength < best.feetLength) best = std::move(path);
   }
   return best;
 }

@@ -390,8 +390,8 @@ void judge(Bench& bench, const std::vector<Vec3>& places, std::size_t maxPlaces,
   }
 }
 
-/// Metres that the feet of an avatar move along a way, tick by tick: a step up or down counts with
-/// its height, wherever the points of the way are. nullopt: it cannot be walked.
+/// Metres that the feet of an avatar move along a way, across and up and down: a step counts with
+/// its height, whether it is taken in one tick or in a fall. nullopt: it cannot be walked.
 std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& way) {
   scene::World world(bench.scene);
   scene::Spawn spawn;
@@ -408,7 +408,8 @@ std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& w
     const auto snapshot = world.snapshot();
     if (snapshot->avatars.empty()) return std::nullopt;
     const Vec3 before = std::exchange(feet, snapshot->avatars.front().footPosition);
-    length += (feet - before).norm();
+    const Vec3 moved = feet - before;
+    length += std::hypot(moved.x(), moved.z()) + std::abs(moved.y());
     for (const scene::Notice& notice : report.notices) {
       if (notice.kind == scene::Notice::Kind::blocked) return std::nullopt;
       if (notice.kind != scene::Notice::Kind::arrived) continue;
@@ -456,7 +457,7 @@ void compareLength(Bench& bench, const FloodFill& fill, const Vec3& from, const 
   }
   lengths.shares.push_back(scene::computeLength(points) / scene::computeLength(way));
   lengths.feetShares.push_back(*walked / *shortest);
-  printLong(from, to, std::max(lengths.shares.back(), lengths.feetShares.back()));
+  printLong(from, to, lengths.feetShares.back());
 }
 
 void compareWithFill(Bench& bench, const Effort& effort, nlohmann::json& row) {

@@ -109,8 +109,8 @@ of radius, or a shift of the grid by one centimetre, changes the answer.
 found between two islands in both directions, or none on one. Lengths are those of paths as a share of the
 shortest way in the fill, pulled straight, where an avatar can walk that. In brackets are those where it cannot, or of
 which the fill has not both ends. Ways of a metre and more are compared. They are measured along the points of both. *By
-feet*: an avatar walks both, and the metres that its feet move are compared, tick by tick. A step up or down then counts
-with its height. –: not measured.
+feet*: an avatar walks both, and the metres that its feet move across, up and down are compared. A step thus counts with
+its height, in one tick as in a fall. –: not measured.
 
 {write("Reach and length", "fill", REACH, make_fill_row)}
 ## Length against Detour

@@ -93,7 +93,7 @@ FeetTravel walkAlong(Walker& walker, const std::vector<Vec3>& places) {
   FeetTravel sum;
   for (std::size_t i = 1; i < places.size(); ++i) {
     EXPECT_TRUE(walks(walker, places[i - 1], places[i], 1e-3)) << i;
-    sum.length += walker.travel().length;
+    sum.across += walker.travel().across;
     sum.climb += walker.travel().climb;
   }
   return sum;
@@ -116,7 +116,7 @@ TEST(LevelDetours, TheEdgeOfALowObjectIsWalkedAround) {
   EXPECT_EQ(places.back(), to);
   const FeetTravel around = walkAlong(walker, places);
   EXPECT_LT(around.climb, 0.01);
-  EXPECT_LT(around.length, 1.01 * (2 * std::hypot(1.9, 0.11) + 2.2));
+  EXPECT_LT(around.length(), 1.01 * (2 * std::hypot(1.9, 0.11) + 2.2));
   EXPECT_FALSE(findBump(walker, places));
 }
 
@@ -142,7 +142,7 @@ TEST(LevelDetours, AnObjectIsWalkedOverIfTheWayAroundItIsLonger) {
     const World world(std::make_shared<const Scene>(makeBedModel(minZ)));
     Walker walker(world.data(), {});
     std::vector<Vec3> places{from, to};
-    const double over = walkAlong(walker, places).length;
+    const double over = walkAlong(walker, places).length();
     const double around = 2 * std::hypot(1.75, minZ - 0.3) + 2.5;
     BumpSearch search{40'000};
     const bool isReplaced = !goAroundBumps(walker, places, search).empty();
@@ -161,14 +161,21 @@ TEST(LevelDetours, AVersionOfAPathThatLeadsAroundIsPreferred) {
   const std::vector<Vec3> around{{0, 0, 0}, {2, 0, -0.15}, {4, 0, -0.15}, {6, 0, 0}};
   const std::vector<Vec3> far{{0, 0, 0}, {3, 0, -4.5}, {6, 0, 0}};
   Proof noSearch(0);
-  NavigationPath path = proveVersions(walker, std::array{over, around}, noSearch);
+  NavigationPath path =
+      proveVersions(walker, std::array{over, around}, Versions::untilLevel, noSearch);
   EXPECT_EQ(path.points, around);
   EXPECT_EQ(path.bumpClimb, 0);
   EXPECT_FALSE(noSearch.bump);
-  path = proveVersions(walker, std::array{over, far}, noSearch);
+  EXPECT_NEAR(path.feetLength, path.length, 0.01);
+  path = proveVersions(walker, std::array{over, far}, Versions::untilLevel, noSearch);
   EXPECT_EQ(path.points, over) << "the way of the feet around is longer";
   EXPECT_NEAR(path.bumpClimb, 2 * kBedHeight, 0.01);
+  EXPECT_NEAR(path.feetLength, 6 + 2 * kBedHeight, 0.01);
   EXPECT_TRUE(noSearch.bump);
+  path = proveVersions(walker, std::array{far, around}, Versions::untilLevel, noSearch);
+  EXPECT_EQ(path.points, far) << "the first one is level";
+  path = proveVersions(walker, std::array{far, around}, Versions::all, noSearch);
+  EXPECT_EQ(path.points, around);
 }
 
 TEST(GridSearch, AShortcutOverALowObjectIsNotTakenIfTheFeetMoveFarther) {
@@ -178,6 +185,18 @@ TEST(GridSearch, AShortcutOverALowObjectIsNotTakenIfTheFeetMoveFarther) {
   const std::vector<Vec3> places = shortenPath(walker, around, Shortcuts::all);
   EXPECT_LT(walkAlong(walker, places).climb, 0.01);
   EXPECT_TRUE(walks(walker, around.front(), around.back(), 1e-3)) << "the shortcut can be walked";
+}
+
+/// The walker steps down from a box at x = 1.3. It does not stop at the third place, which is in
+/// the air.
+TEST(GridSearch, PlacesWithinAFallAreLeftOutOfATightPath) {
+  const World world(makeBoxScene({makeFloorBox(), {"box", {-2, 0, -2}, {1, kBedHeight, 2}}}));
+  Walker walker(world.data(), {});
+  const double offset = world.settings().contactOffset, top = kBedHeight + offset;
+  const std::vector<Vec3> bent{{0, top, 0}, {1.2, top, 0.2}, {1.32, 0.12, 0.22}, {3, offset, 0}};
+  const std::vector<Vec3> straight{bent.front(), bent.back()};
+  EXPECT_EQ(shortenPath(walker, bent, Shortcuts::tight), straight);
+  EXPECT_GT(shortenPath(walker, bent, Shortcuts::all).size(), 2U) << "it may become shorter";
 }
 
 TEST(GridSearch, CornersAreCut) {

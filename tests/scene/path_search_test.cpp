@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <memory>
 #include <random>
 #include <string>
@@ -150,6 +151,26 @@ TEST(PathSearch, FromTheMiddleOfAFloorWithoutAMeshAPathLeadsToTheClosestPlaceOfT
     EXPECT_GT(path.length, 2.7 + 3 + 10);
     EXPECT_LT(path.length, 18);
   }
+}
+
+/// The mesh is on the floor alone. The shortest path leaves the bed obliquely, and bends at the
+/// pillar.
+TEST(PathSearch, FromFurnitureThePathIsShortByFeet) {
+  PartlyMeshed scene({{"floor", {0, -0.2, 0}, {10, 0, 8}},
+                      {"mattress", {5.5, 0, 2}, {8, 0.5, 4}},
+                      {"frame", {5.3, 0, 1.8}, {8.2, 0.24, 4.2}},
+                      {"pillar", {3.5, 0, 3.5}, {4, 2, 4.2}}},
+                     {{"floor", {0, -0.2, 0}, {10, 0, 8}}});
+  const Vec3 goal(1, 0, 5);
+  for (const Vec3& start : {Vec3(7, 0.5, 3), Vec3(6.3, 0.5, 2.6), Vec3(7.5, 0.5, 3.4)})
+    for (const auto& [from, to] : {std::pair(start, goal), std::pair(goal, start)}) {
+      const NavigationPath path = scene.find(from, to);
+      ASSERT_TRUE(path.found()) << path.reason;
+      const double around = std::hypot(start.x() - 4, 4.5 - start.z()) + 0.5 + std::hypot(2.5, 0.5);
+      const double below = std::hypot(start.x() - 4, 3.2 - start.z()) + 0.5 + std::hypot(2.5, 1.8);
+      EXPECT_GT(path.feetLength, 0.98 * std::min(around, below) + 0.5);
+      EXPECT_LT(path.feetLength, 1.01 * std::min(around, below) + 0.51) << start << " " << from;
+    }
 }
 
 }  // namespace

@@ -18,6 +18,7 @@ constexpr double kLayerHeight = 1;       // metres: places of a cell closer than
 constexpr double kSameHeight = 0.05;     // metres: of feet that come to the same place on two paths
 constexpr double kMaxEvenExcess = 0.05;  // metres: of feet over thresholds and rough floor
 constexpr double kMinPull = 0.01;        // metres
+constexpr std::size_t kMaxLeftOut = 4;   // places in a row of a tight path; some are within a fall
 
 struct Cell {
   int x = 0, z = 0, storey = 0;
@@ -96,7 +97,7 @@ std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, co
       walker.returnTo(feet);
       if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
       const Vec3 reached = walker.footPosition();
-      if (search.countsHeights) next = std::max(next, cost + walker.travel().length);
+      if (search.countsHeights) next = std::max(next, cost + walker.travel().length());
       if (next + end.estimate(reached) > search.maxLength) continue;
       const Cell to2 = grid.computeCell(reached, x, z);
       const auto [at, isNew] = places.try_emplace(to2, Place{reached, next, cell, false});
@@ -134,7 +135,7 @@ class LegLengths {
   std::vector<double> lengths_;
 };
 
-/// Whether feet that moved by `length` metres between two places stepped up or down.
+/// Whether feet that moved by `length` metres between two places rose or sank.
 bool isUneven(double length, const Vec3& from, const Vec3& to) {
   return length > (to - from).norm() + kMaxEvenExcess;
 }
@@ -153,7 +154,7 @@ double measureLength(Walker& walker, std::span<const Vec3> places) {
     walker.returnTo(places[i - 1]);
     if (walker.walkTo(places[i]).kind != WalkOutcome::Kind::arrived)
       return std::numeric_limits<double>::infinity();
-    length += walker.travel().length;
+    length += walker.travel().length();
   }
   return length;
 }
@@ -198,9 +199,9 @@ bool pullPlace(Walker& walker, std::vector<Vec3>& places, std::size_t i) {
     walker.returnTo(before);
     if (walker.walkTo(here + part * aside).kind != WalkOutcome::Kind::arrived) continue;
     const Vec3 reached = walker.footPosition();
-    const double first = walker.travel().length;
+    const double first = walker.travel().length();
     if (!walks(walker, reached, after, kSameHeight)) continue;
-    const double second = walker.travel().length;
+    const double second = walker.travel().length();
     if ((isUneven(first, before, reached) || isUneven(second, reached, after)) &&
         first + second > measureLength(walker, std::array{before, here, after}))
       continue;
@@ -226,7 +227,7 @@ bool cutCorner(Walker& walker, std::vector<Vec3>& places, std::size_t i) {
     const Vec3 end = walker.footPosition();
     if (walker.walkTo(after).kind != WalkOutcome::Kind::arrived) continue;
     if (std::abs(walker.footPosition().y() - after.y()) > kSameHeight) continue;
-    const double length = walker.travel().length;
+    const double length = walker.travel().length();
     if (length > measureLength(walker, std::array{before, here, after})) continue;
     places[i] = start;
     places.insert(places.begin() + static_cast<std::ptrdiff_t>(i) + 1, end);
@@ -258,19 +259,24 @@ std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, S
   LegLengths legs(walker, places);
   const auto isShortcut = [&](std::size_t first, std::size_t last) {
     const Vec3 &from = places[first], &to = places[last];
-    if (kind == Shortcuts::all) {
+    if (kind != Shortcuts::free) {
       if (!walks(walker, from, to, kSameHeight)) return false;
-      const double length = walker.travel().length;
-      // A path on a grid will be shorter when it is pulled tight.
-      return !isUneven(length, from, to) || kGridExcess * length <= legs.measure(first, last);
+      const double length = walker.travel().length();
+      const double excess = kind == Shortcuts::tight ? 1 : kGridExcess;
+      return !isUneven(length, from, to) || excess * length <= legs.measure(first, last);
     }
     walker.returnTo(from);
     return walker.isPathClear(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
   };
   std::vector<Vec3> path{places.front()};
   for (std::size_t at = 0; at + 1 < places.size();) {
-    // The farthest place that is found by doubling the distance, then by halving.
     std::size_t reached = at + 1, failed = places.size();
+    if (kind == Shortcuts::tight) {
+      reached = std::min(at + kMaxLeftOut + 1, places.size() - 1);
+      while (reached > at + 1 && !isShortcut(at, reached)) --reached;
+      failed = reached + 1;
+    }
+    // The farthest place that is found by doubling the distance, then by halving.
     for (std::size_t step = 2; reached + 1 < failed; step *= 2) {
       const std::size_t next = std::min(at + step, failed - 1);
       if (next <= reached) break;

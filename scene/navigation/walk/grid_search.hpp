@@ -18,7 +18,7 @@ namespace enfilade::scene {
 /// below.
 bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError);
 
-/// The way of the feet along places, metres; infinite if a leg cannot be walked.
+/// FeetTravel::length() along places; infinite if a leg cannot be walked.
 double measureLength(Walker& walker, std::span<const Vec3> places);
 
 /// Length of a shortest path on a grid, of the same path pulled tight: at most, on even floor.
@@ -55,8 +55,9 @@ std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& fro
 
 /// Lines between places of a path that are tried as shortcuts. A line that is stopped is walked
 /// tick by tick, which takes long: this pays after a search on a grid, and rarely at the corners of
-/// a shortest line.
-enum class Shortcuts : std::uint8_t { all, free };
+/// a shortest line. `tight`: all, of a path that was pulled tight. Else a shortcut over a step must
+/// be shorter by far, since a path on a grid will become shorter.
+enum class Shortcuts : std::uint8_t { all, tight, free };
 
 /// Moves the places between both ends towards the lines between their neighbours, and cuts corners,
 /// as long as the legs can be walked and the way of the feet over steps becomes no longer.

@@ -52,7 +52,7 @@ std::optional<std::vector<Sample>> sampleWalk(Walker& walker, const std::vector<
 std::optional<std::size_t> findEndOfBump(const std::vector<Sample>& samples, std::size_t first) {
   const Sample& start = samples[first];
   for (std::size_t i = first + 2; i < samples.size(); ++i) {
-    if (samples[i].travel.length - start.travel.length > kMaxBumpLength) break;
+    if (samples[i].travel.length() - start.travel.length() > kMaxBumpLength) break;
     if (std::abs(samples[i].feet.y() - start.feet.y()) > kSameLevel) continue;
     if (samples[i].travel.climb - start.travel.climb >= kMinBump) return i;
   }
@@ -60,14 +60,14 @@ std::optional<std::size_t> findEndOfBump(const std::vector<Sample>& samples, std
 }
 
 std::size_t findSampleBefore(const std::vector<Sample>& samples, std::size_t i) {
-  const double start = samples[i].travel.length - kApproach;
-  while (i > 0 && samples[i].travel.length > start) --i;
+  const double start = samples[i].travel.length() - kApproach;
+  while (i > 0 && samples[i].travel.length() > start) --i;
   return i;
 }
 
 std::size_t findSampleAfter(const std::vector<Sample>& samples, std::size_t i) {
-  const double end = samples[i].travel.length + kApproach;
-  while (i + 1 < samples.size() && samples[i].travel.length < end) ++i;
+  const double end = samples[i].travel.length() + kApproach;
+  while (i + 1 < samples.size() && samples[i].travel.length() < end) ++i;
   return i;
 }
 
@@ -93,7 +93,7 @@ std::vector<Vec3> levelPart(Walker& walker, const std::vector<Vec3>& part, const
   const double length = measureLength(walker, part);
   for (GridSearch grid : {kCoarseAround, kFineAround}) {
     const std::size_t walks = grid.maxWalks = std::min(grid.maxWalks, maxWalks);
-    grid.maxLength = kGridExcess * (last.travel.length - first.travel.length);
+    grid.maxLength = kGridExcess * (last.travel.length() - first.travel.length());
     const auto way = findGridPath(walker, first.feet, last.feet, grid);
     maxWalks -= walks - grid.maxWalks;
     if (!way) continue;

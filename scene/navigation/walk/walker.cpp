@@ -144,7 +144,7 @@ void Walker::step(const Vec3& velocity) {
 
 void Walker::addTravel(const Vec3& from) {
   const Vec3 moved = avatar_.footPosition - from;
-  travel_.length += moved.norm();
+  travel_.across += std::hypot(moved.x(), moved.z());
   travel_.climb += std::abs(moved.y());
 }
 

@@ -29,10 +29,13 @@ struct WalkOutcome {
   int ticks = 0;                     ///< of a walk tick by tick
 };
 
-/// The way of the feet. A step counts with its height.
+/// The way of the feet.
 struct FeetTravel {
-  double length = 0;  ///< metres in space
+  double across = 0;  ///< metres
   double climb = 0;   ///< metres up, and down
+
+  /// Metres. A step counts with its height, whether it is taken in one tick or in a fall.
+  double length() const { return across + climb; }
 };
 
 /// Not thread-safe; several walkers may share a world that does not tick.
