@@ -6,7 +6,7 @@ namespace enfilade::assets {
 namespace {
 
 using namespace plan;
-using Along = Wall::Along;
+using Axis = Wall::Axis;
 
 const std::vector<Paint> kStone{Paint::limestone, Paint::limestoneDark};
 constexpr double kTop = kHallCeiling + 0.3;
@@ -42,24 +42,24 @@ void addWalls(Sketch& sketch) {
   const double h = kHallHalf, o = kOuter;
   const std::vector<double> across{kHallWest + 3, kHallWest + 7, kHallWest + 11, kHallWest + 15};
   addGlazedWall(sketch, "south_wall",
-                {Along::x, kHallWest - o, kHallEast + o, h, h + o, -0.06, kTop, Paint::wallIvory,
+                {Axis::x, kHallWest - o, kHallEast + o, h, h + o, -0.06, kTop, Paint::wallIvory,
                  Paint::facade},
                 makeTiers(across), -1);
   addGlazedWall(sketch, "north_wall",
-                {Along::x, kHallWest - o, kHallEast + o, -h - o, -h, -0.06, kTop, Paint::facade,
+                {Axis::x, kHallWest - o, kHallEast + o, -h - o, -h, -0.06, kTop, Paint::facade,
                  Paint::wallIvory},
                 makeTiers(across), 1);
   addGlazedWall(
       sketch, "east_wall",
-      {Along::z, -h, h, kHallEast, kHallEast + o, -0.06, kTop, Paint::wallIvory, Paint::facade},
+      {Axis::z, -h, h, kHallEast, kHallEast + o, -0.06, kTop, Paint::wallIvory, Paint::facade},
       makeTiers({-5.6, 5.6}), -1);
   // West: the far side of the wall has the paint of the wings' last rooms.
-  const Wall west{Along::z, -h,   kSouth + kOuter, kHallWest - o,   kHallWest,
-                  -0.06,    kTop, Paint::wallTeal, Paint::wallIvory};
+  const Wall west{Axis::z, -h,   kSouth + kOuter, kHallWest - o,   kHallWest,
+                  -0.06,   kTop, Paint::wallTeal, Paint::wallIvory};
   const std::vector<Opening> doors = makeWestDoors();
   addWall(sketch, "building/hall/west_wall", west, doors);
   addGlazedWall(sketch, "west_wall_free",
-                {Along::z, kSouth + kOuter, h, kHallWest - o, kHallWest, -0.06, kTop, Paint::facade,
+                {Axis::z, kSouth + kOuter, h, kHallWest - o, kHallWest, -0.06, kTop, Paint::facade,
                  Paint::wallIvory},
                 makeTiers({5.9}), 1);
   int number = 0;
@@ -96,12 +96,12 @@ void addEdgeBands(Sketch& sketch) {
     addRail(sketch, std::string("building/hall/gallery/edge_") + name, face, y, kSlab + 0.015, 0.05,
             Paint::paintedWood);
   };
-  addEdgeBand("north", {Along::x, kVoidWest, kVoidEast, -kVoidHalf, 1});
-  addEdgeBand("south", {Along::x, kVoidWest, kVoidEast, kVoidHalf, -1});
-  addEdgeBand("west", {Along::z, -kVoidHalf, kVoidHalf, kVoidWest, 1});
+  addEdgeBand("north", {Axis::x, kVoidWest, kVoidEast, -kVoidHalf, 1});
+  addEdgeBand("south", {Axis::x, kVoidWest, kVoidEast, kVoidHalf, -1});
+  addEdgeBand("west", {Axis::z, -kVoidHalf, kVoidHalf, kVoidWest, 1});
   // The head of the stair is between the two halves of the east band.
-  addEdgeBand("east_a", {Along::z, -kVoidHalf, kStairLow, kVoidEast, -1});
-  addEdgeBand("east_b", {Along::z, kStairHigh, kVoidHalf, kVoidEast, -1});
+  addEdgeBand("east_a", {Axis::z, -kVoidHalf, kStairLow, kVoidEast, -1});
+  addEdgeBand("east_b", {Axis::z, kStairHigh, kVoidHalf, kVoidEast, -1});
 }
 
 PaintedMesh makeColumnShape(double height, double radius) {
@@ -203,10 +203,10 @@ void addMouldings(Sketch& sketch) {
     const char* name;
     Face face;
     std::vector<Opening> holes;
-  } sides[] = {{"north", {Along::x, kHallWest, kHallEast, -h, 1}, none},
-               {"south", {Along::x, kHallWest, kHallEast, h, -1}, none},
-               {"west", {Along::z, -h, h, kHallWest, 1}, makeWestDoors()},
-               {"east", {Along::z, -h, h, kHallEast, -1}, none}};
+  } sides[] = {{"north", {Axis::x, kHallWest, kHallEast, -h, 1}, none},
+               {"south", {Axis::x, kHallWest, kHallEast, h, -1}, none},
+               {"west", {Axis::z, -h, h, kHallWest, 1}, makeWestDoors()},
+               {"east", {Axis::z, -h, h, kHallEast, -1}, none}};
   for (const auto& side : sides) {
     const std::string path = "building/hall/";
     addSkirting(sketch, path + "skirting_" + side.name, side.face, 0, side.holes);

@@ -6,7 +6,7 @@
 namespace enfilade::assets {
 namespace {
 
-using Along = Wall::Along;
+using Axis = Wall::Axis;
 
 constexpr double kStorey = 3.2, kFloorThick = 0.25, kWallThick = 0.35;
 constexpr int kHouseRisers = 19;
@@ -35,7 +35,7 @@ void addFacades(Sketch& sketch, const Plan& p, int storey) {
   const double y = kStorey * storey, t = kWallThick;
   const std::string path = makeFloorPath(storey);
   for (const bool front : {true, false}) {
-    const Wall wall{Along::x,
+    const Wall wall{Axis::x,
                     -p.halfX - t,
                     p.halfX + t,
                     front ? p.halfZ : -p.halfZ - t,
@@ -61,7 +61,7 @@ void addFacades(Sketch& sketch, const Plan& p, int storey) {
     const bool east = side > 0;
     addWall(
         sketch, path + (east ? "/east" : "/west"),
-        {Along::z, -p.halfZ, p.halfZ, east ? p.halfX : -p.halfX - t, east ? p.halfX + t : -p.halfX,
+        {Axis::z, -p.halfZ, p.halfZ, east ? p.halfX : -p.halfX - t, east ? p.halfX + t : -p.halfX,
          y, y + kStorey, east ? p.inside : p.facade, east ? p.facade : p.inside},
         {});
   }

@@ -112,7 +112,7 @@ void addStairBalusters(Sketch& sketch) {
 }
 
 /// Adds one straight run of railing on the upper floor.
-void addRailing(Sketch& sketch, const std::string& path, Wall::Along along, double from, double to,
+void addRailing(Sketch& sketch, const std::string& path, Wall::Axis along, double from, double to,
                 double across) {
   const double y = kUpper;
   placeWallBox(sketch, path + "/handrail", along, {from, y + 1.03, across - 0.035},
@@ -147,11 +147,11 @@ void addGalleryRailing(Sketch& sketch) {
   const double inset = 0.08;
   const double x0 = kVoidWest - inset, x1 = kVoidEast + inset, z = kVoidHalf + inset;
   const std::string path = "building/hall/gallery/railing_";
-  addRailing(sketch, path + "north", Wall::Along::x, x0, x1, -z);
-  addRailing(sketch, path + "south", Wall::Along::x, x0, x1, z);
-  addRailing(sketch, path + "west", Wall::Along::z, -z + 0.04, z - 0.04, x0);
-  addRailing(sketch, path + "east_a", Wall::Along::z, -z + 0.04, kStairLow - 0.1, x1);
-  addRailing(sketch, path + "east_b", Wall::Along::z, kStairHigh + 0.1, z - 0.04, x1);
+  addRailing(sketch, path + "north", Wall::Axis::x, x0, x1, -z);
+  addRailing(sketch, path + "south", Wall::Axis::x, x0, x1, z);
+  addRailing(sketch, path + "west", Wall::Axis::z, -z + 0.04, z - 0.04, x0);
+  addRailing(sketch, path + "east_a", Wall::Axis::z, -z + 0.04, kStairLow - 0.1, x1);
+  addRailing(sketch, path + "east_b", Wall::Axis::z, kStairHigh + 0.1, z - 0.04, x1);
 }
 
 void addLift(Sketch& sketch) {
@@ -162,9 +162,8 @@ void addLift(Sketch& sketch) {
                   {kLiftWest + t, top, kLiftSouth}, {wall, inner, inner, inner, inner, wall});
   sketch.placeBox(path + "shaft/east", {kLiftEast - t, -0.06, kLiftNorth},
                   {kLiftEast, top, kLiftSouth}, {inner, wall, inner, inner, inner, wall});
-  const Wall front{
-      Wall::Along::x, kLiftWest + t, kLiftEast - t, kLiftSouth - t, kLiftSouth, -0.06, top,
-      inner,          wall};
+  const Wall front{Wall::Axis::x, kLiftWest + t, kLiftEast - t, kLiftSouth - t, kLiftSouth, -0.06,
+                   top,           inner,         wall};
   std::vector<Opening> doors;
   for (const double floor : {0.0, kUpper})
     doors.push_back({mid - 0.5, mid + 0.5, floor, floor + 2.1});

@@ -26,7 +26,7 @@ std::vector<Opening> findHoles(const std::vector<Opening>& openings, double from
 }
 
 BoxPaints makeBoxPaints(const Wall& w) {
-  if (w.along == Wall::Along::x) return {w.ends, w.ends, w.ends, w.ends, w.lowFace, w.highFace};
+  if (w.along == Wall::Axis::x) return {w.ends, w.ends, w.ends, w.ends, w.lowFace, w.highFace};
   return {w.lowFace, w.highFace, w.ends, w.ends, w.ends, w.ends};
 }
 
@@ -67,7 +67,7 @@ void addCurtains(Sketch& sketch, const std::string& path, const Wall& wall, cons
          makeWallPoint(wall.along, hole.to, top, across) + reach, 0.014, 8, Paint::brass);
   sketch.place(path + "/curtain_rod", rod, Eigen::Affine3d::Identity());
   const PaintedMesh cloth = makeCurtainShape(width, top - bottom, style.curtain);
-  const int quarters = wall.along == Wall::Along::x ? 0 : 3;
+  const int quarters = wall.along == Wall::Axis::x ? 0 : 3;
   sketch.place(
       path + "/curtain_left", cloth,
       makeQuarterTurn(quarters, makeWallPoint(wall.along, hole.from - 0.26, bottom, across)));
@@ -78,11 +78,11 @@ void addCurtains(Sketch& sketch, const std::string& path, const Wall& wall, cons
 
 }  // namespace
 
-Vec3 makeWallPoint(Wall::Along along, double a, double y, double across) {
-  return along == Wall::Along::x ? Vec3{a, y, across} : Vec3{across, y, a};
+Vec3 makeWallPoint(Wall::Axis along, double a, double y, double across) {
+  return along == Wall::Axis::x ? Vec3{a, y, across} : Vec3{across, y, a};
 }
 
-void placeWallBox(Sketch& sketch, const std::string& path, Wall::Along along, const Vec3& low,
+void placeWallBox(Sketch& sketch, const std::string& path, Wall::Axis along, const Vec3& low,
                   const Vec3& high, Paint paint) {
   sketch.placeBox(path, makeWallPoint(along, low.x(), low.y(), low.z()),
                   makeWallPoint(along, high.x(), high.y(), high.z()), paint);

@@ -10,8 +10,8 @@ namespace enfilade::assets {
 
 /// A vertical wall along X (its thickness along Z) or along Z (its thickness along X).
 struct Wall {
-  enum class Along : std::uint8_t { x, z };
-  Along along;
+  enum class Axis : std::uint8_t { x, z };
+  Axis along;
   double from, to;     ///< along its length
   double low, high;    ///< across its thickness: the coordinates of its two faces
   double bottom, top;  ///< y
@@ -26,9 +26,9 @@ struct Opening {
 };
 
 /// A point given along the wall, up, and across its thickness.
-Vec3 makeWallPoint(Wall::Along along, double a, double y, double across);
+Vec3 makeWallPoint(Wall::Axis along, double a, double y, double across);
 /// The box between two such points.
-void placeWallBox(Sketch& sketch, const std::string& path, Wall::Along along, const Vec3& low,
+void placeWallBox(Sketch& sketch, const std::string& path, Wall::Axis along, const Vec3& low,
                   const Vec3& high, Paint paint);
 
 /// Builds the wall of vertical strips between the openings, with pieces above and below them.
@@ -38,7 +38,7 @@ void addWall(Sketch& sketch, const std::string& path, const Wall& wall,
 /// One face of a wall, seen from a room. `face` is its coordinate across the wall; `inward` is +1
 /// if the room lies at greater coordinates.
 struct Face {
-  Wall::Along along;
+  Wall::Axis along;
   double from, to;
   double face;
   double inward;

@@ -8,7 +8,7 @@ namespace enfilade::assets {
 namespace {
 
 using namespace plan;
-using Along = Wall::Along;
+using Axis = Wall::Axis;
 
 /// One room of a wing and the paints of its surfaces.
 struct Room {
@@ -172,7 +172,7 @@ bool isLobby(const Room& room) {
 /// The parts of a face that the lift's shaft leaves free in the lobbies' north wall; other walls
 /// stay whole.
 std::vector<Face> cutOutLift(const Room& room, const Face& face) {
-  if (!isLobby(room) || face.along != Along::x || face.face != room.box.north) return {face};
+  if (!isLobby(room) || face.along != Axis::x || face.face != room.box.north) return {face};
   Face west = face, east = face;
   west.to = kLiftWest, east.from = kLiftEast;
   return {west, east};
@@ -181,10 +181,10 @@ std::vector<Face> cutOutLift(const Room& room, const Face& face) {
 void addMouldings(Sketch& sketch, const Room& room,
                   const std::array<std::vector<Opening>, 4>& holes) {
   const RoomBox& b = room.box;
-  const std::array<Face, 4> faces{{{Along::x, b.west, b.east, b.north, 1},
-                                   {Along::x, b.west, b.east, b.south, -1},
-                                   {Along::z, b.north, b.south, b.west, 1},
-                                   {Along::z, b.north, b.south, b.east, -1}}};
+  const std::array<Face, 4> faces{{{Axis::x, b.west, b.east, b.north, 1},
+                                   {Axis::x, b.west, b.east, b.south, -1},
+                                   {Axis::z, b.north, b.south, b.west, 1},
+                                   {Axis::z, b.north, b.south, b.east, -1}}};
   const std::array<const char*, 4> names{"north", "south", "west", "east"};
   const std::string path = room.path;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -271,7 +271,7 @@ void addMiddleWall(Sketch& sketch, const Storey& s) {
   for (std::size_t i = 0; i + 1 < cuts.size(); ++i) {
     if (cuts[i + 1] - cuts[i] < 1e-6) continue;
     const double x = 0.5 * (cuts[i] + cuts[i + 1]);
-    const Wall wall{Along::x,
+    const Wall wall{Axis::x,
                     cuts[i],
                     cuts[i + 1],
                     kMidNorth,
@@ -285,7 +285,7 @@ void addMiddleWall(Sketch& sketch, const Storey& s) {
   }
   int number = 0;
   for (const Opening& o : s.between) {
-    const Wall wall{Along::x, 0, 0, kMidNorth, kMidSouth, 0, 0, Paint::reveal, Paint::reveal};
+    const Wall wall{Axis::x, 0, 0, kMidNorth, kMidSouth, 0, 0, Paint::reveal, Paint::reveal};
     const std::string path = appendNumber(s.path + "/side_doors/door", ++number);
     addDoorFrame(sketch, path, wall, o, Paint::paintedWood);
     addThreshold(sketch, path + "/threshold", wall, o, Paint::oakDark);
@@ -300,7 +300,7 @@ void addOuterWall(Sketch& sketch, const Storey& s, const std::vector<Room>& room
     const double from = i == 0 ? -kOuter : rooms[i - 1].box.east + kPartition / 2;
     const double to = i + 1 == rooms.size() ? computeRoomEast(5) : room.box.east + kPartition / 2;
     const double inner = south ? kSouth : kNorth;
-    Wall wall{Along::x,
+    Wall wall{Axis::x,
               from,
               to,
               south ? inner : inner - kOuter,
@@ -328,7 +328,7 @@ void addCrossWalls(Sketch& sketch, const Storey& s, const std::vector<Room>& roo
                    double doorZ, bool doors, bool leaves) {
   for (std::size_t i = 0; i + 1 < rooms.size(); ++i) {
     const RoomBox& b = rooms[i].box;
-    const Wall wall{Along::z, b.north, b.south,       b.east,           b.east + kPartition,
+    const Wall wall{Axis::z,  b.north, b.south,       b.east,           b.east + kPartition,
                     s.bottom, s.top,   rooms[i].wall, rooms[i + 1].wall};
     std::vector<Opening> holes;
     if (doors) holes.push_back(makeDoor(doorZ, kDoorHalf, b.floor, kDoorHeight));
@@ -351,7 +351,7 @@ void addCrossWalls(Sketch& sketch, const Storey& s, const std::vector<Room>& roo
 void addWestWall(Sketch& sketch, const Storey& s) {
   const bool ground = s.bottom < 1;
   const double floor = s.south[0].box.floor;
-  const Wall south{Along::z, kMidSouth, kSouth,        -kOuter,        kWest,
+  const Wall south{Axis::z,  kMidSouth, kSouth,        -kOuter,        kWest,
                    s.bottom, s.top,     Paint::facade, s.south[0].wall};
   std::vector<Opening> holes;
   if (ground)
@@ -364,7 +364,7 @@ void addWestWall(Sketch& sketch, const Storey& s) {
   for (std::size_t i = ground ? 1 : 0; i < holes.size(); ++i)
     addWindow(sketch, appendNumber(s.path + "/walls/west_window", static_cast<int>(i)), south,
               holes[i], {i == 0 ? 2 : 1, 3, Paint::glass, 1});
-  const Wall north{Along::z, kNorth, kMidNorth,     -kOuter,        kWest,
+  const Wall north{Axis::z,  kNorth, kMidNorth,     -kOuter,        kWest,
                    s.bottom, s.top,  Paint::facade, s.north[0].wall};
   const std::vector<Opening> windows{{-6.5, -5.3, floor + 0.85, floor + 2.85}};
   addWall(sketch, s.path + "/walls/west_north", north, windows);

@@ -136,12 +136,13 @@ template <class Real>
 bool encloseOriginBySearch(Polytope<Real>& polytope) {
   if (!findTetrahedron(polytope)) return false;
   for (int step = 0; step < kMaxSearchSteps; ++step) {
-    const auto signedNearness = [](const Facet<Real>& facet) {
-      return facet.offset < 0 ? -facet.nearness : facet.nearness;
+    const auto computeSignedDistance = [](const Facet<Real>& facet) {
+      return facet.offset < 0 ? -facet.squaredDistance : facet.squaredDistance;
     };
     const Facet<Real> worst = *std::min_element(
-        polytope.all().begin(), polytope.all().end(),
-        [&](const auto& a, const auto& b) { return signedNearness(a) < signedNearness(b); });
+        polytope.all().begin(), polytope.all().end(), [&](const auto& a, const auto& b) {
+          return computeSignedDistance(a) < computeSignedDistance(b);
+        });
     if (polytope.facesAway(worst)) {
       return std::all_of(polytope.all().begin(), polytope.all().end(),
                          [&](const auto& facet) { return polytope.facesAway(facet); });

@@ -18,7 +18,7 @@ struct Facet {
   Corners corners;
   Eigen::Matrix<Real, 3, 1> normal;  ///< outward, any length
   Real offset;                       ///< minimum of normal . corner
-  Real nearness;                     ///< (offset / |normal|)^2, squared metres
+  Real squaredDistance;              ///< (offset / |normal|)^2, squared metres
 };
 
 template <class Real>
@@ -29,11 +29,11 @@ void setFacet(const Corners& corners, const Eigen::Matrix<Real, 3, 1>& a,
   facet.corners = corners;
   facet.normal = normal;
   facet.offset = std::min(std::min(dot(normal, a), dot(normal, b)), dot(normal, c));
-  facet.nearness = facet.offset * facet.offset / dot(normal, normal);
+  facet.squaredDistance = facet.offset * facet.offset / dot(normal, normal);
 }
 
-/// Error bound (metres) of a facet's distance sqrt(nearness), for any rounding of its normal n.
-/// Each point of the facet is a convex combination of its corners, so n . point is at least the
+/// Error bound (metres) of a facet's distance sqrt(squaredDistance), for any rounding of its normal
+/// n. Each point of the facet is a convex combination of its corners, so n . point is at least the
 /// minimum of n . corner. A corner is off by 8u reach per coordinate, the product by 3u |n| reach.
 template <class Real>
 Real computeFacetError(double reach) {

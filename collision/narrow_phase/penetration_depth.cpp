@@ -86,8 +86,8 @@ LongReal computeMinFacetDistance(LongReal minDistance, const Facet<Real>& neares
   const LongReal clearance = minDistance + computeFacetError<Real>(reach);
   const Real squared = static_cast<Real>(clearance * clearance) * (1 + 16 * unitRoundoff<Real>());
   for (const Facet<Real>& facet : polytope.all()) {
-    if (facet.nearness > squared || &facet == &nearest) continue;
-    minDistance = std::min(minDistance, std::sqrt(refineFacet(facet, polytope).nearness));
+    if (facet.squaredDistance > squared || &facet == &nearest) continue;
+    minDistance = std::min(minDistance, std::sqrt(refineFacet(facet, polytope).squaredDistance));
   }
   return minDistance * (1 - 8 * kLongRoundoff) - computeFacetError<LongReal>(reach);
 }
@@ -100,8 +100,8 @@ DepthBounds certifyBounds(const Facet<Real>& nearest, Polytope<Real>& polytope) 
   tightenUpperBound(polytope.difference, refined.normal, polytope.pairs[nearest.corners[0]],
                     bounds);
   for (int k = 0; k < 3; ++k) bounds.facet[k] = polytope.pairs[nearest.corners[k]];
-  bounds.lower = std::max(LongReal{0},
-                          computeMinFacetDistance(std::sqrt(refined.nearness), nearest, polytope));
+  bounds.lower = std::max(
+      LongReal{0}, computeMinFacetDistance(std::sqrt(refined.squaredDistance), nearest, polytope));
   return bounds;
 }
 
@@ -119,7 +119,7 @@ FacetSupport<double> findFacetSupport(const Facet<double>& facet,
   const SupportPair supports =
       hillClimbPair(polytope.difference, inward, kMaxUnitLength, polytope.pairs[facet.corners[0]]);
   const SupportValue value = computeSupportValue(polytope.difference, inward, 1, supports);
-  return {supports.pair(), -value.value - std::sqrt(facet.nearness), inward, supports};
+  return {supports.pair(), -value.value - std::sqrt(facet.squaredDistance), inward, supports};
 }
 FacetSupport<LongReal> findFacetSupport(const Facet<LongReal>& facet,
                                         const Polytope<LongReal>& polytope) {
@@ -127,7 +127,7 @@ FacetSupport<LongReal> findFacetSupport(const Facet<LongReal>& facet,
   const LongReal length = facet.normal.norm();
   const CertifiedSupport support =
       findCertifiedSupport(polytope.difference, -facet.normal, length, hint);
-  return {support.pair, -support.projection / length - std::sqrt(facet.nearness), {}, {}};
+  return {support.pair, -support.projection / length - std::sqrt(facet.squaredDistance), {}, {}};
 }
 
 /// As certifyBounds(), along the nearest facet's normal rounded to doubles. Along any direction, no
@@ -168,7 +168,8 @@ const Facet<Real>& findNearestFacet(const Polytope<Real>& polytope) {
   for (std::size_t k = 1; k < polytope.facetCount; ++k) {
     const Facet<Real>& facet = polytope.facets[k];
     const bool candidateAway = polytope.facesAway(facet);
-    if (candidateAway == away ? !(facet.nearness < nearest->nearness) : candidateAway) continue;
+    if (candidateAway == away ? !(facet.squaredDistance < nearest->squaredDistance) : candidateAway)
+      continue;
     nearest = &facet, away = candidateAway;
   }
   return *nearest;

@@ -25,9 +25,10 @@ struct ObjectClasses {
 };
 
 /// The class is the IFC class, else Object::className; a part without one has that of its whole. A
-/// thing is a body, an IFC product, an object with its parts, the objects of Object::thing, or the
+/// thing is a body, an IFC product, an object with its parts, or the objects of Object::thing. The
 /// primitives of a mesh that a file splits by material into nodes, such as "bed/bed_0" and
-/// "bed/bed_1": all numbers from 0, each of another material, and named by no list or body.
+/// "bed/bed_1", are one thing, too. They have all numbers from 0, each has another material, and no
+/// list or body names them.
 ObjectClasses computeObjectClasses(const Model& model);
 
 }  // namespace enfilade::scene

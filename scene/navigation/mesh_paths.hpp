@@ -44,7 +44,7 @@ bool isThere(const WalkOutcome& outcome, const Vec3& goal, double heightError);
 
 /// Walks the whole path without a stop: after a step a place may be reached at another height.
 bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof);
-/// As walksOn(). Then leads the path around low objects, where this shortens the way of the feet.
+/// As walksOn(). Then leads the path around low objects, where this shortens the path of the feet.
 /// Sets the lengths, `proof.bump` and its climb.
 bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof);
 

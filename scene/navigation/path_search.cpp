@@ -20,8 +20,8 @@ constexpr double kOnMesh = 0.1;     // metres
 constexpr double kMinAim = 1;       // metres from where a path joins the mesh
 constexpr double kStraight = 1.01;  // of the straight line: a path is short enough
 constexpr const char* kNotFound = "no path was found within the limits of the search";
-constexpr std::size_t kMaxLeftOut = 50;  // places of a path of which some may be left out
-constexpr double kMaxGridDistance = 3;   // metres between places that are connected without a mesh
+constexpr std::size_t kMaxThinnedPlaces = 50;  // of a path: of more, single ones are not left out
+constexpr double kMaxGridDistance = 3;  // metres between places that are connected without a mesh
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
 constexpr double kMaxExit = 5;  // metres
 constexpr GridSearch kCoarseGrid{kCoarseSpacing, kMaxExit, 4000};
@@ -102,7 +102,7 @@ NavigationPath provePath(const PathFinder& finder, const std::vector<Vec3>& plac
   if (path.found()) return path;
   // A fall from a step may lead past places where the feet would have stood.
   path = proveVersions(finder.walker, std::array{places}, Versions::all, proof);
-  if (!path.found() || path.points.size() > kMaxLeftOut) return path;
+  if (!path.found() || path.points.size() > kMaxThinnedPlaces) return path;
   return leaveOutPlaces(finder.walker, std::move(path), proof);
 }
 

@@ -131,7 +131,7 @@ std::string validateOverlay(const std::string& text) {
 void addPath(CLI::App& verb, CaptureArguments& into) {
   verb.option_defaults()->group("Path");
   verb.add_option("PATH", into.path,
-                  "Camera path: TUM lines 't tx ty tz qx qy qz qw', a .json list of poses or "
+                  "Camera path: TUM lines 't tx ty tz qx qy qz qw', poses in .json, "
                   "transforms.json, a walk script (.jsonl), or a .gltf or .glb with a camera")
       ->required();
   verb.add_option("--out", into.out, "Output folder for the frames")
@@ -269,8 +269,7 @@ void addRun(CLI::App& verb, CaptureArguments& into) {
                 "depth_report.json and one report per frame; about 1 s per frame");
   verb.add_flag("--strict", into.strict,
                 "Exit with 3 if an order was refused, a walk was blocked, or a frame shows no "
-                "object "
-                "or is taken from inside a solid");
+                "object or the inside of a solid");
   verb.add_flag("--dry-run", into.dryRun, "Print the number of frames and write no files");
 }
 

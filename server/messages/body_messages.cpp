@@ -23,9 +23,11 @@ scene::BodyCommand::Action actionFromProto(v1::BodyCommand::ActionCase action) {
       return Action::moveToLevel;
     case v1::BodyCommand::kRun:
       return Action::run;
-    default:
-      return Action::stop;
+    case v1::BodyCommand::kStop:
+    case v1::BodyCommand::ACTION_NOT_SET:
+      break;
   }
+  return Action::stop;
 }
 
 /// Returns the command, or an error that names a missing field. The world validates the values.

@@ -53,7 +53,8 @@ std::variant<EntityPair, v1::Error> resolvePair(const Message& message,
   auto b = resolveEntity(message.has_b(), message.b(), sceneAt, prefix + "b");
   if (auto* error = std::get_if<v1::Error>(&b)) return std::move(*error);
   const EntityPair pair{std::get<scene::EntityId>(a), std::get<scene::EntityId>(b)};
-  if (pair.a == pair.b) return makeFieldError(prefix + "b", " is the same entity as a: give two");
+  if (pair.a == pair.b)
+    return makeFieldError(prefix + "b", " is the same entity as a: give two different ones");
   return pair;
 }
 

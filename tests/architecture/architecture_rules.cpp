@@ -104,10 +104,10 @@ const Names kWithoutRooms{"assets", "examples", "tests"};
 struct ThirdParty {
   const char* name;
   const char* pattern;  ///< of what stands between the brackets of the include
-  Names folders;        ///< where it may be used
+  Names folders;        ///< where it may be used: folders, or rooms with those below
 };
 
-const std::array<ThirdParty, 22> kThirdParties{{
+const std::array<ThirdParty, 23> kThirdParties{{
     {"GMP", "gmp.*", {"collision"}},
     {"assimp", "assimp/.*", {"scene"}},
     {"ifcplusplus", "(ifcpp|carve)/.*", {"scene"}},
@@ -124,12 +124,13 @@ const std::array<ThirdParty, 22> kThirdParties{{
     {"xxHash", "xxh.*", {"scene"}},
     {"zlib", "zlib.*", {"protocol", "server"}},
     {"zstd", "zstd.*", {"protocol", "render", "server"}},
-    {"Boost.Asio and Beast", "boost/(asio|beast|system).*", {"server"}},
+    {"Boost.Asio and Beast", "boost/(asio|beast|system).*", {"server/net"}},
     {"other Boost", "boost/(?!asio|beast|system).*", {}},
     {"protobuf", "google/protobuf/.*", {"protocol"}},
     {"nlohmann-json", "nlohmann/.*", {"scene", "render", "protocol", "server", "assets"}},
-    {"CLI11", "CLI/.*", {"server"}},
-    {"spdlog", "(spdlog|fmt)/.*", {"server"}},
+    {"CLI11", "CLI/.*", {"server/app"}},
+    {"spdlog", "spdlog/.*", {"server/log", "server/app"}},
+    {"fmt", "fmt/.*", {"server"}},
 }};
 
 struct Include {
@@ -370,10 +371,13 @@ Faults findMisplacedThirdParties(const Sources& sources) {
     if (!isCode(path) || kMayInclude.count(getFolder(path)) == 0) continue;
     for (const Include& include : findIncludes(text)) {
       for (const ThirdParty& party : kThirdParties) {
-        if (include.quoted || party.folders.count(getFolder(path)) != 0) continue;
+        const auto contains = [&, &file = path](const std::string& folder) {
+          return file.rfind(folder + "/", 0) == 0;
+        };
+        if (include.quoted || std::ranges::any_of(party.folders, contains)) continue;
         if (std::regex_match(include.path, std::regex(party.pattern)))
           faults.push_back(formatPlace(path, include.line) + ": " + party.name +
-                           " has no place in " + getFolder(path) + "/");
+                           " has no place in " + getRoom(path) + "/");
       }
     }
   }
@@ -488,11 +492,13 @@ Faults findOddWords(const Sources& sources) {
   static const std::regex words(
       "\\b([Tt]old|[Tt]ells|[Aa]new|[Ll]est|[Bb]esides?|[Ss]omebody|[Nn]obody|[Ww]hoever|[Tt]"
       "hereof|"
-      "has the say|goes on|stands for|is none|k(Most|Least|Few)[A-Z]\\w*|"
+      "has the say|goes on|stands for|is none|[Tt]win|[Mm]ended|[Nn]earness|textOf|"
+      "(Mover|Wish|Follower|RigidStage|Hollows|HttpVisit|ServedWorld|Trial)s?|k(Most|Least|"
+      "Few)[A-Z]\\w*|"
       "k(Farthest|Largest|Longest|Greatest|Fastest)\\w*|"
       "_?(MOST|LEAST|FARTHEST|LARGEST|LONGEST|GREATEST|FASTEST)(_\\w*)?)\\b");
   // A comment names its subject.
-  static const std::regex subjects("^\\s*//+<? (What|Which|Who)\\b");
+  static const std::regex subjects("^\\s*(//+<?|#) (.*[.:] )?(What|Which|Who)\\b(?!.*\\?)");
   Faults faults;
   for (const auto& [path, text] : sources) {
     if (path.rfind("tests/architecture/", 0) == 0) continue;
@@ -501,7 +507,7 @@ Faults findOddWords(const Sources& sources) {
         faults.push_back(formatPlace(name, number) + ": " + (*it)[0].str());
       std::smatch match;
       if (std::regex_search(line, match, subjects))
-        faults.push_back(formatPlace(name, number) + ": a comment about \"" + match[1].str() +
+        faults.push_back(formatPlace(name, number) + ": a comment about \"" + match[3].str() +
                          "\"; name the thing");
     });
   }

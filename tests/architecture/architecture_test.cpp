@@ -326,8 +326,9 @@ TEST(ArchitectureRules, AThirdPartyInAForeignFolderIsFound) {
                         {"scene/import.cpp", "#include <gmpxx.h>\n"},
                         {"scene/log.cpp", "#include <spdlog/spdlog.h>\n"},
                         {"collision/tree.cpp", "#include <boost/geometry.hpp>\n"},
-                        {"server/listen.cpp", "#include <boost/asio.hpp>\n"}};
-  EXPECT_EQ(findMisplacedThirdParties(sources).size(), 3U);
+                        {"server/net/listen.cpp", "#include <boost/asio.hpp>\n"},
+                        {"server/network/ask.cpp", "#include <boost/asio.hpp>\n"}};
+  EXPECT_EQ(findMisplacedThirdParties(sources).size(), 4U);
 }
 
 TEST(ArchitectureRules, ALongFileIsFound) {

@@ -6,7 +6,7 @@ import time
 
 import enfilade
 from enfilade import messages, results
-from enfilade.questions import frame_request
+from enfilade.query_messages import frame_request
 
 _VIEW = {"eye": (1.5, 1.6, 0), "forward": (1, 0, 0), "width": 128, "height": 128,
          "channels": ("rgb", "depth")}

@@ -116,7 +116,7 @@ class GroupTest(RoomCase):
             base = self.server.connect()
             self.addCleanup(base.close)
             group = enfilade.WorldGroup(base, names, shared_memory=shared)
-            request = {"frame": enfilade.questions.frame_request(
+            request = {"frame": enfilade.query_messages.frame_request(
                 eye=(0, 1, 0), forward=(1, 0, 0.2), width=33, height=21, channels=("rgb", "depth"))}
             taken = []
             for _ in range(3):

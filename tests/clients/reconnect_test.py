@@ -234,7 +234,7 @@ class Arguments(RoomCase):
         with self.assertRaisesRegex(enfilade.ServerError, "door"):
             self.client.body("door", to=0.0)
 
-    def test_questions_without_a_place_or_with_two_are_refused_here(self):
+    def test_queries_without_a_place_or_with_two_are_refused_here(self):
         for wrong in (lambda: self.client.frame(),
                       lambda: self.client.frame(eye=(0, 1, 0), target=(1, 1, 1), forward=(1, 0, 0)),
                       lambda: self.client.frame("ann", up=(1, 0, 0)),

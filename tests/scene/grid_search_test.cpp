@@ -168,7 +168,7 @@ TEST(LevelDetours, AVersionOfAPathThatLeadsAroundIsPreferred) {
   EXPECT_FALSE(noSearch.bump);
   EXPECT_NEAR(path.feetLength, path.length, 0.01);
   path = proveVersions(walker, std::array{over, far}, Versions::untilLevel, noSearch);
-  EXPECT_EQ(path.points, over) << "the way of the feet around is longer";
+  EXPECT_EQ(path.points, over) << "the path of the feet around is longer";
   EXPECT_NEAR(path.bumpClimb, 2 * kBedHeight, 0.01);
   EXPECT_NEAR(path.feetLength, 6 + 2 * kBedHeight, 0.01);
   EXPECT_TRUE(noSearch.bump);

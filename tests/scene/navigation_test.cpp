@@ -645,7 +645,7 @@ TEST(Walker, AFaceThatIsTooSteepToStandOnIsNotWalkedDown) {
 }
 
 TEST(Walker, ALongStepOfTheProofPassesNothingThatStopsAWalk) {
-  // A pyramid that is in the way of the feet, and not of who stands a step higher.
+  // A pyramid that is in the path of the feet, and not of who stands a step higher.
   Model model = makeBoxModel({{"floor", {0, -0.2, -3}, {8, 0, 3}}});
   Mesh pyramid;
   for (const Vec3& corner : {Vec3(3.6, 0, -0.4), Vec3(4.4, 0, -0.4), Vec3(4.4, 0, 0.4),

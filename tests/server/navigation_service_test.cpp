@@ -182,7 +182,8 @@ TEST(NavigationService, MeshesOfReasonsAndOfMovedBodiesReportProgress) {
       if (i == 0 || shares[i] < shares[i - 1]) ++count;
     return count;
   };
-  EXPECT_EQ(countMeshes(), 4) << "its own, for the reason, and with open doors: loaded and mended";
+  EXPECT_EQ(countMeshes(), 4)
+      << "its own, for the reason, and with open doors: loaded and repaired";
   EXPECT_EQ(countMeshes(), 0);
   submitBodyCommand(world, {"door", scene::BodyCommand::Action::open, 0, 0, std::nullopt});
   for (int tick = 0; tick < 300; ++tick) tickWorld(world);

@@ -90,7 +90,7 @@ std::string encodePathSegment(std::string_view name) {
 
 std::size_t decodeOtherBytes(std::string& text) {
   constexpr std::uint64_t kHighBits = 0x8080808080808080u;
-  std::string mended;
+  std::string repaired;
   std::size_t count = 0, copied = 0;
   for (std::size_t i = 0; i < text.size();) {
     std::uint64_t eight = kHighBits;
@@ -98,14 +98,14 @@ std::size_t decodeOtherBytes(std::string& text) {
     const bool ascii = (eight & kHighBits) == 0;
     const std::size_t length = ascii ? sizeof eight : utf8SequenceLength(text, i);
     if (length == 0) {
-      mended.append(text, copied, i - copied);
-      appendUtf8(mended, decodeWindows1252(static_cast<unsigned char>(text[i])));
+      repaired.append(text, copied, i - copied);
+      appendUtf8(repaired, decodeWindows1252(static_cast<unsigned char>(text[i])));
       copied = i + 1;
       ++count;
     }
     i += std::max<std::size_t>(length, 1);
   }
-  if (count > 0) text = std::move(mended.append(text, copied));
+  if (count > 0) text = std::move(repaired.append(text, copied));
   return count;
 }
 

@@ -83,7 +83,7 @@ CacheEntry deserializeEntry(std::span<const std::byte> bytes) {
   if (bytes.size() < kChecksumSize) throw ModelStreamError("cache entry: too short");
   const auto body = bytes.first(bytes.size() - kChecksumSize);
   if (!(EntryReader(bytes.last(kChecksumSize)).readHash() == computeContentHash(body))) {
-    throw ModelStreamError("cache entry: the checksum does not hold");
+    throw ModelStreamError("cache entry: wrong checksum");
   }
   EntryReader in(body);
   if (in.readNumber() != kMagic) throw ModelStreamError("cache entry: unknown format");

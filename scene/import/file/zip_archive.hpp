@@ -15,8 +15,8 @@ namespace enfilade::scene {
 std::string readOnlyZipMember(const std::filesystem::path& file,
                               std::span<const std::string_view> extensions, std::size_t maxBytes);
 
-/// Throws ImportError if the archive is damaged, or if all its files together would unpack to more
-/// than `maxBytes` by its directory, which unpacking does not exceed. Nothing is unpacked.
+/// Throws ImportError if the archive is damaged, or if its directory announces more than `maxBytes`
+/// of all files together. Unpacking does not exceed that number. Nothing is unpacked.
 void limitZipMembers(const std::filesystem::path& file, std::size_t maxBytes);
 
 }  // namespace enfilade::scene

@@ -105,8 +105,8 @@ std::set<std::string> readRequired(const Json& gltf, const std::filesystem::path
                     list + "; --ignore-appearance loads the file without them");
 }
 
-void addProblem(const char* kind, const std::set<std::string>& names,
-                std::vector<Diagnostic>& problems) {
+void addDiagnostic(const char* kind, const std::set<std::string>& names,
+                   std::vector<Diagnostic>& problems) {
   if (!names.empty()) problems.push_back({kind, names.size(), *names.begin()});
 }
 
@@ -155,8 +155,8 @@ std::vector<Diagnostic> checkGltfExtensions(const Json& gltf, const ExtensionNam
   for (const std::string& name : inUse.names())
     if (!mayBeIgnored(name)) ignored.insert(name);
   std::vector<Diagnostic> problems;
-  addProblem("ignored_extension", ignored, problems);
-  addProblem("ignored_appearance", appearance, problems);
+  addDiagnostic("ignored_extension", ignored, problems);
+  addDiagnostic("ignored_appearance", appearance, problems);
   return problems;
 }
 

@@ -53,7 +53,7 @@ class StepReceiver {
       case ImportMessage::stepText:
         return append(content);
       case ImportMessage::problem:
-        return addProblem(content);
+        return reportDiagnostic(content);
       case ImportMessage::done:
         return done = true;
       default:
@@ -74,7 +74,7 @@ class StepReceiver {
     return true;
   }
 
-  bool addProblem(std::string_view content) {
+  bool reportDiagnostic(std::string_view content) {
     std::uint32_t count = 0;
     const std::size_t end = content.find('\n', sizeof count);
     if (end == std::string_view::npos) return false;

@@ -111,7 +111,7 @@ std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, co
   return std::nullopt;
 }
 
-/// The way of the feet along a path. Each leg is walked when it is first asked for.
+/// FeetTravel::length() along a path. Each leg is walked when it is first asked for.
 class LegLengths {
  public:
   LegLengths(Walker& walker, const std::vector<Vec3>& places)

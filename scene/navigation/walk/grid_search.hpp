@@ -54,17 +54,17 @@ std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& fro
                                                  const PathOut& out, GridSearch& search);
 
 /// Lines between places of a path that are tried as shortcuts. A line that is stopped is walked
-/// tick by tick, which takes long: this pays after a search on a grid, and rarely at the corners of
+/// tick by tick, which takes long. This pays after a search on a grid, and rarely at the corners of
 /// a shortest line. `tight`: all, of a path that was pulled tight. Else a shortcut over a step must
 /// be shorter by far, since a path on a grid will become shorter.
 enum class Shortcuts : std::uint8_t { all, tight, free };
 
-/// Moves the places between both ends towards the lines between their neighbours, and cuts corners,
-/// as long as the legs can be walked and the way of the feet over steps becomes no longer.
+/// Moves the places between both ends towards the lines between their neighbours, and cuts corners.
+/// The legs can then still be walked, and the path of the feet over steps is no longer.
 void pullTight(Walker& walker, std::vector<Vec3>& places);
 
-/// Leaves out places of a path as long as the legs between the others can be walked and the way of
-/// the feet over steps becomes no longer.
+/// Leaves out places of a path. The legs between the others can be walked, and the path of the feet
+/// over steps is no longer.
 std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, Shortcuts kind);
 
 }  // namespace enfilade::scene

@@ -23,8 +23,8 @@ struct BumpSearch {
 };
 
 /// Replaces parts of a path that lead up and down again by ways around them, if this shortens the
-/// way of the feet. Each leg of `places` can be walked. Bumps of `search.known` stay. Returns those
-/// that were replaced.
+/// path of the feet. Each leg of `places` can be walked. Bumps of `search.known` stay. Returns
+/// those that were replaced.
 BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search);
 
 /// The middle of the first part that leads up and down again; nullopt: none does.

@@ -27,8 +27,8 @@ struct FloorPlace {
   bool isAfterHole = false;   ///< the place before it has no floor
 };
 
-/// Measures the floor along a walk by casts of a point, from a step above the feet down to where
-/// the floor is below the middle of wide feet on a stair.
+/// Measures the floor along a walk by casts of a point. They begin a step above the feet, and end
+/// where the floor is below the middle of wide feet on a stair.
 class FloorProbe {
  public:
   FloorProbe(const WorldData& world, double radius)

@@ -29,7 +29,7 @@ struct WalkOutcome {
   int ticks = 0;                     ///< of a walk tick by tick
 };
 
-/// The way of the feet.
+/// The path of the feet.
 struct FeetTravel {
   double across = 0;  ///< metres
   double climb = 0;   ///< metres up, and down

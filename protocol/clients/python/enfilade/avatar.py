@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Optional, Sequence, Tuple, Union
 from . import messages
 from .errors import OrderFailed
 from .arguments import whole
-from .questions import Point, doors_value, vec
+from .query_messages import Point, doors_value, vec
 from .results import AvatarState, Frame
 
 if TYPE_CHECKING:

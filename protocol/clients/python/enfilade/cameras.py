@@ -11,7 +11,7 @@ import numpy as np
 from . import messages, spaces
 from .arguments import number
 from .kept_request import KeptRequest
-from .questions import frame_request
+from .query_messages import frame_request
 
 FIRST_TICK = 1  # of the first observation of an episode
 _BOXES = {"rgb": (0, 255, (3,), np.uint8), "depth": (0.0, np.inf, (), np.float32),

@@ -11,7 +11,7 @@ from .connection import Connection
 from .errors import ConnectionFailed, OrderFailed
 from .exchange import MAX_AT_ONCE
 from .navigation import Navigation
-from .questions import Point, vec
+from .query_messages import Point, vec
 from .results import Contact, Replay, Step, World
 from .world_queries import WorldQueries
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from .arguments import number
 from .navigation import Navigation, Spot
-from .questions import vec
+from .query_messages import vec
 
 _NOWHERE = np.full(3, np.nan)
 _MAX_ACTIONS = 2000  # of find_path(): 500 m of steps ahead

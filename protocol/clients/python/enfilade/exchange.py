@@ -13,7 +13,7 @@ from . import messages, results
 from .arguments import whole
 from .connection import Received, raise_refusal, server_error
 from .errors import ConnectionFailed, EnfiladeError, ServerError
-from .questions import avatar_ids
+from .query_messages import avatar_ids
 from .results import Contact, Frame, Horizon, Notice, Replay, State
 
 KEPT_FRAMES = 16  # of watches, until frames() takes them; the oldest are dropped first

@@ -11,7 +11,7 @@ import numpy as np
 
 from . import messages
 from .arguments import UINT32, UINT64, optional_whole, whole
-from .questions import Point, doors_value, points, vec
+from .query_messages import Point, doors_value, points, vec
 
 if TYPE_CHECKING:
     from .avatar import Avatar

@@ -13,7 +13,7 @@ from .avatar import Avatar
 from .errors import EnfiladeError
 from .exchange import Exchange
 from .plans import FloorPlan, floor_plan
-from .questions import Point, cannot_touch_query, entity, frame_request, points, vec
+from .query_messages import Point, cannot_touch_query, entity, frame_request, points, vec
 from .results import Apart, Frame, Hits, Pair, Scan, Touching
 
 Entity = Union[int, str, Avatar]  # an id, a name or a path

@@ -12,7 +12,7 @@ import { toVector } from "../world/world_state";
 
 const MAX_LISTED = 400;
 const MAX_ROWS = 120;
-const QUERY_SECONDS = 0.15; // between questions for what is near the focused avatar
+const QUERY_SECONDS = 0.15; // between queries for what is near the focused avatar
 const NEAR = 0.25; // metres: shown as near misses if the server has no limit of its own
 const MAX_MARKERS = 12;
 const FLOOR_NORMAL = -0.7; // y of the normal from an avatar to what it stands on
@@ -152,7 +152,7 @@ export class Contacts {
       this.#found = found.filter(({ normal }) => (normal?.y ?? 0) > FLOOR_NORMAL).slice(0, MAX_MARKERS);
       this.#app.view.invalidate();
     } catch {
-      this.#found = []; // the avatar left between its state and this question
+      this.#found = []; // the avatar left between its state and this query
     } finally {
       this.#isAsking = false;
     }

@@ -9,7 +9,7 @@ import { Verdict, type PairState } from "../generated/enfilade_pb";
 import type { Walk } from "../walk/walk";
 import type { RequestFields } from "../world/source";
 
-const TOUCH_SECONDS = 1; // between questions for what touches the selected object
+const TOUCH_SECONDS = 1; // between queries for what touches the selected object
 const MAX_TOUCHING = 12;
 
 type BodyAction = NonNullable<RequestFields<"bodyCommand">["action"]>;

@@ -23,8 +23,8 @@ const QUALITIES: Quality[] = [
   { samples: 0, shade: false, pixels: 0.5 },
 ];
 const SOFTWARE_QUALITY = 2; // where a CPU draws
-const SOFTWARE_STILL = 1;
-const STILL_DELAY = 400; // milliseconds without motion until the picture is drawn once at its best quality
+const SOFTWARE_IDLE = 1;
+const IDLE_DELAY = 400; // milliseconds without motion until the picture is drawn once at its best quality
 
 const COMPOSE_VERTEX = `
 in vec3 position;
@@ -101,9 +101,9 @@ export class View {
   #isRequested = false;
   #last = 0;
   #level = 0; // of QUALITIES, while something moves
-  #stillLevel = 0; // when nothing moves: one slow picture disturbs no one
-  #isStill = false;
-  #stillTimer = 0;
+  #idleLevel = 0; // when nothing moves: one slow picture disturbs no one
+  #isIdle = false;
+  #idleTimer = 0;
   #slow = 0; // seconds of slow frames in succession
   /** Triangles and draw calls of the last picture of the scene. */
   drawn = { triangles: 0, calls: 0 };
@@ -121,7 +121,7 @@ export class View {
     this.scene.add(sky, this.#sun, this.camera);
     if (isSoftware(context)) {
       this.#level = SOFTWARE_QUALITY;
-      this.#stillLevel = SOFTWARE_STILL;
+      this.#idleLevel = SOFTWARE_IDLE;
     }
     this.#target = this.#makeTarget();
     this.#compose = new RawShaderMaterial({
@@ -139,7 +139,7 @@ export class View {
   }
 
   get #quality(): Quality {
-    return QUALITIES[this.#isStill ? Math.min(this.#stillLevel, this.#level) : this.#level]!;
+    return QUALITIES[this.#isIdle ? Math.min(this.#idleLevel, this.#level) : this.#level]!;
   }
 
   #makeTarget(): WebGLRenderTarget {
@@ -169,10 +169,10 @@ export class View {
   }
 
   /** Changes between the quality of motion and that of a still picture. */
-  #setStill(isStill: boolean): void {
-    if (this.#isStill === isStill) return;
-    this.#isStill = isStill;
-    if (this.#stillLevel < this.#level) this.#rebuild();
+  #setIdle(isIdle: boolean): void {
+    if (this.#isIdle === isIdle) return;
+    this.#isIdle = isIdle;
+    if (this.#idleLevel < this.#level) this.#rebuild();
   }
 
   #rebuild(): void {
@@ -195,12 +195,12 @@ export class View {
     let moves = false;
     // After a pause, motion begins with a short step.
     for (const update of this.updaters) moves = update(Math.min(0.1, interval)) || moves;
-    clearTimeout(this.#stillTimer);
-    if (moves) this.#setStill(false);
+    clearTimeout(this.#idleTimer);
+    if (moves) this.#setIdle(false);
     this.#draw();
     this.#judge(interval, moves);
     if (moves) this.invalidate();
-    else this.#stillTimer = window.setTimeout(() => this.#setStill(true), STILL_DELAY);
+    else this.#idleTimer = window.setTimeout(() => this.#setIdle(true), IDLE_DELAY);
   }
 
   #draw(): void {

@@ -92,8 +92,8 @@ def _set_lens(request: Any, lens: str, width: Optional[float], distortion: Seque
 
 def load_distortion(table: Any) -> np.ndarray:
     """Returns a distortion table as rows x columns x 5 factors. `table` is an array, an .npy file of this
-    shape, or a text file: a first line with the numbers of rows and columns, and then a line of
-    five numbers for each cell of the grid, row by row."""
+    shape, or a text file. Its first line has the numbers of rows and columns. Then a line of five
+    numbers follows for each cell of the grid, row by row."""
     if isinstance(table, (str, Path)):
         if str(table).endswith(".npy"):
             table = np.load(table, allow_pickle=False)
