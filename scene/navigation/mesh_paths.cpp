@@ -363,11 +363,15 @@ bool walksOn(Walker& walker, const std::vector<Vec3>& points, Proof& proof) {
 
 bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
   if (!walksOn(walker, path.points, proof)) return false;
-  // Of the walk over the whole path: searches reset the walker's travel.
   const double rise = std::abs(path.points.back().y() - path.points.front().y());
-  double climb = walker.travel().climb - rise;
-  path.feetLength = walker.travel().length();
-  path.length = computeLength(path.points);
+  double climb = 0;
+  const auto measure =
+      [&] {  // at once after the walk over the whole path: searches reset its travel
+        climb = walker.travel().climb - rise;
+        path.feetLength = walker.travel().length();
+        path.length = computeLength(path.points);
+      };
+  measure();
   proof.bump.reset();
   const auto isSmall = [&] { return climb < std::max(kMinBump, kMinClimb * path.length); };
   if (isSmall()) return true;
@@ -376,10 +380,8 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
     const Vec3 failedAt = proof.failedAt;
     const std::vector<Obstruction> met = proof.met;
     if (walksOn(walker, level, proof)) {
-      climb = walker.travel().climb - rise;
-      path.feetLength = walker.travel().length();
       path.points = std::move(level);
-      path.length = computeLength(path.points);
+      measure();
     } else {
       proof.bumps.known.insert(proof.bumps.known.end(), replaced.begin(), replaced.end());
       proof.failedAt = failedAt;

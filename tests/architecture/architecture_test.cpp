@@ -223,10 +223,13 @@ TEST(ArchitectureRules, ACrowdedFolderIsAFault) {
 TEST(ArchitectureRules, AnOddWordIsAFault) {
   const Sources sources{
       {"scene/model/a.hpp", "// Whoever was told stands beside it.\nint nearTold, besideIt;\n"},
-      {"docs/page.md", "The server reports each contact.\n"}};
-  EXPECT_EQ(findOddWords(sources),
-            (Faults{"scene/model/a.hpp:1: Whoever", "scene/model/a.hpp:1: told",
-                    "scene/model/a.hpp:1: beside"}));
+      {"docs/page.md", "The server reports each contact.\n"},
+      {"scene/old.hpp", "struct Mover { Wish wish; };\ndouble nearness, kFewPlaces;\n"}};
+  EXPECT_EQ(
+      findOddWords(sources),
+      (Faults{"scene/model/a.hpp:1: Whoever", "scene/model/a.hpp:1: told",
+              "scene/model/a.hpp:1: beside", "scene/old.hpp:1: Mover", "scene/old.hpp:1: Wish",
+              "scene/old.hpp:2: nearness", "scene/old.hpp:2: kFewPlaces"}));
 }
 
 TEST(ArchitectureRules, ALongSentenceOfAPageIsAFault) {
@@ -248,10 +251,14 @@ TEST(ArchitectureRules, ALongSentenceOfAPageIsAFault) {
 TEST(ArchitectureRules, ACommentWithoutASubjectIsAFault) {
   const Sources sources{{"scene/model/a.hpp",
                          "/// Who waits.\nint n;  ///< Which one\n  // What comes, comes.\n"
-                         "// Where it is red, stop.\n/// Whatever is left.\n"}};
+                         "// Where it is red, stop.\n/// Whatever is left.\n"
+                         "// It waits. What comes, comes.\n// What is it? Which is red?\n"},
+                        {"tool.py", "# Which one: the last.\n#: Who\n"}};
   EXPECT_EQ(findOddWords(sources),
             (Faults{"scene/model/a.hpp:1: a comment about \"Who\"; name the thing",
-                    "scene/model/a.hpp:3: a comment about \"What\"; name the thing"}));
+                    "scene/model/a.hpp:3: a comment about \"What\"; name the thing",
+                    "scene/model/a.hpp:6: a comment about \"What\"; name the thing",
+                    "tool.py:1: a comment about \"Which\"; name the thing"}));
 }
 
 TEST(ArchitectureRules, AFunctionNamedByANounIsAFault) {
@@ -327,8 +334,10 @@ TEST(ArchitectureRules, AThirdPartyInAForeignFolderIsFound) {
                         {"scene/log.cpp", "#include <spdlog/spdlog.h>\n"},
                         {"collision/tree.cpp", "#include <boost/geometry.hpp>\n"},
                         {"server/net/listen.cpp", "#include <boost/asio.hpp>\n"},
-                        {"server/network/ask.cpp", "#include <boost/asio.hpp>\n"}};
-  EXPECT_EQ(findMisplacedThirdParties(sources).size(), 4U);
+                        {"server/network/ask.cpp", "#include <boost/asio.hpp>\n"},
+                        {"server/app/line.cpp", "#include <CLI/CLI.hpp>\n"},
+                        {"server/base/line.cpp", "#include <CLI/CLI.hpp>\n"}};
+  EXPECT_EQ(findMisplacedThirdParties(sources).size(), 5U);
 }
 
 TEST(ArchitectureRules, ALongFileIsFound) {

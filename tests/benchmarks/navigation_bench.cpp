@@ -29,6 +29,7 @@
 #include "scene/navigation/mesh/off_mesh_connections.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/navigation/walk/walker.hpp"
+#include "scene/world/avatars/walk_velocity.hpp"
 #include "scene/world/world.hpp"
 #include "server/base/load_scene.hpp"
 #include "server/messages/order_messages.hpp"
@@ -408,8 +409,7 @@ std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& w
     const auto snapshot = world.snapshot();
     if (snapshot->avatars.empty()) return std::nullopt;
     const Vec3 before = std::exchange(feet, snapshot->avatars.front().footPosition);
-    const Vec3 moved = feet - before;
-    length += std::hypot(moved.x(), moved.z()) + std::abs(moved.y());
+    length += scene::computeGroundDistance(before, feet) + std::abs(feet.y() - before.y());
     for (const scene::Notice& notice : report.notices) {
       if (notice.kind == scene::Notice::Kind::blocked) return std::nullopt;
       if (notice.kind != scene::Notice::Kind::arrived) continue;

@@ -143,9 +143,8 @@ void Walker::step(const Vec3& velocity) {
 }
 
 void Walker::addTravel(const Vec3& from) {
-  const Vec3 moved = avatar_.footPosition - from;
-  travel_.across += std::hypot(moved.x(), moved.z());
-  travel_.climb += std::abs(moved.y());
+  travel_.across += computeGroundDistance(from, avatar_.footPosition);
+  travel_.climb += std::abs(avatar_.footPosition.y() - from.y());
 }
 
 /// Whether a floor on which one can stand is at most a step below the middle of the feet.
