@@ -27,16 +27,16 @@ Vec3 turnToSide(const Vec3& direction) {
 std::array<double, 2> measureSides(const WorldData& world, const AvatarShape& shape,
                                    const Vec3& position, const Vec3& direction, double maxWidth) {
   const WorldSettings& settings = world.settings;
-  const Vec3 feet = position + Vec3(0, settings.stepHeight, 0);
+  const Vec3 footPosition = position + Vec3(0, settings.stepHeight, 0);
   const Vec3 side = turnToSide(direction);
   std::array<double, 2> widths{};
   for (std::size_t i = 0; i < 2; ++i) {
     const Vec3 move = (i == 0 ? maxWidth : -maxWidth) * side;
-    const Aabb box = inflated(collision::sweptAabb(placeBox(shape.box, feet), move), 0.1);
+    const Aabb box = inflated(collision::sweptAabb(placeBox(shape.box, footPosition), move), 0.1);
     ObstacleSet obstacles = collectObstaclesInBox(world, box, 0);
     QueryCount count;
     const ShapeCastHit hit =
-        castAvatarShape(shape, feet, move, obstacles, makeContactOffset(settings), count);
+        castAvatarShape(shape, footPosition, move, obstacles, makeContactOffset(settings), count);
     widths[i] = kThinRadius + hit.fraction * maxWidth + (hit.entity != 0 ? hit.distance : 0);
   }
   return widths;
@@ -135,20 +135,20 @@ ObstacleDistance measureObstacle(const WorldData& world, const NavigationAgent& 
                                  const Vec3& footPosition, double maxDistance) {
   constexpr double kPrecision = 1e-4;  // metres
   const auto shape = makeThinShape(world.settings, agent);
-  const Vec3 feet = placeThinShape(world.settings, footPosition);
+  const Vec3 raised = placeThinShape(world.settings, footPosition);
   const double limit = std::max(kPrecision, maxDistance - kThinRadius);
   ObstacleSet obstacles =
-      collectObstaclesInBox(world, inflated(placeBox(shape->box, feet), limit), 0);
+      collectObstaclesInBox(world, inflated(placeBox(shape->box, raised), limit), 0);
   // An object that lies only below the step height, as the floor, is no obstacle.
   std::erase_if(obstacles.list,
-                [&](const Obstacle& obstacle) { return obstacle.box.max.y() < feet.y(); });
+                [&](const Obstacle& obstacle) { return obstacle.box.max.y() < raised.y(); });
   QueryCount count;
   EntityId nearest = 0;
-  if (isClear(*shape, feet, limit, obstacles, count, nearest)) return {maxDistance, 0};
+  if (isClear(*shape, raised, limit, obstacles, count, nearest)) return {maxDistance, 0};
   double clear = 0, near = limit;
   while (near - clear > kPrecision) {
     const double middle = 0.5 * (near + clear);
-    (isClear(*shape, feet, middle, obstacles, count, nearest) ? clear : near) = middle;
+    (isClear(*shape, raised, middle, obstacles, count, nearest) ? clear : near) = middle;
   }
   return {near + kThinRadius, nearest};
 }

@@ -205,15 +205,15 @@ GapPaths crossOnGrid(const Collection& all, Walker& walker, BoundaryGap gap,
   const NavigationMesh& mesh = all.finder.ample;
   const auto start = standNear(walker, gap.from);
   if (!start) return {};
-  const auto isWanted = [&](const Vec3& feet) {
-    const auto polygon = findPolygonAt(mesh, feet);
+  const auto isWanted = [&](const Vec3& footPosition) {
+    const auto polygon = findPolygonAt(mesh, footPosition);
     return polygon && all.getIsland(*polygon) != kNoIsland &&
            all.list.partOf[*polygon] != all.list.partOf[gap.fromPolygon];
   };
-  const auto isOpen = [&](const Vec3& feet) {
-    const auto polygon = findPolygonAt(mesh, feet);
+  const auto isOpen = [&](const Vec3& footPosition) {
+    const auto polygon = findPolygonAt(mesh, footPosition);
     return !polygon || all.getIsland(*polygon) == kNoIsland ||
-           computeGroundDistance(feet, *start) < kNearStart;
+           computeGroundDistance(footPosition, *start) < kNearStart;
   };
   const GridSearch limits{kGridSpacing, kGapMargin, maxWalks};
   GridSearch search = limits;
@@ -250,8 +250,8 @@ GapPaths leaveIsland(const Collection& all, std::uint32_t island) {
   const std::size_t share = kMaxExitWalks / all.islands.islands.size();
   const GridSearch limits{kGridSpacing, kMaxExitDistance,
                           std::clamp(share, kMinExitWalks, kMaxWalksOfExit)};
-  const auto isOther = [&](const Vec3& feet) {
-    const auto polygon = findPolygonAt(all.finder.ample, feet);
+  const auto isOther = [&](const Vec3& footPosition) {
+    const auto polygon = findPolygonAt(all.finder.ample, footPosition);
     const auto other = polygon ? all.getIsland(*polygon) : kNoIsland;
     return other != kNoIsland && other != island;
   };

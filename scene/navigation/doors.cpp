@@ -167,20 +167,21 @@ DoorSwing::DoorSwing(EntityIndex& index, const WorldSettings& settings, const Sn
   moved_.bodies = bodies_;
 }
 
-double DoorSwing::measureDistance(const Vec3& feet, double jointPosition) {
+double DoorSwing::measureDistance(const Vec3& footPosition, double jointPosition) {
   door_.jointPosition = jointPosition;
   door_.pose = computeBodyPose(spec_, computeJointPose(spec_, jointPosition));
-  const auto separation = computeSeparationFromShape(index_, moved_, prism_, feet, door_.id);
+  const auto separation =
+      computeSeparationFromShape(index_, moved_, prism_, footPosition, door_.id);
   return separation ? separation->distance : 0;
 }
 
 /// Conservative advancement: the door opens by as much as it can without coming to the agent.
-bool DoorSwing::touches(const Vec3& feet) {
+bool DoorSwing::touches(const Vec3& footPosition) {
   constexpr double kRoom = 0.01;     // metres
   constexpr int kMaxSteps = 10'000;  // a step opens the door by 5 mm or more
   double share = 0;
   for (int step = 0; step < kMaxSteps; ++step) {
-    const double distance = measureDistance(feet, from_ + share * (to_ - from_));
+    const double distance = measureDistance(footPosition, from_ + share * (to_ - from_));
     if (distance <= kRoom) return true;
     if (share >= 1 || !(distance_ > 0)) return false;
     share = std::min(1.0, share + (distance - 0.5 * kRoom) / distance_);

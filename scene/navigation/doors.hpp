@@ -53,11 +53,11 @@ class DoorSwing {
   DoorSwing& operator=(const DoorSwing&) = delete;
 
   /// Whether the door comes within 1 cm of an agent at `feet`.
-  bool touches(const Vec3& feet);
+  bool touches(const Vec3& footPosition);
   const BodySpec& spec() const { return spec_; }
 
  private:
-  double measureDistance(const Vec3& feet, double jointPosition);
+  double measureDistance(const Vec3& footPosition, double jointPosition);
 
   EntityIndex& index_;
   const BodySpec& spec_;

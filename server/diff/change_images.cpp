@@ -294,14 +294,15 @@ std::map<std::string, WalkedPath> readPaths(const RecordedWalk& walk, bool isEar
     last = state->tick();
     for (const v1::AvatarState& avatar : state->avatars()) {
       WalkedPath& path = paths[avatar.name()];
-      const Vec3 feet = vectorFromProto(avatar.feet());
+      const Vec3 footPosition = vectorFromProto(avatar.feet());
       if (path.footPositions.empty()) {
         path.avatar = avatar.name() + (isEarlier ? ", before" : ", after");
         path.id = avatar.id();
         path.isEarlier = isEarlier;
       }
-      if (path.footPositions.empty() || (path.footPositions.back() - feet).norm() > kTrailStep)
-        path.footPositions.push_back(feet);
+      if (path.footPositions.empty() ||
+          (path.footPositions.back() - footPosition).norm() > kTrailStep)
+        path.footPositions.push_back(footPosition);
     }
   }
   return paths;

@@ -68,13 +68,14 @@ class RunCollector {
     run_.hash = state.hash();
     if (state.tick() <= since_) return;
     for (const v1::AvatarState& avatar : state.avatars()) {
-      const Vec3 feet = vectorFromProto(avatar.feet());
+      const Vec3 footPosition = vectorFromProto(avatar.feet());
       const auto [at, isNew] = run_.avatars.try_emplace(avatar.name());
       const auto before = footPositions_.find(avatar.id());
       if (isNew) at->second.entered = state.time();
-      if (before != footPositions_.end()) at->second.pathLength += (feet - before->second).norm();
+      if (before != footPositions_.end())
+        at->second.pathLength += (footPosition - before->second).norm();
       at->second.last = state.time();
-      footPositions_[avatar.id()] = feet;
+      footPositions_[avatar.id()] = footPosition;
     }
   }
 

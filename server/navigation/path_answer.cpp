@@ -72,13 +72,13 @@ struct PathWriter {
 
   /// The doors on the path that touch an agent at `feet` when they open.
   std::vector<scene::DoorSwing> findSwings(const std::vector<scene::DoorOnPath>& doors,
-                                           const Vec3& feet) const {
+                                           const Vec3& footPosition) const {
     std::vector<scene::DoorSwing> swings;
     for (const scene::DoorOnPath& door : doors) {
       if (!door.isInTheWay) continue;
       swings.emplace_back(answer.index(), answer.settings, answer.snapshot,
                           answer.navigation.agent(), door.body);
-      if (!swings.back().touches(feet)) swings.pop_back();
+      if (!swings.back().touches(footPosition)) swings.pop_back();
     }
     return swings;
   }
@@ -94,8 +94,9 @@ struct PathWriter {
       std::ranges::move(more, std::back_inserter(swings));
       scene::NavigationPath aside;
       if (tries < kMaxTries)
-        aside = answer.asTheyAre().findPathOut(start, [&](const Vec3& feet) {
-          return std::ranges::none_of(swings, [&](auto& swing) { return swing.touches(feet); });
+        aside = answer.asTheyAre().findPathOut(start, [&](const Vec3& footPosition) {
+          return std::ranges::none_of(swings,
+                                      [&](auto& swing) { return swing.touches(footPosition); });
         });
       if (!aside.reason.empty()) return;  // an agent can be there only when the doors are open
       scene::NavigationPath onwards =

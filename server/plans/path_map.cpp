@@ -43,7 +43,7 @@ struct MapStorey {
 scene::Aabb computeShownBounds(const WalkTrace& trace) {
   scene::Aabb bounds;
   for (const WalkedPath& path : trace.paths) {
-    for (const Vec3& feet : path.footPositions) bounds.include(feet);
+    for (const Vec3& footPosition : path.footPositions) bounds.include(footPosition);
   }
   const scene::Aabb reach = collision::inflated(bounds, kMaxOrderDistance);
   for (const MapContact& blocked : trace.blockedWalks) bounds.include(blocked.point);

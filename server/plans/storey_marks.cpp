@@ -100,12 +100,12 @@ void StoreyMarks::addPath(const WalkedPath& path, const PathStyle& style) {
     if (line.points.size() > 1) lines_.push_back(line);
     line.points.clear();
   };
-  for (const Vec3& feet : path.footPositions) {
-    if (!isHere(feet.y())) {
+  for (const Vec3& footPosition : path.footPositions) {
+    if (!isHere(footPosition.y())) {
       flush();
       continue;
     }
-    const Point next = view_.at(feet);
+    const Point next = view_.at(footPosition);
     if (line.points.empty() || next.x != line.points.back().x || next.y != line.points.back().y)
       line.points.push_back(next);
   }

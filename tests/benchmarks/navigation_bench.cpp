@@ -403,17 +403,18 @@ std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& w
   for (int tick = 0; tick < kRestTicks; ++tick) tickWorld(world);
   submitAvatarCommand(world, {"walker", walk, 0});
   double length = 0;
-  Vec3 feet = way.front();
+  Vec3 footPosition = way.front();
   for (int tick = 0; tick < kMaxTicks; ++tick) {
     const scene::TickReport report = tickWorld(world);
     const auto snapshot = world.snapshot();
     if (snapshot->avatars.empty()) return std::nullopt;
-    const Vec3 before = std::exchange(feet, snapshot->avatars.front().footPosition);
-    length += scene::computeGroundDistance(before, feet) + std::abs(feet.y() - before.y());
+    const Vec3 before = std::exchange(footPosition, snapshot->avatars.front().footPosition);
+    length += scene::computeGroundDistance(before, footPosition) +
+              std::abs(footPosition.y() - before.y());
     for (const scene::Notice& notice : report.notices) {
       if (notice.kind == scene::Notice::Kind::blocked) return std::nullopt;
       if (notice.kind != scene::Notice::Kind::arrived) continue;
-      if (std::abs(feet.y() - way.back().y()) > scene::kHeightError) return std::nullopt;
+      if (std::abs(footPosition.y() - way.back().y()) > scene::kHeightError) return std::nullopt;
       return length;
     }
   }
@@ -543,10 +544,10 @@ void compareWithDetour(Bench& bench, const Effort& effort, nlohmann::json& row) 
     if (length < kMinCompared) continue;
     const std::vector<Vec3> points = getPoints(path);
     lengths.shares.push_back(scene::computeLength(points) / length);
-    const auto feet = measureWalk(bench, points), feetOnLine = measureWalk(bench, *walked);
-    if (feet && feetOnLine) lengths.feetShares.push_back(*feet / *feetOnLine);
+    const auto feetOnPath = measureWalk(bench, points), feetOnLine = measureWalk(bench, *walked);
+    if (feetOnPath && feetOnLine) lengths.feetShares.push_back(*feetOnPath / *feetOnLine);
     printLong(starts[i], goals[i],
-              feet && feetOnLine ? lengths.feetShares.back() : lengths.shares.back());
+              feetOnPath && feetOnLine ? lengths.feetShares.back() : lengths.shares.back());
   }
   row["detour_pairs"] = pairs;
   row["detour_found"] = found;

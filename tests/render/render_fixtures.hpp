@@ -37,7 +37,7 @@ inline std::vector<PlacedBox> makeOpaque(std::vector<PlacedBox> boxes) {
 }
 
 /// An avatar: a prism 0.6 m wide and 1.75 m high.
-inline scene::AvatarSnapshot makeAvatarAt(scene::EntityId id, const Vec3& feet) {
+inline scene::AvatarSnapshot makeAvatarAt(scene::EntityId id, const Vec3& footPosition) {
   std::vector<Vec3> points;
   for (const double y : {0.0, 1.75}) {
     for (const double x : {-0.3, 0.3}) {
@@ -46,7 +46,7 @@ inline scene::AvatarSnapshot makeAvatarAt(scene::EntityId id, const Vec3& feet) 
   }
   scene::AvatarSnapshot avatar;
   avatar.id = id;
-  avatar.footPosition = feet;
+  avatar.footPosition = footPosition;
   avatar.shape = scene::makeAvatarShape({scene::makeAvatarPart(
       std::make_shared<const collision::Hull>(collision::buildHull(points)))});
   return avatar;

@@ -69,6 +69,38 @@ TEST(Audit, FindsPairsAndNothingWrongOnAWalk) {
   EXPECT_GT(pairs, 8 * audits) << "each stands on the floor, and touches others";
 }
 
+/// 400 avatars in rows of 20 on a wide floor.
+World makeCrowd() {
+  World world(makeBoxScene({{"floor", {-20, -1, -20}, {20, 0, 20}}}));
+  for (int i = 0; i < 400; ++i) {
+    const Vec3 place(0.9 * (i % 20) - 9, 0, 0.9 * (i / 20) - 9);
+    EXPECT_FALSE(submitAvatarCommand(world, {"a" + std::to_string(i), Spawn{place}, 0}));
+  }
+  tickWorld(world);
+  return world;
+}
+
+TEST(Audit, FindsNothingWrongInBatchesAndInLists) {
+  World world = makeCrowd();
+  setAuditInterval(world, 1);
+  std::mt19937_64 random(3);
+  int inBatches = 0, inLists = 0;
+  std::uint64_t pairs = 0;
+  for (int i = 0; i < 100; ++i) {
+    if (i % 20 == 0) driveAbout(world, random);
+    const TickReport report = tickWorld(world);
+    (world.data().broadPhase.counters().batched > 0 ? inBatches : inLists) += 1;
+    ASSERT_TRUE(report.audit);
+    EXPECT_EQ(report.audit->proxies, 400u) << "none waits for its turn";
+    EXPECT_EQ(report.audit->pairs, report.pairs);
+    EXPECT_TRUE(report.audit->findings.empty());
+    pairs += report.audit->pairs;
+  }
+  EXPECT_GT(inBatches, 0);
+  EXPECT_GT(inLists, 0);
+  EXPECT_GT(pairs, 100u * 400u) << "all stand on the floor, and some touch others";
+}
+
 TEST(Audit, IsOffByDefault) {
   World world = makeRoomWithAvatars(1);
   for (int i = 0; i < 10; ++i) EXPECT_FALSE(tickWorld(world).audit);

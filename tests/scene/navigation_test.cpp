@@ -391,8 +391,8 @@ class FloodFill {
       if (reached_[static_cast<std::size_t>(cell)]) return;
       signed char& known = free[static_cast<std::size_t>(cell)];
       EntityId nearest = 0;
-      const Vec3 feet(kStep * (cell % kSide), 1e-3, kStep * (cell / kSide));
-      if (known < 0) known = isClear(*shape, feet, 1e-5, obstacles, count, nearest) ? 1 : 0;
+      const Vec3 footPosition(kStep * (cell % kSide), 1e-3, kStep * (cell / kSide));
+      if (known < 0) known = isClear(*shape, footPosition, 1e-5, obstacles, count, nearest) ? 1 : 0;
       if (known == 0) return;
       reached_[static_cast<std::size_t>(cell)] = true;
       open.push(cell);

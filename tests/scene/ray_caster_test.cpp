@@ -22,12 +22,12 @@ std::shared_ptr<const Scene> makeWallAndPane() {
   return std::make_shared<const Scene>(std::move(model));
 }
 
-Snapshot makeSnapshotWithAvatarAt(const Vec3& feet) {
+Snapshot makeSnapshotWithAvatarAt(const Vec3& footPosition) {
   Snapshot snapshot;
   AvatarSnapshot ann;
   ann.id = 100;
   ann.name = "ann";
-  ann.footPosition = feet;
+  ann.footPosition = footPosition;
   ann.shape = makePrismShape(0.3, 1.75, 1.75, WorldSettings{});
   snapshot.avatars.push_back(ann);
   return snapshot;

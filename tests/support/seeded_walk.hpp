@@ -35,9 +35,9 @@ class SeededWalk {
   }
 
   /// Begins at a given place.
-  bool beginAt(const collision::Vec3& feet, double heading) {
+  bool beginAt(const collision::Vec3& footPosition, double heading) {
     heading_ = heading;
-    return stand("ann", feet);
+    return stand("ann", footPosition);
   }
 
   /// Walks for `ticks` ticks towards seeded goals and looks around at human speed. Empty if the
@@ -71,13 +71,13 @@ class SeededWalk {
     return low + (high - low) * (static_cast<double>(random_() >> 11) * 0x1p-53);
   }
 
-  bool stand(const std::string& name, const collision::Vec3& feet) {
+  bool stand(const std::string& name, const collision::Vec3& footPosition) {
     const auto isThere = [&]() -> const scene::AvatarSnapshot* {
       for (const auto& avatar : world_.snapshot()->avatars)
         if (avatar.name == name) return &avatar;
       return nullptr;
     };
-    if (submitAvatarCommand(world_, {name, scene::Spawn{feet}, 0})) return false;
+    if (submitAvatarCommand(world_, {name, scene::Spawn{footPosition}, 0})) return false;
     tickWorld(world_);
     if (!isThere()) return false;
     for (int i = 0; i < 60; ++i) tickWorld(world_);

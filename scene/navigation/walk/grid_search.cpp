@@ -26,7 +26,7 @@ struct Cell {
 };
 
 struct Place {
-  Vec3 feet = Vec3::Zero();
+  Vec3 footPosition = Vec3::Zero();
   double cost = 0;
   Cell parent;
   bool done = false;
@@ -40,15 +40,15 @@ struct Grid {
   double spacing = 0;
 
   Vec3 centre(int x, int z) const { return origin + Vec3(x * spacing, 0, z * spacing); }
-  Cell computeCell(const Vec3& feet, int x, int z) const {
-    return {x, z, static_cast<int>(std::lround((feet.y() - origin.y()) / kLayerHeight))};
+  Cell computeCell(const Vec3& footPosition, int x, int z) const {
+    return {x, z, static_cast<int>(std::lround((footPosition.y() - origin.y()) / kLayerHeight))};
   }
 };
 
 std::vector<Vec3> collectPlaces(const std::map<Cell, Place>& places, Cell last) {
   std::vector<Vec3> path;
   for (Cell at = last;; at = places.at(at).parent) {
-    path.push_back(places.at(at).feet);
+    path.push_back(places.at(at).footPosition);
     if (places.at(at).parent == at) break;
   }
   std::reverse(path.begin(), path.end());
@@ -78,23 +78,23 @@ std::optional<std::vector<Vec3>> searchGrid(Walker& walker, const Vec3& from, co
     Place& here = places[cell];
     if (here.done) continue;
     here.done = true;
-    const Vec3 feet = here.feet;
+    const Vec3 footPosition = here.footPosition;
     const double cost = here.cost;
-    if (end.isReachedAt(feet)) return collectPlaces(places, cell);
-    if (end.isOpen && !end.isOpen(feet)) continue;
+    if (end.isReachedAt(footPosition)) return collectPlaces(places, cell);
+    if (end.isOpen && !end.isOpen(footPosition)) continue;
     for (const auto& [dx, dz] : kDirections) {
       const int x = cell.x + dx, z = cell.z + dz;
       const Vec3 target = grid.centre(x, z);
       if (target.x() < end.window.min.x() || target.x() > end.window.max.x() ||
           target.z() < end.window.min.z() || target.z() > end.window.max.z())
         continue;
-      double next = cost + computeGroundDistance(feet, target);
+      double next = cost + computeGroundDistance(footPosition, target);
       if (next + end.estimate(target) > search.maxLength) continue;
       const auto known = places.find({x, z, cell.storey});
       if (known != places.end() && known->second.cost <= next) continue;
       if (search.maxWalks == 0) return std::nullopt;
       --search.maxWalks;
-      walker.returnTo(feet);
+      walker.returnTo(footPosition);
       if (walker.walkTo(target).kind != WalkOutcome::Kind::arrived) continue;
       const Vec3 reached = walker.footPosition();
       if (search.countsHeights) next = std::max(next, cost + walker.travel().length());

@@ -39,7 +39,7 @@ struct GridSearch {
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
                                               GridSearch& search);
 
-using PlaceTest = std::function<bool(const Vec3& feet)>;
+using PlaceTest = std::function<bool(const Vec3& footPosition)>;
 
 /// The end of a search that leads out of somewhere.
 struct PathOut {

@@ -25,7 +25,7 @@ constexpr GridSearch kFineAround{kFineSpacing, 0.7, 12'000, true};
 
 /// A place of a walk.
 struct Sample {
-  Vec3 feet;
+  Vec3 footPosition;
   FeetTravel travel;          ///< since the start of the walk
   std::size_t nextPlace = 0;  ///< index of the next place of the path, or of this one
 };
@@ -53,7 +53,7 @@ std::optional<std::size_t> findEndOfBump(const std::vector<Sample>& samples, std
   const Sample& start = samples[first];
   for (std::size_t i = first + 2; i < samples.size(); ++i) {
     if (samples[i].travel.length() - start.travel.length() > kMaxBumpLength) break;
-    if (std::abs(samples[i].feet.y() - start.feet.y()) > kSameLevel) continue;
+    if (std::abs(samples[i].footPosition.y() - start.footPosition.y()) > kSameLevel) continue;
     if (samples[i].travel.climb - start.travel.climb >= kMinBump) return i;
   }
   return std::nullopt;
@@ -75,7 +75,8 @@ std::size_t findSampleAfter(const std::vector<Sample>& samples, std::size_t i) {
 std::optional<std::pair<std::size_t, std::size_t>> findNextBump(const std::vector<Sample>& samples,
                                                                 std::size_t first) {
   for (std::size_t i = first; i + 1 < samples.size(); ++i) {
-    if (std::abs(samples[i + 1].feet.y() - samples[i].feet.y()) < kMinChange) continue;
+    if (std::abs(samples[i + 1].footPosition.y() - samples[i].footPosition.y()) < kMinChange)
+      continue;
     if (const auto end = findEndOfBump(samples, i)) return std::pair(i, *end);
   }
   return std::nullopt;
@@ -94,7 +95,7 @@ std::vector<Vec3> levelPart(Walker& walker, const std::vector<Vec3>& part, const
   for (GridSearch grid : {kCoarseAround, kFineAround}) {
     const std::size_t walks = grid.maxWalks = std::min(grid.maxWalks, maxWalks);
     grid.maxLength = kGridExcess * (last.travel.length() - first.travel.length());
-    const auto way = findGridPath(walker, first.feet, last.feet, grid);
+    const auto way = findGridPath(walker, first.footPosition, last.footPosition, grid);
     maxWalks -= walks - grid.maxWalks;
     if (!way) continue;
     std::vector<Vec3> level{part.front()};
@@ -112,7 +113,7 @@ std::optional<Vec3> findBump(Walker& walker, const std::vector<Vec3>& places) {
   const auto samples = sampleWalk(walker, places);
   const auto bump = samples ? findNextBump(*samples, 0) : std::nullopt;
   if (!bump) return std::nullopt;
-  return (*samples)[(bump->first + bump->second) / 2].feet;
+  return (*samples)[(bump->first + bump->second) / 2].footPosition;
 }
 
 BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search) {
@@ -124,7 +125,8 @@ BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& se
   std::size_t begin = 0;  // the sample where the last way around ends
   auto bump = findNextBump(*samples, 0);
   for (int i = 0; bump && i < kMaxBumps; ++i, bump = findNextBump(*samples, bump->second)) {
-    const std::pair ends((*samples)[bump->first].feet, (*samples)[bump->second].feet);
+    const std::pair ends((*samples)[bump->first].footPosition,
+                         (*samples)[bump->second].footPosition);
     if (isKnown(search.known, ends.first, ends.second)) continue;
     const Sample& first = (*samples)[std::max(findSampleBefore(*samples, bump->first), begin)];
     const std::size_t end = findSampleAfter(*samples, bump->second);
@@ -132,7 +134,7 @@ BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& se
     for (; next < first.nextPlace; ++next) level.push_back(places[next]);
     std::vector<Vec3> part{level.back()};
     for (std::size_t k = next; k < last.nextPlace; ++k) part.push_back(places[k]);
-    part.push_back(last.feet);
+    part.push_back(last.footPosition);
     const std::vector<Vec3> around = levelPart(walker, part, first, last, search.maxWalks);
     if (around.empty()) {
       search.known.push_back(ends);

@@ -21,10 +21,10 @@ constexpr double kSteepestStair = 1.5;    // rise over run
 /// The floor below a place of a walk.
 struct FloorPlace {
   Vec3 floor = Vec3::Zero();  ///< scene frame, metres
-  double feet = 0;            ///< height of the feet there
-  double along = 0;           ///< metres across from the start of the walk
-  bool isSteep = false;       ///< the floor cannot be walked there, as on a riser
-  bool isAfterHole = false;   ///< the place before it has no floor
+  double footHeight = 0;
+  double along = 0;          ///< metres across from the start of the walk
+  bool isSteep = false;      ///< the floor cannot be walked there, as on a riser
+  bool isAfterHole = false;  ///< the place before it has no floor
 };
 
 /// Measures the floor along a walk by casts of a point. They begin a step above the feet, and end
@@ -56,16 +56,16 @@ class FloorProbe {
   std::vector<FloorPlace> places;
 
  private:
-  void measurePlace(const Vec3& feet, double along, ObstacleSet& obstacles) {
+  void measurePlace(const Vec3& footPosition, double along, ObstacleSet& obstacles) {
     const Vec3 fall(0, -(up_ + down_), 0);
     QueryCount count;
-    const ShapeCastHit hit = castAvatarShape(*point_, feet + Vec3(0, up_, 0), fall, obstacles,
-                                             makeContactOffset(world_.settings), count);
+    const ShapeCastHit hit = castAvatarShape(*point_, footPosition + Vec3(0, up_, 0), fall,
+                                             obstacles, makeContactOffset(world_.settings), count);
     const bool isHole = hit.entity == 0;
     if (!isHole) {
-      const double height = feet.y() + up_ + hit.fraction * fall.y() - hit.distance;
-      places.push_back({{feet.x(), height, feet.z()},
-                        feet.y(),
+      const double height = footPosition.y() + up_ + hit.fraction * fall.y() - hit.distance;
+      places.push_back({{footPosition.x(), height, footPosition.z()},
+                        footPosition.y(),
                         along,
                         hit.normal.y() < world_.settings.walkableNormalY,
                         wasHole_});
@@ -111,12 +111,12 @@ bool isSteep(const FloorPlace& from, const FloorPlace& to, const WorldSettings& 
 /// another one.
 double computeFeetRange(const std::vector<FloorPlace>& places, std::size_t first, std::size_t last,
                         double reach) {
-  double lowest = places[first].feet, highest = lowest;
+  double lowest = places[first].footHeight, highest = lowest;
   for (const FloorPlace& place : places) {
     if (place.along < places[first].along - reach || place.along > places[last].along + reach)
       continue;
-    lowest = std::min(lowest, place.feet);
-    highest = std::max(highest, place.feet);
+    lowest = std::min(lowest, place.footHeight);
+    highest = std::max(highest, place.footHeight);
   }
   return highest - lowest;
 }

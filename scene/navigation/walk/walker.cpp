@@ -234,8 +234,9 @@ bool Walker::isPathClear(const Vec3& goal) {
 
 bool Walker::isRideFree(const Vec3& from, const Vec3& to, EntityId body) {
   Aabb swept;
-  for (const Vec3& feet : {from, to})
-    for (const Vec3& corner : {shape_->box.min, shape_->box.max}) swept.include(feet + corner);
+  for (const Vec3& footPosition : {from, to})
+    for (const Vec3& corner : {shape_->box.min, shape_->box.max})
+      swept.include(footPosition + corner);
   ObstacleSet obstacles =
       collectObstaclesInBox(world_, inflated(swept, 2 * world_.settings.contactOffset), 0);
   std::erase_if(obstacles.list, [&](const Obstacle& one) { return one.entity == body; });

@@ -120,7 +120,7 @@ bool isAboutToClose(const Body& door, double tick) {
 void prepareDoor(WorldData& world, const Walk& walk, Avatar& avatar, const BodyHandle& handle) {
   const Body& door = world.bodies[handle.index];
   const double tick = world.settings.tickDuration, open = findOpenLimit(*door.spec);
-  const Vec3& feet = avatar.footPosition;
+  const Vec3& footPosition = avatar.footPosition;
   const Aabb swing = computeSwing(door);
   const Aabb swingOfFeet = growForFeet(swing, avatar, kSideRoom + walk.speed * tick);
   if (isOpen(door)) {
@@ -137,7 +137,8 @@ void prepareDoor(WorldData& world, const Walk& walk, Avatar& avatar, const BodyH
     return;
   if (!door.drive.moving || door.drive.target != open)
     call(world, walk, avatar, makeOpenCommand(handle));
-  if (contains(swingOfFeet, {feet, feet})) waitFor(door, open, world.settings, avatar);
+  if (contains(swingOfFeet, {footPosition, footPosition}))
+    waitFor(door, open, world.settings, avatar);
 }
 
 /// Calls the lift if it is not at the stop.
