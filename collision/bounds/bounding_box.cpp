@@ -39,9 +39,9 @@ constexpr double kUnderflow = 0x1p-1000;  // above the loss of a few products to
 
 // Nanoseconds, measured by `./dev bench boxes` (tests/benchmarks/report/boxes.md). A pair is a
 // warm narrow-phase query of two bodies that are clear.
-constexpr double kCubeCost = 7, kScanCost = 5, kScanCostPerVertex = 1.85;
-constexpr double kClimbCost = 63;      // of a body that hardly turns
-constexpr double kClimbTurnCost = 75;  // a radian of turn, times the root of the number of vertices
+constexpr double kCubeCost = 4, kScanCost = 3.2, kScanCostPerVertex = 1.18;
+constexpr double kClimbCost = 46;       // of a body that hardly turns
+constexpr double kClimbTurnCost = 150;  // a radian of turn, times the fourth root of the vertices
 constexpr double kPairCost = 200;
 constexpr double kUsualTurn = 0.035;  // radians a tick: 2 degrees
 
@@ -242,7 +242,7 @@ double estimateScanCost(const Hull& hull) {
 
 /// Of a climb after a turn, per radian.
 double estimateTurnCost(const Hull& hull) {
-  return kClimbTurnCost * std::sqrt(static_cast<double>(hull.vertices.size()));
+  return kClimbTurnCost * std::sqrt(std::sqrt(static_cast<double>(hull.vertices.size())));
 }
 
 double estimateClimbCost(const Hull& hull, double turn) {

@@ -368,7 +368,7 @@ std::optional<ObstacleDistance> Navigation::findObstacle(const Vec3& point, doub
 /// The mesh lies up to a voxel above level floor, and up to 15 cm off over stairs: where that
 /// decides, an agent is put down.
 NavigationMap Navigation::drawMap(double cell, double height, double tolerance) {
-  constexpr double kMaxCells = 4e6;
+  constexpr double kMaxCells = 16e6;
   const std::lock_guard lock(mutex_);
   const Aabb& bounds = world_.scene().bounds();
   const double width = std::ceil(bounds.size().x() / cell);
@@ -376,7 +376,7 @@ NavigationMap Navigation::drawMap(double cell, double height, double tolerance) 
   if (!(width * depth <= kMaxCells))
     throw std::invalid_argument("the map would have " +
                                 std::to_string(std::llround(std::min(width * depth, 1e15))) +
-                                " cells; at most 4 million: give larger cells");
+                                " cells; at most 16 million: give larger cells");
   NavigationMap map{bounds.min,
                     cell,
                     static_cast<std::uint32_t>(std::max(1.0, width)),

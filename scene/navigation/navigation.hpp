@@ -123,7 +123,7 @@ class Navigation {
   /// nullopt: there is no place to stand at `point`.
   std::optional<ObstacleDistance> findObstacle(const Vec3& point, double maxDistance);
   /// The cells with a floor within `tolerance` metres of `height`, and some with one up to 5 cm
-  /// beyond. Throws std::invalid_argument for more than 4 million cells.
+  /// beyond. Throws std::invalid_argument for more than 16 million cells.
   NavigationMap drawMap(double cell, double height, double tolerance = kMapTolerance);
   /// The triangles of the mesh, three corners each, or of one island: scene frame, metres.
   std::vector<Vec3> collectTriangles(const std::optional<std::uint32_t>& island);

@@ -221,6 +221,7 @@ void addReport(scene::Navigation& navigation, v1::NavigationReply& reply) {
   reply.set_navigable_area(report.area);
   reply.set_build_seconds(report.seconds);
   reply.set_mesh_bytes(report.bytes);
+  reply.set_island_count(static_cast<std::uint32_t>(report.islandAreas.size()));
   const std::size_t count = std::min(report.islandAreas.size(), kMaxIslandAreas);
   reply.mutable_island_areas()->Add(
       report.islandAreas.begin(), report.islandAreas.begin() + static_cast<std::ptrdiff_t>(count));

@@ -425,6 +425,7 @@ std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& w
 struct LengthComparison {
   std::vector<double> shares, feetShares;
   int unwalkable = 0;  ///< no avatar walks the other way, or it is missing
+  int wrong = 0;       ///< no avatar walks the path
 };
 
 std::vector<Vec3> getPoints(const v1::NavigationPath& path) {
@@ -545,6 +546,7 @@ void compareWithDetour(Bench& bench, const Effort& effort, nlohmann::json& row) 
     const std::vector<Vec3> points = getPoints(path);
     lengths.shares.push_back(scene::computeLength(points) / length);
     const auto feetOnPath = measureWalk(bench, points), feetOnLine = measureWalk(bench, *walked);
+    if (!feetOnPath) ++lengths.wrong;
     if (feetOnPath && feetOnLine) lengths.feetShares.push_back(*feetOnPath / *feetOnLine);
     printLong(starts[i], goals[i],
               feetOnPath && feetOnLine ? lengths.feetShares.back() : lengths.shares.back());
@@ -558,6 +560,7 @@ void compareWithDetour(Bench& bench, const Effort& effort, nlohmann::json& row) 
   row["detour_min"] = toJsonNumber(computeQuantile(lengths.shares, 0));
   row["detour_max"] = toJsonNumber(computeQuantile(lengths.shares, 1));
   row["detour_above"] = std::ranges::count_if(lengths.shares, isLong);
+  row["detour_wrong"] = lengths.wrong;
   row["detour_feet_compared"] = lengths.feetShares.size();
   row["detour_feet_max"] = toJsonNumber(computeQuantile(lengths.feetShares, 1));
   row["detour_feet_above"] = std::ranges::count_if(lengths.feetShares, isLong);

@@ -33,7 +33,8 @@ def make_fill_row(row):
 
 def make_length_row(row):
     return [row["scene"], f"{row['detour_pairs']:,}", f"{row['detour_found']:,}", row["detour_no_line"], row["detour_unwalkable"],
-            f"{row['detour_compared']:,}", format_ratio(row["detour_min"]), format_ratio(row["detour_median"]),
+            f"{row['detour_compared']:,}" + (f" ({row['detour_wrong']} wrong)" if row.get("detour_wrong") else ""),
+            format_ratio(row["detour_min"]), format_ratio(row["detour_median"]),
             format_ratio(row["detour_max"]), row["detour_above"], format_ratio(row["detour_feet_max"]),
             row["detour_feet_above"]]
 

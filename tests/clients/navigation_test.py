@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 
 import enfilade
-from enfilade.compat import (GreedyGeodesicFollower, MultiGoalShortestPath, NavMeshSettings, PathFinder,
-                             ShortestPath)
+from enfilade.compat import MultiGoalShortestPath, NavMeshSettings, PathFinder, ShortestPath
 from room import RoomCase, obj
 
 
@@ -227,6 +226,27 @@ class CompatTest(RoomCase):
         self.assertEqual(self.finder.get_topdown_view(0.1, 0).dtype, bool)
         np.testing.assert_array_equal(self.finder.get_topdown_view(0.1, 0, 0.5),
                                       self.finder.get_topdown_view(0.1, 0))
+
+    def test_every_island_has_an_area_and_is_on_the_map(self):
+        navigation = self.finder.navigation
+        self.assertEqual(self.finder.num_islands, len(navigation.island_areas))
+        self.assertEqual(self.finder.island_area(0), navigation.island_areas[0])
+        with self.assertRaises(IndexError):
+            self.finder.island_area(self.finder.num_islands)
+        seen = self.finder.get_topdown_view(0.2, 0)
+        islands = self.finder.get_topdown_island_view(0.2, 0)
+        np.testing.assert_array_equal(islands >= 0, seen)
+        self.assertEqual(islands.dtype, np.int32)
+        low, _ = self.finder.get_bounds()
+        for point in ((0, 0, 0), (2, 0, 3)):
+            row, column = int((point[2] - low[2]) / 0.2), int((point[0] - low[0]) / 0.2)
+            self.assertEqual(islands[row, column], self.finder.get_island(point))
+
+    def test_the_area_of_an_island_beyond_the_list_is_that_of_its_triangles(self):
+        navigation = self.finder.navigation
+        known = navigation.island_area(0)
+        navigation._meshes().ClearField("island_areas")
+        self.assertAlmostEqual(navigation.island_area(0), known, delta=0.01 * known)
 
     def test_a_map_has_the_floors_within_eps(self):
         floor, air, above = (self.finder.get_topdown_view(0.1, height, eps)
@@ -634,45 +654,6 @@ class BuildingTest(unittest.TestCase):
         touched = {one.b_name for one in client.contacts() if one.a_name == "ann"}
         self.assertIn("lift/cabin", touched)
         self.assertFalse([name for name in touched if "door" in name])
-
-
-class FollowerTest(RoomCase):
-    def test_greedy_actions_lead_to_the_goal(self):
-        pathfinder = PathFinder(self.client.navigation())
-        follower = GreedyGeodesicFollower(pathfinder)
-        place, heading = np.array((2.0, 0.0, 0.0)), 0.3
-        for _ in range(200):
-            action = follower.next_action_along(place, heading, (8, 0, 0))
-            if action is None:
-                break
-            if action == "move_forward":
-                step = 0.25 * np.array((math.cos(heading), 0, -math.sin(heading)))
-                place = pathfinder.try_step(place, place + step)
-            heading += {"turn_left": 1, "turn_right": -1}.get(action, 0) * math.radians(10)
-        self.assertIsNone(action)
-        self.assertLess(math.hypot(place[0] - 8, place[2]), 0.25)
-        with self.assertRaisesRegex(ValueError, "no path"):
-            follower.next_action_along(place, heading, (5.1, 9, 0))
-
-    def test_find_path_returns_the_actions_up_to_the_stop(self):
-        follower = GreedyGeodesicFollower(PathFinder(self.client.navigation()), stop_key="stop")
-        self.assertEqual(follower.goal_radius, 0.1875)
-        actions = follower.find_path((0, 0, 0), 0.0, (1, 0, 0))
-        self.assertEqual(actions, ["move_forward"] * 4 + ["stop"])
-        actions = follower.find_path((2, 0, 0), 0.3, (8, 0, 0))
-        place, heading = (2, 0, 0), 0.3
-        for action in actions:
-            self.assertEqual(follower.next_action_along(place, heading, (8, 0, 0)), action)
-            if action == "move_forward":
-                step = 0.25 * np.array((math.cos(heading), 0, -math.sin(heading)))
-                place = follower.pathfinder.try_step(place, place + step)
-            heading += {"turn_left": 1, "turn_right": -1}.get(action, 0) * math.radians(10)
-        self.assertEqual(actions.index("stop"), len(actions) - 1)
-        with self.assertRaisesRegex(ValueError, "no path"):
-            follower.find_path((2, 0, 0), 0.3, (5.1, 9, 0))
-        actions = follower.find_path((2, 0.7, 0), 0.0, (0, 1, 6))  # into the column
-        self.assertEqual(actions[-1], "stop")
-        self.assertIn("move_forward", actions)
 
 
 if __name__ == "__main__":

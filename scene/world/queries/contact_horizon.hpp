@@ -47,7 +47,8 @@ class ContactHorizons {
     double searchDistance = 3;
     /// Examines every pair near an avatar in every tick, for comparison.
     bool examineAll = false;
-    /// Work limit of one update, in the units of kMaxQueryWork: about 8 ms.
+    /// Work limit of one update, in the units of kMaxQueryWork: about 8 ms of distances. A search
+    /// costs more than is charged (tests/benchmarks/report/horizon.md).
     std::size_t maxWork = 100'000;
   };
   /// Numbers of all updates together.

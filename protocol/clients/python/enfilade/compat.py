@@ -88,32 +88,41 @@ class HitRecord:
     hit_dist: float
 
 
+class GreedyFollowerError(ValueError):
+    """No actions lead to the goal, as habitat_sim.errors.GreedyFollowerError."""
+
+
 class GreedyGeodesicFollower:
     """Actions that lead along the path to a goal, as habitat_sim.GreedyGeodesicFollower, for an agent with
     `forward_amount` metres and `turn_amount` radians per action. It has no agent: the methods take the
     position of the feet and the heading in radians (0 along +X, left positive). `goal_radius`: metres; None:
-    0.75 of a step ahead."""
+    0.75 of a step ahead. `fix_thrashing` has no effect: no turn undoes the last one."""
 
     def __init__(self, pathfinder: "PathFinder", goal_radius: Optional[float] = None, *,
                  forward_key: str = "move_forward", left_key: str = "turn_left",
                  right_key: str = "turn_right", stop_key: Optional[str] = None,
+                 fix_thrashing: bool = True, thrashing_threshold: int = 16,
                  forward_amount: float = 0.25, turn_amount: float = math.radians(10)) -> None:
         self.pathfinder = pathfinder
         self.goal_radius = 0.75 * forward_amount if goal_radius is None else goal_radius
         self.keys = {"forward": forward_key, "left": left_key, "right": right_key, "stop": stop_key}
         self.forward_amount, self.turn_amount = forward_amount, turn_amount
+        self.reset()
+
+    def reset(self) -> None:
+        """Forgets the last goal. Another goal does so, too."""
         self._snapped: Tuple[Tuple[float, ...], Optional[Spot]] = ((), None)  # the last goal, and its place
 
     def next_action_along(self, position: Sequence[float], heading: float,
                           goal: Sequence[float]) -> Optional[str]:
-        """Returns the key of the next action; the stop key at the goal. Raises ValueError if there is no
-        path."""
+        """Returns the key of the next action; the stop key at the goal. Raises GreedyFollowerError
+        if there is no path."""
         return self.keys[self._next(position, heading, goal)]
 
     def find_path(self, position: Sequence[float], heading: float,
                   goal: Sequence[float]) -> List[Optional[str]]:
-        """Returns the keys of all actions to the goal, which end with the stop key. Raises ValueError if there
-        is no path, or if steps of this length do not come within `goal_radius`."""
+        """Returns the keys of all actions to the goal, which end with the stop key. Raises
+        GreedyFollowerError if there is no path, or if steps of this length do not come within `goal_radius`."""
         taken: List[Optional[str]] = []
         while len(taken) < _MAX_ACTIONS:
             action = self._next(position, heading, goal)
@@ -125,8 +134,9 @@ class GreedyGeodesicFollower:
                 position = self.pathfinder.try_step(position, np.asarray(position, float) + ahead)
             else:
                 heading += self.turn_amount if action == "left" else -self.turn_amount
-        raise ValueError(f"goal_radius: the goal is not within {self.goal_radius:g} m after {_MAX_ACTIONS} "
-                         f"actions; give more, or a smaller forward_amount than {self.forward_amount:g} m")
+        raise GreedyFollowerError(f"goal_radius: the goal is not within {self.goal_radius:g} m after "
+                                  f"{_MAX_ACTIONS} actions; give more, or a smaller forward_amount than "
+                                  f"{self.forward_amount:g} m")
 
     def _next(self, position: Sequence[float], heading: float, goal: Sequence[float]) -> str:
         wanted = tuple(map(float, goal))
@@ -134,10 +144,11 @@ class GreedyGeodesicFollower:
             self._snapped = wanted, self.pathfinder._projected([wanted])[0]
         start, end = self.pathfinder._projected([position])[0], self._snapped[1]
         if start is None or end is None:
-            raise ValueError(f"no path: no agent can stand near the {'start' if start is None else 'goal'}")
+            raise GreedyFollowerError("no path: no agent can stand near the "
+                                      f"{'start' if start is None else 'goal'}")
         path = self.pathfinder.navigation.path(start.at, end.at)
         if not path.found:
-            raise ValueError(f"no path: {path.reason}")
+            raise GreedyFollowerError(f"no path: {path.reason}")
         if path.length <= self.goal_radius:
             return "stop"
         here = start.at
@@ -273,12 +284,11 @@ class PathFinder:
         return spot.island if spot is not None and spot.island is not None else -1
 
     def island_area(self, island_index: int = -1) -> float:
-        areas = self.navigation.island_areas
-        return self.navigable_area if island_index < 0 else areas[island_index]
+        return self.navigable_area if island_index < 0 else self.navigation.island_area(island_index)
 
     @property
     def num_islands(self) -> int:
-        return len(self.navigation.island_areas)
+        return self.navigation.island_count
 
     @property
     def navigable_area(self) -> float:
@@ -326,6 +336,18 @@ class PathFinder:
     def get_topdown_view(self, meters_per_pixel: float, height: float, eps: float = 0.5) -> np.ndarray:
         """The floors within `eps` metres of the height, as is_navigable() with that `max_y_delta`."""
         return self.navigation.top_down(height, meters_per_pixel, eps).cells
+
+    def get_topdown_island_view(self, meters_per_pixel: float, height: float, eps: float = 0.5) -> np.ndarray:
+        """The number of the island at each cell of get_topdown_view(); -1: no floor."""
+        seen = self.navigation.top_down(height, meters_per_pixel, eps)
+        islands = np.full(seen.cells.shape, -1, np.int32)
+        rows, columns = np.nonzero(seen.cells)
+        x, z = (seen.corner[axis] + (cells + 0.5) * meters_per_pixel for axis, cells in ((0, columns), (2, rows)))
+        reach = meters_per_pixel + 0.1  # a cell is drawn if its middle is on the mesh, which may be off the floor
+        spots = self.navigation.snap_all(np.column_stack((x, np.full(len(x), float(height)), z)),
+                                         extents=(reach, eps + 0.1, reach))
+        islands[rows, columns] = [-1 if spot is None or spot.island is None else spot.island for spot in spots]
+        return islands
 
 
 def _island(index: int) -> Optional[int]:

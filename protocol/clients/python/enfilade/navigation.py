@@ -318,6 +318,22 @@ class Navigation:
         return list(self._meshes().island_areas)
 
     @property
+    def island_count(self) -> int:
+        """The number of islands of all sizes."""
+        return self._meshes().island_count
+
+    def island_area(self, island: int) -> float:
+        """Square metres of any island."""
+        areas = self._meshes().island_areas
+        if island < len(areas):
+            return areas[island]
+        if island >= self.island_count:
+            raise IndexError(f"island: there are {self.island_count}, no number {island}")
+        a, b, c = np.moveaxis(self.triangles(island), 1, 0)
+        return float(np.abs((b[:, 2] - a[:, 2]) * (c[:, 0] - a[:, 0])
+                            - (b[:, 0] - a[:, 0]) * (c[:, 2] - a[:, 2])).sum() / 2)
+
+    @property
     def navigable_area(self) -> float:
         """Square metres."""
         return self._meshes().navigable_area
