@@ -2,6 +2,7 @@
 
 import math
 import unittest
+from unittest import mock
 
 import numpy as np
 
@@ -23,11 +24,20 @@ class FollowerTest(RoomCase):
                 place = pathfinder.try_step(place, place + step)
             heading += {"turn_left": 1, "turn_right": -1}.get(action, 0) * math.radians(10)
         self.assertIsNone(action)
-        follower.reset()
-        self.assertIsNone(follower.next_action_along(place, heading, (8, 0, 0)))
         self.assertLess(math.hypot(place[0] - 8, place[2]), 0.25)
         with self.assertRaisesRegex(ValueError, "no path"):
             follower.next_action_along(place, heading, (5.1, 9, 0))
+
+    def test_a_reset_forgets_the_place_of_the_last_goal(self):
+        pathfinder = PathFinder(self.client.navigation())
+        follower = GreedyGeodesicFollower(pathfinder)
+        with mock.patch.object(pathfinder, "_projected", wraps=pathfinder._projected) as projected:
+            for expected in (2, 3):  # the goal is projected once, the position each time
+                follower.next_action_along((2, 0, 0), 0.0, (4, 0, 0))
+                self.assertEqual(projected.call_count, expected)
+            follower.reset()
+            follower.next_action_along((2, 0, 0), 0.0, (4, 0, 0))
+            self.assertEqual(projected.call_count, 5)
 
     def test_find_path_returns_the_actions_up_to_the_stop(self):
         follower = GreedyGeodesicFollower(PathFinder(self.client.navigation()), stop_key="stop")

@@ -7,6 +7,8 @@
 #include <map>
 #include <random>
 #include <set>
+#include <string>
+#include <vector>
 
 #include "scene/world/data/world_data.hpp"
 #include "scene/world/world.hpp"
@@ -20,15 +22,20 @@ using Finding = AuditFinding::Kind;
 
 const NamedBox kWall{"wall", {3, 0, -2}, {3.2, 3, 2}};
 
-World makeRoomWithAvatars(int avatars) {
-  World world(makeBoxScene({makeFloorBox(), kWall, {"table", {-3, 0, 1}, {-2, 0.8, 2}}}));
-  for (int i = 0; i < avatars; ++i) {
-    EXPECT_FALSE(
-        submitAvatarCommand(world, {"a" + std::to_string(i), Spawn{{0.9 * i - 4, 0, -1}}, 0}));
+World enterAvatars(World world, const std::vector<Vec3>& places) {
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    EXPECT_FALSE(submitAvatarCommand(world, {"a" + std::to_string(i), Spawn{places[i]}, 0}));
   }
   tickWorld(world);
-  EXPECT_EQ(world.snapshot()->avatars.size(), static_cast<std::size_t>(avatars));
+  EXPECT_EQ(world.snapshot()->avatars.size(), places.size());
   return world;
+}
+
+World makeRoomWithAvatars(int avatars) {
+  std::vector<Vec3> places;
+  for (int i = 0; i < avatars; ++i) places.emplace_back(0.9 * i - 4, 0, -1);
+  return enterAvatars(
+      World(makeBoxScene({makeFloorBox(), kWall, {"table", {-3, 0, 1}, {-2, 0.8, 2}}})), places);
 }
 
 void driveAbout(World& world, std::mt19937_64& random) {
@@ -71,13 +78,9 @@ TEST(Audit, FindsPairsAndNothingWrongOnAWalk) {
 
 /// 400 avatars in rows of 20 on a wide floor.
 World makeCrowd() {
-  World world(makeBoxScene({{"floor", {-20, -1, -20}, {20, 0, 20}}}));
-  for (int i = 0; i < 400; ++i) {
-    const Vec3 place(0.9 * (i % 20) - 9, 0, 0.9 * (i / 20) - 9);
-    EXPECT_FALSE(submitAvatarCommand(world, {"a" + std::to_string(i), Spawn{place}, 0}));
-  }
-  tickWorld(world);
-  return world;
+  std::vector<Vec3> places;
+  for (int i = 0; i < 400; ++i) places.emplace_back(0.9 * (i % 20) - 9, 0, 0.9 * (i / 20) - 9);
+  return enterAvatars(World(makeBoxScene({{"floor", {-20, -1, -20}, {20, 0, 20}}})), places);
 }
 
 TEST(Audit, FindsNothingWrongInBatchesAndInLists) {
