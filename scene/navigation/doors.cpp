@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "collision/assert.hpp"
+#include "collision/motion/shape_cast.hpp"
 #include "scene/navigation/shape_separation.hpp"
 #include "scene/world/data/body.hpp"
 #include "scene/world/world.hpp"
@@ -12,17 +13,25 @@
 namespace enfilade::scene {
 namespace {
 
-/// The volume that an agent sweeps on a leg: the hull of its prism at both ends, relative to the
-/// first.
-std::shared_ptr<const AvatarShape> makeSweptShape(const AvatarShape& prism, const Vec3& leg) {
-  std::vector<Vec3> points;
-  for (const AvatarPart& part : prism.parts)
-    for (const Vec3& vertex : part.hull->vertices) {
-      points.push_back(vertex);
-      points.push_back(vertex + leg);
+/// Share of a leg, 0..1, up to where an agent on it touches a body; nullopt: it does not.
+std::optional<double> findTouch(const AvatarShape& agent, const Vec3& from, const Vec3& leg,
+                                const BodyShape& shape, const collision::Pose& pose,
+                                const WorldSettings& settings) {
+  const double threshold = computeContactThreshold(settings);
+  const collision::ContactOffset offset{threshold, threshold + settings.contactOffset / 32};
+  const collision::Mat3 rotation = pose.rotation.toRotationMatrix();
+  std::optional<double> first;
+  for (const collision::Hull& hull : shape.parts) {
+    const collision::PlacedConvex placed{hull.vertices, pose.translation, &rotation, &hull};
+    for (const AvatarPart& part : agent.parts) {
+      const collision::PlacedConvex moved = placeAvatarPart(part, from);
+      collision::FeatureCache cache;
+      if (collision::computeSeparationWithin(moved, placed, threshold, cache)) return 0;
+      const collision::MotionResult cast = collision::castShape(moved, leg, placed, offset, cache);
+      if (!cast.isClear()) first = std::min(first.value_or(1), cast.lo);
     }
-  auto hull = std::make_shared<const collision::Hull>(collision::buildHull(points));
-  return makeAvatarShape({makeAvatarPart(std::move(hull))});
+  }
+  return first;
 }
 
 }  // namespace
@@ -69,8 +78,6 @@ Snapshot takeDoors(const Scene& scene, Snapshot present, const Snapshot& open) {
 
 namespace {
 
-constexpr double kDoorDistanceError = 0.01;  // metres
-
 /// The snapshot with all doors closed.
 Snapshot closeDoors(const Scene& scene, Snapshot snapshot) {
   auto bodies = std::make_shared<std::vector<BodySnapshot>>(*snapshot.bodies);
@@ -87,40 +94,24 @@ Snapshot closeDoors(const Scene& scene, Snapshot snapshot) {
 }  // namespace
 
 std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings& settings,
-                                        const Snapshot& snapshot, const NavigationAgent& agent,
+                                        const Snapshot& snapshot, const AvatarShape& agent,
                                         const std::vector<Vec3>& points,
                                         std::span<const PathLeg> legs) {
   std::vector<DoorOnPath> doors;
   const std::vector<BodySpec>& bodies = index.scene().model().bodies;
   if (!hasDoors(index.scene()) || points.size() < 2) return doors;
   const Snapshot closed = closeDoors(index.scene(), snapshot);
-  const auto prism = makePrismShape(agent.radius, agent.height, agent.height, settings);
   double distance = 0;
   for (std::size_t i = 1; i < points.size(); ++i) {
     const Vec3 leg = points[i] - points[i - 1];
-    Aabb box = placeBox(prism->box, points[i - 1]);
-    box.include(placeBox(prism->box, points[i]));
+    Aabb box = placeBox(agent.box, points[i - 1]);
+    box.include(placeBox(agent.box, points[i]));
     box = inflated(box, settings.contactOffset);
-    std::shared_ptr<const AvatarShape> swept;  // built for the first door that is near
-    const auto meets = [&](const Snapshot& state, std::size_t body,
-                           const std::shared_ptr<const AvatarShape>& shape) {
-      const auto separation =
-          computeSeparationFromShape(index, state, shape, points[i - 1], (*state.bodies)[body].id);
-      return separation && separation->distance < computeContactThreshold(settings);
-    };
-    const auto touches = [&](const Snapshot& state, std::size_t body) {
-      if (!overlaps(box, computeBodyAabb({index, state}, (*state.bodies)[body]))) return false;
-      if (!swept) swept = makeSweptShape(*prism, leg);
-      return meets(state, body, swept);
-    };
-    // Metres along the line to where the agent touches the door, to a centimetre.
-    const auto measureClearLength = [&](const Snapshot& state, std::size_t body) {
-      double clear = 0, met = 1;
-      while ((met - clear) * leg.norm() > kDoorDistanceError) {
-        const double middle = 0.5 * (clear + met);
-        (meets(state, body, makeSweptShape(*prism, middle * leg)) ? met : clear) = middle;
-      }
-      return met * leg.norm();
+    const auto findTouchOn = [&](const Snapshot& state, std::size_t body) -> std::optional<double> {
+      const BodySnapshot& door = (*state.bodies)[body];
+      if (!overlaps(box, computeBodyAabb({index, state}, door))) return std::nullopt;
+      return findTouch(agent, points[i - 1], leg, *index.scene().bodyShape(door.index), door.pose,
+                       settings);
     };
     for (std::size_t b = 0; b < snapshot.bodies->size(); ++b) {
       const BodySnapshot& body = (*snapshot.bodies)[b];
@@ -129,11 +120,13 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
       const auto known =
           std::ranges::find_if(doors, [&](const DoorOnPath& d) { return d.body == body.index; });
       if (known != doors.end() && known->isInTheWay) continue;
-      const bool isInTheWay = touches(snapshot, b);
-      if (!isInTheWay && (known != doors.end() || !touches(closed, b))) continue;
+      std::optional<double> touch = findTouchOn(snapshot, b);
+      const bool isInTheWay = touch.has_value();
+      if (!touch && known == doors.end()) touch = findTouchOn(closed, b);
+      if (!touch) continue;
       if (known != doors.end()) doors.erase(known);  // it stood further on than where it closes
       const double rest = findOpenLimit(spec) - body.jointPosition;
-      const double onLeg = measureClearLength(isInTheWay ? snapshot : closed, b);
+      const double onLeg = *touch * leg.norm();
       doors.push_back({body.index, i - 1, distance + onLeg, onLeg, computeMotionSeconds(spec, rest),
                        isInTheWay});
     }

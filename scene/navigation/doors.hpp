@@ -37,7 +37,7 @@ struct DoorOnPath {
 /// Doors that an agent on the path would touch as they are in `snapshot`, or if they were closed,
 /// in the order of the path. `legs`: of the path; their distances are metres walked, as its length.
 std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings& settings,
-                                        const Snapshot& snapshot, const NavigationAgent& agent,
+                                        const Snapshot& snapshot, const AvatarShape& agent,
                                         const std::vector<Vec3>& points,
                                         std::span<const PathLeg> legs = {});
 

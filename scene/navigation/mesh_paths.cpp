@@ -411,6 +411,17 @@ NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> 
   return best;
 }
 
+std::optional<double> measureLine(const PathFinder& finder, const Vec3& from, const Vec3& to) {
+  const Vec3 reach = computeMeshReach(finder);
+  const auto start = finder.ample.findNearest(from, reach),
+             goal = finder.ample.findNearest(to, reach);
+  if (!start || !goal) return std::nullopt;
+  const auto corridor = findCorridor(finder.ample, *start, *goal);
+  if (!corridor) return std::nullopt;
+  return (start->point - from).norm() + (goal->point - to).norm() +
+         computeLength(finder.ample.straighten(*corridor, start->point, goal->point));
+}
+
 /// A repair that fails takes long, and the next proposal may be as short: first all are tried with
 /// quick repairs.
 NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,

@@ -1,6 +1,7 @@
 #include "scene/navigation/navigation.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
 #include <limits>
@@ -108,6 +109,8 @@ void Navigation::buildTiles(const std::vector<int>& tiles, int threads, const Pr
 }
 
 void Navigation::assembleMeshes(int threads, const Progress& progress) {
+  static std::atomic<std::uint64_t> lastState{0};
+  meshState_ = ++lastState;
   walker_.emplace(world_.data(), agent_);
   links_.clear();
   unobstructed_.reset();
@@ -194,6 +197,12 @@ NavigationMesh Navigation::buildUnobstructed(int threads, const Progress& progre
   return {grid_, std::move(tiles)};
 }
 
+PathFinder Navigation::makeFinder(std::function<const UnobstructedMesh&()> unobstructed) {
+  PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, std::move(unobstructed)};
+  finder.connections = &connections_;
+  return finder;
+}
+
 NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const PathOptions& options,
                                     const Progress& progress) {
   const std::lock_guard lock(mutex_);
@@ -202,8 +211,7 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
       unobstructed_.emplace(makeUnobstructedMesh(buildUnobstructed(2, progress), *scarce_));
     return *unobstructed_;
   };
-  PathFinder finder{world_.data(), agent_, *walker_, *ample_, *scarce_, unobstructed};
-  finder.connections = &connections_;
+  PathFinder finder = makeFinder(unobstructed);
   const auto first = islandAt(from), last = islandAt(to);
   // On furniture one failed search proves nothing about its neighbours.
   const auto isFloor = [&](std::uint32_t island) {
@@ -224,6 +232,21 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
     links = links_.emplace(links_.end(), world_.data(), agent_, *ample_, options);
   }
   return findLinkedPath(finder, *links, *bodies_, from, to, std::move(path));
+}
+
+NavigationPath Navigation::findPathAgain(const Vec3& from, const Vec3& to,
+                                         std::optional<KeptPath>& kept, const Progress& progress) {
+  if (kept && kept->goal == to && kept->meshState == meshState_) {
+    const std::lock_guard lock(mutex_);
+    if (rejoinPath(makeFinder({}), *kept, from)) return kept->path;
+  }
+  NavigationPath path = findPath(from, to, {}, progress);
+  const std::lock_guard lock(mutex_);
+  kept.reset();
+  if (!path.found()) return path;
+  kept = keepPath(makeFinder({}), path, to);
+  kept->meshState = meshState_;
+  return path;
 }
 
 NavigationPath Navigation::findPathOut(const Vec3& from,

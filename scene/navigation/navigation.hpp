@@ -93,6 +93,7 @@ class Navigation {
   std::size_t update(const Snapshot& snapshot, int threads = 2, const Progress& progress = {});
 
   const NavigationAgent& agent() const { return agent_; }
+  const AvatarShape& agentShape() const { return walker_->shape(); }
   NavigationReport report();
   std::string findEntityName(EntityId id) const { return world_.data().findEntityName(id); }
 
@@ -101,6 +102,10 @@ class Navigation {
   /// of the unobstructed mesh, which is built when a path is first not found.
   NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {},
                           const Progress& progress = {});
+  /// As findPath() for an agent on its way. `kept`: its last path, which is used again as
+  /// rejoinPath() says, and replaced. It may be of other meshes: then it is only replaced.
+  NavigationPath findPathAgain(const Vec3& from, const Vec3& to, std::optional<KeptPath>& kept,
+                               const Progress& progress = {});
   /// As scene::findPathOut().
   NavigationPath findPathOut(const Vec3& from, const std::function<bool(const Vec3&)>& isWanted);
   /// The narrowest place of a path; nullopt: both sides are nowhere closer than 3 m.
@@ -140,6 +145,7 @@ class Navigation {
   void assembleMeshes(int threads, const Progress& progress);
   void joinIslands(int threads, const Progress& progress);
   NavigationMesh buildUnobstructed(int threads, const Progress& progress) const;
+  PathFinder makeFinder(std::function<const UnobstructedMesh&()> unobstructed);
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;
   /// As findPlaceIn(), on an island, or anywhere.
@@ -149,6 +155,7 @@ class Navigation {
   World world_;  ///< never ticks
   TileGrid grid_;
   std::mutex mutex_;
+  std::uint64_t meshState_ = 0;  ///< differs from that of any other meshes, and of earlier ones
   std::optional<Walker> walker_;
   std::vector<TileMesh> ampleTiles_, scarceTiles_;
   std::optional<NavigationMesh> ample_, scarce_;

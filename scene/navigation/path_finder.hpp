@@ -53,6 +53,18 @@ struct NavigationPath {
   double cost() const { return length + bumpClimb; }  ///< metres; the search minimises it
 };
 
+/// A walk that a search found. It is kept for an agent on its way to the goal.
+struct KeptPath {
+  NavigationPath path;               ///< from where the agent was last
+  std::uint64_t meshState = 0;       ///< of the meshes on which it was found
+  Vec3 goal = Vec3::Zero();          ///< as it was given; the path ends where an agent stands
+  Vec3 searchedFrom = Vec3::Zero();  ///< start of the search
+  double excess = 0;                 ///< metres beyond the line on the mesh, at the search
+  bool isNearLine = false;           ///< the search found a path about as short as that line
+  std::optional<double> line;        ///< metres: that line when it was last measured; nullopt: none
+  Vec3 measuredFrom = Vec3::Zero();  ///< its start
+};
+
 /// The last searches between two islands: they found nothing.
 struct Refusals {
   int count = 0;

@@ -21,7 +21,11 @@ constexpr double kMinAim = 1;       // metres from where a path joins the mesh
 constexpr double kStraight = 1.01;  // of the straight line: a path is short enough
 constexpr const char* kNotFound = "no path was found within the limits of the search";
 constexpr std::size_t kMaxThinnedPlaces = 50;  // of a path: of more, single ones are not left out
-constexpr double kMaxGridDistance = 3;  // metres between places that are connected without a mesh
+constexpr double kMaxGridDistance = 3;   // metres between places that are connected without a mesh
+constexpr double kMaxKeptGrowth = 0.01;  // metres
+constexpr double kMinSaving = 1e-3;      // metres that a shortcut saves
+constexpr double kNearLine = 1.02;       // of the line on the mesh: no other path is much shorter
+constexpr double kMaxKeptMove = 0.01;    // of the length: then another path may be shorter by 2 %
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
 constexpr double kMaxExit = 5;  // metres
 constexpr GridSearch kCoarseGrid{kCoarseSpacing, kMaxExit, 4000};
@@ -287,6 +291,24 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
   return best;
 }
 
+/// From a place straight to the farthest point of a path that needs no tick-by-tick walk, and along
+/// it; empty: neither its first leg nor its start is reached.
+std::vector<Vec3> leadOnto(Walker& walker, const Vec3& start, const std::vector<Vec3>& path) {
+  // The first point is where the agent was: it may have gone back behind a corner.
+  std::size_t joined = path.size() > 1 && walks(walker, start, path[1], kHeightError) ? 1 : 0;
+  if (joined == 0 && !walks(walker, start, path[0], kHeightError)) return {};
+  const auto isShorterTo = [&](std::size_t next) {
+    const double length = (path[joined] - start).norm() + (path[next] - path[joined]).norm();
+    if (length - (path[next] - start).norm() < kMinSaving) return false;
+    walker.returnTo(start);
+    return walker.isPathClear(path[next]);
+  };
+  while (joined > 0 && joined + 1 < path.size() && isShorterTo(joined + 1)) ++joined;
+  std::vector<Vec3> points{start};
+  points.insert(points.end(), path.begin() + static_cast<std::ptrdiff_t>(joined), path.end());
+  return points;
+}
+
 }  // namespace
 
 NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& to) {
@@ -314,6 +336,41 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
   best = findUnobstructedPath(finder, start, goal, proof);
   if (refusals) *refusals = best.found() ? Refusals() : Refusals{refusals->count + 1, best};
   return best;
+}
+
+KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goal) {
+  KeptPath kept;
+  kept.goal = goal;
+  kept.searchedFrom = kept.measuredFrom = path.points.front();
+  kept.line = measureLine(finder, path.points.front(), path.points.back());
+  kept.excess = path.length - kept.line.value_or(0);
+  kept.isNearLine = kept.line && path.length <= kNearLine * *kept.line;
+  kept.path = std::move(path);
+  return kept;
+}
+
+bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from) {
+  Walker& walker = finder.walker;
+  if (walker.place(from, kMaxStandDrop)) return false;
+  const Vec3 start = walker.footPosition();
+  if (!kept.isNearLine && (start - kept.searchedFrom).norm() > kMaxKeptMove * kept.path.length)
+    return false;
+  std::vector<Vec3> points = leadOnto(walker, start, kept.path.points);
+  if (points.empty()) return false;
+  const double length = computeLength(points);
+  const auto isTooLong = [&](double line) { return length - line > kept.excess + kMaxKeptGrowth; };
+  // The line is at most as much shorter as the agent moved since it was measured.
+  if (kept.line && isTooLong(*kept.line - (start - kept.measuredFrom).norm())) {
+    kept.line = measureLine(finder, start, points.back());
+    kept.measuredFrom = start;
+    if (!kept.line || isTooLong(*kept.line)) return false;
+    kept.excess = std::min(kept.excess, length - *kept.line);
+  }
+  kept.path.points = std::move(points);
+  kept.path.length = length;
+  kept.path.seconds = length / finder.agent.speed;
+  kept.path.legs = {{PathLeg::Kind::walk, 0, length, kept.path.seconds}};
+  return true;
 }
 
 NavigationPath findPathOut(Walker& walker, const Vec3& from,

@@ -10,6 +10,16 @@ namespace enfilade::scene {
 /// A path from where an agent at `from` stands to where it stands at `to`.
 NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& to);
 
+/// Keeps a path of findPath().
+KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goal);
+
+/// Lets a kept path begin at another place: an agent walks straight from there to one of its
+/// points; what follows was proved by the search. False: such a walk does not exist, or against the
+/// line on the mesh the path would be longer by more than 1 cm than when it was found. If it was
+/// over 2 % longer than that line, or without one, also false farther from the start of the search
+/// than 1 % of the path's length. A kept path is thus about 2 % longer than a new one at most.
+bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from);
+
 /// A walk of PathLeg::Kind::aside to the closest place that is wanted, at most some 2 m away.
 /// The reason is given only if no agent can stand at `from`.
 NavigationPath findPathOut(Walker& walker, const Vec3& from,

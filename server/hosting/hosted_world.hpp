@@ -148,7 +148,9 @@ struct HostedWorld {
   std::unique_ptr<scene::ContactHorizons> horizons;  ///< null before the first subscriber
   bool horizonSelectionChanged = false;              ///< a client subscribed or left
   TickStatistics statistics;
-  bool idle = true;                  ///< of the last tick
+  bool idle = true;  ///< of the last tick
+  /// Used by the thread of navigation queries alone.
+  std::shared_ptr<KeptPaths> keptPaths = std::make_shared<KeptPaths>();
   std::uint64_t droppedStates = 0;   ///< of all clients
   std::uint64_t droppedFrames = 0;   ///< of all frame subscriptions
   std::uint64_t lastGeneration = 0;  ///< last FrameSubscription::generation

@@ -86,8 +86,8 @@ std::variant<v1::NavigationReply, v1::Error> QueryService::State::answerNavigati
     for (const auto& one : pending)
       if (one->progress) one->progress(share);
   };
-  return navigation.answer(query.message.navigation(), {query.snapshot, query.settings, report},
-                           attachment);
+  return navigation.answer(query.message.navigation(),
+                           {query.snapshot, query.settings, report, query.keptPaths}, attachment);
 }
 
 void QueryService::State::postNavigation(const std::shared_ptr<const SceneQuery>& query,

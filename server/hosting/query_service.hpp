@@ -12,6 +12,7 @@
 #include "scene/world/data/world_settings.hpp"
 #include "server/base/server_limits.hpp"
 #include "server/messages/outgoing_queue.hpp"
+#include "server/navigation/path_answer.hpp"
 
 namespace enfilade::server {
 
@@ -24,6 +25,7 @@ struct SceneQuery {
   /// Of a navigation query: the share of the meshes that are built, 0..1, by it or by those before
   /// it. Called on the thread of navigation queries.
   std::function<void(double)> progress = {};
+  std::shared_ptr<KeptPaths> keptPaths = {};  ///< of its world; may be null
 };
 
 class QueryService {

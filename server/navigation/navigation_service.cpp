@@ -28,6 +28,8 @@ using scene::Vec3;
 
 constexpr std::size_t kMaxEntries = 8;         // sizes whose meshes are kept
 constexpr std::size_t kMaxIslandAreas = 1000;  // in a reply
+constexpr std::size_t kMaxKeptPaths =
+    10'000;  // of a world: then those of avatars that left go, too
 
 /// Writes the answers to one query into its reply.
 struct Answer {
@@ -81,11 +83,16 @@ struct Answer {
     const scene::PathOptions options{query.max_drop(), query.lifts()};
     const auto from = resolve(places.from, query.from(), "path.from");
     if (const auto* error = std::get_if<v1::Error>(&from)) return *error;
+    PathAnswer means = paths();
+    if (query.keep() && state.keptPaths) {
+      if (state.keptPaths->size() >= kMaxKeptPaths) state.keptPaths->clear();
+      means.kept = &(*state.keptPaths)[query.from().avatar()];
+    }
     for (int i = 0; i < query.to_size(); ++i) {
       const auto to = resolve(places.to[static_cast<std::size_t>(i)], query.to(i),
                               "path.to[" + std::to_string(i) + "]", std::get<Vec3>(from));
       if (const auto* error = std::get_if<v1::Error>(&to)) return *error;
-      writePath(paths(), std::get<Vec3>(from), std::get<Vec3>(to), options,
+      writePath(means, std::get<Vec3>(from), std::get<Vec3>(to), options,
                 {query.narrowest(), query.steps()}, *reply.add_paths());
     }
     return std::nullopt;

@@ -22,6 +22,7 @@ struct NavigationState {
   std::shared_ptr<const scene::Snapshot> snapshot;
   scene::WorldSettings settings;
   scene::Navigation::Progress progress = {};  ///< of building meshes; may be empty
+  std::shared_ptr<KeptPaths> keptPaths = {};  ///< of its avatars; null: none is kept
 };
 
 class NavigationService {

@@ -33,7 +33,7 @@ struct PathWriter {
                                            const scene::NavigationPath& path) const {
     if (!scene::hasDoors(answer.scene)) return {};  // saves building the index
     return scene::findDoorsOnPath(answer.index(), answer.settings, answer.snapshot,
-                                  navigation.agent(), path.points, path.legs);
+                                  navigation.agentShape(), path.points, path.legs);
   }
 
   bool isClosed(std::uint32_t door) const {
@@ -244,7 +244,9 @@ void writePath(const PathAnswer& answer, const Vec3& from, const Vec3& to,
                const scene::PathOptions& options, const PathMeasures& measures,
                v1::NavigationPath& message) {
   const PathWriter writer{answer};
-  scene::NavigationPath path = answer.navigation.findPath(from, to, options, answer.progress);
+  scene::NavigationPath path =
+      answer.kept ? answer.navigation.findPathAgain(from, to, *answer.kept, answer.progress)
+                  : answer.navigation.findPath(from, to, options, answer.progress);
   std::vector<scene::DoorOnPath> doors;
   if (path.found()) doors = writer.findDoors(answer.navigation, path);
   if (path.found() && answer.doorsOpen) writer.stepAside(to, options, path, doors);

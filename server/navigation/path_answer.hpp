@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 
 #include "protocol/enfilade.pb.h"
@@ -24,6 +25,9 @@ struct BlockingDoor {
 /// The reasons why no path leads from one island to another one, as the first query found them.
 using ClosedDoors = std::map<std::pair<std::uint32_t, std::uint32_t>, BlockingDoor>;
 
+/// The last paths of avatars that asked to keep them, by name.
+using KeptPaths = std::map<std::string, std::optional<scene::KeptPath>, std::less<>>;
+
 /// The means to find the paths of a query.
 struct PathAnswer {
   const scene::Scene& scene;
@@ -38,6 +42,7 @@ struct PathAnswer {
   ClosedDoors& closedDoors;                       ///< those that are known, of `navigation`
   scene::Navigation::Progress progress = {};      ///< of building meshes; may be empty
   const char* doorRemedy = "open it, or ask with open doors";  ///< of a closed door
+  std::optional<scene::KeptPath>* kept = nullptr;  ///< of the agent of the query; null: not asked
 };
 
 /// A standing place in one of some named places: on the island of `start` if there is any, else one

@@ -68,6 +68,10 @@ std::variant<PathPlaces, v1::Error> findPathPlaces(const v1::NavigationQuery::Pa
   if (auto error = validateCount("path.to", query.to_size(), 100)) return std::move(*error);
   if (auto error = validateNumber("path.max_drop", query.max_drop(), 0, kMaxDrop))
     return std::move(*error);
+  if (query.keep() && (!query.from().has_avatar() || query.to_size() != 1 ||
+                       query.max_drop() != 0 || query.lifts()))
+    return makeNavigationError("path.keep",
+                               "give an avatar as 'from' and one goal, without max_drop and lifts");
   PathPlaces places;
   auto from = findQueryPlace(query.from(), "path.from", scene, snapshot, radius);
   if (auto* error = std::get_if<v1::Error>(&from)) return std::move(*error);

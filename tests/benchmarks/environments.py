@@ -2,7 +2,10 @@
 world, in turns in one run. The observations of both must be equal. Processor times are per step and world, of the
 worlds stepped together.
 
-    python3 environments.py SCENE [--quick]
+Then environments with goals: distances by kept paths against those by a new search in each step, and by how much the
+kept ones are longer.
+
+    python3 environments.py SCENE [--quick] [--only-goals]
 """
 
 import argparse
@@ -99,16 +102,53 @@ def measure(server: enfilade.Server, count: int, channels: tuple, steps: int, ro
             f"client {client:4.0f} us, server {served:4.0f} us")
 
 
+def search_each_time(env: enfilade.WalkEnv) -> None:
+    """Lets an environment search its path to the goal in each step."""
+    query = env.navigation.query
+    env.navigation.query = lambda goals, **options: query(goals, **{**options, "keep": False})
+
+
+def measure_goals(server: enfilade.Server, count: int, steps: int, warm_up: int) -> str:
+    """The worlds walk the same walks. Doors that close at the start of a world do so in the warm-up."""
+    both = [enfilade.VectorWalkEnv(address=server.address, num_envs=count, channels=(), goals="anywhere", **OPTIONS)
+            for _ in range(2)]
+    for env in both[1].envs:
+        search_each_time(env)
+    random = np.random.default_rng(1)
+    spent, differences = [0.0, 0.0], []
+    for one in both:
+        one.reset(seed=1)
+    for i in range(warm_up + steps):
+        action = random.uniform(-1, 1, (count, 2))
+        lengths = []
+        for k, one in enumerate(both):
+            start = time.perf_counter()
+            lengths.append(one.step(action)[4]["geodesic_distance"].astype(float))
+            spent[k] += (time.perf_counter() - start) * (i >= warm_up)
+        differences += (lengths[0] - lengths[1]).tolist() * (i >= warm_up)
+    for one in both:
+        one.close()
+    kept, searched = (count * steps / seconds for seconds in spent)
+    centimetres = 100 * np.array(differences)
+    low, middle, high = np.percentile(centimetres, (1, 50, 99))
+    return (f"{count:4} worlds, goals        searched {searched:7.0f}/s   kept {kept:7.0f}/s   ratio {kept / searched:.1f}   "
+            f"kept longer by {middle:.2f} cm in the median, {low:.1f} and {high:.1f} at 1 and 99 %, "
+            f"{centimetres.max():.1f} at most")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("scene")
     parser.add_argument("--quick", action="store_true")
+    parser.add_argument("--only-goals", action="store_true")
     arguments = parser.parse_args()
     with enfilade.serve(arguments.scene) as server:
-        for channels, steps in (((), 200), (("depth",), 40), (("rgb",), 40)):
+        cases = () if arguments.only_goals else (((), 200), (("depth",), 40), (("rgb",), 40))
+        for channels, steps in cases:
             for count in (1, 16) if arguments.quick else (1, 4, 16, 64):
                 print(measure(server, count, channels, max(8, steps * 16 // max(count, 4) // 4),
                               3 if arguments.quick else 7), flush=True)
+        print(measure_goals(server, 16, 25 if arguments.quick else 250, 25), flush=True)
 
 
 if __name__ == "__main__":

@@ -53,6 +53,21 @@ class PointNavigation(RoomCase):
             self.assertLessEqual(info["spl"], 1)
             self.assertLessEqual(info["geodesic_distance"], 0.2)
 
+    def test_kept_paths_are_about_as_short_as_those_of_a_new_search(self):
+        env = self.environment(starts=[(2, 0, 0, 0)], goals=[(8, 0, 0)])
+        env.reset(seed=1)
+        env.action_space.seed(1)
+        ann = enfilade.Avatar(env.client, env._name)
+        for _ in range(60):
+            info = env.step(env.action_space.sample())[4]
+            length = env.navigation.geodesic_distance(ann, (8, 0, 0))
+            self.assertAlmostEqual(info["geodesic_distance"], length, delta=0.02 * length)
+        kept = env.navigation.path(ann, (8, 0, 0), keep=True)
+        self.assertEqual(kept.length, info["geodesic_distance"])
+        with self.assertRaises(enfilade.ServerError) as refused:
+            env.navigation.path((2, 0, 0), (8, 0, 0), keep=True)
+        self.assertIn("path.keep", str(refused.exception))
+
     def test_rewards_add_up_to_the_geodesic_progress(self):
         env = self.environment(starts=[(2, 0, 0, 0)], goals=[(8, 0, 0)])
         _, info = env.reset(seed=1)

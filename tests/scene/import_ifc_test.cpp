@@ -348,7 +348,7 @@ TEST(ImportIfc, AReaderThatHangsLeavesTimeForTheNext) {
   const auto file = folder.write("house.ifc", IfcHouse().makeText());
   const Environment fault("ENFILADE_IMPORT_FAULT", "web-ifc:hang");
   ImportOptions options;
-  options.timeLimit = 5;
+  options.timeLimit = 10;
   EXPECT_EQ(importModel(file, options).reader, "ifcplusplus");
 }
 

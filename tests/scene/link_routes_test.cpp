@@ -253,6 +253,12 @@ TEST(WalkBodies, UnknownDoorsAndStopsAreRefused) {
   EXPECT_EQ(refuse({{}, 1, {}, {{0, "lift", 1}}}), "accepted");
 }
 
+/// Of an agent of the default size.
+std::shared_ptr<const AvatarShape> makeAgentShape() {
+  const NavigationAgent agent;
+  return makePrismShape(agent.radius, agent.height, agent.height, {});
+}
+
 TEST(Doors, ThoseOnAPathAreFoundOpenOrClosed) {
   const auto scene = std::make_shared<const Scene>(makeDoorModel({}));
   const auto open = makeSnapshotWithOpenDoors(scene, {});
@@ -260,19 +266,19 @@ TEST(Doors, ThoseOnAPathAreFoundOpenOrClosed) {
   const std::vector<Vec3> points{{1, 0, 0}, {4, 0, 0}, {8, 0, 0}, {11, 0, 0}};
   for (const auto& [snapshot, isClosed] :
        {std::pair(open, false), std::pair(World(scene).snapshot(), true)}) {
-    const auto doors = findDoorsOnPath(index, {}, *snapshot, {}, points);
+    const auto doors = findDoorsOnPath(index, {}, *snapshot, *makeAgentShape(), points);
     ASSERT_EQ(doors.size(), 1u);
     EXPECT_EQ(doors[0].point, 1u);
     EXPECT_NEAR(doors[0].distance, 5.98 - 0.3 - 1, 0.02);
     EXPECT_EQ(doors[0].isInTheWay, isClosed);
     EXPECT_NEAR(doors[0].secondsToOpen, isClosed ? kQuarter : 0, 1e-9);
   }
-  EXPECT_TRUE(findDoorsOnPath(index, {}, *open, {}, {{1, 0, 0}, {4, 0, 2}}).empty());
+  EXPECT_TRUE(findDoorsOnPath(index, {}, *open, *makeAgentShape(), {{1, 0, 0}, {4, 0, 2}}).empty());
   // After a fall of 5 m, 1 m of it across, the distance counts the metre.
   const std::vector<Vec3> fall{{0, 5, 0}, {1, 0, 0}, {4, 0, 0}, {8, 0, 0}};
   const std::vector<PathLeg> legs{{PathLeg::Kind::drop, 0, 1, 1, kNoBody},
                                   {PathLeg::Kind::walk, 1, 7, 5, kNoBody}};
-  const auto doors = findDoorsOnPath(index, {}, *open, {}, fall, legs);
+  const auto doors = findDoorsOnPath(index, {}, *open, *makeAgentShape(), fall, legs);
   ASSERT_EQ(doors.size(), 1u);
   EXPECT_NEAR(doors[0].distance, 1 + 5.98 - 0.3 - 1, 0.02);
 }
@@ -297,8 +303,8 @@ TEST(Doors, OfOneLineAreListedAsTheyAreMet) {
   model.bodies.push_back(gate);
   const auto scene = std::make_shared<const Scene>(std::move(model));
   EntityIndex index(scene);
-  const auto doors =
-      findDoorsOnPath(index, {}, *World(scene).snapshot(), {}, {{1, 0, 0}, {11, 0, 0}});
+  const auto doors = findDoorsOnPath(index, {}, *World(scene).snapshot(), *makeAgentShape(),
+                                     {{1, 0, 0}, {11, 0, 0}});
   ASSERT_EQ(doors.size(), 2u);
   EXPECT_EQ(doors[0].body, 1u);
   EXPECT_NEAR(doors[0].distance, 3.98 - 0.3 - 1, 0.02);
@@ -315,7 +321,7 @@ TEST(Doors, ADoorAjarIsWhereItStands) {
   // Walks along the wall, past the closed leaf's hinge side, and then through the open leaf's arc.
   for (int tick = 0; tick < 600; ++tick) tickWorld(world);
   const std::vector<Vec3> points{{5, 0, 0}, {6.2, 0, 0}, {8, 0, -0.49}};
-  const auto doors = findDoorsOnPath(index, {}, *world.snapshot(), {}, points);
+  const auto doors = findDoorsOnPath(index, {}, *world.snapshot(), *makeAgentShape(), points);
   ASSERT_EQ(doors.size(), 1u);
   EXPECT_TRUE(doors[0].isInTheWay);
   EXPECT_EQ(doors[0].point, 1u) << "on the second line, though its closed pose is on the first";

@@ -236,6 +236,59 @@ TEST(NavigationService, StepsAreListedIfTheyAreAskedFor) {
   EXPECT_FALSE(path.has_narrowest_at());
 }
 
+TEST(NavigationService, APathIsKeptForAnAvatarOfItsWorld) {
+  const auto scene = std::make_shared<const scene::Scene>(makeRoomsWithDoor(1, false));
+  scene::World world(scene);
+  scene::Spawn spawn;
+  spawn.position = {2, 0.1, 1};
+  submitAvatarCommand(world, {"ann", spawn, 0});
+  scene::Walk walk;
+  walk.waypoints = {{4, 0, 1}};
+  submitAvatarCommand(world, {"ann", walk, 0});
+  for (int tick = 0; tick < 30; ++tick) tickWorld(world);
+  v1::NavigationQuery query;
+  query.mutable_path()->mutable_from()->set_avatar("ann");
+  *query.mutable_path()->add_to()->mutable_point() = toProto(scene::Vec3(9, 0, -1));
+  query.mutable_path()->set_keep(true);
+  NavigationService service(scene);
+  NavigationState state{world.snapshot(), {}, {}, std::make_shared<KeptPaths>()};
+  std::vector<std::uint8_t> attachment;
+  const auto askPath = [&] {
+    return std::get<v1::NavigationReply>(service.answer(query, state, attachment)).paths(0);
+  };
+  const v1::NavigationPath first = askPath();
+  ASSERT_TRUE(first.found()) << first.reason();
+  ASSERT_TRUE(state.keptPaths->at("ann"));
+  const Vec3 searchedFrom = state.keptPaths->at("ann")->searchedFrom;
+  for (int tick = 0; tick < 20; ++tick) tickWorld(world);
+  state.snapshot = world.snapshot();
+  const v1::NavigationPath second = askPath();
+  EXPECT_EQ(state.keptPaths->at("ann")->searchedFrom, searchedFrom);
+  EXPECT_LT(second.length(), first.length() - 0.3);
+  query.mutable_path()->set_keep(false);
+  EXPECT_NEAR(askPath().length(), second.length(), 0.02);
+}
+
+TEST(NavigationService, OnlyAWalkOfAnAvatarToOneGoalIsKept) {
+  const auto scene = std::make_shared<const scene::Scene>(makeRoomsWithDoor(1, false));
+  v1::NavigationQuery query;
+  v1::NavigationQuery::Path& path = *query.mutable_path();
+  path.set_keep(true);
+  *path.mutable_from()->mutable_point() = toProto(scene::Vec3(1, 0, 2));
+  *path.add_to()->mutable_point() = toProto(scene::Vec3(9, 0, -1));
+  EXPECT_EQ(ask(scene, query).error.field(), "navigation.path.keep");
+  path.mutable_from()->set_avatar("ann");
+  EXPECT_NE(ask(scene, query).error.field(), "navigation.path.keep");
+  path.set_lifts(true);
+  EXPECT_EQ(ask(scene, query).error.field(), "navigation.path.keep");
+  path.set_lifts(false);
+  path.set_max_drop(1);
+  EXPECT_EQ(ask(scene, query).error.field(), "navigation.path.keep");
+  path.set_max_drop(0);
+  *path.add_to() = path.to(0);
+  EXPECT_EQ(ask(scene, query).error.field(), "navigation.path.keep");
+}
+
 TEST(NavigationService, MapsAreBytesBitsOrAPicture) {
   const auto scene = std::make_shared<const scene::Scene>(makeRoomsWithDoor(1, false));
   v1::NavigationQuery query;

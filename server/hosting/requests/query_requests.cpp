@@ -72,7 +72,7 @@ class BoundedNames {
 void submitQuery(const RequestContext& context, std::function<void(double)> progress) {
   HostedWorld& hosted = context.hosted;
   hosted.queries.submit({hosted.world.snapshot(), context.message, hosted.world.settings(),
-                         hosted.limits, std::move(progress)},
+                         hosted.limits, std::move(progress), hosted.keptPaths},
                         deferReply(context));
 }
 

@@ -371,7 +371,7 @@ class WalkEnv(Walker, spaces.EnvBase):
             return []
         assert self.goal is not None
         return [messages.ClientMessage(
-            navigation=self.navigation.query([self.goal], avatar=self._name))]
+            navigation=self.navigation.query([self.goal], avatar=self._name, keep=True))]
 
     def _take_step(self, posted: List[int]) -> Tuple[Observation, float, bool, bool,
                                                      Dict[str, Any]]:

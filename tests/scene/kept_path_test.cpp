@@ -1,0 +1,152 @@
+// Kept paths: an agent on its way asks for its path again and again. A kept path is about as short
+// as a new one, and can be walked.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "scene/navigation/navigation.hpp"
+#include "tests/scene/body_fixture.hpp"
+
+namespace enfilade::scene::testing {
+namespace {
+
+constexpr double kHallHeight = 2.5;  // metres
+
+/// A floor of 12 x 8 m. Two ways lead around the wall in its middle.
+std::vector<NamedBox> makeHallWithWall() {
+  return {{"floor", {-6, -0.2, -4}, {6, 0, 4}}, {"wall", {-3, 0, -0.1}, {3, kHallHeight, 0.1}}};
+}
+
+bool isPathWalked(Navigation& navigation, const NavigationPath& path) {
+  for (std::size_t i = 1; i < path.points.size(); ++i) {
+    const auto end = navigation.tryStep(path.points[i - 1], path.points[i], false);
+    if (!end || (*end - path.points[i]).norm() > 2e-3) return false;
+  }
+  return true;
+}
+
+/// The results of an agent that asks for its path at each place.
+struct KeptJourney {
+  int searches = 0;
+  double maxExcess = -1;  ///< of the length of a new path, the largest of all places
+};
+
+KeptJourney compareWithNew(Navigation& navigation, const std::vector<Vec3>& places,
+                           const Vec3& goal) {
+  KeptJourney journey;
+  std::optional<KeptPath> kept;
+  std::optional<Vec3> searchedFrom;
+  for (const Vec3& place : places) {
+    const NavigationPath path = navigation.findPathAgain(place, goal, kept);
+    const NavigationPath fresh = navigation.findPath(place, goal);
+    EXPECT_EQ(path.found(), fresh.found());
+    if (!path.found()) continue;
+    EXPECT_LT((path.points.front() - fresh.points.front()).norm(), 1e-3);
+    EXPECT_LT((path.points.back() - fresh.points.back()).norm(), 1e-3);
+    EXPECT_NEAR(path.length, computeLength(path.points), 1e-12);
+    EXPECT_EQ(path.legs.size(), 1u);
+    EXPECT_NEAR(path.legs.front().length, path.length, 1e-12);
+    EXPECT_TRUE(isPathWalked(navigation, path)) << place.transpose();
+    journey.searches += searchedFrom != kept->searchedFrom;
+    searchedFrom = kept->searchedFrom;
+    journey.maxExcess = std::max(journey.maxExcess, path.length / fresh.length - 1);
+  }
+  return journey;
+}
+
+/// Places of a walk with random turns on the floor; it slides along obstacles.
+std::vector<Vec3> wander(Navigation& navigation, const Vec3& start, int count, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> turn(-0.6, 0.6);
+  std::vector<Vec3> places{start};
+  double heading = 0;
+  for (int i = 0; i < count; ++i) {
+    heading += turn(random);
+    const Vec3 step(0.15 * std::cos(heading), 0, 0.15 * std::sin(heading));
+    const auto next = navigation.tryStep(places.back(), places.back() + step, true);
+    if (next && std::abs(next->y()) < 0.01 && (*next - places.back()).norm() > 0.05)
+      places.push_back(*next);
+    else
+      heading += 2;
+  }
+  return places;
+}
+
+TEST(KeptPath, OfAWandererIsAsShortAsANewOneAndRarelySearched) {
+  Navigation navigation(makeBoxScene(makeHallWithWall()), {}, {});
+  for (const unsigned seed : {1u, 2u, 3u}) {
+    const KeptJourney journey =
+        compareWithNew(navigation, wander(navigation, {0, 0, -2}, 300, seed), {0.2, 0, 2});
+    EXPECT_LT(journey.maxExcess, 0.02) << seed;
+    EXPECT_LT(journey.searches, 80) << seed;
+  }
+}
+
+TEST(KeptPath, ChangesToTheOtherWayWhereThatIsShorter) {
+  Navigation navigation(makeBoxScene(makeHallWithWall()), {}, {});
+  std::vector<Vec3> places;
+  for (int i = 0; i <= 60; ++i) places.push_back({-3 + 0.1 * i, 0, -1});
+  const KeptJourney journey = compareWithNew(navigation, places, {0, 0, 1});
+  EXPECT_LT(journey.maxExcess, 0.02);
+  EXPECT_GE(journey.searches, 2);
+  EXPECT_LT(journey.searches, 12);
+}
+
+TEST(KeptPath, LeadsOverSteps) {
+  std::vector<NamedBox> boxes = makeHallWithWall();
+  for (int i = 0; i < 4; ++i)
+    boxes.push_back({"stair/" + std::to_string(i),
+                     {6 + 0.3 * i, -0.2, -4},
+                     {i == 3 ? 10.0 : 6.3 + 0.3 * i, 0.17 * (i + 1), 4}});
+  Navigation navigation(makeBoxScene(boxes), {}, {});
+  std::vector<Vec3> places;
+  const NavigationPath path = navigation.findPath({1, 0, -2}, {9, 0.68, 1});
+  ASSERT_TRUE(path.found()) << path.reason;
+  for (double x = 1; x < 5.8; x += 0.13)
+    places.push_back({x, 0, -2 + (x - 1) * 0.37 + 0.05 * std::sin(9 * x)});
+  const KeptJourney journey = compareWithNew(navigation, places, {9, 0.68, 1});
+  EXPECT_LT(journey.maxExcess, 0.02);
+  EXPECT_LT(journey.searches, 12);
+}
+
+TEST(KeptPath, IsSearchedAgainForAnotherGoalAndWhereABodyMoved) {
+  std::vector<NamedBox> boxes = makeHallWithWall();
+  boxes.push_back({"leaf", {3.01, 0.01, -0.05}, {5.99, 2, 0.05}});
+  boxes.push_back({"end", {-6, 0, -0.1}, {-3, kHallHeight, 0.1}});
+  Model model = makeBoxModel(boxes);
+  BodySpec leaf = makeBodySpec("leaf", BodyKind::sliding, {2});
+  leaf.axis = Vec3::UnitY();
+  leaf.high = 2.2;
+  model.bodies.push_back(leaf);
+  const auto scene = std::make_shared<const Scene>(std::move(model));
+  World world(scene);
+  const auto closed = world.snapshot();
+  submitBodyCommand(world, {"leaf", BodyCommand::Action::open, 0, 0, std::nullopt});
+  for (int tick = 0; tick < 600; ++tick) tickWorld(world);
+  Navigation navigation(scene, {}, {}, world.snapshot().get());
+  std::optional<KeptPath> kept;
+  const NavigationPath path = navigation.findPathAgain({0, 0, -2}, {0, 0, 2}, kept);
+  ASSERT_TRUE(path.found()) << path.reason;
+  ASSERT_TRUE(kept);
+  const NavigationPath other = navigation.findPathAgain({0, 0, -2}, {1, 0, 2}, kept);
+  ASSERT_TRUE(other.found());
+  EXPECT_NEAR(other.points.back().x(), 1, 1e-3);
+  EXPECT_EQ(kept->goal, Vec3(1, 0, 2));
+  EXPECT_GT(navigation.update(*closed), 0u);
+  EXPECT_FALSE(navigation.findPathAgain({0, 0, -2}, {1, 0, 2}, kept).found());
+  EXPECT_FALSE(kept);
+  EXPECT_GT(navigation.update(*world.snapshot()), 0u);
+  EXPECT_TRUE(navigation.findPathAgain({0, 0, -2}, {1, 0, 2}, kept).found());
+}
+
+TEST(KeptPath, OfAPlaceWithoutRoomIsNone) {
+  Navigation navigation(makeBoxScene(makeHallWithWall()), {}, {});
+  std::optional<KeptPath> kept;
+  ASSERT_TRUE(navigation.findPathAgain({0, 0, -2}, {0, 0, 2}, kept).found());
+  const NavigationPath none = navigation.findPathAgain({0, 0, 0}, {0, 0, 2}, kept);
+  EXPECT_FALSE(none.found());
+  EXPECT_NE(none.reason.find("at the start"), std::string::npos) << none.reason;
+}
+
+}  // namespace
+}  // namespace enfilade::scene::testing
