@@ -2,7 +2,7 @@
 
     python3 point_navigation.py SCENE.. [--episodes 200] [--seed 1]
 
-The follower walks along the shortest path; the random walker shows what chance gives. ENFILADE names the
+The follower asks for its shortest path in each step and walks along it; the random walker shows what chance gives. ENFILADE names the
 program if it is not on the PATH; PYTHONPATH needs protocol/clients/python.
 """
 import argparse
@@ -14,21 +14,19 @@ import enfilade
 
 
 def follower(env):
-    """Returns a policy: turn to the next point of the shortest path, then walk to it."""
-    path = env.navigation.path(env.episode.start, env.episode.goal).points
+    """Returns a greedy policy: in each step, turn to the next point of the shortest path from where the avatar
+    is, then walk to it."""
     seconds = env.ticks_per_step * env.client.tick_seconds
-    at = 1
 
     def act(seen):
-        nonlocal at
-        feet = seen["position"]
-        while at + 1 < len(path) and math.hypot(*(path[at] - feet)[[0, 2]]) < 0.02:
-            at += 1
-        x, _, z = path[at] - feet
+        path = env.navigation.path(env.avatar, env.episode.goal, keep=True).points
+        ahead = [point for point in path[1:] if math.hypot(*(point - path[0])[[0, 2]]) >= 0.02]
+        if not ahead:
+            return 0.0, 0.0
+        x, _, z = ahead[0] - path[0]
         heading = math.atan2(seen["heading"][1], seen["heading"][0])
         turn = math.remainder(math.atan2(-z, x) - heading, math.tau) / (env.turn_speed * seconds)
-        ahead = math.hypot(x, z) / (env.speed * seconds) if abs(turn) <= 1 else 0.0
-        return ahead, turn
+        return math.hypot(x, z) / (env.speed * seconds) if abs(turn) <= 1 else 0.0, turn
 
     return act
 
@@ -59,9 +57,9 @@ def main():
         with enfilade.WalkEnv(scene, starts="anywhere", goals="anywhere", channels=(), radius=0.2, height=1.5,
                               goal_radius=0.2, max_steps=500) as env:
             for name, policy in (("follower", follower), ("random", chance)):
-                episodes = arguments.episodes if policy is follower else max(1, arguments.episodes // 10)
-                success, spl = measure(env, policy, episodes, arguments.seed)
-                print(f"{scene}: {name}: success {success:.3f}, SPL {spl:.3f} over {episodes} episodes")
+                success, spl = measure(env, policy, arguments.episodes, arguments.seed)
+                print(f"{scene}: {name}: success {success:.3f}, SPL {spl:.3f} over {arguments.episodes} episodes",
+                      flush=True)
 
 
 if __name__ == "__main__":

@@ -62,7 +62,7 @@ struct KeptPath {
   double excess = 0;                 ///< metres beyond the line on the mesh, at the search
   bool isNearLine = false;           ///< the search found a path about as short as that line
   std::optional<double> line;        ///< metres: that line when it was last measured; nullopt: none
-  Vec3 measuredFrom = Vec3::Zero();  ///< its start
+  double moved = 0;                  ///< metres since then
 };
 
 /// The last searches between two islands: they found nothing.

@@ -21,11 +21,12 @@ constexpr double kMinAim = 1;       // metres from where a path joins the mesh
 constexpr double kStraight = 1.01;  // of the straight line: a path is short enough
 constexpr const char* kNotFound = "no path was found within the limits of the search";
 constexpr std::size_t kMaxThinnedPlaces = 50;  // of a path: of more, single ones are not left out
-constexpr double kMaxGridDistance = 3;   // metres between places that are connected without a mesh
-constexpr double kMaxKeptGrowth = 0.01;  // metres
-constexpr double kMinSaving = 1e-3;      // metres that a shortcut saves
-constexpr double kNearLine = 1.02;       // of the line on the mesh: no other path is much shorter
-constexpr double kMaxKeptMove = 0.01;    // of the length: then another path may be shorter by 2 %
+constexpr double kMaxGridDistance = 3;    // metres between places that are connected without a mesh
+constexpr double kMaxKeptGrowth = 0.01;   // metres
+constexpr double kMaxStraightMove = 0.5;  // metres: a longer move may have led around something
+constexpr double kMinSaving = 1e-3;       // metres that a shortcut saves
+constexpr double kNearLine = 1.02;        // of the line on the mesh: no other path is much shorter
+constexpr double kMaxKeptMove = 0.01;     // of the length: then another path may be shorter by 2 %
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
 constexpr double kMaxExit = 5;  // metres
 constexpr GridSearch kCoarseGrid{kCoarseSpacing, kMaxExit, 4000};
@@ -291,19 +292,21 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
   return best;
 }
 
-/// From a place straight to the farthest point of a path that needs no tick-by-tick walk, and along
-/// it; empty: neither its first leg nor its start is reached.
+/// From a place straight to the second point of a path, or to the farthest one in clear sight, and
+/// along it; empty: the second point cannot be reached so.
 std::vector<Vec3> leadOnto(Walker& walker, const Vec3& start, const std::vector<Vec3>& path) {
-  // The first point is where the agent was: it may have gone back behind a corner.
-  std::size_t joined = path.size() > 1 && walks(walker, start, path[1], kHeightError) ? 1 : 0;
-  if (joined == 0 && !walks(walker, start, path[0], kHeightError)) return {};
+  std::size_t joined = 1;
+  if (path.size() < 2 || !walks(walker, start, path[joined], kHeightError)) return {};
+  const bool isAt = computeGroundDistance(start, path[joined]) < kArrivalDistance;
+  if (isAt && joined + 1 < path.size() && walks(walker, start, path[joined + 1], kHeightError))
+    ++joined;
   const auto isShorterTo = [&](std::size_t next) {
     const double length = (path[joined] - start).norm() + (path[next] - path[joined]).norm();
     if (length - (path[next] - start).norm() < kMinSaving) return false;
     walker.returnTo(start);
     return walker.isPathClear(path[next]);
   };
-  while (joined > 0 && joined + 1 < path.size() && isShorterTo(joined + 1)) ++joined;
+  while (joined + 1 < path.size() && isShorterTo(joined + 1)) ++joined;
   std::vector<Vec3> points{start};
   points.insert(points.end(), path.begin() + static_cast<std::ptrdiff_t>(joined), path.end());
   return points;
@@ -341,7 +344,7 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
 KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goal) {
   KeptPath kept;
   kept.goal = goal;
-  kept.searchedFrom = kept.measuredFrom = path.points.front();
+  kept.searchedFrom = path.points.front();
   kept.line = measureLine(finder, path.points.front(), path.points.back());
   kept.excess = path.length - kept.line.value_or(0);
   kept.isNearLine = kept.line && path.length <= kNearLine * *kept.line;
@@ -360,9 +363,11 @@ bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from) {
   const double length = computeLength(points);
   const auto isTooLong = [&](double line) { return length - line > kept.excess + kMaxKeptGrowth; };
   // The line is at most as much shorter as the agent moved since it was measured.
-  if (kept.line && isTooLong(*kept.line - (start - kept.measuredFrom).norm())) {
+  const double move = (start - kept.path.points.front()).norm();
+  kept.moved += move;
+  if (kept.line && (move > kMaxStraightMove || isTooLong(*kept.line - kept.moved))) {
     kept.line = measureLine(finder, start, points.back());
-    kept.measuredFrom = start;
+    kept.moved = 0;
     if (!kept.line || isTooLong(*kept.line)) return false;
     kept.excess = std::min(kept.excess, length - *kept.line);
   }

@@ -57,12 +57,11 @@ class PointNavigation(RoomCase):
         env = self.environment(starts=[(2, 0, 0, 0)], goals=[(8, 0, 0)])
         env.reset(seed=1)
         env.action_space.seed(1)
-        ann = enfilade.Avatar(env.client, env._name)
         for _ in range(60):
             info = env.step(env.action_space.sample())[4]
-            length = env.navigation.geodesic_distance(ann, (8, 0, 0))
+            length = env.navigation.geodesic_distance(env.avatar, (8, 0, 0))
             self.assertAlmostEqual(info["geodesic_distance"], length, delta=0.02 * length)
-        kept = env.navigation.path(ann, (8, 0, 0), keep=True)
+        kept = env.navigation.path(env.avatar, (8, 0, 0), keep=True)
         self.assertEqual(kept.length, info["geodesic_distance"])
         with self.assertRaises(enfilade.ServerError) as refused:
             env.navigation.path((2, 0, 0), (8, 0, 0), keep=True)

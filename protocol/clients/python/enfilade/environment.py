@@ -17,6 +17,7 @@ import numpy as np
 
 from . import messages, results, spaces
 from .arguments import UINT32, number, numbers, whole
+from .avatar import Avatar
 from .cameras import Camera, CameraRequest, chosen_cameras
 from .client import Client, connect
 from .connection import raise_refusal
@@ -149,6 +150,11 @@ class WalkEnv(Walker, spaces.EnvBase):
             return connect(address, name="enfilade environment", **options)
         self.server = serve(scene, *arguments)
         return self.server.connect(name="enfilade environment", **options)
+
+    @property
+    def avatar(self) -> Avatar:
+        """The avatar, as a place for queries: navigation.path(env.avatar, goal, keep=True)."""
+        return Avatar(self.client, self._name)
 
     # ---- a task may override these -----------------------------------------------------------
 
