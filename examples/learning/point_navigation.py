@@ -2,8 +2,8 @@
 
     python3 point_navigation.py SCENE.. [--episodes 200] [--seed 1]
 
-The follower asks for its shortest path in each step and walks along it; the random walker shows what chance gives. ENFILADE names the
-program if it is not on the PATH; PYTHONPATH needs protocol/clients/python.
+The follower asks for its shortest path in each step and walks along it; the random walker shows what chance
+gives. ENFILADE names the program if it is not on the PATH; PYTHONPATH needs protocol/clients/python.
 """
 import argparse
 import math

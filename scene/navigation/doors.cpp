@@ -6,6 +6,7 @@
 
 #include "collision/assert.hpp"
 #include "collision/motion/shape_cast.hpp"
+#include "collision/shapes/box_tree.hpp"
 #include "scene/navigation/shape_separation.hpp"
 #include "scene/world/data/body.hpp"
 #include "scene/world/world.hpp"
@@ -21,16 +22,28 @@ std::optional<double> findTouch(const AvatarShape& agent, const Vec3& from, cons
   const collision::ContactOffset offset{threshold, threshold + settings.contactOffset / 32};
   const collision::Mat3 rotation = pose.rotation.toRotationMatrix();
   std::optional<double> first;
-  for (const collision::Hull& hull : shape.parts) {
+  const auto castAgainst = [&](const collision::Hull& hull) {
     const collision::PlacedConvex placed{hull.vertices, pose.translation, &rotation, &hull};
     for (const AvatarPart& part : agent.parts) {
       const collision::PlacedConvex moved = placeAvatarPart(part, from);
       collision::FeatureCache cache;
-      if (collision::computeSeparationWithin(moved, placed, threshold, cache)) return 0;
+      if (collision::computeSeparationWithin(moved, placed, threshold, cache)) first = 0;
+      if (first == 0) return;
       const collision::MotionResult cast = collision::castShape(moved, leg, placed, offset, cache);
       if (!cast.isClear()) first = std::min(first.value_or(1), cast.lo);
     }
-  }
+  };
+  const Aabb swept =
+      inflated(collision::sweptAabb(placeBox(agent.box, from), leg), 2 * offset.rest);
+  const Vec3 middle = rotation.transpose() * (swept.centre() - pose.translation);
+  const Vec3 halfExtent = rotation.transpose().cwiseAbs() * (0.5 * swept.size());
+  const Aabb inBodyFrame{middle - halfExtent, middle + halfExtent};
+  collision::forEachOverlappingLeaf(
+      shape.tree, collision::toFloatAabb(inBodyFrame, shape.tree.origin),
+      [&](std::uint32_t item, std::uint32_t count) {
+        for (std::uint32_t i = item; i < item + count && first != 0; ++i)
+          castAgainst(shape.parts[shape.tree.order[i]]);
+      });
   return first;
 }
 

@@ -411,15 +411,22 @@ NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> 
   return best;
 }
 
+/// On the scarce mesh A* through the middles of portals suffices: its line shows whether a narrow
+/// gap makes a path much shorter.
 std::optional<double> measureLine(const PathFinder& finder, const Vec3& from, const Vec3& to) {
   const Vec3 reach = computeMeshReach(finder);
-  const auto start = finder.ample.findNearest(from, reach),
-             goal = finder.ample.findNearest(to, reach);
-  if (!start || !goal) return std::nullopt;
-  const auto corridor = findCorridor(finder.ample, *start, *goal);
-  if (!corridor) return std::nullopt;
-  return (start->point - from).norm() + (goal->point - to).norm() +
-         computeLength(finder.ample.straighten(*corridor, start->point, goal->point));
+  std::optional<double> shortest;
+  for (const NavigationMesh* mesh : {&finder.ample, &finder.scarce}) {
+    const auto start = mesh->findNearest(from, reach), goal = mesh->findNearest(to, reach);
+    if (!start || !goal) continue;
+    const auto corridor = mesh == &finder.ample ? findCorridor(*mesh, *start, *goal)
+                                                : mesh->findCorridor(*start, *goal);
+    if (!corridor) continue;
+    const double length = (start->point - from).norm() + (goal->point - to).norm() +
+                          computeLength(mesh->straighten(*corridor, start->point, goal->point));
+    shortest = std::min(shortest.value_or(length), length);
+  }
+  return shortest;
 }
 
 /// A repair that fails takes long, and the next proposal may be as short: first all are tried with

@@ -56,7 +56,7 @@ enum class Versions : std::uint8_t { all, untilLevel };
 NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> versions,
                              Versions tried, Proof& proof);
 
-/// Metres along the shortest line on the ample mesh, with those to and from it; nullopt: none.
+/// Metres along the shortest line on either mesh, with those to and from it; nullopt: none.
 std::optional<double> measureLine(const PathFinder& finder, const Vec3& from, const Vec3& to);
 
 /// A path on the ample mesh, or on the scarce one; without a reason if none is found.

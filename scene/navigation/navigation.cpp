@@ -203,9 +203,8 @@ PathFinder Navigation::makeFinder(std::function<const UnobstructedMesh&()> unobs
   return finder;
 }
 
-NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const PathOptions& options,
-                                    const Progress& progress) {
-  const std::lock_guard lock(mutex_);
+NavigationPath Navigation::searchPath(const Vec3& from, const Vec3& to, const PathOptions& options,
+                                      const Progress& progress) {
   const auto unobstructed = [&]() -> const UnobstructedMesh& {
     if (!unobstructed_)
       unobstructed_.emplace(makeUnobstructedMesh(buildUnobstructed(2, progress), *scarce_));
@@ -234,14 +233,18 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
   return findLinkedPath(finder, *links, *bodies_, from, to, std::move(path));
 }
 
+NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const PathOptions& options,
+                                    const Progress& progress) {
+  const std::lock_guard lock(mutex_);
+  return searchPath(from, to, options, progress);
+}
+
 NavigationPath Navigation::findPathAgain(const Vec3& from, const Vec3& to,
                                          std::optional<KeptPath>& kept, const Progress& progress) {
-  if (kept && kept->goal == to && kept->meshState == meshState_) {
-    const std::lock_guard lock(mutex_);
-    if (rejoinPath(makeFinder({}), *kept, from)) return kept->path;
-  }
-  NavigationPath path = findPath(from, to, {}, progress);
   const std::lock_guard lock(mutex_);
+  const bool mayServe = kept && kept->goal == to && kept->meshState == meshState_;
+  if (mayServe && rejoinPath(makeFinder({}), *kept, from)) return kept->path;
+  NavigationPath path = searchPath(from, to, {}, progress);
   kept.reset();
   if (!path.found()) return path;
   kept = keepPath(makeFinder({}), path, to);

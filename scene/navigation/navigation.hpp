@@ -93,7 +93,10 @@ class Navigation {
   std::size_t update(const Snapshot& snapshot, int threads = 2, const Progress& progress = {});
 
   const NavigationAgent& agent() const { return agent_; }
-  const AvatarShape& agentShape() const { return walker_->shape(); }
+  std::shared_ptr<const AvatarShape> agentShape() {
+    const std::lock_guard lock(mutex_);
+    return walker_->shape();
+  }
   NavigationReport report();
   std::string findEntityName(EntityId id) const { return world_.data().findEntityName(id); }
 
@@ -103,7 +106,8 @@ class Navigation {
   NavigationPath findPath(const Vec3& from, const Vec3& to, const PathOptions& options = {},
                           const Progress& progress = {});
   /// As findPath() for an agent on its way. `kept`: its last path, which is used again as
-  /// rejoinPath() says, and replaced. It may be of other meshes: then it is only replaced.
+  /// rejoinPath() says, and replaced. After a body has moved, update() makes other meshes, for
+  /// which it does not serve.
   NavigationPath findPathAgain(const Vec3& from, const Vec3& to, std::optional<KeptPath>& kept,
                                const Progress& progress = {});
   /// As scene::findPathOut().
@@ -145,6 +149,9 @@ class Navigation {
   void assembleMeshes(int threads, const Progress& progress);
   void joinIslands(int threads, const Progress& progress);
   NavigationMesh buildUnobstructed(int threads, const Progress& progress) const;
+  /// As findPath(); the caller holds the mutex.
+  NavigationPath searchPath(const Vec3& from, const Vec3& to, const PathOptions& options,
+                            const Progress& progress);
   PathFinder makeFinder(std::function<const UnobstructedMesh&()> unobstructed);
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;

@@ -22,10 +22,9 @@ constexpr double kStraight = 1.01;  // of the straight line: a path is short eno
 constexpr const char* kNotFound = "no path was found within the limits of the search";
 constexpr std::size_t kMaxThinnedPlaces = 50;  // of a path: of more, single ones are not left out
 constexpr double kMaxGridDistance = 3;    // metres between places that are connected without a mesh
-constexpr double kMaxKeptGrowth = 0.01;   // metres
+constexpr double kMaxKeptGrowth = 5e-4;   // of the length: a new search varies by more
 constexpr double kMaxStraightMove = 0.5;  // metres: a longer move may have led around something
 constexpr double kMinSaving = 1e-3;       // metres that a shortcut saves
-constexpr double kNearLine = 1.02;        // of the line on the mesh: no other path is much shorter
 constexpr double kMaxKeptMove = 0.01;     // of the length: then another path may be shorter by 2 %
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
 constexpr double kMaxExit = 5;  // metres
@@ -292,19 +291,23 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
   return best;
 }
 
+/// Whether no other path is much shorter. The line passes corners more closely than an agent.
+bool isNearLine(double length, double line) {
+  return length <= 1.02 * line + 0.1;
+}
+
 /// From a place straight to the second point of a path, or to the farthest one in clear sight, and
 /// along it; empty: the second point cannot be reached so.
 std::vector<Vec3> leadOnto(Walker& walker, const Vec3& start, const std::vector<Vec3>& path) {
   std::size_t joined = 1;
-  if (path.size() < 2 || !walks(walker, start, path[joined], kHeightError)) return {};
+  if (path.size() < 2 || !walks(walker, start, path[joined], kSameHeight)) return {};
   const bool isAt = computeGroundDistance(start, path[joined]) < kArrivalDistance;
-  if (isAt && joined + 1 < path.size() && walks(walker, start, path[joined + 1], kHeightError))
+  if (isAt && joined + 1 < path.size() && walks(walker, start, path[joined + 1], kSameHeight))
     ++joined;
   const auto isShorterTo = [&](std::size_t next) {
     const double length = (path[joined] - start).norm() + (path[next] - path[joined]).norm();
     if (length - (path[next] - start).norm() < kMinSaving) return false;
-    walker.returnTo(start);
-    return walker.isPathClear(path[next]);
+    return isWalkClear(walker, start, path[next]);
   };
   while (joined + 1 < path.size() && isShorterTo(joined + 1)) ++joined;
   std::vector<Vec3> points{start};
@@ -347,7 +350,7 @@ KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goa
   kept.searchedFrom = path.points.front();
   kept.line = measureLine(finder, path.points.front(), path.points.back());
   kept.excess = path.length - kept.line.value_or(0);
-  kept.isNearLine = kept.line && path.length <= kNearLine * *kept.line;
+  kept.isNearLine = kept.line && isNearLine(path.length, *kept.line);
   kept.path = std::move(path);
   return kept;
 }
@@ -361,7 +364,9 @@ bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from) {
   std::vector<Vec3> points = leadOnto(walker, start, kept.path.points);
   if (points.empty()) return false;
   const double length = computeLength(points);
-  const auto isTooLong = [&](double line) { return length - line > kept.excess + kMaxKeptGrowth; };
+  const auto isTooLong = [&](double line) {
+    return length - line > kept.excess + 0.01 + kMaxKeptGrowth * length;
+  };
   // The line is at most as much shorter as the agent moved since it was measured.
   const double move = (start - kept.path.points.front()).norm();
   kept.moved += move;
@@ -369,6 +374,7 @@ bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from) {
     kept.line = measureLine(finder, start, points.back());
     kept.moved = 0;
     if (!kept.line || isTooLong(*kept.line)) return false;
+    if (kept.isNearLine && !isNearLine(length, *kept.line)) return false;
     kept.excess = std::min(kept.excess, length - *kept.line);
   }
   kept.path.points = std::move(points);

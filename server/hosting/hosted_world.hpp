@@ -149,7 +149,7 @@ struct HostedWorld {
   bool horizonSelectionChanged = false;              ///< a client subscribed or left
   TickStatistics statistics;
   bool idle = true;  ///< of the last tick
-  /// Used by the thread of navigation queries alone.
+  /// Of avatars in this run. Used by the thread of navigation queries alone.
   std::shared_ptr<KeptPaths> keptPaths = std::make_shared<KeptPaths>();
   std::uint64_t droppedStates = 0;   ///< of all clients
   std::uint64_t droppedFrames = 0;   ///< of all frame subscriptions

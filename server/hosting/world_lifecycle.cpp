@@ -50,6 +50,7 @@ void clearRunState(HostedWorld& hosted) {
   hosted.owners.clear();
   hosted.pendingRelease.clear();
   hosted.activeContacts.clear();
+  hosted.keptPaths = std::make_shared<KeptPaths>();  // queries on their way hold those before
   hosted.recentSnapshots = {hosted.world.snapshot()};
 }
 

@@ -85,8 +85,11 @@ struct Answer {
     if (const auto* error = std::get_if<v1::Error>(&from)) return *error;
     PathAnswer means = paths();
     if (query.keep() && state.keptPaths) {
-      if (state.keptPaths->size() >= kMaxKeptPaths) state.keptPaths->clear();
-      means.kept = &(*state.keptPaths)[query.from().avatar()];
+      KeptPaths& kept = *state.keptPaths;
+      if (kept.size() >= kMaxKeptPaths)
+        std::erase_if(kept,
+                      [&](const auto& one) { return !findAvatar(*state.snapshot, one.first); });
+      means.kept = &kept[query.from().avatar()];
     }
     for (int i = 0; i < query.to_size(); ++i) {
       const auto to = resolve(places.to[static_cast<std::size_t>(i)], query.to(i),

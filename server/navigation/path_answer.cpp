@@ -29,11 +29,11 @@ scene::NavigationPath join(scene::NavigationPath path, const scene::NavigationPa
 struct PathWriter {
   const PathAnswer& answer;
 
-  std::vector<scene::DoorOnPath> findDoors(const scene::Navigation& navigation,
+  std::vector<scene::DoorOnPath> findDoors(scene::Navigation& navigation,
                                            const scene::NavigationPath& path) const {
     if (!scene::hasDoors(answer.scene)) return {};  // saves building the index
     return scene::findDoorsOnPath(answer.index(), answer.settings, answer.snapshot,
-                                  navigation.agentShape(), path.points, path.legs);
+                                  *navigation.agentShape(), path.points, path.legs);
   }
 
   bool isClosed(std::uint32_t door) const {

@@ -15,7 +15,6 @@ namespace enfilade::scene {
 namespace {
 
 constexpr double kLayerHeight = 1;       // metres: places of a cell closer than this are one place
-constexpr double kSameHeight = 0.05;     // metres: of feet that come to the same place on two paths
 constexpr double kMaxEvenExcess = 0.05;  // metres: of feet over thresholds and rough floor
 constexpr double kMinPull = 0.01;        // metres
 constexpr std::size_t kMaxLeftOut = 4;   // places in a row of a tight path; some are within a fall
@@ -148,6 +147,11 @@ bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError)
          std::abs(walker.footPosition().y() - to.y()) <= heightError;
 }
 
+bool isWalkClear(Walker& walker, const Vec3& from, const Vec3& to) {
+  walker.returnTo(from);
+  return walker.isPathClear(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
+}
+
 double measureLength(Walker& walker, std::span<const Vec3> places) {
   double length = 0;
   for (std::size_t i = 1; i < places.size(); ++i) {
@@ -265,8 +269,7 @@ std::vector<Vec3> shortenPath(Walker& walker, const std::vector<Vec3>& places, S
       const double excess = kind == Shortcuts::tight ? 1 : kGridExcess;
       return !isUneven(length, from, to) || excess * length <= legs.measure(first, last);
     }
-    walker.returnTo(from);
-    return walker.isPathClear(to) && std::abs(walker.footPosition().y() - to.y()) < kSameHeight;
+    return isWalkClear(walker, from, to);
   };
   std::vector<Vec3> path{places.front()};
   for (std::size_t at = 0; at + 1 < places.size();) {

@@ -18,6 +18,11 @@ namespace enfilade::scene {
 /// below.
 bool walks(Walker& walker, const Vec3& from, const Vec3& to, double heightError);
 
+inline constexpr double kSameHeight = 0.05;  ///< metres: of feet at one place on two paths
+
+/// Whether the straight walk is clear, as Walker::isPathClear(), and ends at the height of `to`.
+bool isWalkClear(Walker& walker, const Vec3& from, const Vec3& to);
+
 /// FeetTravel::length() along places; infinite if a leg cannot be walked.
 double measureLength(Walker& walker, std::span<const Vec3> places);
 

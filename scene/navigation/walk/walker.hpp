@@ -81,7 +81,7 @@ class Walker {
   const Vec3& footPosition() const { return avatar_.footPosition; }
   EntityId groundEntity() const { return avatar_.groundEntity; }  ///< after place()
   const NavigationAgent& agent() const { return agent_; }
-  const AvatarShape& shape() const { return *shape_; }
+  std::shared_ptr<const AvatarShape> shape() const { return shape_; }
 
  private:
   WalkOutcome walkWithMargin(const Vec3& goal);
