@@ -413,20 +413,20 @@ NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> 
 
 /// On the scarce mesh A* through the middles of portals suffices: its line shows whether a narrow
 /// gap makes a path much shorter.
-std::optional<double> measureLine(const PathFinder& finder, const Vec3& from, const Vec3& to) {
+MeshLines measureLines(const PathFinder& finder, const Vec3& from, const Vec3& to) {
   const Vec3 reach = computeMeshReach(finder);
-  std::optional<double> shortest;
-  for (const NavigationMesh* mesh : {&finder.ample, &finder.scarce}) {
-    const auto start = mesh->findNearest(from, reach), goal = mesh->findNearest(to, reach);
+  MeshLines lines;
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const NavigationMesh& mesh = i == 0 ? finder.ample : finder.scarce;
+    const auto start = mesh.findNearest(from, reach), goal = mesh.findNearest(to, reach);
     if (!start || !goal) continue;
-    const auto corridor = mesh == &finder.ample ? findCorridor(*mesh, *start, *goal)
-                                                : mesh->findCorridor(*start, *goal);
-    if (!corridor) continue;
-    const double length = (start->point - from).norm() + (goal->point - to).norm() +
-                          computeLength(mesh->straighten(*corridor, start->point, goal->point));
-    shortest = std::min(shortest.value_or(length), length);
+    const auto corridor =
+        i == 0 ? findCorridor(mesh, *start, *goal) : mesh.findCorridor(*start, *goal);
+    if (corridor)
+      lines[i] = (start->point - from).norm() + (goal->point - to).norm() +
+                 computeLength(mesh.straighten(*corridor, start->point, goal->point));
   }
-  return shortest;
+  return lines;
 }
 
 /// A repair that fails takes long, and the next proposal may be as short: first all are tried with

@@ -56,8 +56,8 @@ enum class Versions : std::uint8_t { all, untilLevel };
 NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> versions,
                              Versions tried, Proof& proof);
 
-/// Metres along the shortest line on either mesh, with those to and from it; nullopt: none.
-std::optional<double> measureLine(const PathFinder& finder, const Vec3& from, const Vec3& to);
+/// Metres along a short line on each mesh, with those to and from it.
+MeshLines measureLines(const PathFinder& finder, const Vec3& from, const Vec3& to);
 
 /// A path on the ample mesh, or on the scarce one; without a reason if none is found.
 NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal,

@@ -2,6 +2,7 @@
 // Obstruction.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -53,16 +54,19 @@ struct NavigationPath {
   double cost() const { return length + bumpClimb; }  ///< metres; the search minimises it
 };
 
+/// Metres along a line on the ample mesh and on the scarce one; nullopt: none leads there.
+using MeshLines = std::array<std::optional<double>, 2>;
+
 /// A walk that a search found. It is kept for an agent on its way to the goal.
 struct KeptPath {
   NavigationPath path;               ///< from where the agent was last
   std::uint64_t meshState = 0;       ///< of the meshes on which it was found
   Vec3 goal = Vec3::Zero();          ///< as it was given; the path ends where an agent stands
   Vec3 searchedFrom = Vec3::Zero();  ///< start of the search
-  double excess = 0;                 ///< metres beyond the line on the mesh, at the search
-  bool isNearLine = false;           ///< the search found a path about as short as that line
-  std::optional<double> line;        ///< metres: that line when it was last measured; nullopt: none
-  double moved = 0;                  ///< metres since then
+  MeshLines lines;                   ///< as last measured
+  std::array<double, 2> excess{};    ///< metres of the path beyond each, the least so far
+  bool isNearLine = false;           ///< the search found a path about as short as a line
+  double moved = 0;                  ///< metres since the lines were measured
 };
 
 /// The last searches between two islands: they found nothing.

@@ -291,9 +291,21 @@ NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, co
   return best;
 }
 
-/// Whether no other path is much shorter. The line passes corners more closely than an agent.
-bool isNearLine(double length, double line) {
-  return length <= 1.02 * line + 0.1;
+/// Whether no other path is much shorter. The lines pass corners more closely than an agent.
+bool isNearLine(double length, const MeshLines& lines) {
+  const auto isNear = [&](const auto& line) { return !line || length <= 1.02 * *line + 0.1; };
+  return (lines[0] || lines[1]) && std::ranges::all_of(lines, isNear);
+}
+
+/// Whether against a line on a mesh a kept path would be longer than when it was found. `moved`:
+/// metres by which the lines may be shorter.
+bool isLonger(const KeptPath& kept, double length, const MeshLines& lines, double moved) {
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    if (lines[i].has_value() != kept.lines[i].has_value()) return true;
+    const double excess = length - (lines[i].value_or(0) - moved);
+    if (lines[i] && excess > kept.excess[i] + 0.01 + kMaxKeptGrowth * length) return true;
+  }
+  return false;
 }
 
 /// From a place straight to the second point of a path, or to the farthest one in clear sight, and
@@ -348,9 +360,10 @@ KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goa
   KeptPath kept;
   kept.goal = goal;
   kept.searchedFrom = path.points.front();
-  kept.line = measureLine(finder, path.points.front(), path.points.back());
-  kept.excess = path.length - kept.line.value_or(0);
-  kept.isNearLine = kept.line && isNearLine(path.length, *kept.line);
+  kept.lines = measureLines(finder, path.points.front(), path.points.back());
+  for (std::size_t i = 0; i < kept.lines.size(); ++i)
+    kept.excess[i] = path.length - kept.lines[i].value_or(0);
+  kept.isNearLine = isNearLine(path.length, kept.lines);
   kept.path = std::move(path);
   return kept;
 }
@@ -364,18 +377,17 @@ bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from) {
   std::vector<Vec3> points = leadOnto(walker, start, kept.path.points);
   if (points.empty()) return false;
   const double length = computeLength(points);
-  const auto isTooLong = [&](double line) {
-    return length - line > kept.excess + 0.01 + kMaxKeptGrowth * length;
-  };
-  // The line is at most as much shorter as the agent moved since it was measured.
+  // A line is at most as much shorter as the agent moved since it was measured.
   const double move = (start - kept.path.points.front()).norm();
   kept.moved += move;
-  if (kept.line && (move > kMaxStraightMove || isTooLong(*kept.line - kept.moved))) {
-    kept.line = measureLine(finder, start, points.back());
+  if (move > kMaxStraightMove || isLonger(kept, length, kept.lines, kept.moved)) {
+    const MeshLines lines = measureLines(finder, start, points.back());
+    if (isLonger(kept, length, lines, 0)) return false;
+    if (kept.isNearLine && !isNearLine(length, lines)) return false;
+    kept.lines = lines;
     kept.moved = 0;
-    if (!kept.line || isTooLong(*kept.line)) return false;
-    if (kept.isNearLine && !isNearLine(length, *kept.line)) return false;
-    kept.excess = std::min(kept.excess, length - *kept.line);
+    for (std::size_t i = 0; i < lines.size(); ++i)
+      kept.excess[i] = std::min(kept.excess[i], length - lines[i].value_or(0));
   }
   kept.path.points = std::move(points);
   kept.path.length = length;

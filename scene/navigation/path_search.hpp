@@ -15,9 +15,9 @@ KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goa
 
 /// Lets a kept path begin at another place: an agent walks straight from there to one of its
 /// points; what follows was proved by the search. False: such a walk does not exist, or against the
-/// line on the meshes the path would be longer by more than 1 cm and 0.05 % than when it was found.
-/// If it was longer than that line by over 2 % and 10 cm, or without one, also false farther from
-/// the start of the search than 1 % of the path's length. A kept path is thus at most about 2 % and
+/// line on a mesh the path would be longer by more than 1 cm and 0.05 % than when it was found. If
+/// it was longer than a line by over 2 % and 10 cm, or without one, also false farther from the
+/// start of the search than 1 % of the path's length. A kept path is thus at most about 2 % and
 /// 10 cm longer than a new one.
 bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from);
 

@@ -67,6 +67,16 @@ class PointNavigation(RoomCase):
             env.navigation.path((2, 0, 0), (8, 0, 0), keep=True)
         self.assertIn("path.keep", str(refused.exception))
 
+    def test_a_path_is_not_kept_over_a_reset(self):
+        env = self.environment(starts=[(2, 0, 0, 0)], goals=[(8, 0, 0)])
+        distances = []
+        for _ in range(2):
+            env.reset(seed=1)
+            env.action_space.seed(1)
+            distances.append([env.step(env.action_space.sample())[4]["geodesic_distance"] for _ in range(40)])
+        self.assertEqual(*distances)
+        self.assertGreater(len(set(distances[0])), 20)
+
     def test_rewards_add_up_to_the_geodesic_progress(self):
         env = self.environment(starts=[(2, 0, 0, 0)], goals=[(8, 0, 0)])
         _, info = env.reset(seed=1)
