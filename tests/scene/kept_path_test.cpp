@@ -77,11 +77,11 @@ std::vector<Vec3> wander(Navigation& navigation, const Vec3& start, int count, u
 
 TEST(KeptPath, OfAWandererIsAsShortAsANewOneAndRarelySearched) {
   Navigation navigation(makeBoxScene(makeHallWithWall()), {}, {});
-  for (const unsigned seed : {1u, 2u, 3u}) {
+  for (const unsigned seed : {1u, 2u}) {
     const KeptJourney journey =
-        compareWithNew(navigation, wander(navigation, {0, 0, -2}, 300, seed), {0.2, 0, 2});
+        compareWithNew(navigation, wander(navigation, {0, 0, -2}, 200, seed), {0.2, 0, 2});
     EXPECT_LT(journey.maxExcess, 0.02) << seed;
-    EXPECT_LT(journey.searches, 80) << seed;
+    EXPECT_LT(journey.searches, 60) << seed;
   }
 }
 
