@@ -28,8 +28,8 @@ using scene::Vec3;
 
 constexpr std::size_t kMaxEntries = 8;         // sizes whose meshes are kept
 constexpr std::size_t kMaxIslandAreas = 1000;  // in a reply
-constexpr std::size_t kMaxKeptPaths =
-    10'000;  // of a world: then those of avatars that left go, too
+// Of a world. Beyond, those of avatars that left are forgotten.
+constexpr std::size_t kMaxKeptPaths = 10'000;
 
 /// Writes the answers to one query into its reply.
 struct Answer {

@@ -61,6 +61,7 @@ class PointNavigation(RoomCase):
             info = env.step(env.action_space.sample())[4]
             length = env.navigation.geodesic_distance(env.avatar, (8, 0, 0))
             self.assertAlmostEqual(info["geodesic_distance"], length, delta=0.02 * length)
+        self.assertTrue(env._distance_query()[0].navigation.path.keep)
         kept = env.navigation.path(env.avatar, (8, 0, 0), keep=True)
         self.assertEqual(kept.length, info["geodesic_distance"])
         with self.assertRaises(enfilade.ServerError) as refused:
