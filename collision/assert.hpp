@@ -10,7 +10,7 @@
 namespace enfilade {
 
 /// Prints the place and the condition to stderr and aborts.
-[[noreturn]] inline void assertionFailed(const char* condition, const char* file, int line) {
+[[noreturn]] inline void failAssertion(const char* condition, const char* file, int line) {
   std::fprintf(stderr, "%s:%d: assertion failed: %s\n", file, line, condition);
   std::abort();
 }

@@ -53,7 +53,7 @@ inline bool contains(const Aabb& outer, const Aabb& inner) {
 }
 
 /// `box` extended by `margin` metres in both directions of each axis.
-inline Aabb inflated(const Aabb& box, double margin) {
+inline Aabb inflate(const Aabb& box, double margin) {
   return {box.min - Vec3::Constant(margin), box.max + Vec3::Constant(margin)};
 }
 
@@ -68,7 +68,7 @@ inline double computeGap(const Aabb& a, const Aabb& b) {
 }
 
 /// Bounding box of the motion of `box` by `displacement` (metres).
-inline Aabb sweptAabb(const Aabb& box, const Vec3& displacement) {
+inline Aabb computeSweptAabb(const Aabb& box, const Vec3& displacement) {
   Aabb result = box;
   result.include(Aabb{box.min + displacement, box.max + displacement});
   return result;

@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t kLengthBytes = 4;
 
-std::uint32_t littleEndian(const std::uint8_t* bytes) {
+std::uint32_t readLittleEndian(const std::uint8_t* bytes) {
   return static_cast<std::uint32_t>(bytes[0]) | static_cast<std::uint32_t>(bytes[1]) << 8 |
          static_cast<std::uint32_t>(bytes[2]) << 16 | static_cast<std::uint32_t>(bytes[3]) << 24;
 }
@@ -103,8 +103,8 @@ bool Decoder::readLengths(std::span<const std::uint8_t>& bytes) {
   if (prefixLength_ == both) return true;
   if (!readPrefix(bytes, both)) return false;
   const std::uint64_t start = offset_ - both;
-  const std::uint32_t total = littleEndian(prefix_.data());
-  headerLength_ = littleEndian(prefix_.data() + kLengthBytes);
+  const std::uint32_t total = readLittleEndian(prefix_.data());
+  headerLength_ = readLittleEndian(prefix_.data() + kLengthBytes);
   if (total > limits_.total) {
     fail(FramingError::Code::tooLarge, start,
          "a message of " + std::to_string(total) + " bytes exceeds the limit of " +
@@ -152,7 +152,7 @@ bool parseHeader(std::span<const std::uint8_t> header, google::protobuf::Message
 
 std::uint32_t readHeaderLength(std::span<const std::uint8_t> encoded) {
   static_assert(kPrefixBytes == 2 * kLengthBytes);
-  return littleEndian(encoded.data() + kLengthBytes);
+  return readLittleEndian(encoded.data() + kLengthBytes);
 }
 
 std::vector<std::uint8_t> encode(const google::protobuf::MessageLite& header,

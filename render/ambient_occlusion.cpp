@@ -17,7 +17,7 @@
 #include <cmath>
 
 #include "collision/assert.hpp"
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::render {
 namespace {

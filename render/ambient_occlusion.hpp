@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::render {
 

@@ -58,7 +58,7 @@ void endItem(AvatarMeshes& meshes, AvatarMeshes::Item item) {
 }
 
 void addBody(AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar) {
-  const AvatarMeshes::Item item = beginItem(meshes, avatar, avatarColour(avatar.id), 0.10f);
+  const AvatarMeshes::Item item = beginItem(meshes, avatar, getAvatarColour(avatar.id), 0.10f);
   for (const scene::AvatarPart& part : avatar.shape->parts) {
     for (const auto& face : part.hull->faces) {
       std::vector<Vec3> corners;
@@ -118,7 +118,7 @@ void addFigure(AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar) {
                           figure.mesh,
                           figure.worldFromMesh,
                           {},
-                          makeAvatarMaterial(avatarColour(avatar.id), 0.05f),
+                          makeAvatarMaterial(getAvatarColour(avatar.id), 0.05f),
                           avatar.id};
   item.box.include(avatar.footPosition - Vec3(width, 0, width));
   item.box.include(avatar.footPosition + Vec3(width, avatar.height, width));
@@ -127,7 +127,7 @@ void addFigure(AvatarMeshes& meshes, const scene::AvatarSnapshot& avatar) {
 
 }  // namespace
 
-Eigen::Vector3f avatarColour(scene::EntityId id) {
+Eigen::Vector3f getAvatarColour(scene::EntityId id) {
   // No red: it marks contacts.
   static const std::array<Eigen::Vector3f, 8> kColours{
       Eigen::Vector3f{0.10f, 0.08f, 0.40f}, Eigen::Vector3f{0.04f, 0.30f, 0.75f},

@@ -32,7 +32,7 @@ bool hasSameAppearance(const scene::AvatarSnapshot& a, const scene::AvatarSnapsh
 AvatarMeshes buildAvatarMeshes(const std::vector<scene::AvatarSnapshot>& avatars, AvatarForm form);
 
 /// Linear RGB; consecutive ids have very different colours.
-Eigen::Vector3f avatarColour(scene::EntityId id);
+Eigen::Vector3f getAvatarColour(scene::EntityId id);
 
 /// Draw list of the given items, in this order.
 DrawList buildAvatarDrawList(const AvatarMeshes& avatars, const Camera& camera,

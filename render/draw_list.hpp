@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "render/frame.hpp"
 #include "scene/model/draw_items.hpp"
 #include "scene/world/data/body_placement.hpp"

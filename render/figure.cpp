@@ -223,7 +223,7 @@ scene::Mesh makePose(double crouch) {
   return mesh;
 }
 
-const std::array<scene::Mesh, kPoses>& poses() {
+const std::array<scene::Mesh, kPoses>& getPoses() {
   static const std::array<scene::Mesh, kPoses> all = [] {
     std::array<scene::Mesh, kPoses> made;
     for (std::size_t i = 0; i < kPoses; ++i)
@@ -259,7 +259,7 @@ Figure placeFigure(const scene::AvatarSnapshot& avatar) {
   const double width = std::min(computeRadius(avatar.shape->parts.front()), slim);
   Vec3 ahead(avatar.viewDirection.x(), 0, avatar.viewDirection.z());
   ahead = ahead.norm() > 1e-6 ? ahead.normalized() : Vec3(Vec3::UnitX());
-  Figure figure{&poses()[choosePose(avatar.height, avatar.spawnHeight)],
+  Figure figure{&getPoses()[choosePose(avatar.height, avatar.spawnHeight)],
                 Eigen::Affine3d::Identity()};
   figure.worldFromMesh.translation() = avatar.footPosition;
   figure.worldFromMesh.linear().col(0) = width * ahead;

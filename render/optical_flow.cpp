@@ -6,7 +6,7 @@
 #include <unordered_map>
 
 #include "collision/assert.hpp"
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "render/draw_list.hpp"
 #include "render/figure.hpp"
 

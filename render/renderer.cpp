@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "collision/assert.hpp"
-#include "render/samples.hpp"
+#include "render/camera/samples.hpp"
 
 namespace enfilade::render {
 namespace {

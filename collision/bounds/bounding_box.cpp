@@ -62,10 +62,10 @@ Double2 projectBlock(const Vec3& direction, const double* block) {
          direction.z() * loadDouble2(block + 4);
 }
 
-Double2 larger(Double2 a, Double2 b) {
+Double2 chooseLarger(Double2 a, Double2 b) {
   return a > b ? a : b;
 }
-double larger(Double2 lanes) {
+double chooseLarger(Double2 lanes) {
   return std::max(lanes[0], lanes[1]);
 }
 
@@ -142,8 +142,8 @@ struct Climber {
     looked += 2 * (to - from);
     Double2 highest = kLowest;
     for (std::uint32_t k = from; k < to; ++k)
-      highest = larger(highest, projectBlock(direction, &table.fans[kBlock * k]));
-    return {from, larger(highest)};
+      highest = chooseLarger(highest, projectBlock(direction, &table.fans[kBlock * k]));
+    return {from, chooseLarger(highest)};
   }
 
   /// Index of the first neighbour of this height in the blocks from `block` on.
@@ -202,7 +202,7 @@ Aabb climbSides(const Hull& hull, const SupportTable& table, const Mat3& rotatio
   for (const Vec3& v : hull.vertices) {
     const Double2 heights = column0 * v.x() + column1 * v.y() + column2 * v.z();
     const double height2 = project(row2, v);
-    highest = larger(highest, heights);
+    highest = chooseLarger(highest, heights);
     lowest = lowest < heights ? lowest : heights;
     highest2 = std::max(highest2, height2);
     lowest2 = std::min(lowest2, height2);
@@ -215,7 +215,7 @@ Aabb climbSides(const Hull& hull, const SupportTable& table, const Mat3& rotatio
                                                 double radius, double clearance) {
   const double size = 2 * radius + translation.cwiseAbs().maxCoeff() + clearance;
   const double margin = kRotationError * radius + kSumError * size + kUnderflow + clearance;
-  return inflated({extents.min + translation, extents.max + translation}, margin);
+  return inflate({extents.min + translation, extents.max + translation}, margin);
 }
 
 /// Mean width of the hull over 13 directions: axes, face diagonals and space diagonals of a cube.

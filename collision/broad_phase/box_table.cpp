@@ -70,7 +70,7 @@ BoxTable::IdPair* appendOverlaps(const SignedBounds& minEndpoints, BoxTable::Id 
                                  std::uint32_t count, BoxTable::IdPair* to) {
   for (std::uint32_t k = 0; k < count; ++k) {
     *to = {id, ids[k]};
-    to += noneGreater(minEndpoints, boxes[k]) ? 1 : 0;
+    to += isNoneGreater(minEndpoints, boxes[k]) ? 1 : 0;
   }
   return to;
 }

@@ -70,8 +70,8 @@ void ProxyWindow::build(const StaticGrid& staticGrid, std::span<const StaticGrid
   unsigned anyListed = 0;
   for (std::size_t r = 0; r < rows.size(); ++r) {
     const SignedBounds& minEndpoints = staticGrid.minEndpoints(rows[r]);
-    const unsigned separated = greaterMask(minEndpoints, maxEndpoints),
-                   listed = greaterMask(minEndpoints, minBounds);
+    const unsigned separated = findGreater(minEndpoints, maxEndpoints),
+                   listed = findGreater(minEndpoints, minBounds);
     const std::uint32_t id = staticGrid.getId(rows[r]);
     statics[r] = {id, static_cast<std::uint8_t>(separated), static_cast<std::uint8_t>(listed)};
     overlapping[overlapCount] = id;

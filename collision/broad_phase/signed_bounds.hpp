@@ -24,14 +24,14 @@ inline Aabb makeAabbFromMinEndpoints(const SignedBounds& o) {
 }
 
 /// Bit k: a[k] > b[k].
-inline unsigned greaterMask(const SignedBounds& a, const SignedBounds& b) {
+inline unsigned findGreater(const SignedBounds& a, const SignedBounds& b) {
   return toBits(loadDouble2(&a[0]) > loadDouble2(&b[0])) |
          toBits(loadDouble2(&a[2]) > loadDouble2(&b[2])) << 2 |
          toBits(loadDouble2(&a[4]) > loadDouble2(&b[4])) << 4;
 }
 
 /// Whether a[k] <= b[k] for all k.
-inline bool noneGreater(const SignedBounds& a, const SignedBounds& b) {
+inline bool isNoneGreater(const SignedBounds& a, const SignedBounds& b) {
   return isNoneSet(loadDouble2(&a[0]) > loadDouble2(&b[0]), loadDouble2(&a[2]) > loadDouble2(&b[2]),
                    loadDouble2(&a[4]) > loadDouble2(&b[4]));
 }
@@ -43,7 +43,7 @@ inline SignedBounds computeMinEndpoints(const SignedBounds& maxEndpoints) {
 }
 
 inline bool overlaps(const SignedBounds& minEndpoints, const SignedBounds& maxEndpoints) {
-  return greaterMask(minEndpoints, maxEndpoints) == 0;
+  return findGreater(minEndpoints, maxEndpoints) == 0;
 }
 
 /// Overlap test of two boxes, both given by their maximum endpoints. Exact: a rounded sum has the

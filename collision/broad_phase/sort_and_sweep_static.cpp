@@ -35,7 +35,7 @@ constexpr std::size_t kSmallEditThreshold = 256;
 constexpr double kMaxDouble = std::numeric_limits<double>::max();
 
 bool isWithin(const SignedBounds& low, const SignedBounds& maxEndpoints, const SignedBounds& high) {
-  return (greaterMask(low, maxEndpoints) | (0x3f & ~greaterMask(high, maxEndpoints))) == 0;
+  return (findGreater(low, maxEndpoints) | (0x3f & ~findGreater(high, maxEndpoints))) == 0;
 }
 
 /// Sets the bracket of signed axis `k` to the endpoints adjacent to the proxy's own.
@@ -137,8 +137,8 @@ bool crossOutward(SweepState& sweep, ProxyId id, std::size_t k) {
 /// Crosses inward before outward, so that each pair is reported at most once.
 void crossEndpoints(SweepState& sweep, ProxyId id) {
   const DynamicProxy& proxy = sweep.proxies[id];
-  const unsigned inward = greaterMask(proxy.bracketLow, sweep.proxyMaxEndpoints[id]);
-  const unsigned outward = 0x3f & ~greaterMask(proxy.bracketHigh, sweep.proxyMaxEndpoints[id]);
+  const unsigned inward = findGreater(proxy.bracketLow, sweep.proxyMaxEndpoints[id]);
+  const unsigned outward = 0x3f & ~findGreater(proxy.bracketHigh, sweep.proxyMaxEndpoints[id]);
   for (unsigned bits = inward | outward << 6; bits != 0; bits &= bits - 1) {
     const auto k = static_cast<std::size_t>(std::countr_zero(bits));
     if (!(k < 6 ? crossInward(sweep, id, k) : crossOutward(sweep, id, k - 6))) {

@@ -60,7 +60,7 @@ bool isNoneSet(Shorts a, Shorts b) {
 
 /// Stable counting sort: the items 0 .. keys.size() - 1 in the order of their keys. Keys are below
 /// `keyCount`.
-std::vector<Row> countingSort(std::span<const std::uint32_t> keys, std::size_t keyCount) {
+std::vector<Row> sortByCounting(std::span<const std::uint32_t> keys, std::size_t keyCount) {
   std::vector<Row> start(keyCount + 1, 0);
   for (const std::uint32_t key : keys) {
     ENFILADE_ASSERT(key < keyCount);
@@ -96,7 +96,7 @@ std::vector<Row> sortSpatially(std::span<const Aabb> boxes, const CellGrid& grid
     };
     keys.push_back((from(0) * across(1) + from(1)) * across(2) + from(2));
   }
-  return countingSort(keys, static_cast<std::size_t>(all.count()));
+  return sortByCounting(keys, static_cast<std::size_t>(all.count()));
 }
 
 }  // namespace
@@ -338,7 +338,7 @@ void StaticGrid::fillEntries(std::span<const Aabb> boxes, std::span<const std::u
     firstCell[k] = first;
     home[k] = assignment.cells[first];
   }
-  const std::vector<Row> order = countingSort(home, cells_.size());
+  const std::vector<Row> order = sortByCounting(home, cells_.size());
   // Assign rows in that order, with spare room for insertions.
   const std::size_t capacity = boxes.size() + boxes.size() / kSpareRowDivisor + 1;
   minEndpoints_.reserve(capacity);

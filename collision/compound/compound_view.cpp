@@ -23,7 +23,7 @@ double computeRoundingPad(const CompoundView& view) {
 }
 
 Aabb computeAabb(const CompoundView& view) {
-  return inflated(computeBranchAabb(view, view.tree->root), computeRoundingPad(view));
+  return inflate(computeBranchAabb(view, view.tree->root), computeRoundingPad(view));
 }
 
 bool shouldOpenFirst(const BoxTree::Branch& a, const BoxTree::Branch& b) {

@@ -100,8 +100,8 @@ class ObjectTraversal {
 
  private:
   Aabb computeBox(std::uint32_t branch) const {
-    const Aabb outer = inflated(computeBranchAabb(bounds_.view, (*this)[branch]),
-                                bounds_.margin * (1 + 0x1p-48) + pad_);
+    const Aabb outer = inflate(computeBranchAabb(bounds_.view, (*this)[branch]),
+                               bounds_.margin * (1 + 0x1p-48) + pad_);
     if (!(*this)[branch].isLeaf()) return outer;
     Aabb box;
     for (const std::uint32_t part : parts(branch)) box.include(partBox(part));

@@ -20,23 +20,23 @@ namespace {
 constexpr int kPreciseBits = 256;
 
 /// The exponent of the last of the 53 bits of a double.
-int lastBit(double value) {
+int findLastBit(double value) {
   int exponent = 0;
   std::frexp(value, &exponent);
   return exponent - 53;
 }
 
-/// The minimum of lastBit(); INT_MAX / 4 if all values are zero.
+/// The minimum of findLastBit(); INT_MAX / 4 if all values are zero.
 template <class Derived>
 int findMinLastBit(const Eigen::DenseBase<Derived>& values) {
   int minExponent = std::numeric_limits<int>::max() / 4;
   for (Eigen::Index j = 0; j < values.cols(); ++j)
     for (Eigen::Index i = 0; i < values.rows(); ++i)
-      if (values(i, j) != 0) minExponent = std::min(minExponent, lastBit(values(i, j)));
+      if (values(i, j) != 0) minExponent = std::min(minExponent, findLastBit(values(i, j)));
   return minExponent;
 }
 
-/// value / 2^scale as an integer. Requires scale <= lastBit(value).
+/// value / 2^scale as an integer. Requires scale <= findLastBit(value).
 Integer toInteger(double value, int scale) {
   if (value == 0) return 0;
   int exponent = 0;

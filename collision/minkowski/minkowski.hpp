@@ -38,17 +38,17 @@ inline double computeMaxAbsCoordinate(const Vec3& v) {
 // Scalar code on purpose: Eigen loads pairs of coordinates, which stalls store forwarding after
 // scalar stores.
 template <class Real>
-Eigen::Matrix<Real, 3, 1> plus(const Eigen::Matrix<Real, 3, 1>& a,
-                               const Eigen::Matrix<Real, 3, 1>& b) {
+Eigen::Matrix<Real, 3, 1> addVectors(const Eigen::Matrix<Real, 3, 1>& a,
+                                     const Eigen::Matrix<Real, 3, 1>& b) {
   return {a.x() + b.x(), a.y() + b.y(), a.z() + b.z()};
 }
 template <class Real>
-Eigen::Matrix<Real, 3, 1> minus(const Eigen::Matrix<Real, 3, 1>& a,
-                                const Eigen::Matrix<Real, 3, 1>& b) {
+Eigen::Matrix<Real, 3, 1> subtractVectors(const Eigen::Matrix<Real, 3, 1>& a,
+                                          const Eigen::Matrix<Real, 3, 1>& b) {
   return {a.x() - b.x(), a.y() - b.y(), a.z() - b.z()};
 }
 template <class Real>
-Eigen::Matrix<Real, 3, 1> times(const Eigen::Matrix<Real, 3, 1>& a, Real factor) {
+Eigen::Matrix<Real, 3, 1> scaleVector(const Eigen::Matrix<Real, 3, 1>& a, Real factor) {
   return {a.x() * factor, a.y() * factor, a.z() * factor};
 }
 template <class Real>
@@ -148,7 +148,8 @@ struct MinkowskiDifference {
   template <class Real>
   Eigen::Matrix<Real, 3, 1> point(VertexPair pair) const {
     if constexpr (std::is_same_v<Real, double>) {
-      return minus(plus(b.rotated<double>(pair.b), roundedShift), a.rotated<double>(pair.a));
+      return subtractVectors(addVectors(b.rotated<double>(pair.b), roundedShift),
+                             a.rotated<double>(pair.a));
     } else {
       return b.rotated<Real>(pair.b) + shift() - a.rotated<Real>(pair.a);
     }

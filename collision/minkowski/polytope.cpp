@@ -119,7 +119,7 @@ bool expandPolytope(VertexPair pair, Polytope<Real>& polytope) {
   std::size_t kept = 0;
   for (const Facet<Real>& facet : polytope.all()) {
     const auto& corner = polytope.points[facet.corners[0]];
-    if (dot(facet.normal, minus(polytope.points[added], corner)) > 0) {
+    if (dot(facet.normal, subtractVectors(polytope.points[added], corner)) > 0) {
       for (int k = 0; k < 3; ++k) horizon.toggle(facet.corners[k], facet.corners[(k + 1) % 3]);
     } else if (Facet<Real>& to = polytope.facets[kept++]; &to != &facet) {
       to = facet;

@@ -25,7 +25,7 @@ template <class Real>
 void setFacet(const Corners& corners, const Eigen::Matrix<Real, 3, 1>& a,
               const Eigen::Matrix<Real, 3, 1>& b, const Eigen::Matrix<Real, 3, 1>& c,
               Facet<Real>& facet) {
-  const Eigen::Matrix<Real, 3, 1> normal = minus(b, a).cross(minus(c, a));
+  const Eigen::Matrix<Real, 3, 1> normal = subtractVectors(b, a).cross(subtractVectors(c, a));
   facet.corners = corners;
   facet.normal = normal;
   facet.offset = std::min(std::min(dot(normal, a), dot(normal, b)), dot(normal, c));
@@ -37,7 +37,7 @@ void setFacet(const Corners& corners, const Eigen::Matrix<Real, 3, 1>& a,
 /// minimum of n . corner. A corner is off by 8u reach per coordinate, the product by 3u |n| reach.
 template <class Real>
 Real computeFacetError(double reach) {
-  return 24 * unitRoundoff<Real>() * static_cast<Real>(reach);
+  return 24 * getUnitRoundoff<Real>() * static_cast<Real>(reach);
 }
 
 /// Facets that form a closed surface. If every facet faces away from the origin, the surface winds
@@ -63,7 +63,7 @@ struct Polytope {
     // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2; the same again for
     // rounding the product of edges of up to 2 reach.
     minDeterminant =
-        512 * unitRoundoff<Real>() * reach * reach * reach + std::numeric_limits<Real>::min();
+        512 * getUnitRoundoff<Real>() * reach * reach * reach + std::numeric_limits<Real>::min();
   }
   void clear() { corners = facetCount = 0; }
   bool facesAway(const Facet<Real>& facet) const { return facet.offset > minDeterminant; }

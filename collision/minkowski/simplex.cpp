@@ -40,7 +40,7 @@ template <class Real>
 void keepSegment(const Simplex<Real>& s, int i, int j, Face<Real>& best) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec& from = s.points[i];
-  const Vec edge = minus(s.points[j], from);
+  const Vec edge = subtractVectors(s.points[j], from);
   const Real squared = dot(edge, edge);
   const Real t = -dot(from, edge);
   if (!(t > 0)) return keepCorner(s, i, best);
@@ -51,8 +51,9 @@ void keepSegment(const Simplex<Real>& s, int i, int j, Face<Real>& best) {
   }
   const Real inverse = 1 / squared;
   const Real w = t * inverse;
-  const Vec approximate = plus(from, times(edge, w));
-  const Vec nearest = minus(approximate, times(edge, dot(approximate, edge) * inverse));
+  const Vec approximate = addVectors(from, scaleVector(edge, w));
+  const Vec nearest =
+      subtractVectors(approximate, scaleVector(edge, dot(approximate, edge) * inverse));
   if (!isCloser(nearest, best)) return;
   best.corner[0] = i, best.corner[1] = j;
   best.weight[0] = 1 - w, best.weight[1] = w;
@@ -64,7 +65,7 @@ template <class Real>
 void keepTriangle(const Simplex<Real>& s, int i, int j, int k, Face<Real>& best) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec& a = s.points[i];
-  const Vec ab = minus(s.points[j], a), ac = minus(s.points[k], a);
+  const Vec ab = subtractVectors(s.points[j], a), ac = subtractVectors(s.points[k], a);
   const Vec normal = ab.cross(ac);
   const Real squared = dot(normal, normal);
   // Twice the signed sub-areas between the origin's projection and each edge, times |normal|.
@@ -77,7 +78,7 @@ void keepTriangle(const Simplex<Real>& s, int i, int j, int k, Face<Real>& best)
              beyondJK = flat || !(wi > 0);
   if (!beyondIJ && !beyondIK && !beyondJK) {
     const Real inverse = 1 / squared;
-    const Vec nearest = times(normal, dot(a, normal) * inverse);
+    const Vec nearest = scaleVector(normal, dot(a, normal) * inverse);
     if (!isCloser(nearest, best)) return;
     best.corner[0] = i, best.corner[1] = j, best.corner[2] = k;
     best.weight[0] = wi * inverse, best.weight[1] = wj * inverse, best.weight[2] = wk * inverse;
@@ -103,7 +104,7 @@ void keepTetrahedron(const Simplex<Real>& s, double reach, bool& inside, Face<Re
   const Real sign = sum < 0 ? -1 : 1;
   const Real size = reach;
   const Real bound =
-      256 * unitRoundoff<Real>() * size * size * size + std::numeric_limits<Real>::min();
+      256 * getUnitRoundoff<Real>() * size * size * size + std::numeric_limits<Real>::min();
   const bool flat = !(sign * sum > bound);
   const bool sees0 = flat || !(sign * d0 > bound), sees1 = flat || !(sign * d1 > bound);
   const bool sees2 = flat || !(sign * d2 > bound), sees3 = flat || !(sign * d3 > bound);

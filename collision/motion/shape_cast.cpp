@@ -172,8 +172,8 @@ struct RotationCast {
 
 // ---- uniform motion between two poses ----------------------------------------------------------
 
-/// `still`: B if it is stationary; then `b` is only its shape.
-MotionResult castScrew(const MovingShape& a, const MovingShape& b, const PlacedConvex* still,
+/// `stationary`: B if it is stationary; then `b` is only its shape.
+MotionResult castScrew(const MovingShape& a, const MovingShape& b, const PlacedConvex* stationary,
                        const ContactOffset& offset, FeatureCache& cache) {
   RigidTransform poseA, poseB;
   PairMotion pair;
@@ -182,7 +182,7 @@ MotionResult castScrew(const MovingShape& a, const MovingShape& b, const PlacedC
   pair.a.angularVelocity = a.motion.angle * a.motion.axis;
   pair.b.angularVelocity = b.motion.angle * b.motion.axis;
   pair.a.radius = computeRadiusAround({a.shape.vertices}, Vec3::Zero());
-  if (!still) pair.b.radius = computeRadiusAround({b.shape.vertices}, Vec3::Zero());
+  if (!stationary) pair.b.radius = computeRadiusAround({b.shape.vertices}, Vec3::Zero());
   MotionResult result{.lo = 0};
   double queried = 0;
   advanceFraction(
@@ -190,19 +190,19 @@ MotionResult castScrew(const MovingShape& a, const MovingShape& b, const PlacedC
       [&](double at) {
         queried = at;
         poseA = computeTransformAfter(a.motion, at);
-        if (!still) poseB = computeTransformAfter(b.motion, at);
-        return std::optional(computeSeparation(place(a.shape, poseA),
-                                               still ? *still : place(b.shape, poseB), cache));
+        if (!stationary) poseB = computeTransformAfter(b.motion, at);
+        return std::optional(computeSeparation(
+            place(a.shape, poseA), stationary ? *stationary : place(b.shape, poseB), cache));
       },
       [&](double at, const SeparationResult& separation) {
         if (separation.verdict != Verdict::separated) return kArrived;
         const double distance = separation.distance - separation.errorBound;
         pair.a.body = place(a.shape, poseA);
-        pair.b.body = still ? *still : place(b.shape, poseB);
+        pair.b.body = stationary ? *stationary : place(b.shape, poseB);
         const Vec3 between = pair.b.body.translation - poseA.translation;
-        if (still) {  // about A's origin: the offset and what the bound adds for it are 0
+        if (stationary) {  // about A's origin: the offset and what the bound adds for it are 0
           pair.b.reference = -between;
-          pair.b.radius = computeRadiusAround(*still, poseA.translation);
+          pair.b.radius = computeRadiusAround(*stationary, poseA.translation);
         } else {
           pair.offset = between;
         }

@@ -67,9 +67,9 @@ bool warmStart(const MinkowskiDifference& difference, const FeatureCache& cache,
 }
 
 template <class Real>
-void gjkIterate(const MinkowskiDifference& difference, double limit, int localSteps,
+void iterateGjk(const MinkowskiDifference& difference, double limit, int localSteps,
                 GjkState<Real>& state) {
-  const Real tolerance = 24 * unitRoundoff<Real>() * static_cast<Real>(difference.reach);
+  const Real tolerance = 24 * getUnitRoundoff<Real>() * static_cast<Real>(difference.reach);
   Simplex<Real>& simplex = state.simplex;
   int equalSteps = 0;
   for (int i = 0; i < kMaxIterations && state.hasDirection(); ++i) {
@@ -101,7 +101,7 @@ void gjkIterate(const MinkowskiDifference& difference, double limit, int localSt
 
 template bool warmStart(const MinkowskiDifference&, const FeatureCache&, GjkState<double>&);
 template bool warmStart(const MinkowskiDifference&, const FeatureCache&, GjkState<LongReal>&);
-template void gjkIterate(const MinkowskiDifference&, double, int, GjkState<double>&);
-template void gjkIterate(const MinkowskiDifference&, double, int, GjkState<LongReal>&);
+template void iterateGjk(const MinkowskiDifference&, double, int, GjkState<double>&);
+template void iterateGjk(const MinkowskiDifference&, double, int, GjkState<LongReal>&);
 
 }  // namespace enfilade::collision

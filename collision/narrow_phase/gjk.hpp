@@ -10,7 +10,7 @@ inline constexpr double kMinDoubleDistance = 1e-140;  // metres: below, a square
 
 /// Factor that turns a rounded length into an upper bound of the length.
 template <class Real>
-constexpr Real kLengthInflation = 1 + 16 * unitRoundoff<Real>();
+constexpr Real kLengthInflation = 1 + 16 * getUnitRoundoff<Real>();
 
 /// The state of GJK, in Real.
 template <class Real>
@@ -27,7 +27,7 @@ struct GjkState {
 
   /// `direction`, unit up to rounding.
   Vec3 axis() const {
-    return times(direction, kLengthInflation<Real> / length).template cast<double>();
+    return scaleVector(direction, kLengthInflation<Real> / length).template cast<double>();
   }
   /// False: the simplex contains the origin, or nearly touches it.
   bool hasDirection() const {
@@ -49,7 +49,7 @@ bool warmStart(const MinkowskiDifference& difference, const FeatureCache& cache,
 /// also ends if the distance is certified to exceed `limit`, or if Real makes no more progress. In
 /// the first `localSteps` steps, climbs stop once they pass the origin.
 template <class Real>
-void gjkIterate(const MinkowskiDifference& difference, double limit, int localSteps,
+void iterateGjk(const MinkowskiDifference& difference, double limit, int localSteps,
                 GjkState<Real>& state);
 
 template <class Real>
@@ -61,7 +61,7 @@ void storeFeatures(const GjkState<Real>& state, FeatureCache& cache) {
 extern template bool warmStart(const MinkowskiDifference&, const FeatureCache&, GjkState<double>&);
 extern template bool warmStart(const MinkowskiDifference&, const FeatureCache&,
                                GjkState<LongReal>&);
-extern template void gjkIterate(const MinkowskiDifference&, double, int, GjkState<double>&);
-extern template void gjkIterate(const MinkowskiDifference&, double, int, GjkState<LongReal>&);
+extern template void iterateGjk(const MinkowskiDifference&, double, int, GjkState<double>&);
+extern template void iterateGjk(const MinkowskiDifference&, double, int, GjkState<LongReal>&);
 
 }  // namespace enfilade::collision

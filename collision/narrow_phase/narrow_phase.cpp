@@ -39,7 +39,7 @@ namespace {
 constexpr double kMaxErrorUnits =
     15;  // roundoffs of the largest coordinate; one below the promised 16
 constexpr double kSmallErrorRatio = 0x1p-32;  // relative to the distance: see describeSeparation
-constexpr int kLocalSteps = 12;               // of a warm start: see gjkIterate
+constexpr int kLocalSteps = 12;               // of a warm start: see iterateGjk
 
 /// Square root; uses LongReal where a double would over- or underflow.
 double computeSquareRoot(LongReal squared) {
@@ -103,7 +103,7 @@ struct WitnessPoints {
   bool isCommonPoint(const Vec3& tA, const Simplex<Real>& simplex) {
     const double length = computeSquareRoot(squaredLength);
     if (!isWithin(length, 2, simplex)) return false;
-    const double inWorld = std::max(computeMaxAbsCoordinate(plus(pointA, tA)),
+    const double inWorld = std::max(computeMaxAbsCoordinate(addVectors(pointA, tA)),
                                     maxCoordinate - computeMaxAbsCoordinate(tA));
     return length <= 8 * kRoundoff * inWorld;
   }
@@ -203,7 +203,7 @@ double computeCertifiedExtraDistance(const MinkowskiDifference& difference,
   if (!supportB.unique || supportB.vertex != witnesses.onBodyB.vertex)
     excess += computeSupportExcess(witnesses.onBodyB, difference.b, -d, supportB);
   const double rounding = error + 2 * kRoundoff * head;
-  const Vec3 deviation = minus(witnesses.aToB, d);
+  const Vec3 deviation = subtractVectors(witnesses.aToB, d);
   const double directionError = 2 * (dot(deviation, deviation) + rounding * rounding) / head;
   const double lost = (directionError + excess / state.length + error) * (1 + 0x1p-8);
   return tail - lost;
@@ -305,8 +305,8 @@ GjkOutcome classify(const MinkowskiDifference& difference, GjkState<Real>& state
     refineWeights(difference, simplex, witnesses);
     common = witnesses.isCommonPoint(tA, simplex);
   }
-  result.pointA = plus(witnesses.pointA, tA);
-  result.pointB = plus(witnesses.pointB, tA);
+  result.pointA = addVectors(witnesses.pointA, tA);
+  result.pointB = addVectors(witnesses.pointB, tA);
   if (!inside) {
     const SplitLength length = witnesses.length(static_cast<double>(state.distance));
     const double lowerExtra = computeCertifiedExtraDistance(difference, witnesses, length, state);
@@ -385,7 +385,7 @@ GjkOutcome runGjk(const MinkowskiDifference& difference, double limit, FeatureCa
                   SeparationResult& result) {
   GjkState<Real> state;
   const bool warm = warmStart(difference, cache, state);
-  gjkIterate(difference, limit, warm ? kLocalSteps : 0, state);
+  iterateGjk(difference, limit, warm ? kLocalSteps : 0, state);
   const GjkOutcome outcome = classify(difference, state, limit, cache.axis, result);
   storeFeatures(state, cache);
   return outcome;

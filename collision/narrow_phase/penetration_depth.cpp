@@ -84,7 +84,8 @@ LongReal computeMinFacetDistance(LongReal minDistance, const Facet<Real>& neares
                                  Polytope<Real>& polytope) {
   const double reach = polytope.difference.reach;
   const LongReal clearance = minDistance + computeFacetError<Real>(reach);
-  const Real squared = static_cast<Real>(clearance * clearance) * (1 + 16 * unitRoundoff<Real>());
+  const Real squared =
+      static_cast<Real>(clearance * clearance) * (1 + 16 * getUnitRoundoff<Real>());
   for (const Facet<Real>& facet : polytope.all()) {
     if (facet.squaredDistance > squared || &facet == &nearest) continue;
     minDistance = std::min(minDistance, std::sqrt(refineFacet(facet, polytope).squaredDistance));
@@ -115,7 +116,7 @@ struct FacetSupport {
 };
 FacetSupport<double> findFacetSupport(const Facet<double>& facet,
                                       const Polytope<double>& polytope) {
-  const Vec3 inward = times(facet.normal, -1 / computeNorm(facet.normal));
+  const Vec3 inward = scaleVector(facet.normal, -1 / computeNorm(facet.normal));
   const SupportPair supports =
       hillClimbPair(polytope.difference, inward, kMaxUnitLength, polytope.pairs[facet.corners[0]]);
   const SupportValue value = computeSupportValue(polytope.difference, inward, 1, supports);
@@ -153,8 +154,8 @@ DepthBounds certifyBoundsAlongRounded(const Facet<double>& nearest,
   return bounds;
 }
 
-bool boundsMeet(const DepthBounds& bounds, double tolerance,
-                const MinkowskiDifference& difference) {
+bool doBoundsMeet(const DepthBounds& bounds, double tolerance,
+                  const MinkowskiDifference& difference) {
   return bounds.upper - bounds.lower <= tolerance * bounds.lower + 16 * difference.pointError();
 }
 
@@ -178,7 +179,8 @@ const Facet<Real>& findNearestFacet(const Polytope<Real>& polytope) {
 /// Expands the polytope until the bounds meet (true) or no more progress is certified (false).
 template <class Real>
 bool expandUntilBoundsMeet(Polytope<Real>& polytope, DepthBounds& bounds) {
-  const Real tolerance = 64 * unitRoundoff<Real>() * static_cast<Real>(polytope.difference.reach);
+  const Real tolerance =
+      64 * getUnitRoundoff<Real>() * static_cast<Real>(polytope.difference.reach);
   while (true) {  // terminates: each iteration adds a corner
     const Facet<Real>& nearest = findNearestFacet(polytope);
     const bool away = polytope.facesAway(nearest);
@@ -188,10 +190,10 @@ bool expandUntilBoundsMeet(Polytope<Real>& polytope, DepthBounds& bounds) {
       if (!away) return false;
       if constexpr (std::is_same_v<Real, double>) {
         bounds = certifyBoundsAlongRounded(nearest, facetSupport, polytope);
-        if (boundsMeet(bounds, kTightBoundsTolerance, polytope.difference)) return true;
+        if (doBoundsMeet(bounds, kTightBoundsTolerance, polytope.difference)) return true;
       }
       bounds = certifyBounds(nearest, polytope);
-      if (boundsMeet(bounds, kBoundsTolerance, polytope.difference)) return true;
+      if (doBoundsMeet(bounds, kBoundsTolerance, polytope.difference)) return true;
       if (polytope.contains(bounds.support)) return false;
       next = bounds.support;
     }

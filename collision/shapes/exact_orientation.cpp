@@ -24,9 +24,9 @@ namespace enfilade::collision {
 namespace {
 
 template <class Real>  // Shewchuk's o3derrboundA
-constexpr Real kBound3 = (7 + 56 * unitRoundoff<Real>()) * unitRoundoff<Real>();
+constexpr Real kBound3 = (7 + 56 * getUnitRoundoff<Real>()) * getUnitRoundoff<Real>();
 template <class Real>  // and ccwerrboundA
-constexpr Real kBound2 = (3 + 16 * unitRoundoff<Real>()) * unitRoundoff<Real>();
+constexpr Real kBound2 = (3 + 16 * getUnitRoundoff<Real>()) * getUnitRoundoff<Real>();
 // Six products of two factors below 1e90 lose less than 6 * 2^-1074 to underflow. Multiplied by a
 // third factor, the loss stays below 1e-230.
 constexpr double kMaxDifference = 1e90;
@@ -41,7 +41,8 @@ bool toInteger(double value, double scale, std::int64_t& integer) {
 
 /// Sign of u . (v x w) if the nine numbers are multiples of one power of two by less than 2^62, and
 /// nullopt otherwise. 192 bits then hold all sums of triple products.
-std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w, double largest) {
+std::optional<int> computeSignInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w,
+                                           double largest) {
   __extension__ typedef __int128 Int128;
   int exponent = 0;
   std::frexp(largest, &exponent);  // largest < 2^exponent
@@ -70,7 +71,8 @@ std::optional<int> signInFixedPoint(const Vec3& u, const Vec3& v, const Vec3& w,
 
 /// Sign of ux vy - uy vx if the four numbers are multiples of one power of two by less than 2^62;
 /// nullopt otherwise.
-std::optional<int> signInFixedPoint(double ux, double uy, double vx, double vy, double largest) {
+std::optional<int> computeSignInFixedPoint(double ux, double uy, double vx, double vy,
+                                           double largest) {
   __extension__ typedef __int128 Int128;
   int exponent = 0;
   std::frexp(largest, &exponent);
@@ -135,7 +137,7 @@ int exactOrient2d(double ax, double ay, double bx, double by, double cx, double 
 
 /// Sign of a determinant whose error is at most `bound`; nullopt if the sign is uncertain.
 template <class Real>
-std::optional<int> certifiedSign(Real determinant, Real bound) {
+std::optional<int> certifySign(Real determinant, Real bound) {
   if (determinant > bound) return 1;
   if (determinant < -bound) return -1;
   return std::nullopt;
@@ -153,14 +155,14 @@ std::optional<int> filteredOrient3d(const Eigen::Matrix<Real, 3, 1>& u,
   const Real permanent = std::abs(w.x()) * (std::abs(yz) + std::abs(zy)) +
                          std::abs(w.y()) * (std::abs(zx) + std::abs(xz)) +
                          std::abs(w.z()) * (std::abs(xy) + std::abs(yx));
-  return certifiedSign<Real>(determinant, kBound3<Real> * permanent + kUnderflow);
+  return certifySign<Real>(determinant, kBound3<Real> * permanent + kUnderflow);
 }
 
 template <class Real>
 std::optional<int> filteredOrient2d(Real ux, Real uy, Real vx, Real vy) {
   const Real left = ux * vy, right = uy * vx;
-  return certifiedSign<Real>(left - right,
-                             kBound2<Real> * (std::abs(left) + std::abs(right)) + kUnderflow);
+  return certifySign<Real>(left - right,
+                           kBound2<Real> * (std::abs(left) + std::abs(right)) + kUnderflow);
 }
 
 }  // namespace
@@ -172,7 +174,7 @@ int orient3d(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d) {
   if (largest < kMaxDifference) {
     if (const auto sign = filteredOrient3d<double>(u, v, w)) return *sign;
     if (isExactDifference(u, a, b) && isExactDifference(v, a, c) && isExactDifference(w, a, d)) {
-      if (const auto sign = signInFixedPoint(w, u, v, largest)) return *sign;
+      if (const auto sign = computeSignInFixedPoint(w, u, v, largest)) return *sign;
     }
     const LongVec3 longA = a.cast<LongReal>();
     const auto sign = filteredOrient3d<LongReal>(
@@ -193,7 +195,7 @@ int orient2d(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
     if (const auto sign = filteredOrient2d<double>(ux, uy, vx, vy)) return *sign;
     if (isExactDifference(ux, a[i], b[i]) && isExactDifference(uy, a[j], b[j]) &&
         isExactDifference(vx, a[i], c[i]) && isExactDifference(vy, a[j], c[j])) {
-      if (const auto sign = signInFixedPoint(ux, uy, vx, vy, largest)) return *sign;
+      if (const auto sign = computeSignInFixedPoint(ux, uy, vx, vy, largest)) return *sign;
     }
     const auto sign = filteredOrient2d<LongReal>(LongReal{b[i]} - a[i], LongReal{b[j]} - a[j],
                                                  LongReal{c[i]} - a[i], LongReal{c[j]} - a[j]);
@@ -202,7 +204,7 @@ int orient2d(const Vec3& a, const Vec3& b, const Vec3& c, int dropped) {
   return exactOrient2d(a[i], a[j], b[i], b[j], c[i], c[j]);
 }
 
-bool collinear(const Vec3& a, const Vec3& b, const Vec3& c) {
+bool areCollinear(const Vec3& a, const Vec3& b, const Vec3& c) {
   return orient2d(a, b, c, 0) == 0 && orient2d(a, b, c, 1) == 0 && orient2d(a, b, c, 2) == 0;
 }
 

@@ -16,6 +16,6 @@ int orient3d(const Vec3& a, const Vec3& b, const Vec3& c, const Vec3& d);
 int orient2d(const Vec3& a, const Vec3& b, const Vec3& c, int dropped);
 
 /// True if the three points lie on one line. Exact.
-bool collinear(const Vec3& a, const Vec3& b, const Vec3& c);
+bool areCollinear(const Vec3& a, const Vec3& b, const Vec3& c);
 
 }  // namespace enfilade::collision

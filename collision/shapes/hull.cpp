@@ -28,7 +28,7 @@ namespace {
 using Index = std::uint32_t;
 using Polygon = std::vector<Index>;
 
-bool lexicographicallyLess(const Vec3& a, const Vec3& b) {
+bool isLexicographicallyLess(const Vec3& a, const Vec3& b) {
   if (a.x() != b.x()) return a.x() < b.x();
   if (a.y() != b.y()) return a.y() < b.y();
   return a.z() < b.z();
@@ -47,7 +47,7 @@ std::vector<Vec3> sortUnique(std::span<const Vec3> points) {
     }
     result.emplace_back(points[i] + Vec3::Zero());  // -0 becomes 0: same point, same bits
   }
-  std::sort(result.begin(), result.end(), lexicographicallyLess);
+  std::sort(result.begin(), result.end(), isLexicographicallyLess);
   result.erase(std::unique(result.begin(), result.end()), result.end());
   return result;
 }
@@ -269,7 +269,7 @@ std::vector<Polygon> TriangleHull::mergeFaces() {
 std::vector<Polygon> buildFaces(std::span<const Vec3> points) {
   const std::size_t count = points.size();
   std::size_t offLine = 2;
-  while (offLine < count && collinear(points[0], points[1], points[offLine])) ++offLine;
+  while (offLine < count && areCollinear(points[0], points[1], points[offLine])) ++offLine;
   if (offLine >= count) return {};
   std::size_t offPlane = offLine + 1;
   while (offPlane < count &&

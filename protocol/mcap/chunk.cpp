@@ -112,8 +112,8 @@ Chunk openChunk(std::string_view content, Definitions& definitions) {
   return chunk;
 }
 
-bool nextMessage(std::string_view records, std::size_t& at, const Definitions& definitions,
-                 Message& message) {
+bool readNextMessage(std::string_view records, std::size_t& at, const Definitions& definitions,
+                     Message& message) {
   while (at < records.size()) {
     Fields fields(records.substr(at));
     const auto opcode = static_cast<Opcode>(fields.number<std::uint8_t>());

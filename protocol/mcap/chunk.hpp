@@ -51,8 +51,8 @@ struct Chunk {
 Chunk openChunk(std::string_view content, Definitions& definitions);
 
 /// Reads the next message of `records` from offset `at` and advances `at`; false at the end.
-bool nextMessage(std::string_view records, std::size_t& at, const Definitions& definitions,
-                 Message& message);
+bool readNextMessage(std::string_view records, std::size_t& at, const Definitions& definitions,
+                     Message& message);
 
 /// CRC of `bytes` appended to data with the CRC `before`.
 std::uint32_t computeCrc(std::string_view bytes, std::uint32_t before = 0);

@@ -172,7 +172,7 @@ void IndexedReader::open(std::size_t chunk) {
 }
 
 bool IndexedReader::next(Message& message) {
-  return nextMessage(records_, offset_, definitions_, message);
+  return readNextMessage(records_, offset_, definitions_, message);
 }
 
 }  // namespace enfilade::protocol::mcap

@@ -148,7 +148,7 @@ std::optional<Message> Reader::next() {
   Message message;
   try {
     while (!ended_) {
-      if (nextMessage(chunk_, chunkOffset_, definitions_, message)) {
+      if (readNextMessage(chunk_, chunkOffset_, definitions_, message)) {
         ++messages_;
         return message;
       }

@@ -42,7 +42,7 @@ void readPart(const json& part, const std::string& field, v1::ConvexPart* into) 
   const json& corners = part[key];
   if (!corners.is_array() || corners.empty() || (!points && corners.size() != 2)) {
     refuse(partField, std::string("must be ") + (points ? "a list of" : "two") +
-                          " points [x,y,z], not " + excerpt(corners));
+                          " points [x,y,z], not " + makeExcerpt(corners));
   }
   if (!points) {
     readPoint(corners[0], partField + "[0]", into->mutable_box()->mutable_min());
@@ -55,7 +55,7 @@ void readPart(const json& part, const std::string& field, v1::ConvexPart* into) 
 }
 
 void readParts(const json& parts, v1::Spawn* spawn) {
-  if (!parts.is_array()) refuse("parts", "must be a list, not " + excerpt(parts));
+  if (!parts.is_array()) refuse("parts", "must be a list, not " + makeExcerpt(parts));
   for (std::size_t i = 0; i < parts.size(); ++i) {
     readPart(parts[i], "parts[" + std::to_string(i) + "]", spawn->add_parts());
   }
@@ -74,7 +74,7 @@ void readJoint(const json& link, const std::string& field, v1::Joint* joint) {
   if (!link.contains("limits")) return;
   const json& limits = link["limits"];
   if (!limits.is_array() || limits.size() != 2) {
-    refuse(field + ".limits", "must be two numbers [low, high], not " + excerpt(limits));
+    refuse(field + ".limits", "must be two numbers [low, high], not " + makeExcerpt(limits));
   }
   const char* what = "radians or metres";
   joint->set_low(
@@ -86,9 +86,9 @@ void readJoint(const json& link, const std::string& field, v1::Joint* joint) {
 void readLink(const json& link, const std::string& field, v1::Link* into) {
   static const std::set<std::string> keys{"parent", "joint",  "anchor", "axis",
                                           "limits", "points", "box",    "value"};
-  if (!link.is_object()) refuse(field, "must be an object, not " + excerpt(link));
+  if (!link.is_object()) refuse(field, "must be an object, not " + makeExcerpt(link));
   for (const auto& [key, value] : link.items()) {
-    if (!keys.contains(key)) refuse(field, excerpt(key) + " is not a key of a link");
+    if (!keys.contains(key)) refuse(field, makeExcerpt(key) + " is not a key of a link");
   }
   if (link.contains("parent")) {
     const json& parent = link["parent"];
@@ -108,7 +108,7 @@ void readLink(const json& link, const std::string& field, v1::Link* into) {
 }
 
 void readLinks(const json& links, v1::Spawn* spawn) {
-  if (!links.is_array()) refuse("links", "must be a list, not " + excerpt(links));
+  if (!links.is_array()) refuse("links", "must be a list, not " + makeExcerpt(links));
   for (std::size_t i = 0; i < links.size(); ++i) {
     readLink(links[i], "links[" + std::to_string(i) + "]", spawn->add_links());
   }
@@ -151,7 +151,7 @@ void readWalk(const json& line, v1::Walk* walk) {
   } else {
     const json& along = line["along"];
     if (!along.is_array() || along.empty()) {
-      refuse("along", "must be a list of points [[x,y,z],...], not " + excerpt(along));
+      refuse("along", "must be a list of points [[x,y,z],...], not " + makeExcerpt(along));
     }
     for (std::size_t i = 0; i < along.size(); ++i) {
       readPoint(along[i], "along[" + std::to_string(i) + "]", walk->add_along());
@@ -160,9 +160,9 @@ void readWalk(const json& line, v1::Walk* walk) {
   if (line.contains("speed")) walk->set_speed(readSpeed(line));
   if (!line.contains("opens")) return;
   const json& opens = line["opens"];
-  if (!opens.is_array()) refuse("opens", "must be a list of doors, not " + excerpt(opens));
+  if (!opens.is_array()) refuse("opens", "must be a list of doors, not " + makeExcerpt(opens));
   for (const json& door : opens) {
-    if (!door.is_string()) refuse("opens", "must list names of doors, not " + excerpt(door));
+    if (!door.is_string()) refuse("opens", "must list names of doors, not " + makeExcerpt(door));
     walk->add_opens(door.get<std::string>());
   }
 }
@@ -184,7 +184,7 @@ void readGo(const json& line, v1::Go* go) {
   if (line["doors"] == "open")
     go->set_doors(v1::NavigationQuery::DOORS_OPEN);
   else if (line["doors"] != "as_they_are")
-    refuse("doors", R"(must be "open" or "as_they_are", not )" + excerpt(line["doors"]));
+    refuse("doors", R"(must be "open" or "as_they_are", not )" + makeExcerpt(line["doors"]));
 }
 
 void readLook(const json& line, v1::Look* look) {
@@ -221,7 +221,7 @@ void readCrouch(const json& line, v1::Crouch* crouch) {
 void readJoints(const json& line, v1::DriveJoints* joints) {
   const json& to = requireKey(line, "to", R"("to":[values, null for a joint that stays])");
   if (!to.is_array() || to.empty()) {
-    refuse("to", "must be a list of numbers, one per joint, not " + excerpt(to));
+    refuse("to", "must be a list of numbers, one per joint, not " + makeExcerpt(to));
   }
   for (std::size_t i = 0; i < to.size(); ++i) {
     v1::DriveJoints::Target& target = *joints->add_to();
@@ -262,7 +262,7 @@ struct Verb {
   std::vector<const char*> keys;  ///< other keys than the verb
 };
 
-const std::vector<Verb>& verbs() {
+const std::vector<Verb>& listVerbs() {
   static const std::vector<Verb> all{
       {"spawn", {"at", "facing", "radius", "height", "flying", "parts", "links", "self_contact"}},
       {"walk", {"to", "along", "speed", "opens"}},
@@ -284,25 +284,26 @@ const std::vector<Verb>& verbs() {
 
 std::string listVerbNames() {
   std::string names;
-  for (const Verb& verb : verbs()) names += (names.empty() ? "" : ", ") + std::string(verb.name);
+  for (const Verb& verb : listVerbs())
+    names += (names.empty() ? "" : ", ") + std::string(verb.name);
   return names;
 }
 
 /// Names the verb that a key of the line probably means.
 [[noreturn]] void refuseWithoutVerb(const json& line) {
   std::vector<std::string> names;
-  for (const Verb& verb : verbs()) names.emplace_back(verb.name);
+  for (const Verb& verb : listVerbs()) names.emplace_back(verb.name);
   for (const auto& [key, value] : line.items()) {
     const std::string nearest = findNearestWord(key, names);
     if (!nearest.empty() && key != "avatar")
-      refuse("", excerpt(key) + " is not a command; did you mean \"" + nearest + "\"?");
+      refuse("", makeExcerpt(key) + " is not a command; did you mean \"" + nearest + "\"?");
   }
   refuse("", "no command; a line needs one of " + listVerbNames());
 }
 
 /// Whether the line has a verb to which this one is a key, as "turn" to "body".
 bool isKeyOfOther(const json& line, const Verb& verb) {
-  return std::ranges::any_of(verbs(), [&](const Verb& other) {
+  return std::ranges::any_of(listVerbs(), [&](const Verb& other) {
     return line.contains(other.name) &&
            std::ranges::any_of(other.keys,
                                [&](const std::string& key) { return key == verb.name; });
@@ -311,7 +312,7 @@ bool isKeyOfOther(const json& line, const Verb& verb) {
 
 const Verb& findVerb(const json& line) {
   const Verb* found = nullptr;
-  for (const Verb& verb : verbs()) {
+  for (const Verb& verb : listVerbs()) {
     if (!line.contains(verb.name) || isKeyOfOther(line, verb)) continue;
     if (found) {
       refuse("", std::string("\"") + found->name + "\" and \"" + verb.name +
@@ -331,7 +332,7 @@ void refuseUnknownKeys(const json& line, const Verb& verb) {
     if (known) continue;
     std::string allowed = verb.name;
     for (const char* other : verb.keys) allowed += std::string(", ") + other;
-    refuse("", excerpt(key) + " is not a key of the command " + verb.name + "; its keys are " +
+    refuse("", makeExcerpt(key) + " is not a key of the command " + verb.name + "; its keys are " +
                    allowed);
   }
 }
@@ -359,7 +360,8 @@ void readOrder(const json& line, const std::string& verb, v1::Command& command) 
 
 /// Body names may contain all characters, because they come from the file's nodes.
 std::string parseBodyName(const json& value) {
-  if (!value.is_string()) refuse("body", "must be a body's name in quotes, not " + excerpt(value));
+  if (!value.is_string())
+    refuse("body", "must be a body's name in quotes, not " + makeExcerpt(value));
   const std::string text = value.get<std::string>();
   if (text.empty() || text.size() > kMaxBodyNameLength)
     refuse("body", "must have 1 to " + std::to_string(kMaxBodyNameLength) + " characters");
@@ -376,7 +378,7 @@ void readAction(const json& value, v1::BodyCommand& command) {
   } else if (value == "run") {
     command.mutable_run();
   } else {
-    refuse("do", R"(must be "open", "close", "stop" or "run", not )" + excerpt(value));
+    refuse("do", R"(must be "open", "close", "stop" or "run", not )" + makeExcerpt(value));
   }
 }
 
@@ -406,7 +408,7 @@ v1::BodyCommand readBodyCommand(const json& line) {
   } else if (line.contains("level")) {
     const json& level = line["level"];
     if (!level.is_number_integer() || level < 0 || level > 10000)
-      refuse("level", "must be a whole number from 0 to 10000, not " + excerpt(level));
+      refuse("level", "must be a whole number from 0 to 10000, not " + makeExcerpt(level));
     command.set_level(level.get<std::uint32_t>());
   } else {
     readAction(line["do"], command);
@@ -438,7 +440,7 @@ json parseObject(std::string_view text) {
                    R"(; write one object per line, for example {"wait":1}, with finite numbers)");
   }
   if (!line.is_object()) {
-    refuse("", "must be an object, for example {\"wait\":1}, not " + excerpt(line));
+    refuse("", "must be an object, for example {\"wait\":1}, not " + makeExcerpt(line));
   }
   if (!repeated.empty()) refuse(repeated, "occurs twice in one line; keep one");
   return line;

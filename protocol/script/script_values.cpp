@@ -31,7 +31,7 @@ std::string formatLimit(double limit) {
 
 }  // namespace
 
-std::string excerpt(const json& value) {
+std::string makeExcerpt(const json& value) {
   if (isDeeperThan(value, kMaxJsonDepth)) return "a too deeply nested value";
   std::string text = value.dump();
   if (text.size() > kMaxQuoteLength) {
@@ -44,7 +44,7 @@ std::string excerpt(const json& value) {
 
 double parseNumber(const json& value, std::string_view field, const char* what) {
   if (!value.is_number()) {
-    refuse(field, "must be " + std::string(what) + ", not " + excerpt(value));
+    refuse(field, "must be " + std::string(what) + ", not " + makeExcerpt(value));
   }
   return value.get<double>();
 }
@@ -55,18 +55,18 @@ double parseNumberInRange(const json& value, std::string_view field, const char*
   if (read <= high && (above ? read > low : read >= low)) return read;
   const std::string range =
       above ? " above " + formatLimit(low) + " and at most " : " from " + formatLimit(low) + " to ";
-  refuse(field, excerpt(value) + " is out of range; give " + what + range + formatLimit(high));
+  refuse(field, makeExcerpt(value) + " is out of range; give " + what + range + formatLimit(high));
 }
 
 bool parseFlag(const json& value, std::string_view field) {
-  if (!value.is_boolean()) refuse(field, "must be true or false, not " + excerpt(value));
+  if (!value.is_boolean()) refuse(field, "must be true or false, not " + makeExcerpt(value));
   return value.get<bool>();
 }
 
 void readPoint(const json& value, const std::string& field, v1::Vec3* point) {
   static constexpr std::array<const char*, 3> axes{"x", "y", "z"};
   if (!value.is_array() || value.size() != axes.size()) {
-    refuse(field, "must be three numbers [x, y, z] in metres, not " + excerpt(value));
+    refuse(field, "must be three numbers [x, y, z] in metres, not " + makeExcerpt(value));
   }
   std::array<double, 3> xyz{};
   for (std::size_t i = 0; i < axes.size(); ++i) {
@@ -80,7 +80,7 @@ void readPoint(const json& value, const std::string& field, v1::Vec3* point) {
 
 std::string parseName(const json& value, std::string_view field, const char* what) {
   if (!value.is_string()) {
-    refuse(field, "must be " + std::string(what) + " in quotes, not " + excerpt(value));
+    refuse(field, "must be " + std::string(what) + " in quotes, not " + makeExcerpt(value));
   }
   std::string text = value.get<std::string>();
   if (text.empty()) refuse(field, "is empty; give " + std::string(what));
@@ -89,7 +89,7 @@ std::string parseName(const json& value, std::string_view field, const char* wha
                       std::to_string(kMaxNameLength) + " are allowed");
   }
   if (!std::all_of(text.begin(), text.end(), isNameLetter) || text.front() == '.') {
-    refuse(field, excerpt(value) +
+    refuse(field, makeExcerpt(value) +
                       " has a character that is not allowed; use A-Z, a-z, 0-9, '_', '-' and "
                       "'.' (not first)");
   }

@@ -11,7 +11,7 @@
 namespace enfilade::protocol {
 
 /// Formats a JSON value for a message, shortened.
-std::string excerpt(const nlohmann::json& value);
+std::string makeExcerpt(const nlohmann::json& value);
 
 double parseNumber(const nlohmann::json& value, std::string_view field, const char* what);
 /// Parses a number from `low` to `high`; with `above`, `low` itself is refused.

@@ -1,7 +1,7 @@
 // Frustum and occlusion tests of boxes against a depth pyramid. Independent of OpenGL.
 #pragma once
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "render/culling/depth_pyramid.hpp"
 
 namespace enfilade::render {

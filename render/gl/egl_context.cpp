@@ -155,7 +155,7 @@ void destroyContext(EGLDisplay display, EGLContext context) noexcept {
 /// Serialises device probing. Displays are shared by the process, and Mesa's eglInitialize
 /// overwrites data that another thread may be reading. ThreadSanitizer does not recognise Mesa's
 /// futex locks.
-std::mutex& deviceProbeMutex() {
+std::mutex& getDeviceProbeMutex() {
   static std::mutex mutex;
   return mutex;
 }
@@ -225,7 +225,7 @@ constexpr const char* kNoPlatform =
 EglContext::EglContext(const DeviceChoice& choice) {
   if (const std::string missing = findMissingLibrary(); !missing.empty())
     throw RenderError(missing);
-  const std::lock_guard lock(deviceProbeMutex());
+  const std::lock_guard lock(getDeviceProbeMutex());
   std::string tried, hardwareFailures;
   const std::vector<DisplayCandidate> all =
       enumerateDisplays(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS));
@@ -299,7 +299,7 @@ void EglContext::release() noexcept {
 DeviceList listDevices() {
   DeviceList list{0, findMissingLibrary()};
   if (!list.failure.empty()) return list;
-  const std::lock_guard lock(deviceProbeMutex());
+  const std::lock_guard lock(getDeviceProbeMutex());
   list.count = enumerateDisplays(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS)).size();
   if (list.count == 0) list.failure = kNoPlatform;
   return list;
@@ -309,7 +309,7 @@ DeviceProbe probeDevice(std::size_t index) {
   DeviceProbe probe;
   probe.failure = findMissingLibrary();
   if (!probe.failure.empty()) return probe;
-  const std::lock_guard lock(deviceProbeMutex());
+  const std::lock_guard lock(getDeviceProbeMutex());
   const auto all = enumerateDisplays(eglQueryString(EGL_NO_DISPLAY, EGL_EXTENSIONS));
   if (index >= all.size()) {
     probe.failure = "there is no device " + std::to_string(index);

@@ -11,7 +11,7 @@ namespace {
 
 constexpr int kMaxErrors = 16;  // one flag per error; a lost context reports errors forever
 
-const char* errorName(GLenum error) {
+const char* getErrorName(GLenum error) {
   switch (error) {
     case GL_INVALID_ENUM:
       return "GL_INVALID_ENUM";
@@ -118,7 +118,7 @@ void checkGl(const char* stage) {
   if (first == GL_NO_ERROR) return;
   for (int i = 0; i < kMaxErrors && glGetError() != GL_NO_ERROR; ++i) {
   }
-  throw RenderError(std::string(stage) + ": " + errorName(first) + "; " + suggestRemedy(first));
+  throw RenderError(std::string(stage) + ": " + getErrorName(first) + "; " + suggestRemedy(first));
 }
 
 GlProgram buildProgram(const std::string& name, const std::string& vertexSource,

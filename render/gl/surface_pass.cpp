@@ -8,7 +8,7 @@
 #include <span>
 
 #include "collision/assert.hpp"
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "render/gl/shaders.hpp"
 
 namespace enfilade::render {

@@ -61,7 +61,7 @@ struct Fonts {
   PangoContext* context = pango_font_map_create_context(pango_cairo_font_map_new());
 };
 
-Fonts& fonts() {
+Fonts& getFonts() {
   static Fonts shared;
   return shared;
 }
@@ -69,9 +69,10 @@ Fonts& fonts() {
 /// A layout of Pango for one line of text. Locks the fonts.
 class Layout {
  public:
-  Layout(cairo_t* cairo, const std::string& text, const TextStyle& style) : lock_(fonts().mutex) {
-    pango_cairo_update_context(cairo, fonts().context);
-    layout_ = pango_layout_new(fonts().context);
+  Layout(cairo_t* cairo, const std::string& text, const TextStyle& style)
+      : lock_(getFonts().mutex) {
+    pango_cairo_update_context(cairo, getFonts().context);
+    layout_ = pango_layout_new(getFonts().context);
     PangoFontDescription* const font = pango_font_description_new();
     pango_font_description_set_family(font, kFontFamily);
     pango_font_description_set_absolute_size(font, style.size * PANGO_SCALE);

@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uint64_t kMaxPixels = std::uint64_t{1} << 28;
 
-std::size_t pixelCount(const Image& image) {
+std::size_t countPixels(const Image& image) {
   return static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
 }
 
@@ -59,7 +59,7 @@ Image decodePng(const std::vector<std::uint8_t>& bytes) {
   }
   png.format = PNG_FORMAT_RGB;
   Image image{static_cast<int>(png.width), static_cast<int>(png.height), {}};
-  image.rgb.resize(3 * pixelCount(image));
+  image.rgb.resize(3 * countPixels(image));
   const png_color black{0, 0, 0};
   if (!png_image_finish_read(&png, &black, image.rgb.data(), 0, nullptr)) {
     throw makePngError("png_image_finish_read", png);
@@ -73,9 +73,9 @@ void writePng(const std::filesystem::path& file, const Image& image) {
 }
 
 Image resizeImage(const Image& image, int width, int height) {
-  ENFILADE_ASSERT(width >= 1 && height >= 1 && image.rgb.size() == 3 * pixelCount(image));
+  ENFILADE_ASSERT(width >= 1 && height >= 1 && image.rgb.size() == 3 * countPixels(image));
   Image result{width, height, {}};
-  result.rgb.reserve(3 * pixelCount(result));
+  result.rgb.reserve(3 * countPixels(result));
   for (int y = 0; y < height; ++y) {
     const PixelSpan rows = computeCoveredSpan(y, height, image.height);
     for (int x = 0; x < width; ++x) {

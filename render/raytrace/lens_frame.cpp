@@ -10,7 +10,7 @@
 #include <unordered_map>
 
 #include "render/ambient_occlusion.hpp"
-#include "render/lens.hpp"
+#include "render/camera/lens.hpp"
 
 namespace enfilade::render {
 namespace {

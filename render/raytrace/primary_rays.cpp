@@ -1,6 +1,6 @@
 #include "render/raytrace/primary_rays.hpp"
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::render {
 

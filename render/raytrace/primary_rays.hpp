@@ -1,7 +1,7 @@
 // The primary rays of a camera, one through the centre of each pixel, in doubles.
 #pragma once
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::render {
 

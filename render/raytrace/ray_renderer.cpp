@@ -296,7 +296,7 @@ struct RayRenderer::State {
   RayScene scene;
   MipTextures textures;
   scene::ThreadPool workers;
-  std::string name = scene::embreeName();
+  std::string name = scene::getEmbreeName();
 
   State(std::shared_ptr<const scene::Scene> shared, const RayOptions& options)
       : scene(std::move(shared)), textures(scene.model()), workers(options.threads) {}

@@ -9,7 +9,7 @@ namespace {
 
 /// The result of `make`; turns an EmbreeError into a RenderError.
 template <class Make>
-auto orRenderError(const Make& make) {
+auto callEmbree(const Make& make) {
   try {
     return make();
   } catch (const scene::EmbreeError& error) {
@@ -36,7 +36,7 @@ scene::Mesh extractMesh(const AvatarMeshes& all, const MeshRange& range) {
 
 RayScene::RayScene(std::shared_ptr<const scene::Scene> scene) : scene_(std::move(scene)) {
   if (!scene_) throw RenderError("RayRenderer: there is no scene");
-  trees_ = orRenderError([&] { return &scene::SceneTrees::of(*scene_); });
+  trees_ = callEmbree([&] { return &scene::SceneTrees::of(*scene_); });
 }
 
 void RayScene::update(const scene::Snapshot& snapshot, AvatarForm form) {
@@ -70,7 +70,7 @@ void RayScene::buildAvatarTree() {
     batches.push_back(batch);
   }
   if (!batches.empty())
-    avatarTree_ = orRenderError([&] { return trees_->buildTree(std::move(batches)); });
+    avatarTree_ = callEmbree([&] { return trees_->buildTree(std::move(batches)); });
   avatarTreeBuilt_ = true;
 }
 
@@ -79,7 +79,7 @@ std::vector<const RayTree*> RayScene::itemTrees(bool isTransparent) {
   for (scene::PlacedItems* placed : {trees_->staticItems().get(), bodies_.get()}) {
     if (!placed) continue;
     const RayTree* tree =
-        orRenderError([&] { return trees_->findOrBuildTree(*placed, isTransparent); });
+        callEmbree([&] { return trees_->findOrBuildTree(*placed, isTransparent); });
     if (tree) trees.push_back(tree);
   }
   return trees;

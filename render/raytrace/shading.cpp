@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "scene/model/srgb.hpp"
 
 namespace enfilade::render {

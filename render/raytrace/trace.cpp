@@ -398,15 +398,15 @@ bool isInShadow(const TraceContext& trace, double x, double y, double z) {
 double traceFirstBehind(const TraceContext& trace, int x, int y, double from) {
   RTCRayHit query = makePixelRay(trace, x, y, from, trace.rays.far);
   if (!(query.ray.tnear <= query.ray.tfar)) return std::numeric_limits<double>::quiet_NaN();
-  bool met = false;
+  bool isHit = false;
   for (std::size_t t = 0; t < trace.trees.size(); ++t) {
     FilterContext context = makeFilterContext(trace, t);
     setIgnoredEntity(context, trace);
     rtcIntersect1(trace.trees[t]->embreeScene(), &context.embree, &query);
-    met = met || query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
+    isHit = isHit || query.hit.geomID != RTC_INVALID_GEOMETRY_ID;
   }
-  return met ? trace.rays.start + static_cast<double>(query.ray.tfar)
-             : std::numeric_limits<double>::quiet_NaN();
+  return isHit ? trace.rays.start + static_cast<double>(query.ray.tfar)
+               : std::numeric_limits<double>::quiet_NaN();
 }
 
 }  // namespace enfilade::render

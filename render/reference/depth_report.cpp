@@ -19,7 +19,8 @@ std::size_t findBin(double error) {
 }
 
 /// Distance to the nearest edge pixel in pixels, at most `maxDistance`.
-std::size_t distanceToEdge(const ReferenceFrame& reference, int x, int y, std::size_t maxDistance) {
+std::size_t computeDistanceToEdge(const ReferenceFrame& reference, int x, int y,
+                                  std::size_t maxDistance) {
   const int width = reference.camera.width, height = reference.camera.height;
   for (int r = 0; r < static_cast<int>(maxDistance); ++r) {
     for (int v = std::max(0, y - r); v <= std::min(height - 1, y + r); ++v) {
@@ -67,7 +68,7 @@ void compareId(DepthReport& report, const ReferenceFrame& reference, int x, int 
   } else if (isTied(reference, pixel, frameId)) {
     ++report.idsTied;
   } else {
-    ++report.idsDiffer[distanceToEdge(reference, x, y, report.idsDiffer.size() - 1)];
+    ++report.idsDiffer[computeDistanceToEdge(reference, x, y, report.idsDiffer.size() - 1)];
   }
 }
 

@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 
 std::string listExtensions() {
   std::string list;
-  for (const std::string_view e : importableExtensions())
+  for (const std::string_view e : listImportableExtensions())
     list += (list.empty() ? "" : ", ") + std::string(e);
   return list;
 }

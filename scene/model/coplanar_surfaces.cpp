@@ -124,7 +124,7 @@ std::vector<bool> findTouchingObjects(const Model& model) {
   for (std::uint32_t i = 0; i < model.objects.size(); ++i) {
     const Aabb box = computeWorldAabb(model, model.objects[i]);
     if (box.empty()) continue;
-    boxes.push_back(collision::inflated(box, kBoxMargin));
+    boxes.push_back(collision::inflate(box, kBoxMargin));
     objects.push_back(i);
   }
   // Boxes that a larger box found are not searched again: n boxes at one place cost one query.
@@ -310,7 +310,7 @@ std::vector<CoplanarRank> rankCoplanarObjects(const Model& model) {
       if (!isRanked[other] || ranks[other].rank == kMaxRank) continue;
       own.rank = std::max<std::uint8_t>(own.rank, ranks[other].rank + 1);
       const bool moves = bodyOfObject[object] || bodyOfObject[other];
-      own.lower.push_back(moves ? everywhere : collision::inflated(boxes[other], kMargin));
+      own.lower.push_back(moves ? everywhere : collision::inflate(boxes[other], kMargin));
     }
     isRanked[object] = true;
   }

@@ -32,7 +32,8 @@ std::array<double, 2> measureSides(const WorldData& world, const AvatarShape& sh
   std::array<double, 2> widths{};
   for (std::size_t i = 0; i < 2; ++i) {
     const Vec3 move = (i == 0 ? maxWidth : -maxWidth) * side;
-    const Aabb box = inflated(collision::sweptAabb(placeBox(shape.box, footPosition), move), 0.1);
+    const Aabb box =
+        inflate(collision::computeSweptAabb(placeBox(shape.box, footPosition), move), 0.1);
     ObstacleSet obstacles = collectObstaclesInBox(world, box, 0);
     QueryCount count;
     const ShapeCastHit hit =
@@ -138,7 +139,7 @@ ObstacleDistance measureObstacle(const WorldData& world, const NavigationAgent& 
   const Vec3 raised = placeThinShape(world.settings, footPosition);
   const double limit = std::max(kPrecision, maxDistance - kThinRadius);
   ObstacleSet obstacles =
-      collectObstaclesInBox(world, inflated(placeBox(shape->box, raised), limit), 0);
+      collectObstaclesInBox(world, inflate(placeBox(shape->box, raised), limit), 0);
   // An object that lies only below the step height, as the floor, is no obstacle.
   std::erase_if(obstacles.list,
                 [&](const Obstacle& obstacle) { return obstacle.box.max.y() < raised.y(); });

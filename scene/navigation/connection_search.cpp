@@ -454,7 +454,7 @@ void forgetGaps(TriedGaps& tried, const Aabb& box, const NavigationAgent& agent)
     const auto& [key, paths] = one;
     const Vec3 from(key[0], key[1], key[2]), to(key[3], key[4], key[5]);
     const Aabb around{from.cwiseMin(to), from.cwiseMax(to)};
-    return overlaps(inflated(around, paths.reach + agent.radius + kMargin), box);
+    return overlaps(inflate(around, paths.reach + agent.radius + kMargin), box);
   });
 }
 

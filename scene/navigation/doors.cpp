@@ -34,7 +34,7 @@ std::optional<double> findTouch(const AvatarShape& agent, const Vec3& from, cons
     }
   };
   const Aabb swept =
-      inflated(collision::sweptAabb(placeBox(agent.box, from), leg), 2 * offset.rest);
+      inflate(collision::computeSweptAabb(placeBox(agent.box, from), leg), 2 * offset.rest);
   const Vec3 middle = rotation.transpose() * (swept.centre() - pose.translation);
   const Vec3 halfExtent = rotation.transpose().cwiseAbs() * (0.5 * swept.size());
   const Aabb inBodyFrame{middle - halfExtent, middle + halfExtent};
@@ -119,7 +119,7 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
     const Vec3 leg = points[i] - points[i - 1];
     Aabb box = placeBox(agent.box, points[i - 1]);
     box.include(placeBox(agent.box, points[i]));
-    box = inflated(box, settings.contactOffset);
+    box = inflate(box, settings.contactOffset);
     const auto findTouchOn = [&](const Snapshot& state, std::size_t body) -> std::optional<double> {
       const BodySnapshot& door = (*state.bodies)[body];
       if (!overlaps(box, computeBodyAabb({index, state}, door))) return std::nullopt;

@@ -100,7 +100,7 @@ std::optional<std::vector<RouteStep>> findRoute(const PathFinder& finder, Links&
 /// Whether an agent that walks along the points enters the box of a lift as it stands now.
 bool entersBox(const std::vector<Vec3>& points, const Aabb& box, const NavigationAgent& agent) {
   constexpr double kSpacing = 0.1;  // metres
-  const Aabb near = inflated(box, agent.radius);
+  const Aabb near = inflate(box, agent.radius);
   for (std::size_t i = 1; i < points.size(); ++i) {
     const Vec3 leg = points[i] - points[i - 1];
     const int count = std::max(1, static_cast<int>(std::ceil(leg.norm() / kSpacing)));

@@ -49,7 +49,7 @@ std::optional<Vec3> findPlatform(const Body& lift, Walker& walker) {
 
 /// Returns the metres along `direction` from a place until an agent is clear of a box.
 double computeExitDistance(const Aabb& box, const Vec3& place, const Vec3& direction, double room) {
-  const Aabb grown = inflated(box, room);
+  const Aabb grown = inflate(box, room);
   double distance = box.size().norm() + 2 * room;
   for (const int axis : {0, 2}) {
     if (std::abs(direction[axis]) < 1e-9) continue;

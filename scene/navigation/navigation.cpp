@@ -283,7 +283,7 @@ std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
   const Vec3 middle = named.body == kNoBody ? named.middle : box.centre();
   const Vec3 centre(middle.x(), box.min.y(), middle.z());
   const auto isInside = [&](const Vec3& place) {
-    return collision::contains(inflated(box, kHeightError), {place, place}) &&
+    return collision::contains(inflate(box, kHeightError), {place, place}) &&
            (!named.space || isInSpace(*named.space, {place.x(), middle.y(), place.z()}));
   };
   if (const auto place = standAt(*walker_, centre + Vec3(0, kHeightError, 0), 2 * kHeightError)) {

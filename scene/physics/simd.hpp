@@ -2,8 +2,8 @@
 // equal scalar code bit for bit.
 //
 // Four doubles fill an AVX register. The program is compiled for processors without AVX, so each
-// loop is compiled twice and selected at run time; see simdLoop(). Functions that a loop calls must
-// be inlined into it, because the two versions use different registers.
+// loop is compiled twice and selected at run time; see runSimdLoop(). Functions that a loop calls
+// must be inlined into it, because the two versions use different registers.
 #pragma once
 
 #include <cmath>
@@ -111,12 +111,12 @@ struct Vec3W {
 
 #if defined(__x86_64__)
 template <class Item, class Each>
-__attribute__((target("avx"))) void avxLoop(std::span<Item> items, const Each& each) {
+__attribute__((target("avx"))) void runAvxLoop(std::span<Item> items, const Each& each) {
   for (Item& item : items) each(item);
 }
 #else
 template <class Item, class Each>
-void avxLoop(std::span<Item> items, const Each& each) {
+void runAvxLoop(std::span<Item> items, const Each& each) {
   for (Item& item : items) each(item);
 }
 #endif
@@ -124,8 +124,8 @@ void avxLoop(std::span<Item> items, const Each& each) {
 /// Calls each(item) for all items in order. `each` and all that it calls must be always_inline.
 /// `useAvx`: the processor has AVX; the result is the same.
 template <class Item, class Each>
-void simdLoop(std::span<Item> items, bool useAvx, const Each& each) {
-  if (useAvx) return avxLoop(items, each);
+void runSimdLoop(std::span<Item> items, bool useAvx, const Each& each) {
+  if (useAvx) return runAvxLoop(items, each);
   for (Item& item : items) each(item);
 }
 

@@ -61,13 +61,13 @@ void forEachConstraint(SolverContext& context, ThreadPool& pool, const Each& eac
     const std::size_t blocksPerTask =
         color + 1 == context.colorEnds.size() ? blocks.size() : kConstraintsPerTask;
     pool.parallelFor(blocks.size(), blocksPerTask, [&](std::size_t first, std::size_t last) {
-      simdLoop(blocks.subspan(first, last - first), context.useAvx, each);
+      runSimdLoop(blocks.subspan(first, last - first), context.useAvx, each);
     });
     from = context.colorEnds[color];
   }
 }
 
-[[gnu::always_inline]] inline std::span<ContactConstraintPointW> constraintPoints(
+[[gnu::always_inline]] inline std::span<ContactConstraintPointW> getConstraintPoints(
     const ContactConstraintW& block, SolverContext& context) {
   return {context.points.data() + block.firstPoint, block.pointCount};
 }
@@ -116,7 +116,7 @@ void warmStart(SolverContext& context, ThreadPool& pool) {
         block.applyImpulse(friction.tangent1, friction.angular1, friction.tangentImpulse1, m);
         block.applyImpulse(friction.tangent2, friction.angular2, friction.tangentImpulse2, m);
         block.applyTorsion(friction.torsionImpulse, m);
-        for (const ContactConstraintPointW& point : constraintPoints(block, context))
+        for (const ContactConstraintPointW& point : getConstraintPoints(block, context))
           block.applyImpulse(block.normal, point.normal, point.impulse + point.motorImpulse, m);
         scatterVelocities(m, block, context);
       });
@@ -166,9 +166,9 @@ void warmStart(SolverContext& context, ThreadPool& pool) {
 
 /// Returns whether a point approaches too fast. If none does and no impulse exists yet, the block
 /// needs no solving.
-[[gnu::always_inline]] inline bool anyVelocityError(const ContactConstraintW& block,
+[[gnu::always_inline]] inline bool hasVelocityError(const ContactConstraintW& block,
                                                     const VelocitiesW& m, SolverContext& context) {
-  for (const ContactConstraintPointW& point : constraintPoints(block, context)) {
+  for (const ContactConstraintPointW& point : getConstraintPoints(block, context)) {
     const DoubleW velocityError =
         computeVelocityError(point, context, point.normal.relativeVelocity(block.normal, m));
     if (any(splat(0) < velocityError)) return true;
@@ -179,9 +179,9 @@ void warmStart(SolverContext& context, ThreadPool& pool) {
 [[gnu::always_inline]] inline void solveContactVelocities(ContactConstraintW& block,
                                                           SolverContext& context) {
   VelocitiesW m = gatherVelocities(block, context);
-  if (block.idle && !anyVelocityError(block, m, context)) return;
+  if (block.idle && !hasVelocityError(block, m, context)) return;
   block.idle = false;
-  const std::span points = constraintPoints(block, context);
+  const std::span points = getConstraintPoints(block, context);
   if (block.hasFriction) {
     DoubleW normalImpulse = splat(0);
     for (const ContactConstraintPointW& point : points)
@@ -222,7 +222,7 @@ void warmStart(SolverContext& context, ThreadPool& pool) {
                                                          SolverContext& context) {
   const VelocitiesW velocities = gatherVelocities(block, context);
   VelocitiesW m = gatherCorrectionVelocities(block, context);
-  for (ContactConstraintPointW& point : constraintPoints(block, context)) {
+  for (ContactConstraintPointW& point : getConstraintPoints(block, context)) {
     const MaskW hasGap = splat(context.contactOffset) < point.separation;
     const DoubleW ownSpeed =
         selectW(hasGap, point.normal.relativeVelocity(block.normal, velocities), splat(0));
@@ -263,7 +263,7 @@ void integratePoses(SolverContext& context, std::span<BodyMotion> motions, Threa
       context, pool, [&](const ContactConstraintW& block) __attribute__((always_inline)) {
         const VelocitiesW m = gatherVelocities(block, context),
                           correction = gatherCorrectionVelocities(block, context);
-        for (ContactConstraintPointW& point : constraintPoints(block, context)) {
+        for (ContactConstraintPointW& point : getConstraintPoints(block, context)) {
           const DoubleW speed = point.normal.relativeVelocity(block.normal, m) +
                                 point.normal.relativeVelocity(block.normal, correction);
           point.separation = point.separation + splat(context.seconds) * speed;
@@ -311,7 +311,7 @@ void applyRestitution(SolverContext& context, const SolverSettings& settings) {
   for (const ContactConstraintW& block : context.constraints) {
     if (!block.hasRestitution) continue;
     VelocitiesW m = gatherVelocities(block, context);
-    for (const ContactConstraintPointW& point : constraintPoints(block, context)) {
+    for (const ContactConstraintPointW& point : getConstraintPoints(block, context)) {
       const DoubleW speed = point.normal.relativeVelocity(block.normal, m);
       const DoubleW velocityError = -block.restitution * point.approachSpeed - speed;
       const DoubleW maxImpulse = block.restitution * point.totalImpulse;

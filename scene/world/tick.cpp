@@ -60,7 +60,7 @@ void updateBroadPhase(WorldData& world) {
   for (Avatar& avatar : world.avatars) {
     avatar.motionBounds = computeMotionBounds(world.settings, avatar);
     if (!world.movingBodies.empty())
-      avatar.motionBounds = inflated(avatar.motionBounds, computePushMargin(world, avatar));
+      avatar.motionBounds = inflate(avatar.motionBounds, computePushMargin(world, avatar));
     world.broadPhase.move(avatar.proxy, avatar.motionBounds);
   }
   world.broadPhase.update();

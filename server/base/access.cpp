@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kMinTokenLength = 16;  // characters; shorter tokens are easy to guess
 
 /// Constant-time comparison: the duration depends only on the length of `given`.
-bool equalConstantTime(std::string_view given, std::string_view secret) {
+bool isEqualInConstantTime(std::string_view given, std::string_view secret) {
   unsigned differ = given.size() == secret.size() ? 0 : 1;
   for (std::size_t i = 0; i < given.size(); ++i) {
     const auto a = static_cast<unsigned char>(given[i]);
@@ -62,7 +62,7 @@ std::optional<Role> findRole(const Access& access, std::string_view token) {
   if (access.tokens.empty()) return Role::admin;
   std::optional<Role> role;
   for (const Access::Token& one : access.tokens)  // no early exit: constant time
-    if (equalConstantTime(token, one.secret)) role = one.role;
+    if (isEqualInConstantTime(token, one.secret)) role = one.role;
   return role;
 }
 

@@ -1,6 +1,6 @@
 #include "server/base/camera_rotation.hpp"
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::server {
 

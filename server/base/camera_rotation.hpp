@@ -4,7 +4,7 @@
 #include <array>
 #include <cstdint>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::server {
 

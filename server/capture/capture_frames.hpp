@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "scene/world/data/snapshot.hpp"
 
 namespace enfilade::server {

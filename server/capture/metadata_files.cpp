@@ -5,7 +5,7 @@
 #include <nlohmann/json.hpp>
 
 #include "protocol/recording/recording.hpp"
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "scene/import/file/content_hash.hpp"
 #include "server/base/camera_rotation.hpp"
 #include "server/base/version.hpp"
@@ -102,7 +102,7 @@ Json makeFileHash(const std::filesystem::path& file) {
 /// Key of file names in capture.json. It is informative: the next run may use other names.
 constexpr const char* kNamesKey = "names";
 
-std::string fileName(const std::filesystem::path& file) {
+std::string makeFileName(const std::filesystem::path& file) {
   return file.filename().string();
 }
 
@@ -217,7 +217,7 @@ std::string makeManifest(const scene::Scene& scene, const std::filesystem::path&
                          const PictureOptions& options, const std::string& renderer) {
   Json all;
   all["enfilade"] = kServerVersion;
-  all[kNamesKey] = {{"scene", fileName(scene.model().source)}, {"path", fileName(path)}};
+  all[kNamesKey] = {{"scene", makeFileName(scene.model().source)}, {"path", makeFileName(path)}};
   all["scene"] = protocol::toHex(scene.hash());
   all["scene_file"] = makeFileHash(scene.model().source);
   all["path"] = makeFileHash(path);

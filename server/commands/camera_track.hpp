@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::server {
 

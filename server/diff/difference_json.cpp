@@ -51,7 +51,7 @@ Json toJson(const AvatarRecord& avatar) {
 }
 
 template <class Value>
-Json optionalJson(const std::optional<Value>& value) {
+Json toOptionalJson(const std::optional<Value>& value) {
   return value ? toJson(*value) : Json(nullptr);
 }
 
@@ -81,8 +81,8 @@ void addCommonFields(Json& json, const Change& change) {
 Json toJson(const WalkEventChange& change) {
   Json json{{"kind", toString(change.kind, kKindNames)},
             {"change", getChangeName(change)},
-            {"before", optionalJson(change.before)},
-            {"after", optionalJson(change.after)},
+            {"before", toOptionalJson(change.before)},
+            {"after", toOptionalJson(change.after)},
             {"b_in_model", toString(change.inModel, kModelNames)}};
   if (change.before && change.after) {
     json["shift"] = change.shift;
@@ -97,8 +97,8 @@ Json toJson(const OrderChange& change) {
   const FinishedOrder& end = change.after ? *change.after : *change.before;
   Json json{{"avatar", end.avatar},
             {"tag", end.tag},
-            {"before", optionalJson(change.before)},
-            {"after", optionalJson(change.after)}};
+            {"before", toOptionalJson(change.before)},
+            {"after", toOptionalJson(change.after)}};
   addCommonFields(json, change);
   return json;
 }
@@ -106,8 +106,8 @@ Json toJson(const OrderChange& change) {
 Json toJson(const ClearanceChange& change) {
   Json json{{"a", change.a},
             {"b", change.b},
-            {"before", optionalJson(change.before)},
-            {"after", optionalJson(change.after)},
+            {"before", toOptionalJson(change.before)},
+            {"after", toOptionalJson(change.after)},
             {"changed_by_at_least", change.minChange},
             {"b_in_model", toString(change.inModel, kModelNames)}};
   addCommonFields(json, change);
@@ -116,8 +116,8 @@ Json toJson(const ClearanceChange& change) {
 
 Json toJson(const PathChange& path) {
   return {{"avatar", path.avatar},
-          {"before", optionalJson(path.before)},
-          {"after", optionalJson(path.after)},
+          {"before", toOptionalJson(path.before)},
+          {"after", toOptionalJson(path.after)},
           {"first_tick", path.firstTick},
           {"farthest", path.maxDistance},
           {"farthest_tick", path.maxDistanceTick},

@@ -45,8 +45,8 @@ Event swapSides(Event event) {
 /// Collects the data of a run from its messages.
 class RunCollector {
  public:
-  /// `since`: events up to this tick are skipped.
-  RunCollector(const v1::RecordingStart& start, std::uint64_t since) : since_(since) {
+  /// `afterTick`: events up to this tick are skipped.
+  RunCollector(const v1::RecordingStart& start, std::uint64_t afterTick) : afterTick_(afterTick) {
     run_.start = start;
     run_.hash = start.state_hash();
     for (const v1::Body& body : start.scene().bodies())
@@ -55,10 +55,11 @@ class RunCollector {
 
   void add(const v1::TickEvents& events) {
     for (const Event& event : events.contacts()) {
-      if (event.tick() <= since_) continue;  // includes contacts active at the start of a branch
+      if (event.tick() <= afterTick_)
+        continue;  // includes contacts active at the start of a branch
       isSwapped(event) ? addContact(swapSides(event)) : addContact(event);
     }
-    if (events.tick() <= since_) return;
+    if (events.tick() <= afterTick_) return;
     for (const v1::Notice& notice : events.notices()) addNotice(notice, events.time());
   }
 
@@ -66,7 +67,7 @@ class RunCollector {
     run_.ticks = state.tick();
     run_.time = state.time();
     run_.hash = state.hash();
-    if (state.tick() <= since_) return;
+    if (state.tick() <= afterTick_) return;
     for (const v1::AvatarState& avatar : state.avatars()) {
       const Vec3 footPosition = vectorFromProto(avatar.feet());
       const auto [at, isNew] = run_.avatars.try_emplace(avatar.name());
@@ -174,7 +175,7 @@ class RunCollector {
   static bool isLeaving(const v1::Notice& notice) { return notice.kind() == v1::Notice::KIND_LEFT; }
 
   RecordedRun run_;
-  const std::uint64_t since_;
+  const std::uint64_t afterTick_;
   std::set<std::string> dynamicBodies_;          ///< names of the dynamic bodies
   std::map<std::uint32_t, Vec3> footPositions_;  ///< positions of the last tick, by entity
   /// Positions of active contacts, by entities. The list pointers stay valid inside a std::map.
@@ -211,7 +212,7 @@ RecordedWalk readWalk(const std::filesystem::path& file, const WalkRange& range)
   while (const auto item = reader.next()) {
     if (const auto* start = std::get_if<v1::RecordingStart>(&*item)) {
       if (run) walk.runs.push_back(run->finish());
-      run.emplace(*start, walk.runs.empty() ? range.since : 0);
+      run.emplace(*start, walk.runs.empty() ? range.afterTick : 0);
       continue;
     }
     if (!run) throw RecordingError(file.string() + ": does not start with its scene");

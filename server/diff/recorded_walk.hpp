@@ -91,11 +91,11 @@ struct WalkMoment {
 };
 WalkMoment findEnd(const RecordedWalk& walk);
 
-/// The range of a walk to read: its first run after tick `since`, up to `until`. If `run` is given,
-/// only this run of the file.
+/// The range of a walk to read: its first run after tick `afterTick`, up to `until`. If `run` is
+/// given, only this run of the file.
 struct WalkRange {
   std::optional<std::uint32_t> run = std::nullopt;
-  std::uint64_t since = 0;
+  std::uint64_t afterTick = 0;
   std::optional<WalkMoment> until = std::nullopt;
 };
 

@@ -402,11 +402,12 @@ void readBothWalks(const std::filesystem::path& before, const std::filesystem::p
       now{findParentRun(into.before, into.after)};
   if (old.run != into.before.run) into.before = readWalk(before, old);
   if (now.run != into.after.run) into.after = readWalk(after, now);
-  old.since = now.since = std::max(getParent(into.before).tick(), getParent(into.after).tick());
+  old.afterTick = now.afterTick =
+      std::max(getParent(into.before).tick(), getParent(into.after).tick());
   for (const RecordedWalk* walk : {&into.before, &into.after})
     if (!walk->closed && (!old.until || findEnd(*walk) < *old.until)) old.until = findEnd(*walk);
   now.until = old.until;
-  if (old.since == 0 && !old.until) return;
+  if (old.afterTick == 0 && !old.until) return;
   into.before = readWalk(before, old);
   into.after = readWalk(after, now);
 }

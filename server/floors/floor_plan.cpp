@@ -111,14 +111,30 @@ void addLift(const scene::Scene& scene, const scene::BodySpec& lift, FloorPlan& 
 }
 
 void addBody(const scene::Scene& scene, const scene::BodySpec& body, FloorPlan& plan) {
-  if (body.kind == scene::BodyKind::lift) return addLift(scene, body, plan);
-  if (isTrigger(body.kind)) return;
-  const PlanShape leaf = cutBody(scene, body, plan.floor + kPlanCutHeight);
-  if (leaf.loops.empty() && leaf.lines.empty()) return;
-  plan.shapes.push_back(leaf);
-  if (body.kind == scene::BodyKind::hinged && std::abs(body.axis.y()) > 0.9)
-    addSwing(body, leaf, plan);
-  if (body.kind == scene::BodyKind::sliding) addSlide(body, leaf, plan);
+  using enum scene::BodyKind;
+  const auto cut = [&] { return cutBody(scene, body, plan.floor + kPlanCutHeight); };
+  const auto add = [&](const PlanShape& shape) {
+    const bool isCut = !shape.loops.empty() || !shape.lines.empty();
+    if (isCut) plan.shapes.push_back(shape);
+    return isCut;
+  };
+  switch (body.kind) {
+    case hinged:
+      if (const PlanShape leaf = cut(); add(leaf) && std::abs(body.axis.y()) > 0.9)
+        addSwing(body, leaf, plan);
+      return;
+    case sliding:
+      if (const PlanShape leaf = cut(); add(leaf)) addSlide(body, leaf, plan);
+      return;
+    case lift:
+      return addLift(scene, body, plan);
+    case path:
+    case rigid:
+      add(cut());
+      return;
+    case trigger:  // not drawn
+      return;
+  }
 }
 
 }  // namespace

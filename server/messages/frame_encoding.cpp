@@ -3,10 +3,10 @@
 #include <cstring>
 
 #include "collision/assert.hpp"
+#include "render/camera/lens.hpp"
 #include "render/image/depth_noise.hpp"
 #include "render/image/encode.hpp"
 #include "render/image/image.hpp"
-#include "render/lens.hpp"
 #include "render/optical_flow.hpp"
 
 namespace enfilade::server {

@@ -5,8 +5,8 @@
 
 #include "collision/assert.hpp"
 #include "protocol/framing.hpp"
+#include "render/camera/samples.hpp"
 #include "render/image/depth_noise.hpp"
-#include "render/samples.hpp"
 #include "server/messages/world_messages.hpp"
 
 namespace enfilade::server {

@@ -33,7 +33,7 @@ Aabb computePlanArea(const scene::Scene& scene, const FloorPlan& plan) {
   }
   for (const scene::Space& room : plan.rooms) area.include(room.box);
   if (area.empty()) area = scene.bounds();
-  Aabb drawn = collision::inflated(area, kMargin);
+  Aabb drawn = collision::inflate(area, kMargin);
   drawn.min.y() = std::min(drawn.min.y(), scene.bounds().min.y());
   drawn.max.y() = std::max(drawn.max.y(), scene.bounds().max.y());
   return drawn;

@@ -45,11 +45,11 @@ scene::Aabb computeShownBounds(const WalkTrace& trace) {
   for (const WalkedPath& path : trace.paths) {
     for (const Vec3& footPosition : path.footPositions) bounds.include(footPosition);
   }
-  const scene::Aabb reach = collision::inflated(bounds, kMaxOrderDistance);
+  const scene::Aabb reach = collision::inflate(bounds, kMaxOrderDistance);
   for (const MapContact& blocked : trace.blockedWalks) bounds.include(blocked.point);
   for (const MapContact& refused : trace.refusedOrders)
     if (collision::contains(reach, {refused.point, refused.point})) bounds.include(refused.point);
-  return collision::inflated(bounds, kMapMargin);
+  return collision::inflate(bounds, kMapMargin);
 }
 
 TextStyle makeStyle(double size, bool bold = false) {

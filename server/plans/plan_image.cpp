@@ -25,7 +25,7 @@ PlanRenderer makePlanRenderer(render::RendererSelector& renderer,
 }
 
 render::Colour computeAvatarColour(scene::EntityId id) {
-  const Eigen::Vector3f linear = render::avatarColour(id);
+  const Eigen::Vector3f linear = render::getAvatarColour(id);
   const auto byte = [&](int i) {
     return static_cast<std::uint8_t>(std::lround(255 * std::pow(linear[i], 1 / 2.2f)));
   };

@@ -6,7 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "render/image/canvas.hpp"
 #include "scene/world/data/snapshot.hpp"
 #include "server/floors/storeys.hpp"

@@ -28,7 +28,7 @@ constexpr std::chrono::milliseconds kGuestTime{5};
 /// Idle time after which a recording is flushed to its file.
 constexpr std::chrono::milliseconds kFlushDelay{500};
 
-SteadyClock::duration tickPeriod(const HostedWorld& hosted) {
+SteadyClock::duration computeTickPeriod(const HostedWorld& hosted) {
   ENFILADE_ASSERT(hosted.clock.speed > 0);
   const std::chrono::duration<double> seconds(hosted.world.settings().tickDuration /
                                               hosted.clock.speed);
@@ -345,7 +345,7 @@ bool TickLoop::takeFreeRunTick() {
   const auto now = SteadyClock::now();
   WorldClock& clock = hosted_.clock;
   if (!isFreeRunning(hosted_) || now < clock.nextTick) return false;
-  clock.nextTick = std::max(clock.nextTick + tickPeriod(hosted_), now - kMaxCatchUp);
+  clock.nextTick = std::max(clock.nextTick + computeTickPeriod(hosted_), now - kMaxCatchUp);
   return true;
 }
 

@@ -139,7 +139,7 @@ std::vector<std::uint32_t> findCandidates(const PlacedConvex& body, const Triang
                                                 std::numeric_limits<double>::infinity(), budget);
   const double magnitude = 1 + box.min.cwiseAbs().maxCoeff() + box.max.cwiseAbs().maxCoeff();
   std::vector<std::uint32_t> candidates;
-  tree.query(inflated(box, nearest.separation.distance * (1 + 1e-9) + 1e-12 * magnitude),
+  tree.query(inflate(box, nearest.separation.distance * (1 + 1e-9) + 1e-12 * magnitude),
              candidates);
   for (std::uint32_t& candidate : candidates) candidate = tree.inputIndex(candidate);
   std::sort(candidates.begin(), candidates.end());

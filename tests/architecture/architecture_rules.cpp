@@ -64,6 +64,7 @@ const std::vector<std::string> kRooms{
     "scene/navigation/mesh",
     "scene/navigation/walk",
     "scene/navigation",
+    "render/camera",
     "render",
     "render/image",
     "render/culling",
@@ -556,6 +557,35 @@ Faults findNounFunctions(const Sources& sources) {
         faults.push_back(formatPlace(name, number) + ": " + (*it)[1].str() +
                          "(); name it by a verb, as get.., find.., compute.. or make..");
     });
+  }
+  return faults;
+}
+
+Faults findBodyKindsLeftOut(const Sources& sources) {
+  struct Place {
+    const char* path;
+    const char* before;  ///< the kind's name, as a regular expression
+    const char* after;
+  };
+  static constexpr Place places[] = {
+      {"protocol/enfilade.proto", R"(string kind = \d+; +//[^\n]*")", "\""},
+      {"scene/import/bodies/SIDECAR.md", R"(\n\| `)", "` \\|"},
+      {"server/page/src/panels/pick.ts", R"(\n  )", ": "},
+  };
+  static const std::regex row(R"re(\.name = "([a-z]+)")re");
+  const auto table = sources.find("scene/model/body_spec.hpp");
+  if (table == sources.end()) return {};
+  Faults faults;
+  for (std::sregex_iterator it(table->second.begin(), table->second.end(), row), end; it != end;
+       ++it) {
+    const std::string kind = (*it)[1].str();
+    for (const Place& place : places) {
+      const auto file = sources.find(place.path);
+      const bool isThere =
+          file != sources.end() &&
+          std::regex_search(file->second, std::regex(place.before + kind + place.after));
+      if (!isThere) faults.push_back(std::string(place.path) + ": no body kind \"" + kind + '"');
+    }
   }
   return faults;
 }

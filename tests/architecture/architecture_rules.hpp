@@ -70,6 +70,10 @@ Faults findLongSentences(const Sources& sources, int maxWords);
 /// Comments count.
 Faults findNounFunctions(const Sources& sources);
 
+/// Each row of the table of body kinds is in the schema, in SIDECAR.md and among the page's
+/// commands, which no compiler compares with the table.
+Faults findBodyKindsLeftOut(const Sources& sources);
+
 /// Each kind of diagnostic that scene/ reports is in scene/model/diagnostic_catalog.cpp.
 Faults findUnexplainedDiagnostics(const Sources& sources);
 

@@ -101,6 +101,13 @@ TEST(Architecture, NothingIsLeftUnfinished) {
   EXPECT_EQ(faults, Faults{}) << listFaults(faults);
 }
 
+TEST(Architecture, EveryBodyKindIsDocumentedAndHasCommands) {
+  EXPECT_NE(getRepository().at("scene/model/body_spec.hpp").find(".name = \"hinged\""),
+            std::string::npos);
+  const Faults faults = findBodyKindsLeftOut(getRepository());
+  EXPECT_EQ(faults, Faults{}) << listFaults(faults);
+}
+
 TEST(Architecture, EveryDiagnosticHasAMeaning) {
   const Faults faults = findUnexplainedDiagnostics(getRepository());
   EXPECT_EQ(faults, Faults{}) << listFaults(faults);
@@ -180,6 +187,17 @@ TEST(ArchitectureRules, ADiagnosticWithoutMeaningIsAFault) {
       (Faults{
           "scene/import/three.cpp:1: \"no_sense\" is not in scene/model/diagnostic_catalog.cpp",
           "scene/import/two.cpp:1: \"no_words\" is not in scene/model/diagnostic_catalog.cpp"}));
+}
+
+TEST(ArchitectureRules, ABodyKindThatAFileLeavesOutIsAFault) {
+  const Sources sources{
+      {"scene/model/body_spec.hpp", "return {.name = \"gate\"};\nreturn {.name = \"crane\"};\n"},
+      {"protocol/enfilade.proto", "  string kind = 3;  // \"gate\" or \"crane\"\n"},
+      {"scene/import/bodies/SIDECAR.md", "A `crane`:\n| `gate` | axis |\n"},
+      {"server/page/src/panels/pick.ts", "{\n  crane: [],\n};\n"}};
+  EXPECT_EQ(findBodyKindsLeftOut(sources),
+            (Faults{"server/page/src/panels/pick.ts: no body kind \"gate\"",
+                    "scene/import/bodies/SIDECAR.md: no body kind \"crane\""}));
 }
 
 TEST(ArchitectureRules, ASourceWithoutHeaderIsAFault) {

@@ -40,7 +40,7 @@ class RecomputeUpdate : public BoxUpdate {
       for (const Vec3& v : hull_.vertices)
         box.include(Vec3(poses[k].rotation * v + poses[k].translation));
       const double extent = 2 * hull_.radius + poses[k].translation.cwiseAbs().maxCoeff();
-      boxes[k] = collision::inflated(box, 0x1p-49 * extent);
+      boxes[k] = collision::inflate(box, 0x1p-49 * extent);
     }
     looked_ += poses.size() * hull_.vertices.size();
   }

@@ -46,7 +46,7 @@ class PairTruth {
     PairTally tally;
     for (std::uint32_t a = 0; a < dynamicBoxes.size(); ++a) {
       if (!collision::contains(reach_[a], dynamicBoxes[a]))
-        gather(a, collision::inflated(dynamicBoxes[a], 1));
+        gather(a, collision::inflate(dynamicBoxes[a], 1));
       for (const std::uint32_t s : candidates_[a]) {
         if (collision::overlaps(dynamicBoxes[a], staticBoxes_[s])) tally.addStaticPair(a, s);
       }

@@ -4,7 +4,7 @@
 
 #include <limits>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "render/gl/egl_context.hpp"
 #include "render/gl/gl_objects.hpp"
 

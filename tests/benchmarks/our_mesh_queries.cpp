@@ -31,7 +31,7 @@ class OurMeshQuery : public MeshQuery {
     Aabb box;
     for (const Vec3& vertex : body.vertices) box.include(at.rotation * vertex + at.translation);
     near_.clear();
-    mesh_.query(inflated(box, 1e-9), near_);  // more than the rounding of the box
+    mesh_.query(inflate(box, 1e-9), near_);  // more than the rounding of the box
     for (const std::uint32_t i : near_) {
       FeatureCache cold;
       const auto separation = computeSeparationWithin(body, getTriangle(i), 0, cold);

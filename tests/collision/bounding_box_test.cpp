@@ -251,7 +251,7 @@ TEST(BoxesWithClearance, HoldTheExactBoxGrownByItWhateverTheSizes) {
     const double slack = 0x1p-44 * (hull.radius + pose.translation.norm() + clearance);
     EXPECT_LE((box.max - tight.max).maxCoeff(), clearance + slack);
     // Adding the clearance to the tight box with rounding to nearest is not sufficient.
-    rounded += contains(inflated(tight, clearance), box) ? 0 : 1;
+    rounded += contains(inflate(tight, clearance), box) ? 0 : 1;
   }
   EXPECT_GT(rounded, 10);
 }

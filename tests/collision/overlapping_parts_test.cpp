@@ -37,7 +37,7 @@ struct Placed {
     for (const auto& part : of.parts) {
       Aabb box;
       for (const Vec3& v : part) box.include(Vec3(rotation * v + translation));
-      boxes.push_back(inflated(box, margin));
+      boxes.push_back(inflate(box, margin));
     }
   }
   PartBounds getBounds() const { return {view, boxes, margin}; }

@@ -23,7 +23,7 @@ TEST(TriangleTree, EqualsBruteForce) {
     ASSERT_EQ(tree.triangles().size(), size);
     std::size_t hits = 0;
     for (int q = 0; q < 50; ++q) {
-      const Aabb box = inflated(Aabb{Vec3::Zero(), Vec3::Zero()}, drawUniform(random, 0, 4));
+      const Aabb box = inflate(Aabb{Vec3::Zero(), Vec3::Zero()}, drawUniform(random, 0, 4));
       const Vec3 at = makeRandomPoint(random, 8);
       const Aabb query{box.min + at, box.max + at};
       std::vector<std::uint32_t> found, expected;

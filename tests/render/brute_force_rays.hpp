@@ -6,7 +6,7 @@
 #include <limits>
 #include <vector>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "scene/world/data/scene.hpp"
 
 namespace enfilade::render {

@@ -1,5 +1,5 @@
 // Fisheye and equirectangular frames against closed formulas and rays in double precision.
-#include "render/lens.hpp"
+#include "render/camera/lens.hpp"
 
 #include <gtest/gtest.h>
 

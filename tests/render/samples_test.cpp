@@ -1,12 +1,12 @@
 // Tests of several samples a pixel, against pictures of eight times the size.
-#include "render/samples.hpp"
+#include "render/camera/samples.hpp"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
 
-#include "render/lens.hpp"
+#include "render/camera/lens.hpp"
 #include "render/raytrace/ray_renderer.hpp"
 #include "render/renderer_kind.hpp"
 #include "tests/render/render_fixtures.hpp"

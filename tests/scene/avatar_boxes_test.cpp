@@ -125,7 +125,7 @@ TEST(AvatarBoxes, OfTurningPartsAreMadeByTheExtremalVerticesOfTheLastTick) {
       Aabb exact;
       for (const Vec3& v : part.hull->vertices) exact.include(part.rotation * v);
       EXPECT_TRUE(contains(part.box, exact));
-      EXPECT_TRUE(contains(inflated(exact, 1e-13), part.box)) << "larger by the rounding alone";
+      EXPECT_TRUE(contains(inflate(exact, 1e-13), part.box)) << "larger by the rounding alone";
     }
   }
 }

@@ -75,7 +75,7 @@ TEST(BodyBoxes, ContainEveryVertexAndTheBoxesOfTheParts) {
     const Body& body = t.world.data().bodies[0];
     for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
       const Aabb box = getPartBox(body, part);
-      EXPECT_TRUE(contains(inflated(body.boxes.whole, 1e-12), box));
+      EXPECT_TRUE(contains(inflate(body.boxes.whole, 1e-12), box));
       for (const Vec3& v : body.shape->parts[part].vertices) {
         const Vec3 at = body.rotation * v + body.position;
         EXPECT_TRUE(contains(box, Aabb{at, at})) << "tick " << i << " part " << part;

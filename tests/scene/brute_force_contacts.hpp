@@ -17,7 +17,7 @@ inline bool isObjectCloser(const Scene& scene, std::uint32_t object, const Avata
   const CollisionGeometry& geometry = scene.collisionGeometry(object);
   for (const AvatarPart& part : avatar.shape->parts) {
     const collision::PlacedConvex body = placeAvatarPart(part, avatar.footPosition);
-    const Aabb box = inflated(placeBox(part.box, avatar.footPosition), 2 * limit);
+    const Aabb box = inflate(placeBox(part.box, avatar.footPosition), 2 * limit);
     for (std::uint32_t i = 0; i < geometry.size(); ++i) {
       collision::FeatureCache cold;
       if (overlaps(box, geometry.box(i)) &&

@@ -50,8 +50,8 @@ std::vector<PartPairKey> findPairsByDoubleLoop(const WorldData& world) {
   const std::vector<Aabb>&a = world.bodies[0].boxes.parts, &b = world.bodies[1].boxes.parts;
   for (std::uint32_t i = 0; i < a.size(); ++i)
     for (std::uint32_t k = 0; k < b.size(); ++k)
-      if (overlaps(inflated(a[i], margin + bodies[0].maxStepDisplacement),
-                   inflated(b[k], margin + bodies[1].maxStepDisplacement)))
+      if (overlaps(inflate(a[i], margin + bodies[0].maxStepDisplacement),
+                   inflate(b[k], margin + bodies[1].maxStepDisplacement)))
         keys.push_back({0, 1, i, k});
   return keys;
 }
@@ -131,14 +131,14 @@ TEST(CandidatePairs, WithAMeshAndWithAKinematicBodyEqualTheDoubleLoop) {
       if (other == sliding.id) withKinematic.push_back({0, 0, key.partA, key.partB});
     }
     for (std::uint32_t part = 0; part < kParts; ++part) {
-      const Aabb box = inflated(getPartBox(falling, part), margin + physics[0].maxStepDisplacement);
+      const Aabb box = inflate(getPartBox(falling, part), margin + physics[0].maxStepDisplacement);
       for (std::uint32_t i = 0; i < mesh.size(); ++i)
         if (overlaps(mesh.box(i), falling.motionBounds) && overlaps(mesh.box(i), box))
           expectedMesh.push_back({0, 0, part, i});
       if (!overlaps(falling.motionBounds, sliding.motionBounds)) continue;
       for (std::uint32_t i = 0; i < kParts; ++i)
-        if (overlaps(inflated(getPartBox(sliding, i),
-                              margin + 2 * sliding.kinematicTarget.maxDisplacement),
+        if (overlaps(inflate(getPartBox(sliding, i),
+                             margin + 2 * sliding.kinematicTarget.maxDisplacement),
                      box))
           expectedKinematic.push_back({0, 0, part, i});
     }

@@ -56,7 +56,7 @@ TEST(ImportFailures, AnUnknownExtensionListsTheKnownOnes) {
   const TemporaryFolder folder;
   const std::string text = catchFailure(folder.write("house.skp", "x"));
   EXPECT_TRUE(contains(text, "'.skp'"));
-  for (const std::string_view known : importableExtensions()) {
+  for (const std::string_view known : listImportableExtensions()) {
     EXPECT_TRUE(contains(text, std::string(known))) << known;
   }
 }

@@ -226,7 +226,7 @@ TEST(ImportSharedScenesTogether, TheTableNamesEveryModelThatIsThere) {
   for (const Expected& expected : kScenes) named.insert(expected.file);
   const auto root = *shared / "scenes";
   for (const auto& entry : std::filesystem::recursive_directory_iterator(root)) {
-    const auto known = importableExtensions();
+    const auto known = listImportableExtensions();
     const std::string extension = entry.path().extension().string();
     if (std::find(known.begin(), known.end(), extension) == known.end()) continue;
     there.insert(entry.path().lexically_relative(root).generic_string());
@@ -257,7 +257,7 @@ TEST(ImportSharedScenesTogether, ElectricalFixturesInFeetLieInsideTheirBuilding)
   const auto folder = *shared / "scenes/duplex";
   const Scene house(importShared(folder / "Duplex_A_20110907.ifc", kPlus));
   const Scene fixtures(importShared(folder / "Duplex_Electrical_20121207.ifc", kPlus));
-  const Aabb room = inflated(house.bounds(), 0.2);
+  const Aabb room = inflate(house.bounds(), 0.2);
   EXPECT_TRUE((fixtures.bounds().min.array() >= room.min.array()).all());
   EXPECT_TRUE((fixtures.bounds().max.array() <= room.max.array()).all());
 }

@@ -117,12 +117,12 @@ inline int countPenetrations(const World& world) {
   for (std::size_t i = 0; i < avatars.size(); ++i) {
     for (const AvatarPart& part : avatars[i].shape->parts) {
       const collision::PlacedConvex body = placeAvatarPart(part, avatars[i].footPosition);
-      const Aabb box = inflated(placeBox(part.box, avatars[i].footPosition), 1e-9);
+      const Aabb box = inflate(placeBox(part.box, avatars[i].footPosition), 1e-9);
       for (const auto& [otherBox, other] : still) check(body, box, other, otherBox);
       for (std::size_t k = i + 1; k < avatars.size(); ++k)
         for (const AvatarPart& other : avatars[k].shape->parts)
           check(body, box, placeAvatarPart(other, avatars[k].footPosition),
-                inflated(placeBox(other.box, avatars[k].footPosition), 1e-9));
+                inflate(placeBox(other.box, avatars[k].footPosition), 1e-9));
     }
   }
   return found;

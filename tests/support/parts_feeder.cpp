@@ -164,7 +164,7 @@ Feeder::Feeder(const FeederPlan& plan, int threads)
   boxes_.resize(dynamics_.bodies.size());
   for (std::uint32_t i = 0; i < trayHulls.size(); ++i) {
     const double moves = 2 * (plan.amplitude + plan.sidewards) + 2 * settings_.solver.contactOffset;
-    broadPhase_.insert(inflated(Aabb{plan.tray[i][0], plan.tray[i][1]}, moves));
+    broadPhase_.insert(inflate(Aabb{plan.tray[i][0], plan.tray[i][1]}, moves));
   }
   for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i)
     partProxies_.push_back(broadPhase_.insert({Vec3::Zero(), Vec3::Zero()}));
@@ -191,7 +191,7 @@ void Feeder::moveBoxes(double lookout) {
   });
   for (std::size_t i = 1; i < dynamics_.bodies.size(); ++i) {
     if (contains(boxes_[i], needed_[i])) continue;
-    boxes_[i] = inflated(needed_[i], kSpareBox);
+    boxes_[i] = inflate(needed_[i], kSpareBox);
     broadPhase_.move(partProxies_[i - 1], boxes_[i]);
   }
   broadPhase_.update();

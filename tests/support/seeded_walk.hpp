@@ -9,7 +9,7 @@
 #include <random>
 #include <vector>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "scene/world/world.hpp"
 
 namespace enfilade::tests {

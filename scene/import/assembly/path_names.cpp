@@ -9,7 +9,7 @@ namespace enfilade::scene {
 namespace {
 
 /// Length in bytes of the UTF-8 sequence at `i`; 0 if it is invalid.
-std::size_t utf8SequenceLength(std::string_view text, std::size_t i) {
+std::size_t getUtf8SequenceLength(std::string_view text, std::size_t i) {
   const auto byte = [&](std::size_t k) { return static_cast<unsigned char>(text[k]); };
   const unsigned char first = byte(i);
   if (first < 0x80) return 1;
@@ -72,7 +72,7 @@ std::string encodePathSegment(std::string_view name) {
   std::string result;
   for (std::size_t i = 0; i < name.size();) {
     const auto c = static_cast<unsigned char>(name[i]);
-    const std::size_t length = utf8SequenceLength(name, i);
+    const std::size_t length = getUtf8SequenceLength(name, i);
     const bool isControl =
         c < 0x20 || c == 0x7f || (c == 0xc2 && length == 2 && (name[i + 1] & 0x20) == 0);
     if (length == 0 || isControl || c == '/' || c == '%') {
@@ -96,7 +96,7 @@ std::size_t decodeOtherBytes(std::string& text) {
     std::uint64_t eight = kHighBits;
     if (i + sizeof eight <= text.size()) std::memcpy(&eight, text.data() + i, sizeof eight);
     const bool ascii = (eight & kHighBits) == 0;
-    const std::size_t length = ascii ? sizeof eight : utf8SequenceLength(text, i);
+    const std::size_t length = ascii ? sizeof eight : getUtf8SequenceLength(text, i);
     if (length == 0) {
       repaired.append(text, copied, i - copied);
       appendUtf8(repaired, decodeWindows1252(static_cast<unsigned char>(text[i])));

@@ -40,7 +40,7 @@ constexpr const char* kTemporaryExtension = ".unfinished";
 constexpr auto kTemporaryLifetime =
     std::chrono::hours(1);  // a temporary file this old is abandoned
 
-double secondsSince(Clock::time_point start) {
+double measureSecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
@@ -99,7 +99,7 @@ std::optional<ContentHash> computeKey(const fs::path& file, const ImportOptions&
 }
 
 /// Fingerprints a dependency. A relative path is relative to the model's folder.
-Dependency fingerprint(const fs::path& file, const std::string& path) {
+Dependency computeFingerprint(const fs::path& file, const std::string& path) {
   const auto content = computeFileVersion(file.parent_path() / path);
   return {path, content.has_value(), content.value_or(ContentHash{})};
 }
@@ -119,7 +119,7 @@ std::vector<Dependency> listDependencies(const fs::path& file, const Model& mode
   paths.erase(std::unique(paths.begin(), paths.end()), paths.end());
   std::erase(paths, file.filename().string());
   std::vector<Dependency> files;
-  for (const std::string& path : paths) files.push_back(fingerprint(file, path));
+  for (const std::string& path : paths) files.push_back(computeFingerprint(file, path));
   return files;
 }
 
@@ -165,7 +165,7 @@ std::optional<CacheEntry> findEntry(const fs::path& file, const fs::path& path,
     if (!(entry.key == key)) throw ModelStreamError("cache entry: belongs to another file");
     const bool same = std::all_of(entry.dependencies.begin(), entry.dependencies.end(),
                                   [&](const Dependency& dependency) {
-                                    return fingerprint(file, dependency.path) == dependency;
+                                    return computeFingerprint(file, dependency.path) == dependency;
                                   });
     if (!same) return std::nullopt;
     utimensat(AT_FDCWD, path.c_str(), nullptr, 0);  // marks it as recently used
@@ -267,7 +267,7 @@ LoadedModel importUncached(const fs::path& file, const ImportOptions& options,
   LoadedModel loaded;
   loaded.model = importModel(file, options, progress);
   deduplicateMeshes(loaded.model);
-  loaded.importSeconds = secondsSince(start);
+  loaded.importSeconds = measureSecondsSince(start);
   return loaded;
 }
 
@@ -311,7 +311,7 @@ LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
   LoadedModel loaded;
   if (!key) {
     loaded = importUncached(file, options, progress);
-    loaded.loadSeconds = secondsSince(start);
+    loaded.loadSeconds = measureSecondsSince(start);
     return loaded;
   }
   const fs::path path = cache->folder / (toHex(*key) + kModelExtension);
@@ -333,7 +333,7 @@ LoadedModel loadModel(const fs::path& file, const ImportOptions& options,
     }
   }
   loaded.notes = std::move(notes);
-  loaded.loadSeconds = secondsSince(start);
+  loaded.loadSeconds = measureSecondsSince(start);
   return loaded;
 }
 

@@ -25,7 +25,7 @@ std::optional<ModelFormat> detectModelFormat(const std::filesystem::path& file) 
   return kFormats[static_cast<std::size_t>(known - kExtensions.begin())];
 }
 
-std::span<const std::string_view> importableExtensions() {
+std::span<const std::string_view> listImportableExtensions() {
   return kExtensions;
 }
 

@@ -21,7 +21,7 @@ enum class ModelFormat : std::uint8_t { gltf, glb, obj, collada, fbx, ifc, ply, 
 std::optional<ModelFormat> detectModelFormat(const std::filesystem::path& file);
 
 /// Returns the extensions that importModel() accepts, lower case, with the dot.
-std::span<const std::string_view> importableExtensions();
+std::span<const std::string_view> listImportableExtensions();
 
 /// Statements of a model file about its coordinates.
 struct FileMetadata {

@@ -91,7 +91,7 @@ std::vector<double> readMorphWeights(const Json& node, const Json& mesh) {
   return isNeutral ? std::vector<double>{} : weights;
 }
 
-Eigen::Vector3d vectorAt(const std::vector<float>& values, std::size_t vertex) {
+Eigen::Vector3d getVector(const std::vector<float>& values, std::size_t vertex) {
   return Eigen::Map<const Eigen::Vector3f>(values.data() + 3 * vertex).cast<double>();
 }
 
@@ -220,10 +220,10 @@ void applySkin(const RestPose& pose, GltfBuffers& buffers, const std::string& na
     const double sum = blended[v](3, 3);  // of the weights; rounded ones rarely add up to 1
     const Affine3d transform(sum > 0 ? Eigen::Matrix4d(blended[v] / sum)
                                      : pose.nodeFromJoint.front().matrix());
-    setVector(positions, v, transform * vectorAt(positions, v));
+    setVector(positions, v, transform * getVector(positions, v));
     if (normals != arrays.end() && normals->second.size() == positions.size())
       setVector(normals->second, v,
-                transformNormal(transform.linear(), vectorAt(normals->second, v)));
+                transformNormal(transform.linear(), getVector(normals->second, v)));
   }
 }
 

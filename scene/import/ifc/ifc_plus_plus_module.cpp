@@ -22,7 +22,7 @@ using CarveFace = carve::mesh::Face<3>;
 constexpr std::size_t kTriangleCorners = 3;  // of a triangulated face
 
 /// From the file's Z up to Y up.
-Eigen::Affine3d yUpFromZUp() {
+Eigen::Affine3d convertZUpToYUp() {
   Eigen::Matrix3d rotation;
   rotation << 1, 0, 0, 0, 0, 1, 0, -1, 0;
   return Eigen::Affine3d(rotation);
@@ -79,7 +79,7 @@ class ItemTriangles {
     IfcPlacedGeometry placed;
     placed.geometry = id;
     placed.colour = colour;
-    placed.worldFromGeometry = yUpFromZUp() * fileFromProduct * Eigen::Translation3d(centre);
+    placed.worldFromGeometry = convertZUpToYUp() * fileFromProduct * Eigen::Translation3d(centre);
     return placed;
   }
 

@@ -73,7 +73,7 @@ bool intersectsSegment(const Vec3& from, const Vec3& displacement, const Corners
 std::vector<Corners> collectNearbyTriangles(const Model& model,
                                             const std::vector<const Object*>& hosts,
                                             const OpeningFrame& frame) {
-  const Aabb searchBox = inflated(frame.box, kRayMargin);
+  const Aabb searchBox = inflate(frame.box, kRayMargin);
   std::vector<Corners> nearby;
   for (const Object* host : hosts) {
     const Eigen::Affine3d frameFromMesh = computeFrameFromMesh(frame, *host);
@@ -165,7 +165,7 @@ std::vector<const Object*> findSurroundingWalls(const Model& model, const std::v
   const Vec3 margin = (0.25 * frame.box.size()).cwiseMin(kMaxWallOverlap);
   const Aabb inner{frame.box.min + margin, frame.box.max - margin};
   const Vec3 middle = frame.worldFromFrame * inner.centre();
-  const Aabb inWorld = inflated(Aabb{middle, middle}, 0.5 * inner.size().norm());
+  const Aabb inWorld = inflate(Aabb{middle, middle}, 0.5 * inner.size().norm());
   const auto isOverlapping = [](const Aabb& box, const Aabb& other) {
     return !box.empty() && collision::overlaps(box, other);
   };

@@ -262,7 +262,7 @@ class MessageBuffer {
   std::size_t begin_ = 0, end_ = 0, capacity_ = 0;
 };
 
-double secondsSince(Clock::time_point start) {
+double measureSecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
@@ -275,8 +275,8 @@ ImportExit::Reason receiveMessages(int readEnd, const ImportRequest& request,
   MessageBuffer messages(request.options.memoryLimit > 0 ? request.options.memoryLimit
                                                          : std::numeric_limits<std::size_t>::max());
   for (;;) {  // ends with the time limit at the latest
-    const double left = request.options.timeLimit - secondsSince(start);
-    const double stallTime = stallLimit() - secondsSince(lastMessage);
+    const double left = request.options.timeLimit - measureSecondsSince(start);
+    const double stallTime = stallLimit() - measureSecondsSince(lastMessage);
     if (!(left > 0)) return ImportExit::Reason::timeLimit;
     if (!(stallTime > 0)) return ImportExit::Reason::stallLimit;
     const double wait = std::min({left, stallTime, kMaxPollWait});

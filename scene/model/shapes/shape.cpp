@@ -98,7 +98,7 @@ std::vector<Corners> cleanTriangles(const std::vector<Index>& corners, Shape& sh
 }
 
 /// Ascending corners, then triangles: a counting sort by the lower corner, each bucket sorted.
-std::vector<EdgeUse> sortedEdges(const std::vector<Corners>& triangles, std::size_t vertexCount) {
+std::vector<EdgeUse> sortEdges(const std::vector<Corners>& triangles, std::size_t vertexCount) {
   std::vector<Index> end(vertexCount + 1);
   const auto forEachEdge = [&](const auto& visit) {
     for (Index t = 0; t < triangles.size(); ++t) {
@@ -140,7 +140,7 @@ int findEdgeSlot(const Corners& t, const EdgeUse& edge) {
 
 std::vector<Neighbours> linkNeighbours(const std::vector<Corners>& triangles, Shape& shape) {
   std::vector<Neighbours> links(triangles.size());
-  const std::vector<EdgeUse> edges = sortedEdges(triangles, shape.vertices.size());
+  const std::vector<EdgeUse> edges = sortEdges(triangles, shape.vertices.size());
   for (auto first = edges.begin(); first != edges.end();) {
     const auto last = std::find_if(
         first, edges.end(), [&](const EdgeUse& e) { return e.corners() != first->corners(); });
@@ -265,7 +265,7 @@ void findCavities(Shape& shape) {
 }  // namespace
 
 bool hasExactArea(const Eigen::Vector3f& a, const Eigen::Vector3f& b, const Eigen::Vector3f& c) {
-  return !collision::collinear(a.cast<double>(), b.cast<double>(), c.cast<double>());
+  return !collision::areCollinear(a.cast<double>(), b.cast<double>(), c.cast<double>());
 }
 
 std::vector<Index> collectVertices(const Shape& shape, std::span<const Shell> shells) {

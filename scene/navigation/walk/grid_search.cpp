@@ -168,7 +168,7 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
   Aabb window;
   window.include(from);
   window.include(to);
-  const Target end{inflated(window, search.margin),
+  const Target end{inflate(window, search.margin),
                    [&](const Vec3& at) { return computeGroundDistance(at, to); },
                    [&](const Vec3& at) {
                      return computeGroundDistance(at, to) < 1.5 * search.spacing &&
@@ -183,7 +183,7 @@ std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, 
 std::optional<std::vector<Vec3>> findGridPathOut(Walker& walker, const Vec3& from,
                                                  const PathOut& out, GridSearch& search) {
   const Target end{
-      inflated(Aabb{from, from}, search.margin),
+      inflate(Aabb{from, from}, search.margin),
       [&](const Vec3& at) { return out.toward ? computeGroundDistance(*out.toward, at) : 0.0; },
       out.isWanted, out.isOpen};
   return searchGrid(walker, from, end, search);

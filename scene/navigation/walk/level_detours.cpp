@@ -89,8 +89,8 @@ bool isKnown(const BumpList& known, const Vec3& before, const Vec3& after) {
 }
 
 /// A part of a path with a way around a bump from `first` to `last`; empty: none is shorter.
-std::vector<Vec3> levelPart(Walker& walker, const std::vector<Vec3>& part, const Sample& first,
-                            const Sample& last, std::size_t& maxWalks) {
+std::vector<Vec3> findLevelPart(Walker& walker, const std::vector<Vec3>& part, const Sample& first,
+                                const Sample& last, std::size_t& maxWalks) {
   const double length = measureLength(walker, part);
   for (GridSearch grid : {kCoarseAround, kFineAround}) {
     const std::size_t walks = grid.maxWalks = std::min(grid.maxWalks, maxWalks);
@@ -135,7 +135,7 @@ BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& se
     std::vector<Vec3> part{level.back()};
     for (std::size_t k = next; k < last.nextPlace; ++k) part.push_back(places[k]);
     part.push_back(last.footPosition);
-    const std::vector<Vec3> around = levelPart(walker, part, first, last, search.maxWalks);
+    const std::vector<Vec3> around = findLevelPart(walker, part, first, last, search.maxWalks);
     if (around.empty()) {
       search.known.push_back(ends);
       continue;

@@ -45,7 +45,7 @@ class FloorProbe {
     Aabb box{from.cwiseMin(to), from.cwiseMax(to)};
     box.min.y() -= down_;
     box.max.y() += up_;
-    ObstacleSet obstacles = collectObstaclesInBox(world_, inflated(box, kFloorSpacing), 0);
+    ObstacleSet obstacles = collectObstaclesInBox(world_, inflate(box, kFloorSpacing), 0);
     for (int i = 0; i < count; ++i) {
       const double fraction = static_cast<double>(i) / count;
       measurePlace(from + fraction * (to - from), along_ + fraction * length, obstacles);

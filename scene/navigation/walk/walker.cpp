@@ -238,7 +238,7 @@ bool Walker::isRideFree(const Vec3& from, const Vec3& to, EntityId body) {
     for (const Vec3& corner : {shape_->box.min, shape_->box.max})
       swept.include(footPosition + corner);
   ObstacleSet obstacles =
-      collectObstaclesInBox(world_, inflated(swept, 2 * world_.settings.contactOffset), 0);
+      collectObstaclesInBox(world_, inflate(swept, 2 * world_.settings.contactOffset), 0);
   std::erase_if(obstacles.list, [&](const Obstacle& one) { return one.entity == body; });
   std::erase_if(obstacles.dense, [&](const DenseObject& one) { return one.entity == body; });
   return castAvatarShape(*shape_, from, to - from, obstacles, makeContactOffset(world_.settings),

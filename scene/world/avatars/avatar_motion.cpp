@@ -266,7 +266,7 @@ Aabb computeMotionBounds(const WorldSettings& settings, const Avatar& avatar) {
   Aabb box = placeBox(avatar.shape->box, avatar.footPosition);
   box.min -= Vec3(across, across + std::max(settings.stepHeight, down), across);
   box.max += Vec3(across, across + std::max(settings.stepHeight, down), across);
-  return inflated(box, margin);
+  return inflate(box, margin);
 }
 
 void moveAvatar(const WorldData& world, Avatar& avatar, QueryCount& count) {

@@ -37,7 +37,7 @@ void setPrismHeight(WorldData& world, Avatar& avatar, std::shared_ptr<const Avat
 EntityId findBlockingEntity(OrderContext& context, const AvatarShape& shape) {
   const Avatar& avatar = *context.findAvatar();
   const double clearance = kHeadroomFraction * context.world.settings.contactOffset;
-  const Aabb box = inflated(placeBox(shape.box, avatar.footPosition), 2 * clearance);
+  const Aabb box = inflate(placeBox(shape.box, avatar.footPosition), 2 * clearance);
   ObstacleSet obstacles = collectObstaclesInBox(context.world, box, avatar.id);
   EntityId nearest = 0;
   return isClear(shape, avatar.footPosition, clearance, obstacles, context.count, nearest)

@@ -91,8 +91,8 @@ class ChainMotion {
     Aabb box;
     for (std::size_t part = 0; part < avatar_.shape->parts.size(); ++part)
       if ((step.movedParts >> part & 1) != 0) box.include(avatar_.shape->parts[part].box);
-    return inflated(placeBox(box, avatar_.footPosition),
-                    displacement_ + step.maxDisplacement + 2 * settings_.contactOffset);
+    return inflate(placeBox(box, avatar_.footPosition),
+                   displacement_ + step.maxDisplacement + 2 * settings_.contactOffset);
   }
 
   RigidStepHit castStep(const RigidStep& step) {

@@ -349,7 +349,7 @@ std::string describeOutOfScene(const WorldData& world, const Avatar& avatar) {
   const Aabb& bounds = world.scene->bounds();
   if (avatar.footPosition.y() < bounds.min.y() - kMaxAvatarDepthBelowScene)
     return "fell out of the scene";
-  if (!contains(inflated(bounds, kMaxAvatarDistanceOutside),
+  if (!contains(inflate(bounds, kMaxAvatarDistanceOutside),
                 {avatar.footPosition, avatar.footPosition}))
     return "is " + formatShortNumber(kMaxAvatarDistanceOutside) + " m out of the scene";
   return "";

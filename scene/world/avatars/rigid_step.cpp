@@ -31,7 +31,7 @@ struct StepCaster {
 
   bool reaches(const AvatarPart& part, const Aabb& box) const {
     const double margin = step.maxDisplacement * hit.fraction + contactOffset.rest;
-    return overlaps(inflated(placeBox(part.box, avatar.footPosition), margin), box);
+    return overlaps(inflate(placeBox(part.box, avatar.footPosition), margin), box);
   }
 
   void castAgainst(std::size_t part, const Aabb& otherBox, EntityId entity,

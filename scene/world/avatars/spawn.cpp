@@ -54,7 +54,8 @@ FloorHit findFloorBelow(PlacementSearch& search, const Avatar& avatar) {
   const double depth = avatar.footPosition.y() - world.scene->bounds().min.y() + kFloorMargin;
   if (!(depth > 0)) return {};
   const Vec3 down{0, -depth, 0};
-  const Aabb column = collision::sweptAabb(placeBox(avatar.shape->box, avatar.footPosition), down);
+  const Aabb column =
+      collision::computeSweptAabb(placeBox(avatar.shape->box, avatar.footPosition), down);
   ObstacleSet obstacles = collectObstaclesInBox(world, column, avatar.id);
   const double contactOffset = world.settings.contactOffset;
   const ShapeCastHit hit = castAvatarShape(*avatar.shape, avatar.footPosition, down, obstacles,
@@ -90,8 +91,8 @@ std::optional<std::string> tryPlacement(PlacementSearch& search, const Vec3& at,
   const WorldData& world = search.world;
   Aabb searchBox = placeBox(avatar.shape->box, at);
   searchBox.max.y() += kTrialLifts.back();
-  ObstacleSet obstacles = collectObstaclesInBox(
-      world, inflated(searchBox, 2 * world.settings.contactOffset), avatar.id);
+  ObstacleSet obstacles =
+      collectObstaclesInBox(world, inflate(searchBox, 2 * world.settings.contactOffset), avatar.id);
   std::optional<std::string> error;
   for (const double lift : kTrialLifts) {
     avatar.footPosition = at + Vec3(0, lift, 0);

@@ -28,8 +28,8 @@ Aabb computeSwing(const Body& door) {
   const BodySpec& spec = *door.spec;
   Aabb swing = door.boxes.whole;
   if (!getTraits(spec.kind).rotates) {
-    swing.include(
-        sweptAabb(door.boxes.whole, (findOpenLimit(spec) - door.drive.jointPosition) * spec.axis));
+    swing.include(computeSweptAabb(door.boxes.whole,
+                                   (findOpenLimit(spec) - door.drive.jointPosition) * spec.axis));
     return swing;
   }
   double radius = door.shape->radius;

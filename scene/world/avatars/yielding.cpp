@@ -189,7 +189,7 @@ bool mayPassEarly(const WorldData& world, const Avatar& avatar, double distance,
   Aabb box = placeBox(avatar.shape->box, avatar.footPosition);
   box.include(placeBox(avatar.shape->box, avatar.footPosition + onward));
   ObstacleSet obstacles =
-      collectObstaclesInBox(world, inflated(box, 2 * world.settings.contactOffset), avatar.id);
+      collectObstaclesInBox(world, inflate(box, 2 * world.settings.contactOffset), avatar.id);
   std::erase_if(obstacles.list,
                 [&](const Obstacle& one) { return one.entity >= world.firstAvatarId(); });
   return castAvatarShape(*avatar.shape, avatar.footPosition, onward, obstacles,

@@ -73,7 +73,7 @@ SweptBounds computeSweptBounds(WorldData& world, ThreadPool* threadPool) {
                           if (!body.boxes.hasParts) continue;
                           for (std::uint32_t part = 0; part < getPartCount(body); ++part)
                             bounds.boxes[bounds.firstBox[i] + part] =
-                                inflated(body.boxes.parts[part], bounds.margins[i]);
+                                inflate(body.boxes.parts[part], bounds.margins[i]);
                         }
                       });
   return bounds;
@@ -219,7 +219,7 @@ struct PairCollector {
     std::vector<Aabb>& boxes = kinematicBoxes[index];
     if (boxes.empty()) {
       makePartBoxes(body);
-      for (const Aabb& box : body.boxes.parts) boxes.push_back(inflated(box, margin));
+      for (const Aabb& box : body.boxes.parts) boxes.push_back(inflate(box, margin));
     }
     addPartPairs(active, {body, ensureSceneBody(world, index), boxes, margin},
                  world.dynamicBodies.partFronts[active.physicsBody], keys);

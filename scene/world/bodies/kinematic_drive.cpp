@@ -223,8 +223,7 @@ void planKinematicMotion(WorldData& world) {
     if (body.kinematicTarget.maxDisplacement == 0 && !hadMotionBounds) continue;
     body.motionBounds = body.boxes.whole;
     if (body.kinematicTarget.maxDisplacement > 0)
-      body.motionBounds =
-          inflated(body.motionBounds, body.kinematicTarget.maxDisplacement + margin);
+      body.motionBounds = inflate(body.motionBounds, body.kinematicTarget.maxDisplacement + margin);
     world.broadPhase.move(body.proxy, body.motionBounds);
   }
 }
@@ -235,7 +234,7 @@ double computePushMargin(const WorldData& world, const Avatar& avatar) {
   // A pushed body may enter the path of another one: at most as many passes as bodies.
   for (bool more = !rest.empty(); more;) {
     more = false;
-    const Aabb within = inflated(avatar.motionBounds, room);
+    const Aabb within = inflate(avatar.motionBounds, room);
     std::erase_if(rest, [&](std::uint32_t i) {
       const Body& body = world.bodies[i];
       if (!overlaps(within, body.motionBounds)) return false;

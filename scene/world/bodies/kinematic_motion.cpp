@@ -100,8 +100,8 @@ void findFirstHit(const Body& body, const collision::ScrewMotion& motion, double
                   Avatar& avatar, const WorldData& world, FirstHit& firstHit, QueryCount& count) {
   const collision::ContactOffset contactOffset = makeContactOffset(world.settings);
   for (const AvatarPart& avatarPart : avatar.shape->parts) {
-    const Aabb box = inflated(placeBox(avatarPart.box, avatar.footPosition),
-                              contactOffset.rest + maxDisplacement);
+    const Aabb box = inflate(placeBox(avatarPart.box, avatar.footPosition),
+                             contactOffset.rest + maxDisplacement);
     for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
       if (!overlaps(box, getPartBox(body, part))) continue;
       const collision::MotionResult cast =
@@ -123,7 +123,7 @@ void findFirstCarriedHit(const CarriedBody& carried, Avatar& avatar, const World
   const collision::ScrewMotion motion{
       body.rotation, Vec3(body.position + appliedLift), {0, lift, 0}, Vec3::UnitY(), 0};
   for (const AvatarPart& avatarPart : avatar.shape->parts) {
-    Aabb box = inflated(placeBox(avatarPart.box, avatar.footPosition), contactOffset.rest + lift);
+    Aabb box = inflate(placeBox(avatarPart.box, avatar.footPosition), contactOffset.rest + lift);
     box.min -= appliedLift, box.max -= appliedLift;
     for (std::uint32_t part = 0; part < getPartCount(body); ++part) {
       if (!overlaps(box, getPartBox(body, part))) continue;

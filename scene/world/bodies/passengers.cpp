@@ -15,7 +15,7 @@ double findSteepestNormalY(const WorldData& world, const Body& a, const Body& b)
   double steepest = 0;
   const double limit = computeContactThreshold(world.settings);
   for (std::uint32_t i = 0; i < getPartCount(a); ++i) {
-    const Aabb box = inflated(getPartBox(a, i), limit);
+    const Aabb box = inflate(getPartBox(a, i), limit);
     for (std::uint32_t k = 0; k < getPartCount(b); ++k) {
       if (!overlaps(box, getPartBox(b, k))) continue;
       collision::FeatureCache cache;
@@ -82,7 +82,7 @@ Vec3 findSupportPoint(const WorldData& world, const Body& body, const Avatar& av
   const double limit = computeContactThreshold(world.settings);
   Aabb contactArea{contact.separation.pointB, contact.separation.pointB};
   for (const AvatarPart& avatarPart : avatar.shape->parts) {
-    const Aabb box = inflated(placeBox(avatarPart.box, avatar.footPosition), limit);
+    const Aabb box = inflate(placeBox(avatarPart.box, avatar.footPosition), limit);
     for (std::uint32_t i = 0; i < getPartCount(body); ++i) {
       if (!overlaps(box, getPartBox(body, i))) continue;
       const collision::PlacedConvex placedPart = placeAvatarPart(avatarPart, avatar.footPosition),

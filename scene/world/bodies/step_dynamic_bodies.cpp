@@ -154,7 +154,7 @@ std::vector<double> computeKinematicPushBounds(const WorldData& world) {
     const std::size_t pusher = pending.back();
     pending.pop_back();
     const Aabb within =
-        inflated(boxes[pusher], pushBounds[pusher] + computeContactQueryMargin(world.settings));
+        inflate(boxes[pusher], pushBounds[pusher] + computeContactQueryMargin(world.settings));
     std::erase_if(unpushed, [&](std::size_t k) {
       if (!overlaps(within, boxes[k])) return false;
       pushBounds[k] = pushBounds[pusher];
@@ -203,10 +203,10 @@ void planDynamicMotion(WorldData& world) {
         isStationary
             ? margin
             : physicsBody.maxPointSpeed() * tick + fallDistance + std::max(pushBound, extraMotion);
-    const Aabb required = inflated(body.boxes.whole, physicsBody.maxStepDisplacement + margin);
+    const Aabb required = inflate(body.boxes.whole, physicsBody.maxStepDisplacement + margin);
     if (!isStationary && contains(body.motionBounds, required)) continue;
     body.motionBounds =
-        inflated(required, std::min(kAabbMargin, kAabbMarginPerRadius * physicsBody.radius));
+        inflate(required, std::min(kAabbMargin, kAabbMarginPerRadius * physicsBody.radius));
     world.broadPhase.move(body.proxy, body.motionBounds);
   }
 }

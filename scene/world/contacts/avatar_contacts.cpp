@@ -36,7 +36,7 @@ struct CloseSearch {
               QueryCount& queryCount)
       : part(placeAvatarPart(avatarPart, footPosition)),
         distances(contactDistances),
-        box(inflated(placeBox(avatarPart.box, footPosition), contactDistances.reportLimit)),
+        box(inflate(placeBox(avatarPart.box, footPosition), contactDistances.reportLimit)),
         found(contacts),
         count(queryCount) {}
 
@@ -130,8 +130,7 @@ std::vector<Contact> findNearby(Avatar& avatar, const ContactDistances& distance
   searches.reserve(avatar.shape->parts.size());
   for (const AvatarPart& part : avatar.shape->parts)
     searches.emplace_back(part, avatar.footPosition, distances, found, count);
-  const Aabb box =
-      inflated(placeBox(avatar.shape->box, avatar.footPosition), distances.reportLimit);
+  const Aabb box = inflate(placeBox(avatar.shape->box, avatar.footPosition), distances.reportLimit);
   for (Obstacle& obstacle : avatar.obstacles.list) {
     if (!overlaps(box, obstacle.box)) continue;
     for (std::size_t i = 0; i < searches.size(); ++i) {
@@ -156,7 +155,7 @@ SeparationResult computeDenseSeparation(const Avatar& avatar, const DenseObject&
     const collision::PlacedConvex part = placeAvatarPart(avatarPart, avatar.footPosition);
     const Aabb box = placeBox(avatarPart.box, avatar.footPosition);
     const auto mayBeNearer = [&](const Aabb& other) {
-      return overlaps(inflated(box, best.distance + best.errorBound), other);
+      return overlaps(inflate(box, best.distance + best.errorBound), other);
     };
     descendParts(*object.geometry, computeCore(box), mayBeNearer, [&](std::uint32_t i) {
       if (!mayBeNearer(object.geometry->box(i))) return;

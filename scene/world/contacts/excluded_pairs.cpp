@@ -45,7 +45,7 @@ std::vector<EntityId> findExcludedPartners(const Scene& scene, std::uint32_t bod
   const auto& bodies = scene.model().bodies;
   if (!isKinematic(bodies[body].kind)) return excluded;
   const CompoundViews own = makeBodyAtStart(scene, body);
-  const Aabb searchBox = inflated(collision::computeAabb(own[0]), contact);
+  const Aabb searchBox = inflate(collision::computeAabb(own[0]), contact);
   const auto& solidObjects = scene.solidObjects();
   for (std::size_t i = 0; i < solidObjects.size(); ++i)
     if (overlaps(searchBox, scene.staticBoxes()[i]) &&

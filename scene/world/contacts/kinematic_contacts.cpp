@@ -73,7 +73,7 @@ std::vector<Aabb> computeSweptPartAabbs(const Body& body) {
 
 /// True if the two may have been closer than `within` in this tick, by AABBs.
 bool mayTouch(const WorldData& world, const EntityPair& key, double within) {
-  const Aabb sweptBox = inflated(computeSweptAabb(*findKinematicBody(world, key.first)), within);
+  const Aabb sweptBox = inflate(computeSweptAabb(*findKinematicBody(world, key.first)), within);
   if (const Body* other = findKinematicBody(world, key.second))
     return overlaps(sweptBox, computeSweptAabb(*other));
   std::vector<std::uint32_t> parts;
@@ -92,7 +92,7 @@ PartPairs findPartPairsInRange(const WorldData& world, const EntityPair& key, do
   PartPairs pairs;
   std::vector<std::uint32_t> candidates;
   for (std::uint32_t part = 0; part < sweptBoxes.size(); ++part) {
-    const Aabb sweptBox = inflated(sweptBoxes[part], within);
+    const Aabb sweptBox = inflate(sweptBoxes[part], within);
     candidates.clear();
     if (!other) {
       world.scene->collisionGeometry(key.second - 1).query(sweptBox, candidates);

@@ -159,7 +159,7 @@ class PartCast {
 
  private:
   void updateSweptBox() {
-    sweptBox_ = inflated(collision::sweptAabb(start_, rest_), contactOffset_.rest);
+    sweptBox_ = inflate(collision::computeSweptAabb(start_, rest_), contactOffset_.rest);
   }
 
   const collision::PlacedConvex part_;
@@ -199,7 +199,7 @@ ShapeCastHit castAvatarShape(const AvatarShape& shape, const Vec3& footPosition,
 bool isClear(const AvatarShape& shape, const Vec3& footPosition, double clearance,
              ObstacleSet& obstacles, QueryCount& count, EntityId& nearest) {
   for (std::uint32_t i = 0; i < shape.parts.size(); ++i) {
-    const Aabb box = inflated(placeBox(shape.parts[i].box, footPosition), clearance);
+    const Aabb box = inflate(placeBox(shape.parts[i].box, footPosition), clearance);
     const collision::PlacedConvex part = placeAvatarPart(shape.parts[i], footPosition);
     bool clear = true;
     const auto query = [&](EntityId entity, const collision::PlacedConvex& obstacle,
@@ -247,7 +247,7 @@ Aabb computeAvatarFootBounds(const WorldSettings& settings, const Avatar& avatar
   const double clearance = computeContactQueryMargin(settings) +
                            computeMaxChainDisplacement(avatar.chain, settings.tickDuration);
   const Aabb &bounds = avatar.motionBounds, &shapeBox = avatar.shape->box;
-  return inflated(Aabb{bounds.min - shapeBox.min, bounds.max - shapeBox.max}, -clearance);
+  return inflate(Aabb{bounds.min - shapeBox.min, bounds.max - shapeBox.max}, -clearance);
 }
 
 void updateObstaclePose(const WorldData& world, Obstacle& obstacle) {
@@ -292,7 +292,7 @@ void prefetchSurroundings(const WorldData& world) {
     if (!isNew && (world.tick + avatar.id) % ticksPerLook != 0) continue;
     const double distance =
         kPrefetchDistance + 2 * kPrefetchSeconds * avatar.desiredVelocity.norm();
-    const Aabb around = inflated(avatar.motionBounds, distance);
+    const Aabb around = inflate(avatar.motionBounds, distance);
     forEachDenseIndex(world, around,
                       [&](std::uint32_t i) { objects.push_back(scene.solidObjects()[i]); });
   }
@@ -314,7 +314,7 @@ void collectObstacles(const WorldData& world, Avatar& avatar) {
   ObstacleSet last;
   std::swap(last, obstacles);
   avatar.hasBodyObstacles = false;
-  avatar.cachedBounds = inflated(avatar.motionBounds, kCollectMargin);
+  avatar.cachedBounds = inflate(avatar.motionBounds, kCollectMargin);
   for (const auto& overlap : world.broadPhase.getOverlaps(avatar.proxy)) {
     if (!overlap.isDynamic) {
       collectStaticObstacles(*world.scene, world.scene->solidObjects()[overlap.id],

@@ -48,7 +48,7 @@ bool isEarlier(const ContactHorizon::Approach& x, const ContactHorizon::Approach
          std::tuple(y.notBefore, y.entity == 0, y.entity);
 }
 
-bool equal(const ContactHorizon& x, const ContactHorizon& y) {
+bool isEqual(const ContactHorizon& x, const ContactHorizon& y) {
   const auto same = [](const ContactHorizon::Approach& p, const ContactHorizon::Approach& q) {
     return p.entity == q.entity && p.notBefore == q.notBefore;
   };
@@ -337,7 +337,7 @@ void ContactHorizons::composeHorizon(EntityId avatar, Tracked& tracked) {
                             horizon.approaches.begin() + static_cast<std::ptrdiff_t>(count),
                             isEarlier);
   horizon.approaches.resize(count);
-  if (isNew || !equal(known->second, horizon)) known->second = std::move(horizon);
+  if (isNew || !isEqual(known->second, horizon)) known->second = std::move(horizon);
 }
 
 void ContactHorizons::validate() const {

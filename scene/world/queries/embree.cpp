@@ -43,7 +43,7 @@ EmbreeDevice makeEmbreeDevice() {
   return device;
 }
 
-std::string embreeName() {
+std::string getEmbreeName() {
   return "Embree " RTC_VERSION_STRING;
 }
 

@@ -38,7 +38,7 @@ using EmbreeScene = std::unique_ptr<RTCSceneTy, EmbreeRelease>;
 /// Builds trees with one thread, so that the tree and therefore the order of equally near hits are
 /// deterministic. Throws EmbreeError.
 EmbreeDevice makeEmbreeDevice();
-std::string embreeName();  ///< "Embree 3.13.5"
+std::string getEmbreeName();  ///< "Embree 3.13.5"
 
 EmbreeScene makeEmbreeScene(RTCDeviceTy* device);
 

@@ -9,7 +9,7 @@ namespace {
 
 using collision::CompoundView;
 
-EntityId firstAvatarId(const SceneAt& sceneAt) {
+EntityId getFirstAvatarId(const SceneAt& sceneAt) {
   return static_cast<EntityId>(sceneAt.scene().model().objects.size()) + 1;
 }
 
@@ -99,7 +99,7 @@ const BodySnapshot* findBodySnapshot(const SceneAt& sceneAt, EntityId id) {
 }
 
 EntityId resolveEntity(const SceneAt& sceneAt, EntityId id) {
-  if (id >= firstAvatarId(sceneAt)) return findAvatarSnapshot(sceneAt, id) ? id : 0;
+  if (id >= getFirstAvatarId(sceneAt)) return findAvatarSnapshot(sceneAt, id) ? id : 0;
   const std::uint32_t* body = sceneAt.index.findBodyOfObject(id);
   return body ? (*sceneAt.snapshot.bodies)[*body].id : id;
 }
@@ -116,7 +116,7 @@ std::string lookUpEntityName(const SceneAt& sceneAt, EntityId entity) {
   if (const AvatarSnapshot* avatar = findAvatarSnapshot(sceneAt, entity)) return avatar->name;
   if (const BodySnapshot* body = findBodySnapshot(sceneAt, entity))
     return sceneAt.scene().model().bodies[body->index].name;
-  const bool isObject = entity != 0 && entity < firstAvatarId(sceneAt);
+  const bool isObject = entity != 0 && entity < getFirstAvatarId(sceneAt);
   return isObject ? sceneAt.scene().model().objects[entity - 1].path : "";
 }
 
@@ -134,7 +134,7 @@ Aabb computeBodyAabb(const SceneAt& sceneAt, const BodySnapshot& body) {
   const Vec3 middle = rotation * shape.box.centre() + body.pose.translation;
   const Vec3 halfExtent = rotation.cwiseAbs() * (0.5 * shape.box.size());
   const double size = body.pose.translation.cwiseAbs().maxCoeff() + 3 * shape.radius;
-  return collision::inflated(Aabb{middle - halfExtent, middle + halfExtent}, kRounding * size);
+  return collision::inflate(Aabb{middle - halfExtent, middle + halfExtent}, kRounding * size);
 }
 
 }  // namespace enfilade::scene

@@ -165,7 +165,7 @@ void HorizonState::findStaticNeighbours(const AvatarSnapshot& avatar, double spe
   const double growth = computeGrowthLimit(avatar);
   const double reach = speed * seconds * kRoundUp + growth +
                        2 * computeContactThreshold(settings_) + computeBoxRounding(own);
-  const auto box = collision::toFloatAabb(inflated(own, reach), staticTree_.origin);
+  const auto box = collision::toFloatAabb(inflate(own, reach), staticTree_.origin);
   collision::forEachOverlappingLeaf(
       staticTree_, box, [&](std::uint32_t first, std::uint32_t count) {
         for (std::uint32_t item = first; item < first + count; ++item) {

@@ -20,7 +20,7 @@ void visitSpaceTriangles(const Space& space, const Visit& visit) {
 
 /// Metres from the point to the solid, 0 inside; nullopt beyond `reach`.
 std::optional<double> computeSpaceDistance(const Space& space, const Vec3& point, double reach) {
-  const Aabb reached = collision::inflated({point, point}, reach);
+  const Aabb reached = collision::inflate({point, point}, reach);
   if (space.box.empty() || !overlaps(space.box, reached)) return std::nullopt;
   if (space.surface.empty())
     return (point.cwiseMax(space.box.min).cwiseMin(space.box.max) - point).norm();

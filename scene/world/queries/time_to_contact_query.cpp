@@ -75,8 +75,7 @@ bool isTouched(const SceneAt& sceneAt, const AvatarSnapshot& avatar, const BodyS
 void addCarrierMotion(const SceneAt& sceneAt, const AvatarSnapshot& avatar,
                       const WorldSettings& settings, Motion& motion) {
   const double within = 4 * settings.contactOffset;
-  const Aabb box =
-      collision::inflated(placeBox(avatar.shape->box, avatar.footPosition), 2 * within);
+  const Aabb box = collision::inflate(placeBox(avatar.shape->box, avatar.footPosition), 2 * within);
   const bool onDynamicBody = standsOnDynamicBody(sceneAt, avatar);
   for (const BodySnapshot& snapshot : *sceneAt.snapshot.bodies) {
     const BodyInfo body = makeBodyInfo(sceneAt, snapshot);

@@ -12,7 +12,7 @@ namespace enfilade::server {
 
 using collision::Vec3;
 
-inline constexpr double kMaxEyeCoordinate = 1e9;  ///< metres, limit of render/camera.cpp
+inline constexpr double kMaxEyeCoordinate = 1e9;  ///< metres, limit of render/camera/camera.cpp
 inline constexpr std::size_t kMaxPoses = 10'000'000;
 
 /// An invalid camera path. The text has the file, the line or element, the value and a remedy.

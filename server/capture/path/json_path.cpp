@@ -31,7 +31,7 @@ struct JsonPosition {
   }
 };
 
-std::string excerpt(const Json& value) {
+std::string makeExcerpt(const Json& value) {
   if (protocol::isDeeperThan(value, protocol::kMaxJsonDepth)) return "a too deeply nested value";
   std::string text = value.dump(-1, ' ', true, Json::error_handler_t::replace);
   if (text.size() > kMaxQuoteLength) text = text.substr(0, kMaxQuoteLength) + "...";
@@ -40,14 +40,14 @@ std::string excerpt(const Json& value) {
 
 double parseNumber(const Json& value, const JsonPosition& position) {
   if (!value.is_number() || !std::isfinite(value.get<double>()))
-    position.fail("must be a finite number, not " + excerpt(value));
+    position.fail("must be a finite number, not " + makeExcerpt(value));
   return value.get<double>();
 }
 
 template <std::size_t count>
 std::array<double, count> parseNumbers(const Json& value, const JsonPosition& position) {
   if (!value.is_array() || value.size() != count)
-    position.fail("must be " + std::to_string(count) + " numbers, not " + excerpt(value));
+    position.fail("must be " + std::to_string(count) + " numbers, not " + makeExcerpt(value));
   std::array<double, count> numbers{};
   for (std::size_t i = 0; i < count; ++i) numbers[i] = parseNumber(value[i], position.element(i));
   return numbers;
@@ -64,7 +64,7 @@ Vec3 parseVector(const Json& value, const JsonPosition& position) {
 void readMatrix(const Json& value, const JsonPosition& position, CameraAxes axes,
                 CameraPose& pose) {
   if (!value.is_array() || value.size() < 3 || value.size() > 4)
-    position.fail("must be 3 or 4 rows of 4 numbers, not " + excerpt(value));
+    position.fail("must be 3 or 4 rows of 4 numbers, not " + makeExcerpt(value));
   for (std::size_t row = 0; row < 3; ++row) {
     const auto numbers = parseNumbers<4>(value[row], position.element(row));
     const auto r = static_cast<Eigen::Index>(row);
@@ -134,7 +134,7 @@ void requireKnownKeys(const Json& entry, const JsonPosition& position) {
 
 CameraPose parsePose(const Json& entry, const JsonPosition& position, CameraAxes axes,
                      double time) {
-  if (!entry.is_object()) position.fail("must be an object, not " + excerpt(entry));
+  if (!entry.is_object()) position.fail("must be an object, not " + makeExcerpt(entry));
   CameraPose pose;
   pose.time = entry.contains("time") ? parseNumber(entry["time"], position.member("time")) : time;
   if (entry.contains("transform_matrix")) {

@@ -72,7 +72,7 @@ void handleSetClock(const RequestContext& context, const v1::SetClock& request) 
   broadcastReplay(context.hosted);
   v1::ServerMessage message;
   *message.mutable_set_clock()->mutable_clock() = toProto(clock);
-  message.mutable_set_clock()->set_tick(lastTick(context.hosted));
+  message.mutable_set_clock()->set_tick(getLastTick(context.hosted));
   sendReply(context, std::move(message));
 }
 
@@ -122,7 +122,7 @@ void handleTakeOver(const RequestContext& context, const v1::TakeOver& request) 
   if (!error) error = takeOverReplay(context.hosted, context.clientId, request);
   if (error) return replyError(context, std::move(*error));
   v1::ServerMessage message;
-  message.mutable_take_over()->set_tick(lastTick(context.hosted));
+  message.mutable_take_over()->set_tick(getLastTick(context.hosted));
   sendReply(context, std::move(message));
 }
 

@@ -71,7 +71,7 @@ v1::ServerMessage makeCommandReply(const HostedWorld& hosted, std::optional<v1::
   if (error) {
     *body.mutable_error() = std::move(*error);
   } else {
-    body.set_tick(lastTick(hosted) + 1);
+    body.set_tick(getLastTick(hosted) + 1);
   }
   return message;
 }

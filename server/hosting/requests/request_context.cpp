@@ -5,13 +5,13 @@
 
 namespace enfilade::server {
 
-std::uint64_t lastTick(const HostedWorld& hosted) {
+std::uint64_t getLastTick(const HostedWorld& hosted) {
   return hosted.world.snapshot()->tick;
 }
 
 std::optional<v1::Error> validateTick(const HostedWorld& hosted, std::uint64_t tick,
                                       const char* field) {
-  const std::uint64_t last = lastTick(hosted);
+  const std::uint64_t last = getLastTick(hosted);
   if (tick == last) return std::nullopt;
   return makeError(v1::ERROR_TICK_GONE,
                    "the last tick is " + std::to_string(last) + ", not " + std::to_string(tick),

@@ -17,7 +17,7 @@ struct RequestContext {
   void (*resumeQueue)(HostedWorld&, ClientId);
 };
 
-std::uint64_t lastTick(const HostedWorld& hosted);
+std::uint64_t getLastTick(const HostedWorld& hosted);
 
 /// An error unless `tick` is the last tick. `field` is the request's field.
 std::optional<v1::Error> validateTick(const HostedWorld& hosted, std::uint64_t tick,

@@ -17,7 +17,7 @@ void handleSubscribe(const RequestContext& context, const v1::Subscribe& subscri
   context.client.subscription = subscription;
   context.client.nextStateTime = 0;
   v1::ServerMessage message;
-  message.mutable_subscribe()->set_tick(lastTick(context.hosted));
+  message.mutable_subscribe()->set_tick(getLastTick(context.hosted));
   if (subscription.contacts()) {
     for (const auto& [pair, event] : context.hosted.activeContacts) {
       *message.mutable_subscribe()->add_live() = event;
@@ -35,7 +35,7 @@ void handleWatchFrames(const RequestContext& context, const v1::WatchFrames& req
           updateFrameSubscription(context.hosted, context.clientId, context.client, request))
     return replyError(context, std::move(*error));
   v1::ServerMessage message;
-  message.mutable_watch_frames()->set_tick(lastTick(context.hosted));
+  message.mutable_watch_frames()->set_tick(getLastTick(context.hosted));
   sendReply(context, std::move(message));
 }
 

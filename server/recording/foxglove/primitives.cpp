@@ -133,7 +133,7 @@ foxglove::Color makeColour(const Eigen::Vector3f& rgb, double alpha) {
   return colour;
 }
 
-Eigen::Quaterniond zUpFromYUp() {
+Eigen::Quaterniond convertYUpToZUp() {
   const double half = std::sqrt(0.5);
   return {half, half, 0, 0};  // 90 degrees about X
 }

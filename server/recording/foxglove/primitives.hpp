@@ -17,7 +17,7 @@ foxglove::Quaternion toQuaternion(const Eigen::Quaterniond& q);
 foxglove::Color makeColour(const Eigen::Vector3f& rgb, double alpha = 1);
 
 /// Rotation from a Y-up frame to its Z-up parent: 90 degrees about X.
-Eigen::Quaterniond zUpFromYUp();
+Eigen::Quaterniond convertYUpToZUp();
 
 /// An AABB as a cube.
 foxglove::CubePrimitive makeCube(const scene::Aabb& box, const foxglove::Color& colour);

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/recording/foxglove/primitives.hpp"
 
@@ -117,7 +117,7 @@ void ViewerChannels::writeTransforms(const scene::World& world, bool includeStat
                                 const scene::Vec3& at, const Eigen::Quaterniond& rotation) {
     *transforms.add_transforms() = makeTransform(time, parent, child, at, rotation);
   };
-  if (includeStatic) addTransform("map", "scene", scene::Vec3::Zero(), zUpFromYUp());
+  if (includeStatic) addTransform("map", "scene", scene::Vec3::Zero(), convertYUpToZUp());
   for (const scene::AvatarSnapshot& avatar : snapshot.avatars) {
     addTransform("scene", "avatar/" + avatar.name, avatar.footPosition,
                  Eigen::Quaterniond::Identity());

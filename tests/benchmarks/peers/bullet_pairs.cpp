@@ -42,7 +42,7 @@ class BulletPairs : public BroadPhase {
   BulletPairs(std::span<const Aabb> staticBoxes, bool axisSweep) : staticBoxes_(staticBoxes) {
     Aabb world;
     for (const Aabb& box : staticBoxes) world.include(box);
-    world = collision::inflated(world, 10);
+    world = collision::inflate(world, 10);
     const std::size_t maxDynamicBoxes =
         staticBoxes.size() < 100 ? 100'000 : 2'000;  // or everything moves
     if (axisSweep) {

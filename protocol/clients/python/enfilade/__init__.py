@@ -18,8 +18,8 @@ from . import messages
 from .avatar import Avatar
 from .cameras import Camera
 from .client import Client, connect
-from .environment import WalkEnv
-from .episodes import Episode, draw_episode, read_episodes, write_episodes
+from .environments import (Episode, VectorWalkEnv, WalkEnv, draw_episode, read_episodes,
+                           write_episodes)
 from .errors import (ConnectionFailed, EnfiladeError, EpisodeNotFound, OrderFailed, ServerError,
                      StartFailed)
 from .lidar import Lidar, LidarPattern, PointCloud
@@ -28,7 +28,6 @@ from .plans import FloorPlan, PlanRoom, PlanShape
 from .process import Server, serve
 from .results import (Apart, AvatarState, Contact, Frame, Hits, Horizon, Notice, ObjectInfo, Pair,
                       Replay, Scan, State, Step, Touching, World)
-from .vector_environment import VectorWalkEnv
 from .video import Video
 from .world_group import WorldGroup
 

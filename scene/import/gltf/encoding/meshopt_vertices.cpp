@@ -33,7 +33,7 @@ struct VertexStream {
   std::string_view channels;  ///< a byte each; empty in version 0
 };
 
-unsigned byteAt(std::string_view bytes, std::size_t at) {
+unsigned getByte(std::string_view bytes, std::size_t at) {
   return static_cast<unsigned char>(bytes[at]);
 }
 
@@ -57,10 +57,10 @@ bool readShortDeltas(std::string_view& from, unsigned char* deltas) {
   std::size_t escapes = 0;
   for (unsigned i = 0; i < kGroup; ++i) {
     const unsigned place = kBits == 1 ? i % kEach : kEach - 1 - i % kEach;
-    unsigned delta = byteAt(packed, i / kEach) >> (place * kBits) & kEscape;
+    unsigned delta = getByte(packed, i / kEach) >> (place * kBits) & kEscape;
     if (delta == kEscape) {
       if (escapes == from.size()) return false;
-      delta = byteAt(from, escapes++);
+      delta = getByte(from, escapes++);
     }
     deltas[i] = static_cast<unsigned char>(delta);
   }
@@ -99,7 +99,7 @@ bool readGroups(std::string_view& from, const BitLengths& lengths, std::size_t c
   std::string_view headers;
   if (!takeBytes(from, (groups + 3) / 4, headers)) return false;
   for (std::size_t i = 0; i < groups; ++i) {
-    const unsigned choice = byteAt(headers, i / 4) >> (i % 4 * 2) & 3;
+    const unsigned choice = getByte(headers, i / 4) >> (i % 4 * 2) & 3;
     if (!readGroup(from, lengths[choice], deltas + i * kGroup)) return false;
   }
   return true;
@@ -166,12 +166,12 @@ bool decodeBlock(VertexStream& stream, std::size_t count, std::array<char, kMaxS
       const bool read =
           controls.empty()
               ? readGroups(stream.blocks, kBitsOfVersion0, count, plane)
-              : readPlane(stream.blocks, byteAt(controls, channel) >> 2 * k & 3, count, plane);
+              : readPlane(stream.blocks, getByte(controls, channel) >> 2 * k & 3, count, plane);
       if (!read) return false;
     }
     std::uint32_t word = 0;
     std::memcpy(&word, previous.data() + 4 * channel, sizeof word);
-    word = decodeChannel(stream.channels.empty() ? 0 : byteAt(stream.channels, channel),
+    word = decodeChannel(stream.channels.empty() ? 0 : getByte(stream.channels, channel),
                          planes.data(), kBlockElements, count, stride, word, to + 4 * channel);
     std::memcpy(previous.data() + 4 * channel, &word, sizeof word);
   }
@@ -182,7 +182,7 @@ bool decodeBlock(VertexStream& stream, std::size_t count, std::array<char, kMaxS
 
 /// Splits the source. Returns what is wrong with it; "" for a valid one.
 std::string openStream(std::string_view source, VertexStream& stream) {
-  const unsigned header = source.empty() ? 0 : byteAt(source, 0);
+  const unsigned header = source.empty() ? 0 : getByte(source, 0);
   if (header >> 4 != 0xa) return "its compressed data is not of the vertex codec";
   stream.version = header & 15;
   if (stream.version > 1)

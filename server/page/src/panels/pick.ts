@@ -15,11 +15,14 @@ const MAX_TOUCHING = 12;
 type BodyAction = NonNullable<RequestFields<"bodyCommand">["action"]>;
 
 const DOOR_ACTIONS: [string, BodyAction][] = [["Open", { case: "open", value: {} }], ["Close door", { case: "close", value: {} }]];
-/** The commands of a kind of body, with the texts of their buttons. Levels come from the stops of the body itself. */
+/** The commands of each kind of body, with the texts of their buttons. Levels of lifts come from the stops of the body itself. */
 const ACTIONS: Record<string, [string, BodyAction][]> = {
   hinged: DOOR_ACTIONS,
   sliding: DOOR_ACTIONS,
+  lift: [],
   path: [["Run", { case: "run", value: {} }], ["Stop", { case: "stop", value: {} }]],
+  rigid: [],
+  trigger: [],
 };
 
 interface Picked {

@@ -15,18 +15,18 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from . import messages, results, spaces
-from .arguments import UINT32, number, numbers, whole
-from .avatar import Avatar
-from .cameras import Camera, CameraRequest, chosen_cameras
-from .client import Client, connect
-from .connection import raise_refusal
+from .. import messages, results, spaces
+from ..arguments import UINT32, number, numbers, whole
+from ..avatar import Avatar
+from ..cameras import Camera, CameraRequest, chosen_cameras
+from ..client import Client, connect
+from ..connection import raise_refusal
+from ..errors import OrderFailed
+from ..kept_request import KeptRequest
+from ..process import Server, serve
+from ..world_group import Member
 from .episodes import Episode, checked_episodes, checked_places, draw_episode
-from .errors import OrderFailed
-from .kept_request import KeptRequest
-from .process import Server, serve
 from .walker import Observation, Walker
-from .world_group import Member
 
 _RADII, _HEIGHTS = (0.05, 5), (0.2, 10)  # metres: those of Spawn
 MAX_STARTS = 32  # that are drawn for one episode

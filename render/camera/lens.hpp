@@ -3,7 +3,7 @@
 
 #include <optional>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::render {
 

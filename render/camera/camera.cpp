@@ -1,4 +1,4 @@
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "collision/assert.hpp"
-#include "render/fisheye.hpp"
+#include "render/camera/fisheye.hpp"
 
 namespace enfilade::render {
 namespace {

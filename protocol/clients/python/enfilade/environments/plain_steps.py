@@ -8,10 +8,10 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from .environment import WalkEnv
-from .kept_request import KeptRequest
+from ..kept_request import KeptRequest
+from ..world_group import Member, PackedSteps
+from .walk_env import WalkEnv
 from .walker import Observation
-from .world_group import Member, PackedSteps
 
 Result = Tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Dict[str, Any]]
 

@@ -1,11 +1,11 @@
-#include "render/lens.hpp"
+#include "render/camera/lens.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <numbers>
 
-#include "render/fisheye.hpp"
+#include "render/camera/fisheye.hpp"
 
 namespace enfilade::render {
 namespace {

@@ -8,11 +8,11 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from . import messages, results, spaces
-from .cameras import Camera, CameraRequest
-from .client import Client
-from .exchange import Reply
-from .kept_request import KeptRequest
+from .. import messages, results, spaces
+from ..cameras import Camera, CameraRequest
+from ..client import Client
+from ..exchange import Reply
+from ..kept_request import KeptRequest
 
 Observation = Dict[str, np.ndarray]
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 
 namespace enfilade::render {
 

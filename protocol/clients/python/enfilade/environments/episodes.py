@@ -12,9 +12,9 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from .arguments import number, numbers
-from .errors import EpisodeNotFound
-from .navigation import Navigation
+from ..arguments import number, numbers
+from ..errors import EpisodeNotFound
+from ..navigation import Navigation
 
 MAX_DRAWS = 64  # of a start and a goal, for one episode
 MAX_LISTED = 20  # scenes in an error

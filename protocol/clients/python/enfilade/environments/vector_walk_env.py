@@ -10,15 +10,15 @@ from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from . import spaces
-from .client import Client, connect
-from .environment import WalkEnv
-from .errors import EpisodeNotFound, OrderFailed, ServerError
-from .kept_request import KeptRequest
+from .. import spaces
+from ..client import Client, connect
+from ..errors import EpisodeNotFound, OrderFailed, ServerError
+from ..kept_request import KeptRequest
+from ..process import Server, serve
+from ..world_group import Member, WorldGroup
+from .walk_env import WalkEnv
 from .plain_steps import PlainSteps, Result
-from .process import Server, serve
 from .walker import Observation
-from .world_group import Member, WorldGroup
 
 
 class _Batch:

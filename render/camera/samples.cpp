@@ -1,11 +1,11 @@
-#include "render/samples.hpp"
+#include "render/camera/samples.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 
 #include "collision/assert.hpp"
-#include "render/camera.hpp"
+#include "render/camera/camera.hpp"
 #include "scene/model/srgb.hpp"
 
 namespace enfilade::render {
