@@ -10,9 +10,9 @@ namespace enfilade::render {
 /// has a shape of its own.
 bool isPerson(const scene::AvatarSnapshot& avatar);
 
-/// A placed mesh. The mesh faces +X, its feet are at the origin, its height is 1 and its greatest
-/// distance from the vertical axis at most 1; it has normals. Equal poses share a mesh, which lives
-/// as long as the program.
+/// A placed mesh. The mesh faces +X. Its feet are at the origin, its height is 1, and its greatest
+/// distance from the vertical axis is at most 1. It has normals. Equal poses share a mesh, which
+/// lives as long as the program.
 struct Figure {
   const scene::Mesh* mesh = nullptr;
   Eigen::Affine3d worldFromMesh;

@@ -6,9 +6,9 @@
 
 namespace enfilade::render {
 
-/// For each pixel, how far the point that it shows has moved in the image since an earlier tick:
-/// pixels to the right and down; NaN: background, not before the camera then, or not in the earlier
-/// snapshot with the same shape. `frame` is a perspective frame of `now` with ids and depth,
+/// For each pixel, the motion of its point in the image since an earlier tick, in pixels to the
+/// right and down. NaN: background, not before the camera then, or not in the earlier snapshot with
+/// the same shape. `frame` is a perspective frame of `now` with ids and depth,
 /// without a lens; `then` has the camera of that tick.
 std::vector<float> computeOpticalFlow(const Frame& frame, const scene::Scene& scene,
                                       const scene::Snapshot& now, const scene::Snapshot& then,

@@ -29,13 +29,13 @@ std::optional<RendererKind> parseRendererKind(const std::string& name) {
 RendererKind chooseRendererKind(bool softwareGl, const Camera& camera, const Channels& channels,
                                 std::size_t triangles) {
   if (!softwareGl) return RendererKind::gl;
-  // Measured for depth and ids in four scenes of 146 thousand to 2.4 million triangles: rays took
+  // Measured for depth and ids in four scenes of 146 thousand to 2.4 million triangles. Rays took
   // 0.3 to 0.8 of GL's time at 128 x 128, and 0.7 to 1.4 at 256 x 256. At 640 x 480 they took 1.2
   // to 2.5.
   constexpr std::size_t kSmallFrameThreshold = 256 * 256;
   const std::size_t pixels = countPixels(camera);
   if (pixels > kSmallFrameThreshold) return RendererKind::gl;
-  // A pixel's colour costs as much as some triangles of software GL: with colour, rays took 0.2 to
+  // A pixel's colour costs as much as some triangles of software GL. With colour, rays took 0.2 to
   // 0.8 of GL's time with at least 9 triangles a pixel, and 1.4 to 2.3 with at most 1.
   constexpr std::size_t kTrianglesPerColouredPixel = 4;
   return channels.rgb && triangles < kTrianglesPerColouredPixel * pixels ? RendererKind::gl

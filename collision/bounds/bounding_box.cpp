@@ -1,6 +1,6 @@
 // Hill climbing (Lin 1993, section 5.2.1) handles one side of one axis at a time. It starts at the
 // last tick's vertex and moves to the most extreme neighbour while that is more extreme. A test is
-// one dot product with a row of the rotation matrix; the neighbours of a vertex lie together in
+// one dot product with a row of the rotation matrix. The neighbours of a vertex lie together in
 // memory, two to a SIMD register. Lin stops there. In rounded arithmetic that is not enough: along
 // a face that is nearly perpendicular to the axis, every step may be below the rounding error. The
 // climb may then stop far from the extremal vertex. findHigherVertex() therefore also searches the
@@ -255,7 +255,7 @@ double findMaxClimbTurn(const Hull& hull) {
 }
 
 /// Bodies of its own kind that overlap the cube of a body and not its tight box, if these bodies
-/// lie side by side: an upper bound for what the cube costs.
+/// lie side by side. This is an upper bound for what the cube costs.
 double estimateFalsePairs(const Hull& hull) {
   const double width = computeMeanWidth(hull);
   if (!(width > 0)) return 0;

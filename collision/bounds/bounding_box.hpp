@@ -25,8 +25,8 @@ struct SupportTable {
   AabbMethod method = AabbMethod::vertexScan;
   /// 1 + 2 cos of the largest turn since the last box after which it climbs; -infinity: always.
   double minTurnTrace = 0;
-  /// Neighbours of vertex v: blocks fanOffsets[v] to fanOffsets[v + 1] of `fans`, each two
-  /// neighbours as x x y y z z, with their indices in `fanVertices`. The blocks of a vertex may
+  /// Neighbours of vertex v: blocks fanOffsets[v] to fanOffsets[v + 1] of `fans`. Each block has
+  /// two neighbours as x x y y z z, with their indices in `fanVertices`. The blocks of a vertex may
   /// repeat its last neighbour.
   std::vector<std::uint32_t> fanOffsets, fanVertices;
   std::vector<double> fans;

@@ -15,8 +15,8 @@ namespace enfilade::collision {
 namespace {
 
 constexpr std::size_t kExponents = 2048;  // of a double
-// Cells of a level, at most, for each box. More cells take more memory and more time to clear;
-// fewer wrap more places onto one cell, so that more boxes are compared that are far apart.
+// Cells of a level, at most, for each box. More cells take more memory and more time to clear.
+// Fewer wrap more places onto one cell, so that more boxes are compared that are far apart.
 constexpr double kCellsPerBox = 8;
 // Cells on an axis: the neighbours of a cell on both sides must differ.
 constexpr double kMinCells = 5;
@@ -95,8 +95,8 @@ constexpr AppendOverlaps appendOverlapsAvx = appendOverlaps;
 
 }  // namespace
 
-/// Up to ten runs that are not empty: of a cell's own row and the four rows after it, each in two
-/// parts where it wraps around.
+/// Up to ten runs that are not empty, of a cell's own row and the four rows after it. Each row is
+/// in two parts where it wraps around.
 struct BoxTable::RunList {
   std::array<Run, 10> all;
   std::size_t count = 0;
@@ -119,7 +119,7 @@ class BoxTable::PairWriter {
   void compare(const BoxTable& table, const SignedBounds& box, Id id, std::span<const Run> runs) {
     std::size_t candidates = 0;
     for (const Run& run : runs) candidates += run.end - run.begin;
-    // Room for as many pairs again as this object has appended, and not as the vector holds: a
+    // Room for as many pairs again as this object has appended, and not as the vector holds. A
     // vector may get few pairs from each of many objects.
     if (pairs_.size() < count_ + candidates) pairs_.resize(2 * count_ - begin_ + candidates);
     const SignedBounds minEndpoints = computeMinEndpoints(box);
@@ -286,8 +286,8 @@ void BoxTable::findPairsInLevel(const Level& level, PairWriter& writer) const {
     for (std::size_t y = 0; y < ny; ++y) findPairsInRow(level, x, y, writer);
 }
 
-/// Pairs of the boxes in a row of cells along z with each other and with the four rows after it:
-/// each of the 26 neighbours of a cell is visited from one side.
+/// Pairs of the boxes in a row of cells along z with each other and with the four rows after it.
+/// Each of the 26 neighbours of a cell is thus visited from one side.
 void BoxTable::findPairsInRow(const Level& level, std::size_t x, std::size_t y,
                               PairWriter& writer) const {
   const auto nx = static_cast<std::size_t>(level.cells[0]),

@@ -21,9 +21,9 @@ struct BroadPhaseAudit {
   std::vector<ProxyPair> extra;   ///< pairs of the sweep that do not overlap; sorted
 };
 
-/// Compares the pairs of `sweep` after an update() with brute force over its boxes: `staticBoxes`
-/// by StaticId (an empty Aabb for an unused id), and all active dynamic proxies with their ids.
-/// Costs dynamic * (static + dynamic) box tests of about 5 ns.
+/// Compares the pairs of `sweep` after an update() with brute force over its boxes. These are
+/// `staticBoxes` by StaticId (an empty Aabb for an unused id), and all active dynamic proxies with
+/// their ids. Costs dynamic * (static + dynamic) box tests of about 5 ns.
 BroadPhaseAudit compareWithBruteForce(const SortAndSweep& sweep, std::span<const Aabb> staticBoxes,
                                       std::span<const std::pair<ProxyId, Aabb>> dynamicBoxes);
 

@@ -1,7 +1,7 @@
 // Insertion sort, one proxy after the other. While the first proxies are sorted, the endpoints of
 // the others still have their old positions. A later step of the same update may undo a
 // swap. The boxes before and after the update therefore decide whether a swap changes an overlap.
-// No change is missed: if the overlap of a pair changed, a lower and an upper endpoint of the two
+// No change is missed. If the overlap of a pair changed, a lower and an upper endpoint of the two
 // changed their order on some axis. They were therefore swapped in that direction at least once.
 
 #include "collision/broad_phase/endpoint_lists.hpp"
@@ -66,8 +66,8 @@ void EndpointLists::recordSwaps(std::uint32_t proxy, std::size_t count, bool add
   }
 }
 
-// The kind (lower or upper) of the swapped endpoints is unpredictable, so the loops have no branch:
-// each proxy is written, and counted only if its endpoint is of the opposite kind.
+// The kind (lower or upper) of the swapped endpoints is unpredictable, so the loops have no branch.
+// Each proxy is written, and counted only if its endpoint is of the opposite kind.
 
 template <bool isUp>
 void EndpointLists::bubble(std::size_t axis, Endpoint endpoint, std::vector<PairChange>& changes) {

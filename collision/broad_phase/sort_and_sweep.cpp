@@ -29,7 +29,7 @@
 // the pairs of the proxy by the overlaps among the gathered boxes. Endpoint lists of the windows
 // find the windows that overlap; the boxes of two such proxies are compared when one moves. Where
 // everything moves, exchanges grow with the square of the proxies, and a batch finds all pairs of
-// dynamic proxies without the lists; the pairs and the order of their changes are the same.
+// dynamic proxies without the lists. The pairs and the order of their changes are the same.
 //
 // Limits: 2^31 - 1 dynamic proxies, 2^32 - 2 static boxes, 2^32 - 2 cells; otherwise memory.
 

@@ -1,11 +1,11 @@
 // Batch updates of the dynamic pairs.
 //
 // The moving proxies are put into a table in each update (box_table.hpp), which finds their pairs.
-// Proxies that have not moved for some time rest: they are in a second table, which is built
+// Proxies that have not moved for some time rest. They are in a second table, which is built
 // rarely, and pairs of two of them are not looked at. A heap asleep thus costs nothing.
 //
-// The cheaper method is predicted from the work of each, in estimated nanoseconds, not from clocks:
-// runs are reproducible, and both methods yield the same pairs in the same order.
+// The cheaper method is predicted from the work of each, in estimated nanoseconds, not from clocks.
+// Runs are reproducible, and both methods yield the same pairs in the same order.
 #include "collision/broad_phase/sort_and_sweep_batch.hpp"
 
 #include <algorithm>
@@ -76,8 +76,8 @@ double predictBatchCost(std::size_t moving, std::size_t pairs) {
 
 // ---- pairs -------------------------------------------------------------------------------------
 
-/// Lists the proxies that overlap each proxy, ascending. Two counting sorts: as the pairs are
-/// symmetric, the second one, which takes the lists of the first in the order of ids, writes
+/// Lists the proxies that overlap each proxy, ascending. Uses two counting sorts. The pairs are
+/// symmetric, so the second one, which takes the lists of the first in the order of ids, writes
 /// ascending lists.
 void listDynamicOverlaps(std::span<const IdPair> pairs, std::size_t proxies, BatchState& batch) {
   std::vector<std::uint32_t>& start = batch.next.start;

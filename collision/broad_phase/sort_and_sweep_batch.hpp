@@ -1,4 +1,4 @@
-// Overlaps of the dynamic proxies with each other where coherence is lost: each update finds all
+// Overlaps of the dynamic proxies with each other where coherence is lost. Each update finds all
 // pairs from scratch, and the changes follow from a comparison with the last ones. Internal to
 // SortAndSweep.
 #pragma once

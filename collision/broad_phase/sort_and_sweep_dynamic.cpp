@@ -2,7 +2,7 @@
 //
 // Proxy windows are boxes that change rarely. Three sorted endpoint lists (endpoint_lists.hpp)
 // report windows that begin or cease to overlap. Proxies with separate windows cannot overlap and
-// cost nothing. Proxies with overlapping windows are neighbours: their boxes are compared when one
+// cost nothing. Proxies with overlapping windows are neighbours. Their boxes are compared when one
 // of them has moved, first on the last separating axis, then on all six signed axes.
 #include "collision/broad_phase/sort_and_sweep_dynamic.hpp"
 

@@ -5,8 +5,8 @@
 // miss the query box; they cost a few instructions and no further memory access. Coordinates are
 // mapped monotonically, so no overlap is missed.
 //
-// A box that lies in several cells is reported in exactly one of them: the cell that on every axis
-// contains either the low corner of the box or the low corner of the query.
+// A box that lies in several cells is reported in exactly one of them. On every axis, this cell
+// contains either the low corner of the box or that of the query.
 //
 // An inserted box is added to each of its cells, a removed box is erased from them. A cell that
 // outgrows its capacity moves to a block of its own. The next full build reclaims that memory and

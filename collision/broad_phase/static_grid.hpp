@@ -51,8 +51,8 @@ class StaticGrid {
   std::size_t overheadBytes() const;
 
  private:
-  /// A box in a cell, in 16 bytes: six fine coordinates of its minimum endpoints relative to the
-  /// cell's low corner, clamped to 16 bits, and its row in the last two lanes.
+  /// A box in a cell, in 16 bytes. Six lanes are fine coordinates of its minimum endpoints relative
+  /// to the cell's low corner, clamped to 16 bits. The last two hold its row.
   using Entry = std::int16_t __attribute__((vector_size(16)));
   struct CellData {
     CellCoords coords;

@@ -1,7 +1,7 @@
 // Rounding. All values are below M = |translation| + 3 * (extent of the tree), because rows of a
 // rotation have a 1-norm below 2. The error of a rotated and translated point or half extent is
 // less than 8u M, u = 2^-53. The pad of 128u M covers a branch, a part that others place, and a few
-// further operations on both: a margin, a subtraction, a square root.
+// further operations on both. These are a margin, a subtraction and a square root.
 #include "collision/compound/compound_view.hpp"
 
 #include "collision/assert.hpp"

@@ -25,7 +25,7 @@ struct PartPair {
 };
 
 /// The nodes at which the last descent of two trees ended. It holds for these two trees and is
-/// reset, at the cost of a descent, with others; a tree is known by its address and size. Poses may
+/// reset, at the cost of a descent, with others. A tree is known by its address and size. Poses may
 /// change arbitrarily. The pairs found never depend on it.
 struct PartFront {
   /// Two branches. Branch 0 is the root; 2k + 1 and 2k + 2 are the children of node k.

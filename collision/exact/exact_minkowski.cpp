@@ -1,4 +1,4 @@
-// Integers instead of rationals: all coordinates share one scale, a power of two, and quotients
+// Integers instead of rationals. All coordinates share one scale, a power of two, and quotients
 // stay numerator and denominator, so that no fraction is ever reduced.
 //
 // findSeparatingDirection: let the origin be in the relative interior of a face of B - A, and L the

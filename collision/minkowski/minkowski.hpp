@@ -340,7 +340,7 @@ void forEachSupportCandidate(const BoundedConvex& convex, const SupportVertex& s
   for (std::size_t k = 0; k < count; ++k) visit(reached[k]);
 }
 
-/// Vertices of a hull up to which a scan of all is cheaper than a search along its edges; at most
+/// Vertices of a hull up to which a scan of all is cheaper than a search along its edges. At most
 /// the bits of a word.
 inline constexpr std::size_t kMaxScannedVertices = 48;
 
@@ -366,8 +366,8 @@ inline std::uint64_t findVerticesAbove(std::span<const Vec3> vertices, const Vec
   return above;
 }
 
-/// As forEachSupportCandidate(), in any order and possibly with more vertices: for a maximum of
-/// values, not for a vertex, which ties would make depend on the order.
+/// As forEachSupportCandidate(), in any order and possibly with more vertices. This suits a maximum
+/// of values, but not a vertex, which ties would make depend on the order.
 template <class Visit>
 void forEachSupportValue(const BoundedConvex& convex, const SupportVertex& support, Visit visit) {
   const std::span<const Vec3> vertices = convex.shape->vertices;

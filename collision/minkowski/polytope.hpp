@@ -60,7 +60,7 @@ struct Polytope {
   explicit Polytope(const MinkowskiDifference& minkowskiDifference)
       : difference(minkowskiDifference) {
     const Real reach = minkowskiDifference.reach;
-    // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2; the same again for
+    // Nine entries off by at most 8u reach, with cofactors of at most 2 reach^2. The same again for
     // rounding the product of edges of up to 2 reach.
     minDeterminant =
         512 * getUnitRoundoff<Real>() * reach * reach * reach + std::numeric_limits<Real>::min();

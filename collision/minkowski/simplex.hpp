@@ -42,7 +42,7 @@ struct BodyPoint {
 };
 
 /// The point of one body with the simplex' weights. It belongs to the body up to the error of a
-/// vertex: the weights are >= 0, and the largest (at least 1/4) is adjusted so that their sum is 1.
+/// vertex. The weights are >= 0, and the largest (at least 1/4) is adjusted so that their sum is 1.
 template <class Real>
 BodyPoint combineVertices(const Simplex<Real>& simplex, const BoundedConvex& convex,
                           std::uint32_t VertexPair::*vertex);

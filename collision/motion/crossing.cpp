@@ -2,7 +2,7 @@
 //
 // Let x0..x3 be the four points, V = det(x1 - x0, x2 - x0, x3 - x0), and d a fixed vector. With
 //   side(i, j, k) = ((xj - xi) x d) . (xk - xi)
-// the points meet at some time if V has opposite signs at both ends, and throughout the interval
+// the points meet if V has opposite signs at both ends, and throughout the interval this holds.
 //  - vertex p and triangle t: side(t0, t1, p), side(t1, t2, p), side(t2, t0, p) have one sign.
 //    Where V = 0, they are the barycentric coordinates of p times -d . normal: p is inside.
 //  - edges a and b: side(a0, a1, b0) and side(a0, a1, b1) have opposite signs, and so have
@@ -11,10 +11,10 @@
 // translation, and the normal.
 //
 // Bounds. A difference of two points departs from the chord between its computed ends by at most
-// 2 delta; delta is the sum of three bounds: the pose error, the rounding, and h^2 / 8 times the
-// bound of the relative acceleration, h the length of the interval. On the chords, side() is
-// quadratic. It departs from the line between its ends by at most |d| |u1 - u0| |q1 - q0| / 4, for
-// the changes of u = xj - xi and q = xk - xi. All signs must hold by more than these bounds.
+// 2 delta. delta sums the bounds of the pose error and the rounding, and h^2 / 8 times the bound of
+// the relative acceleration. h is the length of the interval. On the chords, side() is quadratic.
+// It departs from the line between its ends by at most |d| |u1 - u0| |q1 - q0| / 4. Here
+// u = xj - xi and q = xk - xi. All signs must hold by more than these bounds.
 //
 // Where these bounds do not suffice, a uniform translation is decided in exact arithmetic, as a ray
 // against the faces of the Minkowski difference.

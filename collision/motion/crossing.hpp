@@ -1,4 +1,4 @@
-// Proof that two bodies meet within an interval though they are separated at both ends: a vertex
+// Proof that two bodies meet within an interval though they are separated at both ends. A vertex
 // passes through a triangle, or an edge through an edge. Thin bodies meet at no time that is a
 // double, as a rule.
 #pragma once

@@ -5,9 +5,9 @@
 // at most rho theta^2 t (1 - t) / 2. With B = (rho_A theta_A^2 + rho_B theta_B^2) / 2 the gap stays
 // positive if
 //   g0 / t + g1 / (1 - t) > B; by its minimum: (sqrt g0 + sqrt g1)^2 > B.
-// Where neither the plane of the start nor that of the end suffices, the motion is halved: the
-// advancement continues from the position reached to the end of the longest part that is proved.
-// The middle of a uniform rotation from q0 to q1 is q0 + q1, normalised, up to rounding.
+// Where neither the plane of the start nor that of the end suffices, the motion is halved. The
+// advancement then continues from the position reached to the end of the longest part that is
+// proved. The middle of a uniform rotation from q0 to q1 is q0 + q1, normalised, up to rounding.
 //
 // Where the bodies move by less than their distance, no plane is needed.
 //

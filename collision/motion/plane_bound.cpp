@@ -55,7 +55,7 @@ struct Line {
 };
 
 /// The vertices of a body that rotates at w relative to the plane, along the direction d towards
-/// the other body: with r from the reference point, d . r and d . (w x r) = (d x w) . r. Direction
+/// the other body. With r from the reference point: d . r and d . (w x r) = (d x w) . r. Direction
 /// and tangent are in the body frame.
 struct VertexLines {
   std::span<const Vec3> vertices;

@@ -1,6 +1,6 @@
 // Separating planes of one convex body that translates among many obstacles. A plane that proves a
-// miss of one obstacle usually proves it of the obstacle's neighbours, too: a wall of a thousand
-// triangles costs one support of the body and a thousand tests of some nanoseconds.
+// miss of one obstacle usually proves it of the obstacle's neighbours, too. A wall of a thousand
+// triangles thus costs one support of the body and a thousand tests of some nanoseconds.
 #pragma once
 
 #include <array>

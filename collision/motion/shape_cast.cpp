@@ -1,7 +1,7 @@
 // Shape casts by conservative advancement (conservative_advancement.hpp). The motions differ in the
 // bound of a step.
 //
-// Translation. If a plane with normal n separates A and B by d, the motion of A by s * displacement
+// Translation. Let a plane with normal n separate A and B by d. The motion of A by s * displacement
 // leaves a distance of at least d - s * (displacement . n).
 //
 // Rotation about a fixed line, and uniform motion between two poses: plane_bound.cpp.
@@ -24,7 +24,7 @@ namespace {
 constexpr int kMaxTranslationSteps = 48;  // per target; about five are usual
 constexpr int kMaxRotationSteps = 96;     // per target; a dozen is usual
 constexpr int kMaxScrewSteps = 200;       // two or three are usual
-// Of |displacement|, or of the radius: slower approach counts as none, because the direction of a
+// Of |displacement|, or of the radius. Slower approach counts as none, because the direction of a
 // small distance between large bodies has an error of this size.
 constexpr double kGrazing = 1e-9;
 constexpr double kArrivalTolerance = 1.0 / 32;    // of (rest - min): tolerance at a target
@@ -39,8 +39,8 @@ struct TargetDistance {
 
 /// Advances to offset.rest, and from there to offset.min to check that the obstacle really blocks
 /// the motion. `cast` advances to a target (advanceTo), and decides where the first target is
-/// reached: isLeaving(), for bodies that overlap there, frees the motion; findSecondTarget()
-/// returns nullopt if it ends there.
+/// reached. Its isLeaving() frees the motion of bodies that overlap there. Its findSecondTarget()
+/// returns nullopt if the motion ends there.
 template <class Cast>
 MotionResult castToOffset(Cast& cast, const ContactOffset& offset) {
   ENFILADE_ASSERT(offset.min < offset.rest);

@@ -9,8 +9,8 @@
 //     the pose error and, if the pose is exact, touching.
 //
 // Rounding. The gap is either the exact distance (refineSeparation) minus its relative error, or
-// the projection on n with the bound 16 u (S_A + S_B + |T|): four sums of three products. S is the
-// magnitude of a body (computeMagnitude), T the vector between the reference points.
+// the projection on n with the bound 16 u (S_A + S_B + |T|). It covers four sums of three products.
+// S is the magnitude of a body (computeMagnitude), T the vector between the reference points.
 #include "collision/motion/time_of_impact.hpp"
 
 #include <algorithm>
@@ -118,8 +118,8 @@ class ImpactSearch {
             b.acceleration - a.acceleration};
   }
 
-  /// Moves time_ to the latest time that a plane certifies, and returns it: the horizon if the rest
-  /// is clear, kArrived if the search has ended or there is no further step.
+  /// Moves time_ to the latest time that a plane certifies. Returns it, the horizon if the rest is
+  /// clear, or kArrived if the search has ended or there is no further step.
   double certify() {
     const PairAtTime pair(a_, b_, time_);
     const PairMotion at = makePairMotion(pair);

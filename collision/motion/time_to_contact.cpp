@@ -4,7 +4,7 @@
 // division by 0.
 //
 // Departures from Lin 1993. There v is the speed of the closest points, which is no bound for
-// rotating bodies: the centre of a rod along a wall is closest and at rest while a tip approaches.
+// rotating bodies. The centre of a rod along a wall is closest and at rest while a tip approaches.
 // Here v is the closing speed of the reference points along the normal of the separating plane,
 // plus |w| rho of each body. This bounds the speed of every vertex. a is the sum of |linear|,
 // |alpha| rho and |w|^2 rho, with the maximum |w| in the interval. NextCheck::proved is false if

@@ -1,4 +1,4 @@
-// Rounding, as in minkowski.hpp: the dot product of the direction, rotated into a body's frame,
+// Rounding is as in minkowski.hpp. The dot product of the direction, rotated into a body's frame,
 // with any vertex is off by less than 8u |d| S. The maximum product is therefore equally close to
 // the true maximum. Both maxima, the shift and its product, and the two differences are together
 // off by less than 40u |d| reach.

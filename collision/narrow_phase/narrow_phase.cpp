@@ -54,7 +54,7 @@ struct SplitLength {
 };
 
 /// The witness points of A and B: the combinations of vertices with the simplex' weights.
-/// Rounding: weights at most 8.1 eta S per body, rotation 3 eta S, shift and sums eta (S_A + 2 S_B
+/// Rounding: weights at most 8.1 eta S per body, rotation 3 eta S. Shift and sums eta (S_A + 2 S_B
 /// + 3 sqrt(3) D), length 2.5 sqrt(3) eta reach. In total below 17.5 eta reach; `error` is 24 eta
 /// reach.
 struct WitnessPoints {
@@ -362,8 +362,8 @@ double computeMaxProjection(const BoundedConvex& convex, const SupportVertex& su
 }
 
 /// Whether the bodies' distance along `axis` exceeds `distance`, as far as doubles tell. The value
-/// of a support pair is off by less than 40u length reach (computeSupportValue); 48 leave room for
-/// the bound in extended precision, which is closer.
+/// of a support pair is off by less than 40u length reach (computeSupportValue). The 48 leave room
+/// for the bound in extended precision, which is closer.
 std::optional<bool> isFartherAlong(const MinkowskiDifference& difference, const Vec3& axis,
                                    double distance, VertexPair hint) {
   const double length = computeNorm(axis) * kMaxUnitLength;

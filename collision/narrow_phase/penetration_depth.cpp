@@ -10,7 +10,7 @@
 //  4. This runs in doubles. Once the bounds seem to meet, they are recomputed in extended precision
 //     from the nearest facet, its support and every facet that might be nearer. If doubles do not
 //     converge, as for slivers, all steps run in extended precision.
-// Proof of the lower bound: the facets form a closed surface, and all of them face away from the
+// Proof of the lower bound. The facets form a closed surface, and all of them face away from the
 // origin (each determinant is positive beyond rounding). The surface therefore winds around the
 // origin at least once. Every ray from the origin meets a facet, at no less than the distance of
 // that facet's plane. M is convex and contains all corners and the origin, so it contains the ball

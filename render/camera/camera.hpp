@@ -15,7 +15,7 @@ namespace enfilade::render {
 using collision::Vec3;
 
 /// A pinhole camera's intrinsics in pixels. cx and cy are measured from the image's top left
-/// corner, to the right and downwards; the centre of the first pixel is at (0.5, 0.5).
+/// corner, to the right and downwards. The centre of the first pixel is at (0.5, 0.5).
 struct Pinhole {
   double fx = 0, fy = 0;  ///< focal lengths, 1e-3..1e6
   double cx = 0, cy = 0;  ///< principal point, possibly outside the image; within 1e5

@@ -1,6 +1,6 @@
-// Steps of a frame: depth prepass of the visible items of model, bodies and avatars; shading of
-// colour, id and normal at equal depth, once per pixel; sky and transparent items (colour only);
-// ambient occlusion on the colours read back.
+// Steps of a frame: depth prepass of the visible items of model, bodies and avatars. Shading of
+// colour, id and normal at equal depth, once per pixel. Sky and transparent items (colour only).
+// Ambient occlusion on the colours read back.
 //
 // Visible items are found by temporal occlusion culling:
 //

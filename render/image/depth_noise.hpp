@@ -20,8 +20,8 @@ struct DepthNoise {
 
 /// Replaces depths in metres (NaN: none) by those of a structured-light camera: the model of Choi
 /// et al. 2015 ("Robust Reconstruction of Indoor Scenes"). Each pixel takes the depth of a
-/// neighbour, which the distortion divides, and its disparity gets noise and is rounded to an
-/// eighth; depths from 10 m on are lost. The result depends on noise, `frame` and pixel alone.
+/// neighbour, which the distortion divides. Its disparity gets noise and is rounded to an eighth.
+/// Depths from 10 m on are lost. The result depends on noise, `frame` and pixel alone.
 void addDepthNoise(std::vector<float>& depth, int width, int height, const DepthNoise& noise,
                    std::uint64_t frame);
 

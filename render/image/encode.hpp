@@ -43,7 +43,7 @@ struct Depth16 {
 Depth16 quantizeDepth(std::span<const float> metres, double stepsPerMetre);
 
 /// A Zstandard frame of 2 * width * height bytes: the difference of each value to its left
-/// neighbour (first column: the value above; first pixel: 0) modulo 65536. All low bytes come
+/// neighbour, modulo 65536. First column: to the value above; first pixel: to 0. All low bytes come
 /// first, then all high bytes. One channel.
 Bytes packDepth(const Raster<std::uint16_t>& steps);
 

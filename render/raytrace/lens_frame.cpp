@@ -1,6 +1,6 @@
 // Depth and shading are affine in the pixel of a pinhole camera (projected_triangle.hpp). So each
-// ray is expressed in one of six pinhole cameras that look along the camera's axes, as the faces of
-// a cube: at a point between its pixels, through which the same ray goes.
+// ray is expressed in one of six pinhole cameras, which look along the camera's axes, as the faces
+// of a cube. The ray goes through a point between the pixels of that camera.
 #include "render/raytrace/lens_frame.hpp"
 
 #include <algorithm>

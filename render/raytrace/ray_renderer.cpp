@@ -1,8 +1,8 @@
-// Steps of a frame: packets of primary rays find each pixel's triangle; depth, id and normal are
-// computed from its corners in doubles, in runs along the rows; if requested, a shadow ray towards
-// the sun; shading. Then, for the whole frame, transparent surfaces are blended from back to front
-// and ambient occlusion is applied. Threads share the rows; the result does not depend on their
-// number.
+// Steps of a frame: packets of primary rays find each pixel's triangle. Depth, id and normal are
+// computed from its corners in doubles, in runs along the rows. A shadow ray towards the sun
+// follows if requested, and shading. Then, for the whole frame, transparent surfaces are blended
+// from back to front and ambient occlusion is applied. Threads share the rows; the result does not
+// depend on their number.
 #include "render/raytrace/ray_renderer.hpp"
 
 #include <algorithm>

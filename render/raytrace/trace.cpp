@@ -164,8 +164,8 @@ void intersectPacket(RayPacket& packet, const TraceContext& trace, FilterContext
                  &packet.query);
 }
 
-/// Of opaque surfaces in the plane of a hit, that of the lowest rank at a point of the image:
-/// rounding decides which of them Embree finds.
+/// Of opaque surfaces in the plane of a hit, that of the lowest rank at a point of the image.
+/// Rounding decides which of them Embree finds.
 HitKey chooseCoplanar(const TraceContext& trace, double x, double y, HitKey hit) {
   const BatchTriangle found = findTriangle(trace, hit);
   if (found.batch->coplanarRank() == 0) return hit;

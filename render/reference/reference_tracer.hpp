@@ -18,7 +18,7 @@ struct ReferenceFrame {
   Camera camera;
   std::vector<scene::EntityId> ids;  ///< 0: background
   std::vector<double> depth;         ///< metres along forward; NaN: background
-  /// Whether the pixel is at an edge: one of its eight neighbours has another id, or its depth
+  /// Whether the pixel is at an edge. One of its eight neighbours has another id, or its depth
   /// deviates from the pixel's plane by more than a thousandth of the depth.
   std::vector<bool> edge;
   /// A coincident object: within 0.02 mm plus a millionth of the depth.

@@ -16,7 +16,7 @@ namespace enfilade::render {
 /// on one thread, as RenderThread does.
 class RendererSelector {
  public:
-  /// If no device provides a context: throws RenderError if `kind` is gl or a GPU is required;
+  /// If no device provides a context: throws RenderError if `kind` is gl or a GPU is required.
   /// `automatic` then uses only rays, and deviceWarning() states the reason.
   explicit RendererSelector(std::shared_ptr<const scene::Scene> scene,
                             RendererKind kind = RendererKind::automatic,

@@ -1,5 +1,5 @@
-// Reads the metadata in the text of a model file that assimp does not pass on: unit, up axis,
-// writer, and whether the file is complete.
+// Reads the metadata in the text of a model file that assimp does not pass on. These are the unit,
+// the up axis, the writer, and whether the file is complete.
 #pragma once
 
 #include <cstddef>

@@ -10,10 +10,10 @@ namespace enfilade::scene {
 /// importModel() restarts the program with hidden arguments, and that worker reads the file.
 /// Returns the worker's exit code, or nullopt if the arguments are not the hidden ones.
 ///
-/// For tests, the environment variable ENFILADE_IMPORT_FAULT injects a fault into the worker:
-/// `hang`, `crash`, `exit` (without an answer), `memory` (exceeds the limit) or `garbage` (an
-/// invalid answer). A prefix as in `web-ifc:hang` selects the worker of one IFC reader: web-ifc,
-/// ifcplusplus or assimp.
+/// For tests, the environment variable ENFILADE_IMPORT_FAULT injects a fault into the worker. The
+/// fault is `hang`, `crash`, `exit` (without an answer), `memory` (exceeds the limit) or `garbage`
+/// (an invalid answer). A prefix as in `web-ifc:hang` selects the worker of one IFC reader:
+/// web-ifc, ifcplusplus or assimp.
 std::optional<int> runImportWorker(int argc, char** argv);
 
 }  // namespace enfilade::scene

@@ -1,9 +1,9 @@
 // BodySpec: description of a body (door, lift, path, rigid body, trigger volume). Plain data of the
 // model; an object without a spec is static.
 // A body frame has its origin at `anchor` and, in the authored pose, the axes of the scene. The one
-// degree of freedom of a kinematic body is its joint position: radians about `axis` (hinged),
-// metres along it (sliding, lift), seconds since the path began (path). 0 is the authored pose; for
-// a path this holds if its first key is zero.
+// degree of freedom of a kinematic body is its joint position. It is in radians about `axis`
+// (hinged), metres along it (sliding, lift), or seconds since the path began (path). 0 is the
+// authored pose; for a path this holds if its first key is zero.
 #pragma once
 
 #include <cstdint>

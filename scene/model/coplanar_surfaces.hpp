@@ -38,8 +38,8 @@ CoplanarSurfaces findCoplanarSurfaces(const Model& model,
 /// Decides which of coplanar surfaces is visible.
 struct CoplanarRank {
   std::uint8_t rank = 0;  ///< the lowest is visible
-  /// World boxes of the objects of lower rank that it shares planes with, inflated by a millimetre;
-  /// endless if one of both is of a body, which may move.
+  /// World boxes of the objects of lower rank that it shares planes with, inflated by a millimetre.
+  /// A box is endless if one of both is of a body, which may move.
   std::vector<Aabb> lower;
 };
 

@@ -81,15 +81,15 @@ struct Object {
       {};  ///< IFC OperationType or similar: "SINGLE_SWING_LEFT", "ELEVATOR"
   /// IFC OverallWidth and OverallHeight of doors and windows in metres; 0: unknown.
   double overallWidth = 0, overallHeight = 0;
-  /// Placement of an IFC product, in metres and without scale; null: unknown. Its axes are
-  /// IFC's: for a door, x runs along its width from the lower corner, y is the side to which it
-  /// opens, z is up. Stored outside the object, because few objects have one.
+  /// Placement of an IFC product, in metres and without scale; null: unknown. Its axes are IFC's.
+  /// For a door, x runs along its width from the lower corner, y is the side to which it opens, z
+  /// is up. Stored outside the object, because few objects have one.
   std::shared_ptr<const Eigen::Affine3d> worldFromPlacement = nullptr;
   Usage usage = Usage::both;
   /// The storey that contains it: an index into Model::storeys; nullopt: unknown.
   std::optional<std::uint32_t> storey = std::nullopt;
-  /// The object that this one is a part of, by which people name it: for a collision shape the
-  /// drawn object, for a door's frame the door.
+  /// The object that this one is a part of, by which people name it. For a collision shape it is
+  /// the drawn object, for a door's frame the door.
   std::optional<std::uint32_t> partOf = std::nullopt;
   /// Its class, as "chair", by the sidecar or the node's extras; empty: unknown.
   std::string className = {};

@@ -23,7 +23,7 @@ Vec3 turnToSide(const Vec3& direction) {
 }
 
 /// Distances that a thin prism at `position` can be moved to both sides of `direction`, a
-/// horizontal unit vector, each up to `maxWidth`; metres from its middle.
+/// horizontal unit vector, each up to `maxWidth`. They are in metres from its middle.
 std::array<double, 2> measureSides(const WorldData& world, const AvatarShape& shape,
                                    const Vec3& position, const Vec3& direction, double maxWidth) {
   const WorldSettings& settings = world.settings;

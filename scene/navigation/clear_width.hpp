@@ -41,7 +41,7 @@ inline Vec3 placeThinShape(const WorldSettings& settings, const Vec3& footPositi
 }
 
 /// The places of a walk along the points of a path, some centimetres apart, with the heights of the
-/// feet: on stairs the line between two points is above or below them. The rest of a leg that is
+/// feet. On stairs, the line between two points is above or below them. The rest of a leg that is
 /// not walked, such as a ride or a fall, is one line.
 std::vector<Vec3> traceFeet(Walker& walker, const std::vector<Vec3>& points);
 

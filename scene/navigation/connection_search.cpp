@@ -33,7 +33,7 @@ constexpr double kLineSpacing = 0.012;  // metres
 // 0.8 m to each side. Next to the gap the closest places are not opposite each other, so no line
 // parallel to theirs passes the gap. It is crossed from places of the next 0.5 m.
 constexpr int kMaxLines = 134;
-// Axes are measured at the middle of the gap and up to 0.3 m aside: a thin prism finds a gap that
+// Axes are measured at the middle of the gap and up to 0.3 m aside. A thin prism finds a gap that
 // admits an agent from any place within it.
 constexpr double kAxisSpacing = 0.1;  // metres
 constexpr int kMaxAxes = 6;
@@ -160,8 +160,8 @@ GapPaths crossAlong(Walker& walker, const Vec3& start, const Vec3& end) {
   return {.there = {*from, to}, .back = {to, *from}};
 }
 
-/// Walks through the middle of the gap: it may be wider than the agent by a centimetre, and the
-/// boundaries of the mesh do not face each other along its walls.
+/// Walks through the middle of the gap. The gap may be wider than the agent by a centimetre, and
+/// the boundaries of the mesh do not face each other along its walls.
 GapPaths crossAlongAxis(const WorldData& world, Walker& walker, const BoundaryGap& gap,
                         const Vec3& across, const Vec3& aside) {
   if (across.isZero(0)) return {};
@@ -179,7 +179,7 @@ GapPaths crossAlongAxis(const WorldData& world, Walker& walker, const BoundaryGa
   return {};
 }
 
-/// Walks straight across, along the axis of the gap or along lines that are close together: a gap
+/// Walks straight across, along the axis of the gap or along lines that are close together. A gap
 /// may be wider than the agent by less than any grid sees.
 /// Nothing for gaps that are too wide.
 GapPaths crossStraight(const WorldData& world, Walker& walker, const BoundaryGap& gap) {
@@ -194,7 +194,7 @@ GapPaths crossStraight(const WorldData& world, Walker& walker, const BoundaryGap
   return paths;
 }
 
-/// Searches on a grid off the mesh, from the higher side, since some paths lead down alone: the
+/// Searches on a grid off the mesh, from the higher side, since some paths lead down alone. The
 /// search soon comes to an end at a wall. Subtracts the walks from `maxWalks`.
 GapPaths crossOnGrid(const Collection& all, Walker& walker, BoundaryGap gap,
                      std::size_t& maxWalks) {

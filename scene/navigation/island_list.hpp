@@ -40,7 +40,7 @@ IslandList collectIslands(const NavigationMesh& mesh, Walker& walker, const Aabb
 void joinIslands(IslandList& list, const ConnectionList& connections);
 
 /// The number of the island on which an agent stands; nullopt: on none. The mesh ends at a distance
-/// from the edge of a floor: a place there has the island of the closest mesh to which an agent
+/// from the edge of a floor. A place there has the island of the closest mesh to which an agent
 /// walks, and back.
 std::optional<std::uint32_t> findIslandAt(const NavigationMesh& mesh, const IslandList& list,
                                           Walker& walker, const Vec3& place);

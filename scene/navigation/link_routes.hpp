@@ -7,9 +7,9 @@
 
 namespace enfilade::scene {
 
-/// The quickest path with links from where an agent at `from` stands to where it stands at `to`;
-/// `walked`, the path without, if that is quicker or no other is found. `bodies`: the present
-/// joint positions, for the wait for lifts.
+/// The quickest path with links from where an agent at `from` stands to where it stands at `to`.
+/// Returns `walked`, the path without links, if that is quicker or no other is found. `bodies`: the
+/// present joint positions, for the wait for lifts.
 NavigationPath findLinkedPath(const PathFinder& finder, Links& links, const Snapshot& bodies,
                               const Vec3& from, const Vec3& to, NavigationPath walked);
 

@@ -14,7 +14,7 @@ namespace {
 
 constexpr double kDropError = 0.005;   // metres, of landings
 constexpr double kEdgeSpacing = 0.75;  // metres between places along an edge
-/// Metres of the landing beyond a place at the edge of a mesh, in addition to twice the radius: the
+/// Metres of the landing beyond a place at the edge of a mesh, in addition to twice the radius. The
 /// mesh ends up to two cells further from the drop than the radius.
 constexpr std::array<double, 2> kLandings{0.25, 0.6};
 constexpr int kPhases = 3;             // starts of a drop within the length of a tick

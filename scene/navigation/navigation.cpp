@@ -391,7 +391,7 @@ std::optional<ObstacleDistance> Navigation::findObstacle(const Vec3& point, doub
   return measureObstacle(world_.data(), agent_, *place, maxDistance);
 }
 
-/// The mesh lies up to a voxel above level floor, and up to 15 cm off over stairs: where that
+/// The mesh lies up to a voxel above level floor, and up to 15 cm off over stairs. Where that
 /// decides, an agent is put down.
 NavigationMap Navigation::drawMap(double cell, double height, double tolerance) {
   constexpr double kMaxCells = 16e6;

@@ -37,12 +37,12 @@ struct PathLeg {
 
 struct NavigationPath {
   std::vector<Vec3> points;  ///< feet, scene frame, metres: waypoints of a Walk; empty: none found
-  /// Metres that the feet move, from point to point in space: a stair between two points counts as
+  /// Metres that the feet move, from point to point in space. A stair between two points counts as
   /// a slope, a step next to a point with its height. Of falls the distance across, of rides
   /// nothing.
   double length = 0;
   /// Metres up and down in excess of the difference in height of both ends, if the path leads over
-  /// a low object; 0: it does not, or the excess is small.
+  /// a low object. 0 if it does not, or if the excess is small.
   double bumpClimb = 0;
   double feetLength = 0;  ///< FeetTravel::length() of the proof; 0: not measured
   double seconds = 0;     ///< expected, without waits for doors

@@ -192,9 +192,12 @@ NavigationPath findUnobstructedPath(const PathFinder& finder, const Vec3& from, 
     const auto around = findGridPath(finder.walker, places.back(), *place, search);
     if (!around) {
       path.reason = kNotFound;  // it may stand above or below the corner
-      if (outcome.kind != WalkOutcome::Kind::arrived)
-        explainStop(finder, outcome, projectToGround(*place - places.back()).normalized(),
-                    line->middles, path);
+      if (outcome.kind != WalkOutcome::Kind::arrived) {
+        const Vec3 direction = projectToGround(*place - places.back()).normalized();
+        explainStop(finder, outcome, places.back(),
+                    outcome.footPosition + 2 * finder.agent.radius * direction, line->middles,
+                    path);
+      }
       return path;
     }
     places.insert(places.end(), around->begin() + 1, around->end());
@@ -266,8 +269,8 @@ NavigationPath findPathOverMesh(const PathFinder& finder, const Vec3& start, con
   return provePath(finder, *places, proof);
 }
 
-/// Places without a mesh, such as narrow ones on furniture, or on a small part of one, are
-/// connected with it by walks on a grid. Places that are near are connected with one another.
+/// Walks on a grid connect places without a mesh (such as narrow ones on furniture), or on a small
+/// part of one, with it. Places that are near are connected with one another.
 NavigationPath findPathOffMeshes(const PathFinder& finder, const Vec3& start, const Vec3& goal) {
   Walker& walker = finder.walker;
   Proof proof(finder.maxRepairWalks);
@@ -309,7 +312,7 @@ bool isLonger(const KeptPath& kept, double length, const MeshLines& lines, doubl
 }
 
 /// From a place straight to the second point of a path, or to the farthest one in clear sight, and
-/// along it; empty: the second point cannot be reached so.
+/// along it. Empty: the second point cannot be reached so.
 std::vector<Vec3> leadOnto(Walker& walker, const Vec3& start, const std::vector<Vec3>& path) {
   std::size_t joined = 1;
   if (path.size() < 2 || !walks(walker, start, path[joined], kSameHeight)) return {};

@@ -13,12 +13,12 @@ NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& 
 /// Keeps a path of findPath().
 KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goal);
 
-/// Lets a kept path begin at another place: an agent walks straight from there to one of its
-/// points; what follows was proved by the search. False: such a walk does not exist, or against the
-/// line on a mesh the path would be longer by more than 1 cm and 0.05 % than when it was found. If
-/// it was longer than a line by over 2 % and 10 cm, or without one, also false farther from the
-/// start of the search than 1 % of the path's length. A kept path is thus at most about 2 % and
-/// 10 cm longer than a new one.
+/// Lets a kept path begin at another place. An agent walks straight from there to one of its
+/// points; the search proved the rest. False if such a walk does not exist. Also false if, against
+/// the line on a mesh, the path would be longer by over 1 cm and 0.05 % than when found. Some paths
+/// are kept only within 1 % of their length from the start of the search. These are paths without a
+/// line, and those that were longer than it by over 2 % and 10 cm. A kept path is thus at most
+/// about 2 % and 10 cm longer than a new one.
 bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from);
 
 /// A walk of PathLeg::Kind::aside to the closest place that is wanted, at most some 2 m away.

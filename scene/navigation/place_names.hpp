@@ -21,12 +21,12 @@ struct NamedPlace {
 /// The box of places next to an object: `reach` metres to the sides, and on floors below.
 Aabb inflateAround(const Aabb& object, double reach);
 
-/// Points whose closest places to stand may be in the named place: its middle on the floor, and for
-/// a room that may not fill its box the points of a grid in it.
+/// Points whose closest places to stand may be in the named place. These are its middle on the
+/// floor, and for a room that may not fill its box the points of a grid in it.
 std::vector<Vec3> listAims(const NamedPlace& named, const Vec3& middle);
 
 /// `name`: a space's name, long name or GlobalId, a storey's, then an object's path or GlobalId,
-/// or a body's name; with the prefix "room:", "storey:", "object:" or "body:" only one of these.
+/// or a body's name. With the prefix "room:", "storey:", "object:" or "body:" only one of these.
 /// Several rooms, storeys, objects or bodies may have one name: all of the first kind that has it,
 /// in the model's order. `reach`: how far from an object or a body. Empty: the name is unknown, or
 /// its extent is.

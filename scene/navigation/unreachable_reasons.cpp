@@ -28,7 +28,8 @@ constexpr double kBoundarySpacing = 0.5;   // metres along the boundary
 constexpr double kMaxRise = 1.2;           // metres: higher obstacles are walls, not steps
 constexpr double kMaxDepth = 10;           // metres: deeper falls have no number
 constexpr double kMinHeadroom = 0.6;       // metres: less is no passage to stoop through
-constexpr double kHeadroomError = 1e-4;    // metres
+constexpr double kMinRadius = 0.01;        // metres: a thinner agent gets through cracks
+constexpr double kPassageError = 1e-4;     // metres
 constexpr double kOntoObstacle = 0.15;     // metres from where the agent touches it
 
 template <class... Numbers>
@@ -49,24 +50,49 @@ std::optional<double> measureRise(const PathFinder& finder, const WalkOutcome& s
   return rise > finder.world.settings.stepHeight ? std::optional(rise) : std::nullopt;
 }
 
-/// The greatest height of an agent that gets past the obstacle; nullopt: none does.
-std::optional<double> measureHeadroom(const PathFinder& finder, const WalkOutcome& stop,
-                                      const Vec3& direction) {
-  const Vec3 beyond = stop.footPosition + 2 * finder.agent.radius * direction;
-  const auto passes = [&](double height) {
-    NavigationAgent lower = finder.agent;
-    lower.height = height;
-    Walker walker(finder.world, lower);
+/// The largest size from `min` to `max` with which an agent walks straight from the stop to
+/// `beyond`. `max`: all do; nullopt: not even `min`. `resize` sets the size of an agent.
+template <class Resize>
+std::optional<double> measurePassage(const PathFinder& finder, const WalkOutcome& stop,
+                                     const Vec3& beyond, double min, double max,
+                                     const Resize& resize) {
+  const auto passes = [&](double size) {
+    NavigationAgent smaller = finder.agent;
+    resize(smaller, size);
+    Walker walker(finder.world, smaller);
     return standAt(walker, stop.footPosition).has_value() &&
            walker.walkTo(beyond).kind == WalkOutcome::Kind::arrived;
   };
-  double low = kMinHeadroom, high = finder.agent.height;
+  double low = min, high = max;
   if (high <= low || !passes(low)) return std::nullopt;
-  while (high - low > kHeadroomError) {
+  if (passes(high)) return high;
+  while (high - low > kPassageError) {
     const double middle = 0.5 * (low + high);
     (passes(middle) ? low : high) = middle;
   }
-  return low + 2 * finder.world.settings.contactOffset;  // below the feet and above the head
+  return low;
+}
+
+/// The greatest height of an agent that gets past the obstacle; nullopt: none does.
+std::optional<double> measureHeadroom(const PathFinder& finder, const WalkOutcome& stop,
+                                      const Vec3& beyond) {
+  const auto height =
+      measurePassage(finder, stop, beyond, kMinHeadroom, finder.agent.height,
+                     [](NavigationAgent& agent, double size) { agent.height = size; });
+  if (!height || *height == finder.agent.height) return std::nullopt;
+  return *height + 2 * finder.world.settings.contactOffset;  // below the feet and above the head
+}
+
+/// The clear width straight ahead, in metres; 0: not even a thin agent gets past; nullopt: the
+/// agent does.
+std::optional<double> measureGapAhead(const PathFinder& finder, const WalkOutcome& stop,
+                                      const Vec3& beyond) {
+  const auto radius =
+      measurePassage(finder, stop, beyond, kMinRadius, finder.agent.radius,
+                     [](NavigationAgent& agent, double size) { agent.radius = size; });
+  if (!radius) return 0;
+  if (*radius == finder.agent.radius) return std::nullopt;
+  return 2 * (*radius + finder.world.settings.contactOffset);
 }
 
 /// A place for the agent at the end of a gap.
@@ -172,8 +198,9 @@ UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh, const NavigationMesh&
   return {std::move(mesh), std::move(partOf), std::move(gaps)};
 }
 
-void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& direction,
-                 const std::vector<Vec3>& line, NavigationPath& path) {
+void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& from,
+                 const Vec3& beyond, const std::vector<Vec3>& line, NavigationPath& path) {
+  const Vec3 direction = projectToGround(beyond - from).normalized();
   path.obstruction = Obstruction{stop.obstacle, stop.footPosition, 0};
   if (stop.obstacle == 0) {
     path.reason = explainEnd(finder, stop, direction);
@@ -187,11 +214,16 @@ void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& 
   if (width < 2 * finder.agent.radius) {
     path.obstruction->clearWidth = width;
     path.reason += format(": clear width %.3f m, needs %.3f", width, 2 * finder.agent.radius);
-  } else if (const auto headroom = measureHeadroom(finder, stop, direction)) {
+  } else if (const auto headroom = measureHeadroom(finder, stop, beyond)) {
     path.reason += format(": clear height %.3f m, needs %.3f", *headroom, finder.agent.height);
   } else if (const auto rise = measureRise(finder, stop, direction)) {
     path.reason +=
         format(": a step of %.3f m, climbs %.3f", *rise, finder.world.settings.stepHeight);
+  } else if (const auto gap = measureGapAhead(finder, stop, beyond)) {
+    path.obstruction->clearWidth = *gap;
+    path.reason += *gap > 0
+                       ? format(": clear width %.3f m, needs %.3f", *gap, 2 * finder.agent.radius)
+                       : format(": no gap, needs %.3f m", 2 * finder.agent.radius);
   }
 }
 
@@ -211,7 +243,7 @@ bool explainGaps(const PathFinder& finder, const MeshPoint& from, const MeshPoin
     finder.walker.returnTo(*start);
     const WalkOutcome outcome = finder.walker.walkTo(goal);
     if (outcome.kind == WalkOutcome::Kind::arrived) continue;
-    explainStop(finder, outcome, gap.across, {*start, goal}, path);
+    explainStop(finder, outcome, *start, goal, {*start, goal}, path);
     return true;
   }
   return false;

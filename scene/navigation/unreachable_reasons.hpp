@@ -23,7 +23,7 @@ struct PartGap {
   PartGap reversed() const { return {toPart, fromPart, to, from, -across, hasRoom}; }
 };
 
-/// The mesh of Clearance::none, its parts, and the closest places of those that are near each
+/// The mesh of Clearance::none and its parts. Also the closest places of parts that are near each
 /// other, with room for an agent if there are any.
 struct UnobstructedMesh {
   NavigationMesh mesh;
@@ -37,11 +37,11 @@ struct UnobstructedMesh {
 /// `walkable`: the mesh where agents fit.
 UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh, const NavigationMesh& walkable);
 
-/// The end of a walk that did not arrive, as the reason of `path`: the entity, and its clear width
-/// or height, the step or the drop. `direction`: of the walk, horizontal, unit. `line`: the places
-/// around, along the path.
-void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& direction,
-                 const std::vector<Vec3>& line, NavigationPath& path);
+/// The end of a walk that did not arrive, as the reason of `path`. It has the entity, and its clear
+/// width or height, the step or the drop. The walk led from `from` to a place `beyond` the
+/// obstacle. `line`: the places around, along the path.
+void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& from,
+                 const Vec3& beyond, const std::vector<Vec3>& line, NavigationPath& path);
 
 /// Explains `path` by the first gap that stops the walker, of the shortest sequence of gaps of the
 /// unobstructed mesh that leads to the goal. Returns false if no gap does.

@@ -1,5 +1,5 @@
-// Normal selection. Any plane that separates the bodies keeps them apart: the plane of the closest
-// points, or that of a face of either body that looks along it.
+// Normal selection. Any plane that separates the bodies keeps them apart. Such a plane is the one
+// of the closest points, or that of a face of either body that looks along it.
 //   - Near rest a face normal is better. Where edges of equal boxes are aligned, the closest
 //     points lie on rounded corners, and their normal changes with the slightest displacement.
 //   - In motion the plane that opposes the predicted motion least is best. A box that slides over

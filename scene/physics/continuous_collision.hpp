@@ -7,7 +7,7 @@
 
 namespace enfilade::scene {
 
-/// Moves the bodies towards the solver's result as far as that is proved clear: sets the swept
+/// Moves the bodies towards the solver's result as far as that is proved clear. Sets the swept
 /// poses and the fractions of the motions that are kept.
 void clampToProvenMotion(const PhysicsWorld& world, double seconds, double contactOffset,
                          StepScratch& scratch);

@@ -15,7 +15,7 @@ bool isInterrupted();
 struct Interrupted {};
 
 /// Runs `work`, which polls isInterrupted(). Returns ExitCode::interrupted and prints `message` on
-/// stderr if `work` throws Interrupted, or any exception after the signal: a terminal interrupts
+/// stderr if `work` throws Interrupted, or any exception after the signal. A terminal interrupts
 /// the whole process group, so the import worker fails because of the signal.
 ExitCode runInterruptible(const std::function<ExitCode()>& work, const char* message);
 

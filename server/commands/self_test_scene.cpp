@@ -1,5 +1,5 @@
-// The golden picture is encoded as text: 16 x 12 cells, each with the id at its centre (a digit)
-// and its mean colour (two hexadecimal digits for red, green and blue).
+// The golden picture is encoded as text: 16 x 12 cells. Each has the id at its centre (a digit) and
+// its mean colour (two hexadecimal digits for red, green and blue).
 #include "server/commands/self_test_scene.hpp"
 
 #include <array>

@@ -1,5 +1,5 @@
-// Steps: choose the moments for pictures, worst first; replay both walks to get the avatars'
-// positions at these moments; find a viewpoint with a free line of sight, by ray casts; render
+// Steps: choose the moments for pictures, worst first. Replay both walks to get the avatars'
+// positions at these moments. Find a viewpoint with a free line of sight, by ray casts. Render
 // both models side by side.
 #include "server/diff/change_images.hpp"
 

@@ -11,7 +11,7 @@
 namespace enfilade::server {
 namespace {
 
-/// Cosine between two axes of a transform below which it counts as free of shear: rotations that a
+/// Cosine between two axes of a transform below which it counts as free of shear. Rotations that a
 /// file stores in single precision deviate by about 1e-7.
 constexpr double kMaxShear = 5e-7;
 

@@ -28,7 +28,7 @@ Vec3 loadVector(const std::vector<float>& numbers, std::size_t index) {
 }
 
 /// glTF requires unit normals. A vertex whose normal has no direction gets that of a triangle that
-/// it belongs to; if these have no area, nothing of them is visible, and +Y serves.
+/// it belongs to. If these have no area, nothing of them is visible, and +Y serves.
 void replaceZeroNormals(PrimitiveData& data, std::size_t firstVertex, std::size_t firstIndex) {
   const auto isZero = [&](std::size_t vertex) {
     return loadVector(data.normals, vertex).isZero(0);

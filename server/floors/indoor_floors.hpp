@@ -18,7 +18,7 @@ struct FloorTriangle {
   double height() const { return (corners[0].y() + corners[1].y() + corners[2].y()) / 3; }
 };
 
-/// The height with most indoor floor that is less than a storey away from `height`; `height`
+/// The height with most indoor floor that is less than a storey away from `height`. It is `height`
 /// itself if the floor there is mostly indoors, or if no floor near it is.
 double findIndoorFloor(const scene::Scene& scene, std::span<const FloorTriangle> faces,
                        double height);

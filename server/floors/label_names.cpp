@@ -19,8 +19,8 @@ constexpr std::array<std::string_view, 26> kPieceWords{
 constexpr std::array<std::string_view, 7> kAppended{
     "_node", "_visual", "_collision", "_mesh", "_geometry", "_primitive", "_link"};
 
-/// Returns the index at which a part "_GlobalId" begins: 22 digits of base 64, the first of which
-/// is below 4; those of a word have no letters of both cases. npos: none.
+/// Returns the index at which a part "_GlobalId" begins; npos: none. It has 22 digits of base 64,
+/// the first below 4. Those of a word have no letters of both cases.
 std::size_t findGlobalId(const std::string& name) {
   constexpr std::size_t kLength = 22;
   const auto isDigit = [](char c) {

@@ -87,8 +87,8 @@ bool isCutSolid(const scene::Scene& scene, double floor, double floorArea) {
   return solid > kMaxSolidShare * floorArea;
 }
 
-/// Parses the storey name from an object path: the text between `Ifc...Storey` and the next '/';
-/// empty also for the name that converters give to a storey without one.
+/// Parses the storey name from an object path: the text between `Ifc...Storey` and the next '/'.
+/// Empty also for the name that converters give to a storey without one.
 std::string parseStoreyName(const std::string& path) {
   const std::size_t word = path.find("IfcBuildingStorey");
   if (word == std::string::npos) return "";

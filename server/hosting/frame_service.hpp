@@ -43,8 +43,8 @@ class FrameService {
   FrameService& operator=(const FrameService&) = delete;
 
   /// Creates the renderer in the background and logs its problems. Call it after all threads have
-  /// started: opening a driver can take seconds, and in glibc 2.36 it blocks the start of threads
-  /// (both take the lock of the library list).
+  /// started. Opening a driver can take seconds, and in glibc 2.36 it blocks the start of threads:
+  /// both take the lock of the library list.
   void prepare();
   // These wait until the renderer is created. Do not call them after finish().
   const std::string& deviceName() const;

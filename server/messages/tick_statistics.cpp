@@ -11,8 +11,8 @@ namespace enfilade::server {
 
 namespace {
 
-// A bucket has the exponent and the first bits of the mantissa of a duration in nanoseconds: 64
-// buckets for each power of two, without a logarithm in each stage of each tick.
+// A bucket has the exponent and the first bits of the mantissa of a duration in nanoseconds. There
+// are 64 buckets for each power of two, and no logarithm in each stage of each tick.
 constexpr int kMantissaBits = 6, kDroppedBits = 52 - kMantissaBits;
 constexpr std::uint64_t kFirstBucket = std::uint64_t{1023} << kMantissaBits;  // of 1 ns
 constexpr std::size_t kBucketCount = 46 << kMantissaBits;                     // 2^46 ns

@@ -45,7 +45,7 @@ struct PathAnswer {
   std::optional<scene::KeptPath>* kept = nullptr;  ///< of the agent of the query; null: not asked
 };
 
-/// A standing place in one of some named places: on the island of `start` if there is any, else one
+/// A standing place in one of some named places. On the island of `start` if there is any, else one
 /// that is on it once doors are open, else the closest. nullopt: without room.
 std::optional<scene::Vec3> findPlaceIn(scene::Navigation& navigation,
                                        const std::function<scene::Navigation&()>& withOpenDoors,

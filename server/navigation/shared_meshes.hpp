@@ -19,7 +19,7 @@ struct MeshRequest {
 };
 
 /// A navigation of a size. The first world of a scene builds its meshes, or reads them from the
-/// cache with which the scene was loaded; others share these, and build the tiles around bodies
+/// cache with which the scene was loaded. Others share these, and build the tiles around bodies
 /// that stand elsewhere. Thread-safe: a second caller for the same meshes waits for the first, and
 /// reports its progress meanwhile; others do not wait.
 std::unique_ptr<scene::Navigation> makeNavigation(const MeshRequest& request,

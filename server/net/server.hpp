@@ -32,8 +32,8 @@ void requireListenable(const HostPort& listen, const Access& access);
 class Server {
  public:
   /// Clients may connect after construction. Throws ServerError if the address is unavailable, or
-  /// reachable from other machines without permission in `access`; RenderError, like FrameService;
-  /// RecordingError if the recording cannot be started.
+  /// reachable from other machines without permission in `access`. Throws RenderError, like
+  /// FrameService, and RecordingError if the recording cannot be started.
   Server(std::shared_ptr<const scene::Scene> scene, const HostPort& listen,
          ServerOptions options = {});
   ~Server();  ///< calls stop()

@@ -1,5 +1,5 @@
-// Captions on plans: their places next to marks, free of marks and of each other, and the list of
-// those that a plan has no space for.
+// Captions on plans. Their places next to marks are free of marks and of each other. Those that a
+// plan has no space for are in a list.
 #pragma once
 
 #include <cstdint>

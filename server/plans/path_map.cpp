@@ -1,6 +1,6 @@
-// Steps: find the walked storeys (peaks of a histogram of the feet's heights); render a plan of
-// each, cut 1.2 m above its floor, around the walked area; place marks and captions on the plan of
-// their nearest storey; stack the plans with a title, a legend and the captions without space.
+// Steps: find the walked storeys (peaks of a histogram of the feet's heights). Render a plan of
+// each, cut 1.2 m above its floor, around the walked area. Place marks and captions on the plan of
+// their nearest storey. Stack the plans with a title, a legend and the captions without space.
 #include "server/plans/path_map.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// Draws a floor plan on a canvas: the picture from above, walls cut and filled, doors with their
-// swing, a grid with coordinates, scale bar and axes.
+// Draws a floor plan on a canvas. It has the picture from above, walls cut and filled, doors with
+// their swing, a grid with coordinates, scale bar and axes.
 #pragma once
 
 #include <optional>
@@ -57,8 +57,8 @@ void drawPlanHeading(render::Canvas& canvas, const PlanHeading& heading, double 
 /// The words for a plan's floor and cut: "floor at y = 0.00 m, cut 1.1 m above".
 std::string formatFloorAndCut(double floor);
 
-/// Draws a scale bar with its top left corner at `at`, and right of it the axes and, if it is
-/// known, north: its direction in x and z.
+/// Draws a scale bar with its top left corner at `at`, and right of it the axes. `north`: its
+/// direction in x and z, if it is known.
 void drawScaleBar(render::Canvas& canvas, const PlanView& view, render::Point at,
                   const std::optional<Eigen::Vector2d>& north);
 

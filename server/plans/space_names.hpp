@@ -8,8 +8,8 @@
 
 namespace enfilade::server {
 
-/// Places the names of spaces in them: in the middle, or where no mark is in the way;
-/// in two lines or smaller where a room is narrow. A room without space for its name shows its
+/// Places the names of spaces in them: in the middle, or where no mark is in the way. Names have
+/// two lines or are smaller where a room is narrow. A room without space for its name shows its
 /// number alone, and the name joins the list.
 void placeSpaceNames(CaptionList& captions, const render::Canvas& measuring, const PlanView& view,
                      std::span<const scene::Space> spaces);

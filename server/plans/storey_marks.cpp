@@ -1,5 +1,5 @@
-// Steps: place all marks and reserve them; place the names of rooms, which must lie in their rooms;
-// place the names of avatars and pictures in what is left.
+// Steps: place all marks and reserve them. Place the names of rooms, which must lie in their rooms.
+// Place the names of avatars and pictures in what is left.
 #include "server/plans/storey_marks.hpp"
 
 #include <algorithm>

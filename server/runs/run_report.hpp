@@ -1,5 +1,6 @@
 // The report of a script run: contacts.jsonl, summary.json, frames/, sheet.png and map.png in one
-// folder, the same for worlds in this process and behind a socket. Files are written atomically.
+// folder. It is the same for worlds in this process and behind a socket. Files are written
+// atomically.
 #pragma once
 
 #include <filesystem>

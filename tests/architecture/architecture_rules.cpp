@@ -516,29 +516,46 @@ Faults findOddWords(const Sources& sources) {
 }
 
 Faults findLongSentences(const Sources& sources, int maxWords) {
-  static const std::regex code("^\\s*```"), noText("^\\s*([#|].*)?$");
+  static const std::regex fence("^\\s*```"), noText("^\\s*([#|].*)?$");
   static const std::regex item(R"(^\s*([-*+]|\d+\.)\s)");
+  static const std::regex comment(R"(^(\s*|.*\S\s*)//+<?( (.*))?$)");
   Faults faults;
   for (const auto& [path, text] : sources) {
-    if (!endsWith(path, ".md")) continue;
+    const bool isPage = endsWith(path, ".md");
+    const bool isProduct = kMayInclude.count(path.substr(0, path.find('/'))) != 0;
+    if (!isPage && !(isProduct && (isCode(path) || endsWith(path, ".proto")))) continue;
     int words = 0, firstLine = 0;
-    bool inCode = false;
+    bool inFence = false;
     const auto endSentence = [&, &name = path] {
       if (words > maxWords)
         faults.push_back(formatPlace(name, firstLine) + ": a sentence of " + std::to_string(words) +
                          " words; split it");
       words = 0;
     };
-    forEachLine(text, [&](int number, const std::string& line) {
-      const bool fence = std::regex_search(line, code);
-      if (fence) inCode = !inCode;
-      if (fence || inCode || std::regex_search(line, noText)) return endSentence();
+    const auto readLine = [&](int number, const std::string& line) {
+      const bool isFence = std::regex_search(line, fence);
+      if (isFence) inFence = !inFence;
+      if (isFence || inFence || std::regex_search(line, noText)) return endSentence();
       if (std::regex_search(line, item)) endSentence();
       std::istringstream rest(line);
       for (std::string word; rest >> word;) {
         if (isWord(word) && ++words == 1) firstLine = number;
         if (endsSentence(word)) endSentence();
       }
+    };
+    forEachLine(text, [&](int number, const std::string& line) {
+      if (isPage) return readLine(number, line);
+      std::smatch match;
+      const bool isComment =
+          line.find("//") != std::string::npos && std::regex_match(line, match, comment);
+      const bool followsCode =
+          isComment && match[1].str().find_first_not_of(' ') != std::string::npos;
+      const std::string written = isComment ? match[3].str() : "";
+      const bool isIndented = written.starts_with(' ');  // formulas and items of a list
+      const bool isFormula = isIndented && written.find('=') != std::string::npos;
+      if (followsCode || written.empty() || isIndented) endSentence();
+      if (!written.empty() && !isFormula) readLine(number, written);
+      if (followsCode) endSentence();
     });
     endSentence();
   }

@@ -15,8 +15,8 @@ using Sources = std::map<std::string, std::string>;
 /// One line a fault: "file:line: what is wrong".
 using Faults = std::vector<std::string>;
 
-/// Every text file of the repository that people write, and, without their text, the pictures and
-/// the licence that pages link to; build folders, out/ and .git left out.
+/// Every text file of the repository that people write. Also, without their text, the pictures and
+/// the licence that pages link to. Build folders, out/ and .git are left out.
 Sources readSources(const std::filesystem::path& root);
 
 /// Quoted includes go by path from the root, exist, and follow
@@ -49,7 +49,7 @@ Faults findUnfinishedWork(const Sources& sources);
 /// sanitizers have none.
 Faults findSourcesWithoutHeader(const Sources& sources);
 
-/// A header of collision/ that no program of the product reaches: neither another folder includes
+/// A header of collision/ that no program of the product reaches. Neither another folder includes
 /// it, nor a header that one reaches, nor the source of such a header. Tests do not count.
 Faults findUnreachedHeaders(const Sources& sources);
 
@@ -61,8 +61,9 @@ Faults findCrowdedFolders(const Sources& sources, int maxFiles);
 /// Constants are named kMax.. and kMin.., not kMost.., kLeast.. and kLargest...
 Faults findOddWords(const Sources& sources);
 
-/// Sentences of the Markdown pages with more than `maxWords` words. A list item ends a sentence,
-/// too. Headings, tables and code do not count.
+/// Sentences of the Markdown pages, and of comments in the product's C++ and schema, with more
+/// than `maxWords` words. A list item ends a sentence, too. Headings, tables, code and formulas do not
+/// count.
 Faults findLongSentences(const Sources& sources, int maxWords);
 
 /// Functions of the product, and of all scripts for browsers and Node.js, that are named by a noun,
@@ -71,13 +72,13 @@ Faults findLongSentences(const Sources& sources, int maxWords);
 Faults findNounFunctions(const Sources& sources);
 
 /// Each row of the table of body kinds is in the schema, in SIDECAR.md and among the page's
-/// commands, which no compiler compares with the table.
+/// commands. No compiler compares them with the table.
 Faults findBodyKindsLeftOut(const Sources& sources);
 
 /// Each kind of diagnostic that scene/ reports is in scene/model/diagnostic_catalog.cpp.
 Faults findUnexplainedDiagnostics(const Sources& sources);
 
-/// Tests run side by side: a file in the system's temporary folder under a name of its author's
+/// Tests run side by side. A file in the system's temporary folder under a name of its author's
 /// choice is overwritten by the next test that chose it.
 Faults findSharedTemporaryFiles(const Sources& sources);
 

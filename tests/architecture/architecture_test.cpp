@@ -86,7 +86,7 @@ TEST(Architecture, NoOddWordsAreUsed) {
   EXPECT_EQ(faults, Faults{}) << listFaults(faults);
 }
 
-TEST(Architecture, SentencesOfThePagesAreShort) {
+TEST(Architecture, SentencesOfPagesAndCommentsAreShort) {
   const Faults faults = findLongSentences(getRepository(), 25);
   EXPECT_EQ(faults, Faults{}) << listFaults(faults);
 }
@@ -251,19 +251,25 @@ TEST(ArchitectureRules, AnOddWordIsAFault) {
 }
 
 TEST(ArchitectureRules, ALongSentenceOfAPageIsAFault) {
-  const Sources sources{{"docs/page.md",
-                         "# A heading may have five words\n\n"
-                         "A page - is\n50 %. \"Has it (five\nor) more `words`?\" No.\n"
-                         "- A list item is\n- one sentence, without\n  a stop\n\n"
-                         "A paragraph is another\n\none, too.\n"
-                         "| a | table | has | no | sentences |\n"
-                         "```\ncode has no sentences either\n```\n"
-                         "1. The last sentence is long\n"},
-                        {"docs/page.hpp", "// A comment has many more words.\n"}};
+  const Sources sources{
+      {"docs/page.md",
+       "# A heading may have five words\n\n"
+       "A page - is\n50 %. \"Has it (five\nor) more `words`?\" No.\n"
+       "- A list item is\n- one sentence, without\n  a stop\n\n"
+       "A paragraph is another\n\none, too.\n"
+       "| a | table | has | no | sentences |\n"
+       "```\ncode has no sentences either\n```\n"
+       "1. The last sentence is long\n"},
+      {"scene/page.hpp",
+       "// A comment has many\n// words. One of few.\n//   f = a formula of many words\n"
+       "int a;  ///< one of each\nint b;  ///< two of each\n"
+       "int c = 1;  // Here is one with five.\nuse(\"http://a b c d e f\");\n"}};
   EXPECT_EQ(findLongSentences(sources, 4),
             (Faults{"docs/page.md:4: a sentence of 6 words; split it",
                     "docs/page.md:7: a sentence of 5 words; split it",
-                    "docs/page.md:17: a sentence of 5 words; split it"}));
+                    "docs/page.md:17: a sentence of 5 words; split it",
+                    "scene/page.hpp:1: a sentence of 5 words; split it",
+                    "scene/page.hpp:6: a sentence of 5 words; split it"}));
 }
 
 TEST(ArchitectureRules, ACommentWithoutASubjectIsAFault) {

@@ -52,8 +52,8 @@ struct PairTally {
 class BroadPhase {
  public:
   virtual ~BroadPhase() = default;
-  /// Moves every proxy to its new box (the first call inserts them) and reports exactly all
-  /// overlapping pairs of closed boxes: a dynamic and a static one, or two dynamic ones.
+  /// Moves every proxy to its new box; the first call inserts them. Reports exactly all overlapping
+  /// pairs of closed boxes: a dynamic and a static one, or two dynamic ones.
   virtual void runTick(std::span<const Aabb> dynamicBoxes, PairTally& tally) = 0;
   /// Bytes allocated without malloc.
   virtual std::size_t countHiddenBytes() const { return 0; }

@@ -87,7 +87,7 @@ std::size_t measure(CubeMotion motion, const Size& size, const Arguments& argume
   return wrong;
 }
 
-/// A heap whose endpoint lists would be expensive, and walkers elsewhere whose lists are cheap: the
+/// A heap whose endpoint lists would be expensive, and walkers elsewhere whose lists are cheap. The
 /// cost of both in one sweep against one sweep for each. Returns the number of wrong frames.
 std::size_t measureHeapBesideWalkers(const Size& size, const BroadPhaseMethod& ours,
                                      Results& results) {

@@ -1,12 +1,12 @@
-// Boxes of turning bodies (Lin 1993, section 5.2.1): cost of each method, vertices that it looks
+// Boxes of turning bodies (Lin 1993, section 5.2.1). Of each method: cost, vertices that it looks
 // at, size of its box, and boxes that do not contain the body, by rationals.
 //
 //   collision_boxes [--quick] [--out FILE] [--only PART_OF_A_METHOD]
 //
 // 1,000 bodies (250 of 2,000 vertices, 50 of 10,000) have the same hull. It is an ellipsoid of 8 to
 // 10,000 vertices and half axes of 0.2, 0.15 and 0.1 m. Each turns about its own axis by 2 or 10
-// degrees a tick; where a climb may cost as much as a scan, also by 4 or 6. In every tick each
-// method computes all boxes, in random order: no method always finds the vertices that the same
+// degrees a tick. Where a climb may cost as much as a scan, also by 4 or 6. In every tick each
+// method computes all boxes, in random order. No method always finds the vertices that the same
 // other one left in the cache.
 #include <gmpxx.h>
 

@@ -4,7 +4,7 @@
 //   collision_icollide [--quick] [--out FILE] [--only PART_OF_A_NAME]
 //
 // Default parameters of the paper: 1000 polytopes of 36 faces; 10 degrees and 10 % of the radius a
-// frame; density 1 % (volume of the bodies relative to the cube that contains them). Bodies pass
+// frame. Density 1 % (volume of the bodies relative to the cube that contains them). Bodies pass
 // through one another and are reflected by the walls. A frame is timed from the new poses to all
 // contacts: boxes, broad phase, narrow phase of every pair. The reference uses the same exact
 // verdict another way: brute force over all boxes, each pair computed cold.

@@ -4,8 +4,8 @@
 //   collision_mesh [--quick] [--out FILE] [--only PART_OF_A_NAME]
 //
 // The mesh is a hilly terrain of 40 m x 40 m. The hull (radius 0.5 m) flies over it at 1.5 m/s and
-// rotates by 1 degree a tick: about 0.3 m clear, or up to 0.2 m deep. Methods run in turns. The
-// reference for sampled steps is our exact verdict on every triangle with a nearby box.
+// rotates by 1 degree a tick. It is about 0.3 m clear, or up to 0.2 m deep. Methods run in turns.
+// The reference for sampled steps is our exact verdict on every triangle with a nearby box.
 
 #include <algorithm>
 #include <numbers>

@@ -1,6 +1,6 @@
-// Cost of contact horizons for a crowd in the bundled building: a schedule of pairs, against the
-// examination of every pair near an avatar, and of every pair, in each tick. One run measures all,
-// tick by tick, so their ratio does not depend on other load.
+// Cost of contact horizons, a schedule of pairs, for a crowd in the bundled building. Compared with
+// the examination of every pair near an avatar, and of every pair, in each tick. One run measures
+// all, tick by tick, so their ratio does not depend on other load.
 //
 //   contact_horizon_bench [AVATARS [TICKS [OBJECTS]]]
 //

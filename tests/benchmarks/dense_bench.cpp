@@ -5,7 +5,7 @@
 // Ten avatars walk at 1.5 m/s in each scene of dense_scenes.hpp, at several numbers of triangles,
 // and in SCENEs. The collision geometry is built before, as a server's prefetch does. The time of a
 // tick is that of the processor: other load does not count. In every 20th tick the contacts of all
-// avatars are compared with brute force: every triangle and hull of the scene, cold, by the exact
+// avatars are compared with brute force: every triangle and hull, cold, by the exact
 // comparison. FILE gets the rows as JSON lines, for dense_report.py.
 #include <algorithm>
 #include <cstdio>

@@ -1,4 +1,4 @@
-// Where an upright avatar comes to by steps of 2 cm, found without a navigation mesh: every place
+// Where an upright avatar comes to by steps of 2 cm, found without a navigation mesh. Every place
 // of a grid is tried by standing there. The reference of the benchmark of navigation.
 #pragma once
 

@@ -8,7 +8,7 @@
 // single samples vary with the allocators' caches. Exit code 3: memory grew.
 //
 // On 2026-11-22 with Mesa's llvmpipe: gl had 13.98 MB allocated after 20 scenes and 13.99 after
-// 200, rays 13.18 and 13.19; resident memory varied in 137 to 156 MB and 90 to 93 MB.
+// 200, rays 13.18 and 13.19. Resident memory varied in 137 to 156 MB and 90 to 93 MB.
 #include <malloc.h>
 #include <unistd.h>
 

@@ -1,5 +1,5 @@
 // Benchmark of navigation: avatars go between random places as clients' avatars do, through closed
-// doors, by lifts and over edges; the time of a path with its proof; and its islands and lengths
+// doors, by lifts and over edges. The time of a path with its proof, and its islands and lengths
 // against a flood fill and Detour's lines.
 //
 //   navigation_bench [--quick] [--pairs N] [--places N] [--only PART] [--out FILE] SCENE..
@@ -122,8 +122,8 @@ struct Walked {
   bool hasDoors = false, hasLifts = false, hasDrops = false;  ///< on the path
 };
 
-/// The ways of an order Go: all that there are, and in a sixth of them the avatar may fall by up to
-/// 2 m; or walks alone, through doors as they are.
+/// The ways of an order Go: all that there are, or walks alone, through doors as they are. In a
+/// sixth of the first, the avatar may fall by up to 2 m.
 enum class GoKind : std::uint8_t { all, walks };
 
 Walked go(Bench& bench, scene::World& world, int number, const Vec3& from, const Vec3& to,
@@ -335,7 +335,7 @@ void comparePair(Bench& bench, const FloodFill& fill, const Vec3& from, const Ve
 }
 
 /// Counts disagreements. Components have no direction, but an avatar may get down where it does not
-/// get up: an avatar that walks the path decides, or the fill of the start alone, by walks. A pair
+/// get up. An avatar that walks the path decides, or the fill of the start alone, by walks. A pair
 /// is near if a thinner avatar passes where a path was found, or a wider one does not where none
 /// was. It is also near if two shifted grids differ.
 void judge(Bench& bench, const std::vector<Vec3>& places, std::size_t maxPlaces,
@@ -391,7 +391,7 @@ void judge(Bench& bench, const std::vector<Vec3>& places, std::size_t maxPlaces,
   }
 }
 
-/// Metres that the feet of an avatar move along a way, across and up and down: a step counts with
+/// Metres that the feet of an avatar move along a way, across and up and down. A step counts with
 /// its height, whether it is taken in one tick or in a fall. nullopt: it cannot be walked.
 std::optional<double> measureWalk(const Bench& bench, const std::vector<Vec3>& way) {
   scene::World world(bench.scene);

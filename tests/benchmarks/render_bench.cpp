@@ -1,5 +1,5 @@
 // Benchmark of rendering: one draw an object with frustum culling against the renderer's culling,
-// in one run over the same walks, with every channel compared byte by byte. CPU time of all threads
+// in one run over the same walks. Every channel is compared byte by byte. CPU time of all threads
 // (with those of a software GL) is reported as well, since other load stretches the wall-clock
 // time.
 //
@@ -108,7 +108,7 @@ render::Frame draw(render::GlRenderer& renderer, const tests::WalkStop& stop, Si
 }
 
 /// Walks once with culling alone, as in use. A second walk compares frames of both methods at some
-/// stops; only these stops of the first walk and of the drawing without culling are timed.
+/// stops. Only these stops of the first walk and of the drawing without culling are timed.
 void measure(const std::shared_ptr<const scene::Scene>& scene, const std::string& name,
              bool textured, Size size, int frames) {
   const std::vector<tests::WalkStop> stops = walkIn(scene, name, frames);

@@ -199,6 +199,28 @@ class Environments(RoomCase):
                                cameras=[enfilade.Camera("a", (16, 12), ahead=0.1),
                                         enfilade.Camera("b", (8, 8), ("ids", "flow"), yaw=1.0)])
 
+    def test_pictures_without_a_copy_are_those_with_one(self):
+        self.need_pictures()
+        cameras = [enfilade.Camera("a", (16, 12), ("rgb", "depth")), enfilade.Camera("b", (8, 8), ("ids",))]
+        options = {"goals": [(-4, 0, 0)], "discrete": True, "max_steps": 7, "cameras": cameras}
+        copies, views = self.vector(3, **options), self.vector(3, copy=False, **options)
+        self.assert_same(views.reset(seed=3)[0], copies.reset(seed=3)[0])
+        places = set()
+        for number in range(1, 16):
+            seen, expected = views.step([1, 3, 2])[0], copies.step([1, 3, 2])[0]
+            self.assert_same(seen, expected)
+            is_restart = number % 8 == 0
+            for name in ("a_rgb", "b_ids"):
+                self.assertEqual(seen[name].flags.writeable, is_restart, f"{name} in step {number}")
+                if not is_restart:
+                    places.add(seen[name].ctypes.data)
+            self.assertTrue(seen["a_depth"].flags.writeable)
+        self.assertLess(len(places), 2 * 14, "the memory is used again")
+        world = views.envs[1].client.world
+        self.client.drop_world(world)
+        with self.assertRaisesRegex(enfilade.ServerError, "environment 1"):
+            views.step([1, 3, 2])
+
     def test_an_avatar_that_falls_ends_its_episode_in_a_packed_step(self):
         infos = self.assert_same_steps(2, 60, lambda: np.array([[1, 0], [0, 0]], float),
                                        starts=[(9, 0, 9, 0)])

@@ -123,7 +123,7 @@ TEST_P(BoxTables, BoxesThatTouchOverlapAndThoseApartByOneRoundingDoNot) {
 }
 
 TEST_P(BoxTables, RoundingNeverPutsBoxesThatTouchTwoCellsApart) {
-  // Boxes as large as a cell, whose corners lie on both sides of the cells' borders: without slack
+  // Boxes as large as a cell, whose corners lie on both sides of the cells' borders. Without slack
   // in the cell size, the product with its inverse would be rounded down for one and up for the
   // other.
   Random random(6);

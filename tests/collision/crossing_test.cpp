@@ -1,4 +1,4 @@
-// Thin bodies that pass through each other at a time that is no double: the contact is proved, and
+// Thin bodies that pass through each other at a time that is no double. The contact is proved, and
 // its interval contains the exact time, in rational arithmetic.
 #include "collision/motion/crossing.hpp"
 
@@ -101,7 +101,7 @@ TEST(Crossing, ThinBodiesMeetAtTheExactTime) {
   EXPECT_GT(misses, 400);
 }
 
-/// The query takes an interval around the exact time; a shift of the path by a multiple of an ulp
+/// The query takes an interval around the exact time. A shift of the path by a multiple of an ulp
 /// makes hits and near misses of the same triangle.
 TEST(Crossing, NearAnEdgeNoMissIsAContact) {
   Random random(32);

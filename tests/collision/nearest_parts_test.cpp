@@ -1,5 +1,5 @@
-// Nearest parts of two compound objects: those by brute force, whether or not the parts have boxes;
-// with boxes, parts out of reach are not placed.
+// Nearest parts of two compound objects: those by brute force, whether or not the parts have boxes.
+// With boxes, parts out of reach are not placed.
 #include "collision/compound/nearest_parts.hpp"
 
 #include <gtest/gtest.h>

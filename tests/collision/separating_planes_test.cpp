@@ -80,7 +80,7 @@ struct Tally {
   int missed = 0, reached = 0;
 };
 
-/// One body among 40 others near `origin`: every proved miss is checked exactly, with the hull of
+/// One body among 40 others near `origin`. Every proved miss is checked exactly, with the hull of
 /// the body at the start and at the end.
 void checkMotion(Random& random, const Vec3& origin, Tally& tally) {
   const std::vector<Vec3> vertices = makeDyadicPoints(random, 12, 0.5);

@@ -1,4 +1,4 @@
-// Tests of batch updates, which find all dynamic pairs from scratch because coherence is lost: the
+// Tests of batch updates, which find all dynamic pairs from scratch because coherence is lost. The
 // same pairs and changes as by brute force, and a return to the endpoint lists.
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// Prints the final state hashes of worlds with all kinds of motion: avatars on stairs, a crowd,
-// flyers among slivers, a driven arm, doors and a lift, leaves that hit one another, a heap of
+// Prints the final state hashes of worlds with all kinds of motion. Avatars on stairs, a crowd,
+// flyers among slivers, a driven arm, doors and a lift, leaves that hit one another. A heap of
 // dynamic bodies, a vibrating tray (by one thread and by two: these two lines must agree). Scenes
 // and commands are made without libm, so that every build on every processor has the same input and
 // must print the same lines.

@@ -1,4 +1,4 @@
-// The shared glTF scenes in the encodings of today's exporters, written by glTF Transform: each imports to the same
+// The shared glTF scenes in the encodings of today's exporters, written by glTF Transform. Each imports to the same
 // objects and triangles, and places within the step of its quantization.
 //   node encoded_scenes_test.mjs --server build/enfilade [--scenes ../shared/scenes]
 // Without the shared scenes our own building alone is tested; under CI that is a failure.

@@ -1,4 +1,4 @@
-// Serves the built page and a plain GLB file in front of a server without a page of its own: for development of the
+// Serves the built page and a plain GLB file in front of a server without a page of its own. For development of the
 // page, and for tests of files without entity ids.
 //   node page_proxy.mjs PAGE_FOLDER SCENE.glb SERVER_PORT [PORT]
 import { createReadStream, existsSync, statSync } from "node:fs";

@@ -1,5 +1,5 @@
-// Tests of MCAP files: written items are read back, a truncated file is read up to its last whole
-// chunk, and every flipped bit is detected.
+// Tests of MCAP files: written items are read back, and every flipped bit is detected. A truncated
+// file is read up to its last whole chunk.
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 

@@ -1,5 +1,5 @@
-// Boxes of avatars: only links that moved get new ones, once a tick in free space; parts that turn
-// get theirs from the extremal vertices of the last tick; placed boxes contain the exact part.
+// Boxes of avatars: only links that moved get new ones, once a tick in free space. Parts that turn
+// get theirs from the extremal vertices of the last tick. Placed boxes contain the exact part.
 #include <gmpxx.h>
 #include <gtest/gtest.h>
 
@@ -130,8 +130,8 @@ TEST(AvatarBoxes, OfTurningPartsAreMadeByTheExtremalVerticesOfTheLastTick) {
   }
 }
 
-/// Whether a placed box contains the part exactly: with its rounded translation, as the narrow
-/// phase sees it, and with the exact sum of foot position and offset.
+/// Whether a placed box contains the part exactly. Once with its rounded translation, as the narrow
+/// phase sees it, and once with the exact sum of foot position and offset.
 bool containsExactly(const Aabb& box, const AvatarPart& part, const Vec3& footPosition) {
   const collision::PlacedConvex placed = placeAvatarPart(part, footPosition);
   for (const Vec3& v : part.hull->vertices) {

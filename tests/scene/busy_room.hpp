@@ -1,5 +1,5 @@
-// A room with all kinds of moving entities at once: walkers, a rider, a flyer, a chain, a lift, a
-// door, a path body and dynamic bodies, with seeded commands.
+// A room with all kinds of moving entities at once, with seeded commands. Walkers, a rider, a
+// flyer, a chain, a lift, a door, a path body and dynamic bodies.
 #pragma once
 
 #include <random>

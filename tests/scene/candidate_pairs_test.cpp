@@ -1,4 +1,4 @@
-// Compares the candidate pairs of concave bodies with the double loop over their parts: with one
+// Compares the candidate pairs of concave bodies with the double loop over their parts. With one
 // another, with a static mesh, and with a kinematic body.
 #include "scene/world/bodies/candidate_pairs.hpp"
 

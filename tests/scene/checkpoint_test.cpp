@@ -13,8 +13,8 @@ namespace {
 
 using namespace testing;
 
-/// A room with all moving things: doors that avatars open and that close again, a lift, a tray that
-/// shakes boxes, a tower of boxes, a step, a trigger.
+/// A room with all moving things: doors that avatars open and that close again, a lift, a step. A
+/// tray that shakes boxes, a tower of boxes, a trigger.
 std::shared_ptr<const Scene> makeLivelyRoom() {
   std::vector<NamedBox> boxes{makeFloorBox(),
                               {"north", {-10, 0, -10.2}, {10, 3, -10}},

@@ -1,4 +1,4 @@
-// Encodings of one and the same small model give the same triangles as the plain file; damaged ones
+// Encodings of one and the same small model give the same triangles as the plain file. Damaged ones
 // are errors, and counts that a file cannot justify are refused.
 #include <gtest/gtest.h>
 #include <webp/encode.h>

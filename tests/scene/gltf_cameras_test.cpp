@@ -108,7 +108,7 @@ TEST(GltfCamera, StepKeysHoldAndTheFirstHoldsBeforeItself) {
 
 TEST(GltfCamera, CubicSplinesFollowTheirTangents) {
   GltfFile file;
-  // Cubic Hermite spline from 0 to 0 in two seconds, with the tangents 3 m/s and -3 m/s: at the
+  // Cubic Hermite spline from 0 to 0 in two seconds, with the tangents 3 m/s and -3 m/s. At the
   // middle h10 * 2 * 3 + h11 * 2 * (-3) = (0.125 + 0.125) * 6.
   file.animate(1, "translation", "CUBICSPLINE", {0, 2},
                {0, 0, 0, 0, 0, 0, 0, 3, 0, 0, -3, 0, 0, 0, 0, 0, 0, 0});

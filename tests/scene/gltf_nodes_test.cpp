@@ -1,4 +1,4 @@
-// The nodes of glTF files: transforms are the file's own, whatever assimp makes of them, and what
+// Nodes of glTF files: transforms are the file's own, whatever assimp makes of them, and what
 // glTF does not allow in a node is reported.
 #include <gtest/gtest.h>
 

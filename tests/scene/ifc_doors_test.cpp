@@ -1,5 +1,5 @@
-// Tests of IFC doors and lifts as bodies: hinge side and direction of each leaf, doors that stay
-// static with the reason, and the doors of real buildings.
+// Tests of IFC doors and lifts as bodies: hinge side and direction of each leaf, static doors with
+// the reason, the doors of real buildings.
 #include <gtest/gtest.h>
 
 #include <algorithm>

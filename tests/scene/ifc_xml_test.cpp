@@ -70,7 +70,7 @@ ENDSEC;
 END-ISO-10303-21;
 )";
 
-/// The same in ifcXML: relationships nested as inverse attributes and at the top level, entities in
+/// The same in ifcXML. Relationships nested as inverse attributes and at the top level. Entities in
 /// place of attributes and in elements of their own, references in both forms.
 constexpr char kRoot[] =
     R"(<?xml version="1.0" encoding="utf-8"?>

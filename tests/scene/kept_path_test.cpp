@@ -93,7 +93,7 @@ TEST(KeptPath, ChangesToTheOtherWayWhereThatIsShorter) {
   EXPECT_LT(journey.searches, 20);
 }
 
-/// An agent overshoots the points of its path by up to a step. It is led on, not back: around the
+/// An agent overshoots the points of its path by up to a step. It is led on, not back. Around the
 /// wall the path is much longer than the way across, and a rug keeps points out of clear sight.
 TEST(KeptPath, LeadsAnAgentOnThatOvershootsItsPoints) {
   constexpr double kStep = 0.14;

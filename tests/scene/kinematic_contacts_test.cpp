@@ -181,7 +181,7 @@ TEST(KinematicContacts, APathThatReversesWithinATickTouchesReachedObjects) {
   EXPECT_EQ(turning.events.size(), 2u);
 }
 
-/// Two blocks of 0.1 m. In one tick one moves 1 m along x from `x`; the other starts at `z` and
+/// Two blocks of 0.1 m. In one tick one moves 1 m along x from `x`. The other starts at `z` and
 /// moves by `kind`: a slide of 1 m along z, or a path that returns after half a metre.
 BodyFixture makeCrossing(double x, BodyKind kind, double z) {
   Model model = makeBoxModel({{"a", {x - 0.05, 0, -0.05}, {x + 0.05, 0.1, 0.05}},

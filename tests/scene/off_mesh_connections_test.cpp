@@ -117,7 +117,7 @@ TEST(OffMeshConnections, AnAnswerDoesNotDependOnEarlierOnes) {
   }
 }
 
-/// A narrow door at the end of an alcove in each storey: it is the only gap, and those of other
+/// A narrow door at the end of an alcove in each storey. It is the only gap, and those of other
 /// storeys lie above and below it.
 TEST(OffMeshConnections, GapsOfEachStoreyAreTried) {
   constexpr double kDoor = 0.61;

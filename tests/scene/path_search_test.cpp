@@ -138,7 +138,7 @@ TEST(PathSearch, PlacesWithoutAMeshAreConnectedWithIt) {
   EXPECT_FALSE(scene.find(onMesh, {12, 0, 3}).found()) << "it is too far from the mesh";
 }
 
-/// The floor is a U. One leg has no mesh but at its end, and is wide: a search from there towards
+/// The floor is a U. One leg has no mesh but at its end, and is wide. A search from there towards
 /// the goal in the other leg uses up its walks before it turns back.
 TEST(PathSearch, FromTheMiddleOfAFloorWithoutAMeshAPathLeadsToTheClosestPlaceOfTheMesh) {
   const NamedBox bottom{"bottom", {0, -0.2, -6}, {3, 0, 9}}, mesh{"leg", {3, -0.2, 6}, {14, 0, 9}};

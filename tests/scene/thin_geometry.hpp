@@ -1,5 +1,5 @@
-// Closed rooms of thin obstacles, and an exact check that no avatar crossed one: the narrow phase
-// on every triangle and part, and the side of each sheet.
+// Closed rooms of thin obstacles, and an exact check that no avatar crossed one. It uses the narrow
+// phase on every triangle and part, and the side of each sheet.
 #pragma once
 
 #include <algorithm>

@@ -19,7 +19,7 @@ TEST(UnreachableReasons, NameWhatStopsTheAgentAndWhatItWouldNeed) {
     return Navigation(makeBoxScene(boxes), {}, {}).findPath({2, 0, 2}, goal).reason;
   };
   EXPECT_EQ(findReason({floor, {"wall", {5, 0, -1}, {5.2, 2.5, 6}}}, {8, 0, 2}),
-            "wall is in the way");
+            "wall is in the way: no gap, needs 0.600 m");
   EXPECT_EQ(findReason({floor, {"kerb", {5, 0, 0}, {10, 0.4, 5}}}, {8, 0.4, 2}),
             "kerb is in the way: a step of 0.400 m, climbs 0.300");
   EXPECT_EQ(findReason({floor, {"beam", {5, 1.5, -1}, {5.3, 3, 6}}}, {8, 0, 2}),
@@ -37,7 +37,8 @@ TEST(UnreachableReasons, AreThoseOfTheFirstRoomOnTheWay) {
   Navigation navigation(makeBoxScene(boxes), {}, {});
   EXPECT_EQ(navigation.findPath({2, 0, 2}, {13, 0, 2}).reason,
             "kerb is in the way: a step of 0.500 m, climbs 0.300");
-  EXPECT_EQ(navigation.findPath({13, 0, 2}, {2, 0, 2}).reason, "wall is in the way");
+  EXPECT_EQ(navigation.findPath({13, 0, 2}, {2, 0, 2}).reason,
+            "wall is in the way: no gap, needs 0.600 m");
 }
 
 /// A strip of floor belongs to the other room and runs behind a panel of this one: no agent fits.
@@ -49,7 +50,7 @@ TEST(UnreachableReasons, AreOfPlacesWhereAnAgentFits) {
                         {}, {});
   for (const auto& [from, to] : {std::pair(2, 8), std::pair(8, 2)}) {
     const std::string reason = navigation.findPath(Vec3(from, 0, 2), Vec3(to, 0, 2)).reason;
-    EXPECT_TRUE(reason.starts_with("party is in the way")) << reason;
+    EXPECT_TRUE(reason.starts_with("party is in the way: ")) << reason;
   }
 }
 
@@ -64,12 +65,12 @@ TEST(UnreachableReasons, TheFirstPathThatIsNotFoundReportsTheirMesh) {
   };
   EXPECT_TRUE(find({4, 0, 2}).found());
   EXPECT_TRUE(shares.empty());
-  EXPECT_EQ(find({8, 0, 2}).reason, "wall is in the way");
+  EXPECT_EQ(find({8, 0, 2}).reason, "wall is in the way: no gap, needs 0.600 m");
   ASSERT_FALSE(shares.empty());
   EXPECT_LT(shares.front(), 1);
   EXPECT_TRUE(std::ranges::is_sorted(shares));
   EXPECT_EQ(shares.back(), 1);
-  EXPECT_EQ(find({9, 0, 2}).reason, "wall is in the way");
+  EXPECT_EQ(find({9, 0, 2}).reason, "wall is in the way: no gap, needs 0.600 m");
   EXPECT_TRUE(shares.empty());
 }
 

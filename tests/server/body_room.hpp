@@ -12,9 +12,9 @@ namespace enfilade::server::testing {
 
 inline constexpr scene::EntityId kEnd = 4, kLeaf = 5, kZone = 6, kCrate = 7;
 
-/// Floor x, z in -10..10 with its top at 0; a wall at x = 2 with an opening z in -0.6..0.6, in it
-/// the leaf "door", hinged at z = -0.6, that opens towards +x; a wall at x = 6; the volume "zone"
-/// around (-3, 0, 0); the rigid "crate" beyond the floor.
+/// Floor x, z in -10..10 with its top at 0. A wall at x = 2 with an opening z in -0.6..0.6. In it
+/// the leaf "door", hinged at z = -0.6, that opens towards +x. A wall at x = 6, the volume "zone"
+/// around (-3, 0, 0), the rigid "crate" beyond the floor.
 inline scene::Model makeBodyRoomModel() {
   using scene::Vec3;
   scene::Model model =

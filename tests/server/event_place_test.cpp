@@ -11,7 +11,7 @@ namespace {
 
 using scene::Vec3;
 
-/// Two storeys; on the ground floor a hall of 10 x 10 m, and in a corner of it a booth of 2 x 2 m.
+/// Two storeys. On the ground floor a hall of 10 x 10 m, and in a corner of it a booth of 2 x 2 m.
 /// Object 1 is in the upper storey, object 2 in none.
 scene::Model makeHouse() {
   scene::Model model;

@@ -1,5 +1,5 @@
 // Replies of the navigation service: the reasons that separate islands, formats of maps, goals on
-// the start's island, and meshes that the next start of the program finds in the cache.
+// the start's island. Meshes that the next start of the program finds in the cache.
 #include "server/navigation/navigation_service.hpp"
 
 #include <gtest/gtest.h>

@@ -36,7 +36,7 @@ Eigen::Vector2d findArrow(const Eigen::Vector2d& north) {
 }
 
 TEST(NorthArrow, PointsToNorthOnThePage) {
-  // The letter beyond the tip and the tail are on opposite sides; turning the arrow by a half turn
+  // The letter beyond the tip and the tail are on opposite sides. Turning the arrow by a half turn
   // moves the letter, so that the difference points to north.
   const Eigen::Vector2d up(0, -1), right(1, 0), slanted(0.6, -0.8);
   for (const Eigen::Vector2d& north : {up, right, slanted}) {

@@ -1,4 +1,4 @@
-// Replaces each number of every request by NaN, infinity and absurd values: all are refused, and
+// Replaces each number of every request by NaN, infinity and absurd values. All are refused, and
 // the world continues as if no request had been made.
 #include <google/protobuf/message.h>
 

@@ -1,5 +1,5 @@
-// Tests of playing a recording over the socket: every tick equals the recorded one after any seek,
-// contacts pair for every client, and a branch is a recording of its own.
+// Tests of playing a recording over the socket: every tick equals the recorded one after any seek.
+// Contacts pair for every client, and a branch is a recording of its own.
 #include <filesystem>
 #include <map>
 #include <random>

@@ -1,4 +1,4 @@
-// Two squares, one red and one grey by the colours of their vertices, as PLY, OBJ and glTF: both
+// Two squares, one red and one grey by the colours of their vertices, as PLY, OBJ and glTF. Both
 // renderers show each colour as they show a material of that colour.
 #include <gtest/gtest.h>
 

@@ -1,5 +1,5 @@
-// A vibrating tray with small convex parts (Lin 1993, section 5.4: "thousands of small mechanical
-// parts on a vibrating parts feeder in real time"), for a test and for a benchmark.
+// A vibrating tray with small convex parts, for a test and for a benchmark. Lin 1993, section 5.4:
+// "thousands of small mechanical parts on a vibrating parts feeder in real time".
 #pragma once
 
 #include <deque>

@@ -46,7 +46,7 @@ struct LoadResult {
 LoadResult runLoad(const LoadOptions& options, const std::function<void()>& beforeStop,
                    const std::function<void()>& stop);
 
-/// Makes `count` visits: some say hello and goodbye, some leave in the middle of a message, some
+/// Makes `count` visits. Some say hello and goodbye, some leave in the middle of a message. Some
 /// close one direction only, some close at once, some spawn an avatar and vanish.
 void visitRudely(std::uint16_t port, int count, unsigned seed);
 

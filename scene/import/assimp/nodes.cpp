@@ -120,7 +120,7 @@ class NodeCollector {
   std::vector<ImportedNode> importedNodes_;
 };
 
-/// Whether the root is not a node of the file: assimp created it or named it after the file, and a
+/// Whether the root is not a node of the file, but assimp created it or named it after the file. A
 /// renamed file must keep its paths.
 bool isSyntheticRoot(const aiNode& root, ModelFormat format) {
   return root.mNumMeshes == 0 && format != ModelFormat::ifc;

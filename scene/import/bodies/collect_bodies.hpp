@@ -1,6 +1,6 @@
-// Collects the bodies of a model from all sources. If several sources describe an object, the first
-// in this list wins: the sidecar, the imported file itself (KHR_physics_rigid_bodies, extras of
-// nodes, name suffixes), IFC doors and elevators. All other objects are static.
+// Collects the bodies of a model from all sources. The first source that describes an object wins.
+// The order is: the sidecar, the imported file itself (KHR_physics_rigid_bodies, extras of nodes,
+// name suffixes), IFC doors and elevators. All other objects are static.
 #pragma once
 
 #include <cstdint>

@@ -1,5 +1,5 @@
-// Bodies of a glTF file: those of its physics extension first, then those in extras of nodes,
-// `walk_kind` and the other keys of SIDECAR.md with the prefix `walk_`.
+// Bodies of a glTF file: those of its physics extension first, then those in extras of nodes. The
+// extras are `walk_kind` and the other keys of SIDECAR.md with the prefix `walk_`.
 #pragma once
 
 #include <cstdint>

@@ -1,6 +1,6 @@
 // Reads KHR_physics_rigid_bodies (draft of 2024): motion with mass and velocity, colliders with
-// shapes and materials, triggers, and joints with one degree of freedom between a body and a static
-// node. The rest is reported, not guessed.
+// shapes and materials, and triggers. Also reads joints with one degree of freedom between a body
+// and a static node. The rest is reported, not guessed.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,6 @@
 // Doors of IFC as bodies. Their OperationType gives the direction of opening, in the frame of the
-// door's placement (IfcDoorStyleOperationEnum, IfcDoorTypeOperationEnum): hinges left or right as
-// seen along the positive y axis, opening to that side.
+// door's placement (IfcDoorStyleOperationEnum, IfcDoorTypeOperationEnum). Hinges are left or right
+// as seen along the positive y axis, to which the door opens.
 #pragma once
 
 #include <vector>

@@ -2,7 +2,7 @@
 // size is checked before anything is allocated. Private to the import.
 //
 // The rule for sizes: what a file decodes to is at most kMaxExpansion times its own bytes and those
-// of its buffers, plus a constant. No codec of a valid file comes near it: a triangle takes at
+// of its buffers, plus a constant. No codec of a valid file comes near it. A triangle takes at
 // least one byte of EXT_meshopt_compression, and 64 bytes of vertices at least one.
 #pragma once
 

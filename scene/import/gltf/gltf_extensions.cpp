@@ -32,8 +32,8 @@ constexpr std::array<std::string_view, 9> kAppearanceExtensions{
     "KHR_materials_", "KHR_texture_", "KHR_lights_",  "KHR_animation_pointer", "EXT_materials_",
     "EXT_texture_",   "EXT_lights_",  "MSFT_texture", "NV_materials_"};
 
-/// Beginnings of names of other extensions that change neither shapes nor places if they are
-/// optional: metadata, physics, and alternatives to what the core of the file describes.
+/// Beginnings of names of other extensions that change neither shapes nor places if optional. They
+/// are for metadata, physics, and alternatives to what the core of the file describes.
 constexpr std::array<std::string_view, 25> kHarmlessExtensions{"MOZ_",
                                                                "OMI_",
                                                                "ASOBO_",

@@ -1,5 +1,5 @@
-// The rest pose of skinned and morphed glTF meshes: skins with the joints where the file's nodes
-// put them, and morph targets with their default weights (glTF 2.0, 3.7.2.2 and 3.7.3). Private to
+// The rest pose of skinned and morphed glTF meshes (glTF 2.0, 3.7.2.2 and 3.7.3). Skins have the
+// joints where the file's nodes put them, and morph targets have their default weights. Private to
 // the import.
 #pragma once
 
@@ -37,9 +37,9 @@ void applyMorphTargets(const RestPose& pose, const nlohmann::json& targets, Gltf
 void applySkin(const RestPose& pose, GltfBuffers& buffers, const std::string& name,
                PrimitiveArrays& arrays);
 
-/// The box of all places where the skin can put a point of `box`: for each joint that moves a
-/// vertex of the primitive, the box of the corners after it. Needs the skin's joints and the
-/// primitive's weights, but not its positions. Throws ImportError if they cannot be read.
+/// The box of all places where the skin can put a point of `box`. It contains the corners after
+/// each joint that moves a vertex of the primitive. Needs the skin's joints and the primitive's
+/// weights, but not its positions. Throws ImportError if they cannot be read.
 Aabb computePosedBox(const RestPose& pose, const Aabb& box, const nlohmann::json& primitive,
                      GltfBuffers& buffers, const std::string& name);
 

@@ -1,6 +1,6 @@
 // The pre-pass over glTF files: checks them, reads their nodes, and makes a file of their meshes
-// for assimp. Data that assimp would not read, or not read right, is rewritten to plain accessors:
-// it decodes KHR_mesh_quantization, EXT_meshopt_compression, KHR_meshopt_compression,
+// for assimp. It rewrites data that assimp would not read, or not read right, to plain accessors.
+// It decodes KHR_mesh_quantization, EXT_meshopt_compression, KHR_meshopt_compression,
 // KHR_draco_mesh_compression, sparse accessors, strips, fans and data URIs, expands
 // EXT_mesh_gpu_instancing and applies KHR_texture_transform. Nodes and meshes keep their indices.
 #pragma once

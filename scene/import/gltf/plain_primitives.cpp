@@ -16,7 +16,7 @@ using Json = nlohmann::json;
 constexpr const char* kColours = "COLOR_0";
 // glTF 2.0, 5.24.4; points and lines are below.
 constexpr std::size_t kTriangleMode = 4, kStripMode = 5, kFanMode = 6;
-/// Bytes of Draco's output that count as one of those that the file must justify: Draco compresses
+/// Bytes of Draco's output that count as one of those that the file must justify. Draco compresses
 /// regular grids far better than other codecs, and draco_mesh.cpp bounds its counts itself.
 constexpr std::size_t kDracoBytesPerByte = 32;
 

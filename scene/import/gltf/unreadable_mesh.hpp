@@ -18,7 +18,7 @@ struct UnreadableMesh {
 };
 
 /// Returns a solid box of the extent that the positions of a primitive state, in its rest pose, so
-/// that no avatar walks through it; null without a valid extent. Reports which. `accessors`: of the
+/// that no avatar walks through it. Null without a valid extent. Reports which. `accessors`: of the
 /// file.
 nlohmann::json replaceUnreadable(const UnreadableMesh& mesh, const nlohmann::json& accessors,
                                  GltfBuffers& buffers, GltfBinary& binary,

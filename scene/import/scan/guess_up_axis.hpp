@@ -13,8 +13,8 @@ namespace enfilade::scene {
 struct LevelArea {
   double largest = 0;  ///< of those at one height
   double all = 0;
-  /// That at one height is in the upper half and faces down, and the lower half has no such level:
-  /// a floor that hangs upside down, or a ceiling alone.
+  /// That at one height is in the upper half and faces down, and the lower half has no such level.
+  /// This is a floor that hangs upside down, or a ceiling alone.
   bool hangs = false;
 };
 
@@ -28,9 +28,9 @@ LevelAreas computeLevelAreas(std::span<const ScanMesh> meshes);
 struct UpAxisGuess {
   UpAxis axis = UpAxis::z;
   /// Its level exceeds those of the other axes by half and does not hang. The level areas are a
-  /// tenth of the surface, and those of a second axis a twentieth, as in a room with square walls:
-  /// of one that is tilted, two walls alone are perpendicular to an axis. Of a lawn or a table,
-  /// three quarters of the surface are level, and no second axis is needed.
+  /// tenth of the surface, and those of a second axis a twentieth, as in a room with square walls.
+  /// In a tilted one, only two walls are perpendicular to an axis. Of a lawn or a table, three
+  /// quarters of the surface are level, and no second axis is needed.
   bool isClear = false;
 };
 

@@ -1,5 +1,5 @@
-// Reads the elements in the order of the header: of "vertex" positions, normals and colours, of
-// "face" polygons and their colours, of "tristrips" strips that -1 ends. All else is skipped.
+// Reads the elements in the order of the header. "vertex" has positions, normals and colours,
+// "face" polygons and their colours, "tristrips" strips that -1 ends. All else is skipped.
 #include "scene/import/scan/ply_file.hpp"
 
 #include <algorithm>

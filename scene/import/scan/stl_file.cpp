@@ -1,4 +1,4 @@
-// A binary file has a header of 80 bytes, a count, and 50 bytes per triangle; programs disagree on
+// A binary file has a header of 80 bytes, a count, and 50 bytes per triangle. Programs disagree on
 // whether a text file may begin with anything but "solid", and some binary headers do begin with
 // it. So a file whose size fits its count is binary, and any other that begins with "solid" and
 // has no zero bytes is text.

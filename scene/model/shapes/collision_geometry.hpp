@@ -24,8 +24,8 @@ struct CollisionGeometry {
   /// to the rounding of the coordinates (convex_surface.hpp).
   std::vector<collision::Hull> localHulls;
   collision::TriangleTree localTriangles;  ///< closed sets, without thickness
-  /// Per triangle: 1 if it is part of a closed surface and counter-clockwise seen from outside, -1
-  /// if clockwise (the placement mirrors), 0 if its surface is open.
+  /// Per triangle: 0 if its surface is open. If it is closed, 1 for counter-clockwise seen from
+  /// outside, -1 for clockwise (the placement mirrors).
   std::vector<signed char> windingSigns;
 
   std::vector<Aabb> hullBoxes;  ///< not relative to the origin

@@ -64,7 +64,7 @@ double computeSixfoldVolume(const SurfaceMesh& surface) {
 }
 
 /// Quick test: some faces of most non-convex surfaces have points well on both sides. It rejects
-/// only surfaces that would fail the full test: a triangle 1e5 d high whose corners lie within d of
+/// only surfaces that would fail the full test. A triangle 1e5 d high whose corners lie within d of
 /// a face's plane is hardly tilted. No point is beyond it by a thousandth of the extent.
 bool isClearlyNotConvex(const SurfaceMesh& surface) {
   const double clear = 1e-3 * surface.extent;

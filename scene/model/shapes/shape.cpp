@@ -1,6 +1,6 @@
 // Steps: weld equal positions; drop duplicate triangles and those without area; sort the edges;
-// connect triangles over edges that exactly two share; give each surface the winding of most of its
-// triangles; classify each closed surface as convex or not, and as inward or outward.
+// connect triangles over edges that exactly two share. Then give each surface the winding of most
+// of its triangles, and classify each closed surface as convex or not, and as inward or outward.
 #include "scene/model/shapes/shape.hpp"
 
 #include <algorithm>

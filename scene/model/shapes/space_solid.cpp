@@ -83,7 +83,7 @@ double computeWallDistance(const Outline& outline, const GroundPoint& point) {
 }
 
 /// Calls visit(point) for the points of a grid that are inside, and for the middle of each part of
-/// its lines that is inside: a narrow corridor has points too.
+/// its lines that is inside. A narrow corridor thus has points too.
 template <class Visit>
 void visitInside(const Outline& outline, const GroundPoint& low, const GroundPoint& high,
                  const Visit& visit) {

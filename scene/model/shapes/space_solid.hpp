@@ -13,9 +13,9 @@ struct SpaceMiddle {
   double width = 0;  ///< metres along x in the space, half of them on each side of the point
 };
 
-/// A point of a space that is not empty, for its name or as a goal: the centre of its box if this
-/// is in the solid, otherwise about the point that is farthest from the walls. Only the part in
-/// `area` counts, which overlaps the box. A surface without inside has the centre as well.
+/// A point of a space that is not empty, for its name or as a goal. It is the centre of its box if
+/// this is in the solid, otherwise about the point that is farthest from the walls. Only the part
+/// in `area` counts, which overlaps the box. A surface without inside has the centre as well.
 SpaceMiddle findSpaceMiddle(const Space& space, const Aabb& area);
 
 }  // namespace enfilade::scene

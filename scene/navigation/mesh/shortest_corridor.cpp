@@ -132,8 +132,8 @@ class CorridorSearch {
         interval.parent == kNoNode ? from_.polygon : nodes_[interval.parent].polygon;
     for (const Portal& portal : mesh_.portals(interval.polygon)) {
       if (!isOpen(portal) || portal.to == before) continue;
-      // The portal runs from its low to its high end as seen from inside of the polygon: first the
-      // part beyond the ray through the interval's low end, last that beyond its high end.
+      // The portal runs from its low to its high end as seen from inside of the polygon. The part
+      // beyond the ray through the interval's low end comes first, that beyond its high end last.
       const double first = crossing(toLow, portal.low - root, portal.high - root);
       const double last = 1 - crossing(-toHigh, portal.high - root, portal.low - root);
       const auto at = [&](double t) -> Vec3 {

@@ -48,7 +48,7 @@ std::optional<std::vector<Sample>> sampleWalk(Walker& walker, const std::vector<
 }
 
 /// The sample where the walk is back at the height of sample `first`, after which it rises or
-/// sinks; nullopt: it does not within a short way.
+/// sinks. The result is nullopt if it is not back within a short way.
 std::optional<std::size_t> findEndOfBump(const std::vector<Sample>& samples, std::size_t first) {
   const Sample& start = samples[first];
   for (std::size_t i = first + 2; i < samples.size(); ++i) {

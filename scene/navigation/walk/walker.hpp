@@ -64,7 +64,7 @@ class Walker {
 
   /// Walks straight to `goal` over even floor, without an obstacle; false: it does not arrive so.
   bool walkEvenly(const Vec3& goal);
-  /// Walks tick by tick as an avatar in a world does, equal up to rounding: it may slide along
+  /// Walks tick by tick as an avatar in a world does, equal up to rounding. It may slide along
   /// obstacles, and may end in a fall from a step. Begins standing, or in that fall.
   WalkOutcome walkOn(const Vec3& goal);
   /// Walks tick by tick to `goal`, and may fall by up to `maxDrop` metres on the way.

@@ -53,8 +53,8 @@ ShapeCastHit castFrom(AvatarMover& m, const Vec3& displacement) {
   return hit;
 }
 
-/// Projects `desired` so that it enters no plane: onto one plane if the result suits all others,
-/// else onto the crease of two planes, else zero.
+/// Projects `desired` so that it enters no plane. The result is on one plane if it suits all
+/// others, else on the crease of two planes, else zero.
 Vec3 projectOntoPlanes(const Vec3& desired, const std::vector<Vec3>& normals) {
   const auto isAllowed = [&](const Vec3& move) {
     for (const Vec3& n : normals)

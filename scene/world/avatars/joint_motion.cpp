@@ -1,7 +1,7 @@
 // One tick of a driven chain. The joints move one after the other, starting at the base. Each joint
-// moves its link and all descendants as one rigid body (rigid_step.hpp): a revolute joint by a
-// rotational shape cast, a prismatic joint by a linear one. Each stops about one contact offset
-// before an obstacle; the following joints still move.
+// moves its link and all descendants as one rigid body (rigid_step.hpp). A revolute joint uses a
+// rotational shape cast, a prismatic joint a linear one. Each stops about one contact offset before
+// an obstacle; the following joints still move.
 #include "scene/world/avatars/joint_motion.hpp"
 
 #include <algorithm>

@@ -1,5 +1,5 @@
-// A rigid motion of some of an avatar's parts within a tick, cast against its obstacles: the parts
-// that a joint moves, or all that turn with the avatar.
+// A rigid motion of some of an avatar's parts within a tick, cast against its obstacles. These are
+// the parts that a joint moves, or all that turn with the avatar.
 #pragma once
 
 #include <cstdint>

@@ -20,7 +20,7 @@ constexpr double kFloorMargin = 1.0;    // metres searched below the scene's low
 constexpr double kMaxDrop = 100;        // metres: a higher position is probably a mistake
 constexpr double kMinReportedDrop = 2;  // metres: minimum drop that is reported
 // Maximum number of triangles and narrow-phase queries in the search for a free position near a
-// refused one: a few milliseconds, because it runs inside a tick.
+// refused one. They take a few milliseconds, because the search runs inside a tick.
 constexpr std::uint64_t kMaxSearchCost = 300'000;
 
 /// A search for a free position, and its cost.
@@ -122,7 +122,7 @@ std::optional<Vec3> findPlaceAround(PlacementSearch& search, const Vec3& at, Ava
   return std::nullopt;
 }
 
-/// The floor below `at`, if an avatar that starts lower fits: a start with the head in the ceiling
+/// The floor below `at`, if an avatar that starts lower fits. A start with the head in the ceiling
 /// is a wrong height more often than a wrong place.
 std::optional<Vec3> findFloorUnder(PlacementSearch& search, const Vec3& at, Avatar& avatar,
                                    std::uint64_t maxCost) {

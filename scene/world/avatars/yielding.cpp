@@ -83,7 +83,7 @@ double computeGapAhead(const Avatar& avatar, const GroundWalk& walk, const Avata
   return isCloser ? computeGap(avatar, walk, other, otherWalk) : kNone;
 }
 
-/// Walks that wedge one another, as in the arch that a crowd forms in front of a door: one that
+/// Walks that wedge one another, as in the arch that a crowd forms in front of a door. One that
 /// makes no progress yields to a neighbour that is closer to its own waypoint. Infinite: not to
 /// this one.
 double computeGapToUnwedge(const Avatar& avatar, const GroundWalk& walk, const Avatar& other,

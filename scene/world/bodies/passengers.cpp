@@ -9,7 +9,7 @@
 namespace enfilade::scene {
 namespace {
 
-/// Y component of the steepest contact normal from `a` to `b` over all touching parts: the part
+/// Y component of the steepest contact normal from `a` to `b` over all touching parts. The part
 /// nearest to a crate in a corner may belong to the wall.
 double findSteepestNormalY(const WorldData& world, const Body& a, const Body& b) {
   double steepest = 0;

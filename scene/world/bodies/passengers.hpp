@@ -1,5 +1,5 @@
-// Passengers of a kinematic body in a tick: dynamic bodies that rest on it, avatars that stand on
-// it or on those, and avatars near any of them, which may obstruct the motion.
+// Passengers of a kinematic body in a tick are dynamic bodies that rest on it and avatars that
+// stand on it or on those. Avatars near any of them may obstruct the motion and are passengers too.
 #pragma once
 
 #include <algorithm>

@@ -1,8 +1,8 @@
 // Rigid bodies in the tick. Before the broad phase, each awake body gets its motion bounds. After
 // the avatars, the solver moves the bodies among everything inside these bounds:
-//  - static objects, as triangles;
-//  - other rigid bodies, with sleeping ones that may be woken and the bodies in contact with them;
-//  - kinematic bodies, which have moved already, as driven from their previous pose;
+//  - static objects, as triangles.
+//  - other rigid bodies, with sleeping ones that may be woken and the bodies in contact with them.
+//  - kinematic bodies, which have moved already, as driven from their previous pose.
 //  - avatars, which have moved already: they are fixed, and push with their desired velocity.
 // A body does not leave its motion bounds in a tick, because no obstacles are known beyond them.
 #include "scene/world/bodies/step_dynamic_bodies.hpp"

@@ -250,8 +250,8 @@ std::optional<SeparationResult> computeTouchWith(const WorldData& world, Avatar&
   return hit.entity == body ? std::optional(hit.separation) : std::nullopt;
 }
 
-/// Adds bodies that touched the avatar within this tick and moved away since: the one that blocked
-/// it, dynamic bodies that it pushed, and those that bounced off it.
+/// Adds bodies that touched the avatar within this tick and moved away since. These are the one
+/// that blocked it, dynamic bodies that it pushed, and those that bounced off it.
 void addYieldedBodies(const WorldData& world, Avatar& avatar, std::vector<Contact>& now,
                       QueryCount& count) {
   if (world.bodyIndexById.contains(avatar.blockedBy))

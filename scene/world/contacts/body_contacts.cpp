@@ -1,8 +1,8 @@
-// Contacts between bodies: dynamic ones with static objects, with kinematic ones and with one
-// another, and kinematic ones with one another and with static objects (kinematic_contacts.cpp).
+// Contacts of dynamic bodies with static objects, with kinematic bodies and with one another. Also
+// contacts of kinematic bodies with one another and with static objects (kinematic_contacts.cpp).
 // avatar_contacts.cpp reports the contacts of avatars.
 // For dynamic bodies only solver pairs of moved bodies are queried that are not certified as
-// farther apart than the limit: a contact of two stationary bodies persists. A pair that touched in
+// farther apart than the limit. A contact of two stationary bodies persists. A pair that touched in
 // the solver and is separated after the tick, as after a bounce, begins and ends in this tick.
 #include "scene/world/contacts/body_contacts.hpp"
 

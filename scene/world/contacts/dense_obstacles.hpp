@@ -1,5 +1,5 @@
 // The parts of a dense object that a query of an avatar's part needs. The cost follows what is near
-// the avatar's surface: a plane that separates the avatar from a branch of the tree discards all
+// the avatar's surface. A plane that separates the avatar from a branch of the tree discards all
 // parts in it.
 #pragma once
 

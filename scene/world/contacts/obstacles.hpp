@@ -1,5 +1,5 @@
 // Obstacles of an avatar in a tick: hulls and triangles of static objects, parts of bodies, hulls
-// of other avatars; and the avatar's shape casts against them.
+// of other avatars. Also the avatar's shape casts against them.
 #pragma once
 
 #include <vector>

@@ -78,7 +78,7 @@ inline Aabb placeBox(const Aabb& box, const Vec3& footPosition) {
 
 /// The same, rounded outwards: it contains the part as placeAvatarPart() places it. Let e be the
 /// unit roundoff. Each side errs by e |box + foot|, its margin by as much again, and the
-/// translation of the part by e |foot + offset|; computeAabb() has room for e |offset|. 4 e (|box|
+/// translation of the part by e |foot + offset|. computeAabb() has room for e |offset|. 4 e (|box|
 /// + |foot|) covers the rest.
 inline Aabb placeBoxOutward(const Aabb& box, const Vec3& footPosition) {
   const Vec3 sizes = box.min.cwiseAbs().cwiseMax(box.max.cwiseAbs()) + footPosition.cwiseAbs();

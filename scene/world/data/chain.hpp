@@ -41,8 +41,8 @@ struct LinkPose {
 /// Builds the chain of a spawn order that validateCommandFields() accepted.
 Chain makeChain(const Spawn& order, const Mat3& avatarFromBase);
 
-/// Forward kinematics: pose of a link for its current joint value and its parent's pose, which is
-/// one of `before`, the poses of all links before it.
+/// Forward kinematics: pose of a link for its current joint value and its parent's pose. The latter
+/// is one of `before`, the poses of all links before it.
 LinkPose computeLinkPose(const Chain& chain, std::size_t link, std::span<const LinkPose> before);
 
 /// Shape of `base` and the links at their current poses; the parts of the base come first. Of the

@@ -46,7 +46,7 @@ class Scene {
   const CollisionGeometry& collisionGeometry(std::uint32_t object) const;
 
   /// Builds the collision geometry of these objects in a thread of its own, in this order, so that
-  /// ticks find it ready; a tick that comes earlier builds it itself. Returns at once; results do
+  /// ticks find it ready. A tick that comes earlier builds it itself. Returns at once; results do
   /// not depend on it.
   void prefetchCollisionGeometry(std::span<const std::uint32_t> objects) const;
   /// Indices into solidObjects() of those that have many triangles.

@@ -29,7 +29,7 @@ class HorizonState {
   /// Avatars that left at the last update.
   const std::vector<EntityId>& left() const { return left_; }
   /// Avatars that joined or were teleported at the last update, or began to stand on a dynamic
-  /// body: earlier bounds of their motion do not hold.
+  /// body. Earlier bounds of their motion do not hold.
   const std::vector<EntityId>& unbounded() const { return unbounded_; }
 
   /// Last tick in which the entity changed its pose, shape or ground; 0 for static objects.

@@ -10,9 +10,9 @@
 
 namespace enfilade::scene {
 
-/// Maximum displacement of an avatar per displacement of a body: pushed by at most 1 / 0.714 of it,
-/// since a push is horizontal although the normal is not (bodies/kinematic_motion.cpp), and carried
-/// by it.
+/// Maximum displacement of an avatar per displacement of a body. A push is at most 1 / 0.714 of the
+/// latter, since it is horizontal although the normal is not (bodies/kinematic_motion.cpp). The
+/// body also carries the avatar.
 inline constexpr double kMaxPushFactor = 2.5;
 
 /// True if the avatar stands on a dynamic body: a distant body may carry both.
@@ -38,9 +38,9 @@ struct AvatarPusher {
   double speed = 0;  ///< maximum of any point, m/s
 };
 
-/// Maximum speed of an avatar during the next `seconds` (> 0, may be infinite), m/s: its own and
-/// that of all `pushers` that can reach it by then. `onDynamicBody`: all of them count, because a
-/// distant one may carry what it stands on.
+/// Maximum speed of an avatar during the next `seconds` (> 0, may be infinite), m/s. It is its own
+/// and that of all `pushers` that can reach it by then. `onDynamicBody`: all of them count, because
+/// a distant one may carry what it stands on.
 double computeAvatarSpeedWithin(const AvatarSnapshot& avatar, std::span<const AvatarPusher> pushers,
                                 bool onDynamicBody, const WorldSettings& settings, double seconds);
 

@@ -2,7 +2,7 @@
 // renderers.
 //
 // The static scene is copied into single trees, because instances would cost rays half as much
-// again; only in very large scenes, repeated meshes are instanced. Bodies are instances. Opaque and
+// again. Repeated meshes are instanced only in very large scenes. Bodies are instances. Opaque and
 // transparent items have separate trees: pictures need the latter for colour alone, and rays may
 // ignore them. Trees are built on demand, with one thread. All functions may be called from any
 // thread: world threads answer rays while a renderer draws. One mutex guards this object; nothing

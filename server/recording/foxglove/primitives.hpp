@@ -22,8 +22,8 @@ Eigen::Quaterniond convertYUpToZUp();
 /// An AABB as a cube.
 foxglove::CubePrimitive makeCube(const scene::Aabb& box, const foxglove::Color& colour);
 
-/// The static objects: all triangles if there are at most `maxTriangles`, otherwise one AABB per
-/// object if there are at most `maxBoxes`, otherwise the AABB of the scene.
+/// The static objects: all triangles if there are at most `maxTriangles`. Otherwise one AABB per
+/// object if there are at most `maxBoxes`, or else the AABB of the scene.
 foxglove::SceneEntity makeStaticEntity(const scene::Scene& scene, std::size_t maxTriangles,
                                        std::size_t maxBoxes);
 /// A glTF file as the static objects.

@@ -1,12 +1,12 @@
 // Interval tree for 2-D intersection tests (Lin 1993, section 5.2.3).
 //
 // A line sweeps along x. At the start of a box, its interval on z is inserted into an interval tree
-// and compared with those in it; at its end it is removed. Overlapping pairs of rectangles are then
+// and compared with those in it. At its end it is removed. Overlapping pairs of rectangles are then
 // tested on y. The static end points on x are sorted once and merged with the dynamic boxes' each
 // tick. Static and dynamic intervals are in two trees, so that no two static boxes are paired.
 // Every tick sweeps over the whole static scene: O(n log n), as in the thesis.
 //
-// Departures: the split values are a sample of at most 4095 static ends, fixed for all ticks; a
+// Departures: the split values are a sample of at most 4095 static ends, fixed for all ticks. A
 // node's intervals are unordered and tested one by one.
 #include <algorithm>
 #include <array>

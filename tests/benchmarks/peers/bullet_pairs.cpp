@@ -3,7 +3,7 @@
 //
 // Both cache pairs whose fattened or quantized boxes overlap; pairs with overlapping exact boxes
 // are reported. Filter groups exclude static pairs. Dbvt needs about a hundred ticks to move static
-// boxes into its fixed tree and to balance it: these run at construction and count as building.
+// boxes into its fixed tree and to balance it. These run at construction and count as building.
 #include <BulletCollision/BroadphaseCollision/btAxisSweep3.h>
 #include <BulletCollision/BroadphaseCollision/btDbvtBroadphase.h>
 

@@ -1,4 +1,4 @@
-// Peer: FCL's two convex solvers, called without its dispatch overhead: libccd's GJK and EPA, and
+// Peer: FCL's two convex solvers, called without its dispatch overhead. libccd's GJK and EPA, and
 // its own ("indep") at the default and at a tight tolerance.
 #include <fcl/narrowphase/detail/gjk_solver_indep.h>
 #include <fcl/narrowphase/detail/gjk_solver_libccd.h>

@@ -1,6 +1,6 @@
 // Peer: ODE's sweep-and-prune and hash spaces; category bits exclude static pairs. ODE sorts or
 // rehashes a space at each query. Boxes are made from a centre and sizes, so their bounds may
-// differ from the given ones by a rounding; the callback tests the given ones.
+// differ from the given ones by a rounding. The callback tests the given ones.
 #include <ode/ode.h>
 
 #include "tests/benchmarks/broad_phase_method.hpp"

@@ -1,4 +1,4 @@
-// Reads FILE with the reader of MCAP's own authors: by its index, or with --stream from front to back
+// Reads FILE with the reader of MCAP's own authors, by its index. With --stream, from front to back
 // up to where the file was cut off. Prints, as one JSON object, the messages of each channel; with
 // --messages each one, its bytes and the channels' schemas in base64.
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";

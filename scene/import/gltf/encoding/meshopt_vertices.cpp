@@ -1,8 +1,8 @@
-// The stream (KHR_meshopt_compression, appendix A, mode 0): a byte with the version, blocks of up
-// to 256 elements, padding, the element before the first, and in version 1 a byte for each channel.
-// A channel is four bytes of an element. A block stores for each byte of the element one plane: the
-// deltas of this byte for all elements of the block, in groups of 16. The channel's mode says how
-// deltas and the previous element give the next one.
+// The stream of KHR_meshopt_compression, appendix A, mode 0. It has a byte with the version, blocks
+// of up to 256 elements, padding, and the element before the first. In version 1, a byte for each
+// channel follows. A channel is four bytes of an element. A block stores for each byte of the
+// element one plane. The plane has the deltas of this byte for all elements of the block, in groups
+// of 16. The channel's mode says how deltas and the previous element give the next one.
 #include "scene/import/gltf/encoding/meshopt_vertices.hpp"
 
 #include <algorithm>

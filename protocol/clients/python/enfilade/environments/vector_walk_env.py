@@ -16,26 +16,10 @@ from ..errors import EpisodeNotFound, OrderFailed, ServerError
 from ..kept_request import KeptRequest
 from ..process import Server, serve
 from ..world_group import Member, WorldGroup
-from .walk_env import WalkEnv
+from .batch import Batch
 from .plain_steps import PlainSteps, Result
-from .walker import Observation
-
-
-class _Batch:
-    """Observations of all environments. Each is copied at once, because the server's shared memory is
-    valid for two rounds only."""
-
-    def __init__(self, space: Any, count: int) -> None:
-        self.observations = {name: np.empty((count, *one.shape), one.dtype)
-                             for name, one in space.spaces.items()}
-
-    def add(self, i: int, seen: Observation) -> None:
-        for name, one in seen.items():
-            self.observations[name][i] = one
-
-    def clear(self, i: int) -> None:
-        for all_ in self.observations.values():
-            all_[i] = 0
+from .walk_env import WalkEnv
+from .walker import DISTANCES, Observation
 
 
 def _is_refusal(error: Exception) -> bool:
@@ -47,9 +31,7 @@ def _is_refusal(error: Exception) -> bool:
 
 class VectorWalkEnv(spaces.VectorEnvBase):
     """Several WalkEnvs that run at the same time, in worlds of one server that share its scene: one
-    message steps all of them. Each picture is copied once, from the memory that the server shares into
-    the batch: observations belong to their reader. A WorldGroup gives the arrays without a copy.
-    A VectorEnv of Gymnasium if that is installed, with its methods and attributes everywhere.
+    message steps all of them. A VectorEnv of Gymnasium if that is installed, with its methods and attributes everywhere.
 
     scene or address: a model, for which a server process is started, or HOST:PORT of a running
         server that lets this client create worlds (the role admin). Each world is dropped when its
@@ -58,6 +40,10 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     token: if the server requires one, of the role admin.
     make: creates one environment for a client in a world of its own, make(number, client); by default
         WalkEnv(client=client, **options).
+    copy: as in Gymnasium. True: observations belong to their reader; each picture is copied once, from
+        the memory that the server shares. False: pictures of a step are that memory, read-only, and
+        valid until the second step after theirs. Those with distances or flow are still copied, since
+        NaN becomes infinity, and so are all of a step in which an environment restarts.
 
     An environment whose episode ended restarts with the next step(). That step ignores its action,
     and its reward is 0 (Gymnasium's "next step" mode).
@@ -77,7 +63,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     def __init__(self, scene: Union[str, Path, None] = None, num_envs: int = 1, *,
                  address: str = "", world_scene: str = "", token: str = "",
                  make: Optional[Callable[[int, Client], WalkEnv]] = None,
-                 server_arguments: Sequence[str] = (), **options: Any) -> None:
+                 server_arguments: Sequence[str] = (), copy: bool = True, **options: Any) -> None:
         if operator.index(num_envs) < 1:
             raise ValueError(f"num_envs: give at least 1, not {num_envs}")
         if (scene is None) == (not address):
@@ -87,6 +73,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         if make is not None and options:
             raise ValueError(f"make: set {sorted(options)} inside make; options are for the default")
         self.num_envs = num_envs
+        self._copies = bool(copy)
         self.closed = False
         self.server: Optional[Server] = None
         self._maker: Optional[Client] = None
@@ -142,7 +129,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         seeds, options = self._seeds(seed), options or {}
         self._over = None
         self._kept = [None] * self.num_envs
-        batch = _Batch(self.single_observation_space, self.num_envs)
+        batch = self._make_batch()
 
         def take(i: int, ids: List[int]) -> Dict[str, Any]:
             seen, info = self.envs[i]._entered(ids, options)
@@ -151,13 +138,18 @@ class VectorWalkEnv(spaces.VectorEnvBase):
 
         infos, failures = self._each(
             lambda i: self.envs[i]._post_reset(seeds[i], options), take)
-        self._last = batch.observations
         over = np.array([info is None for info in infos])
         self._over = None if over.all() else over
         for i, text in self._tolerate(failures, batch):
             warnings.warn(text, stacklevel=2)
             infos[i] = {"error": text}
-        return batch.observations, self._gathered(infos)
+        self._last = batch.finish()
+        return self._last, self._gathered(infos)
+
+    def _make_batch(self) -> Batch:
+        distances = {camera.prefix + name for camera in self.envs[0].cameras
+                     for name in DISTANCES.intersection(camera.channels)}
+        return Batch(self.single_observation_space, self.num_envs, self._copies, distances)
 
     def _seeds(self, seed: Any) -> List[Optional[int]]:
         if seed is None:
@@ -199,7 +191,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         return post
 
     def _step_each(self, over: np.ndarray, post: Callable[[int], List[int]]) -> Result:
-        batch = _Batch(self.single_observation_space, self.num_envs)
+        batch = self._make_batch()
 
         def take(i: int, ids: List[int]) -> Tuple[float, bool, bool, Dict[str, Any]]:
             if over[i]:
@@ -209,13 +201,13 @@ class VectorWalkEnv(spaces.VectorEnvBase):
             return self._take_step(i, ids, batch)
 
         taken, failures = self._each(post, take)
-        self._last = batch.observations
         self._over = np.array([one is None or one[1] or one[2] for one in taken])
         for i, text in self._tolerate(failures, batch):
             warnings.warn(text, stacklevel=3)
             taken[i] = (0.0, False, True, {"error": text})
         rewards, terminated, truncated, infos = zip(*taken)
-        return (batch.observations, np.array(rewards), np.array(terminated),
+        self._last = batch.finish()
+        return (self._last, np.array(rewards), np.array(terminated),
                 np.array(truncated), self._gathered(infos))
 
     def _meanings(self, actions: Any, over: np.ndarray) -> Sequence[Tuple[float, float]]:
@@ -249,7 +241,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         return kept
 
     def _take_step(self, i: int, ids: List[int],
-                   batch: _Batch) -> Tuple[float, bool, bool, Dict[str, Any]]:
+                   batch: Batch) -> Tuple[float, bool, bool, Dict[str, Any]]:
         env = self.envs[i]
         if self._is_packing[i]:
             others = len(env.cameras) + env.is_geodesic
@@ -260,7 +252,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                 pictures = list(zip(reply.messages, reply.attachments())) if env.cameras else ()
                 before = env._feet
                 info = env._take_packed(step)
-                batch.add(i, env._pictured(pictures))
+                batch.add(i, env._channels(pictures))
                 batch.add(i, env._place())
                 env.client.forget_reply()
                 return env._judged(before, info, path)
@@ -291,7 +283,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
                 failures.append((i, error))
         return taken, failures
 
-    def _tolerate(self, failures: List[Tuple[int, Exception]], batch: _Batch) -> List[Tuple[int, str]]:
+    def _tolerate(self, failures: List[Tuple[int, Exception]], batch: Batch) -> List[Tuple[int, str]]:
         """Returns the texts of refusals, by environment, and clears their observations. Raises the first failure
         of another kind, or if all environments failed."""
         others = [one for one in failures if not _is_refusal(one[1])]

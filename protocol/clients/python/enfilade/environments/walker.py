@@ -16,6 +16,7 @@ from ..kept_request import KeptRequest
 
 Observation = Dict[str, np.ndarray]
 
+DISTANCES = frozenset({"depth", "range", "flow"})  # channels with NaN where nothing is known
 MAX_FLOW_TICKS = 31  # between two observations: a server keeps the last 32 ticks
 _DISCRETE = ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0), (0.0, -1.0))
 
@@ -177,15 +178,20 @@ class Walker:
         return self._seen
 
     def _pictured(self, pictures: Sequence[Reply]) -> Observation:
-        """The channels of the pictures that came."""
+        """The channels of the pictures that came, with infinity instead of NaN: unknown, background."""
+        seen = self._channels(pictures)
+        for camera in self.cameras:
+            for name in DISTANCES.intersection(camera.channels):
+                seen[camera.prefix + name] = np.fmin(seen[camera.prefix + name], np.float32(np.inf))
+        return seen
+
+    def _channels(self, pictures: Sequence[Reply]) -> Observation:
+        """The channels as they came."""
         seen: Observation = {}
         for camera, (reply, attachment) in zip(self.cameras, pictures):
             frame = results.frame(reply.frame, attachment)
             for name in camera.channels:
                 seen[camera.prefix + name] = frame.channel(name)
-            for name in {"depth", "range", "flow"}.intersection(camera.channels):
-                values = seen[camera.prefix + name]
-                seen[camera.prefix + name] = np.fmin(values, np.float32(np.inf))  # NaN: unknown, background
             if camera.has_flow:
                 camera.keep(frame.tick)
         if self.render_mode is not None and self._picture_key in seen:
