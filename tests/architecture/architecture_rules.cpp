@@ -522,8 +522,7 @@ Faults findLongSentences(const Sources& sources, int maxWords) {
   Faults faults;
   for (const auto& [path, text] : sources) {
     const bool isPage = endsWith(path, ".md");
-    const bool isProduct = kMayInclude.count(path.substr(0, path.find('/'))) != 0;
-    if (!isPage && !(isProduct && (isCode(path) || endsWith(path, ".proto")))) continue;
+    if (!isPage && !isCode(path) && !endsWith(path, ".proto")) continue;
     int words = 0, firstLine = 0;
     bool inFence = false;
     const auto endSentence = [&, &name = path] {

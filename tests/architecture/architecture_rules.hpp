@@ -61,8 +61,8 @@ Faults findCrowdedFolders(const Sources& sources, int maxFiles);
 /// Constants are named kMax.. and kMin.., not kMost.., kLeast.. and kLargest...
 Faults findOddWords(const Sources& sources);
 
-/// Sentences of the Markdown pages, and of comments in the product's C++ and schema, with more
-/// than `maxWords` words. A list item ends a sentence, too. Headings, tables, code and formulas do not
+/// Sentences of the Markdown pages, and of comments in C++ and in the schema, with more than
+/// `maxWords` words. A list item ends a sentence, too. Headings, tables, code and formulas do not
 /// count.
 Faults findLongSentences(const Sources& sources, int maxWords);
 
