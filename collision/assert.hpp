@@ -19,7 +19,7 @@ namespace enfilade {
 
 #define ENFILADE_ASSERT(...)                             \
   (static_cast<bool>(__VA_ARGS__) ? static_cast<void>(0) \
-                                  : ::enfilade::assertionFailed(#__VA_ARGS__, __FILE__, __LINE__))
+                                  : ::enfilade::failAssertion(#__VA_ARGS__, __FILE__, __LINE__))
 
 #else
 

@@ -7,7 +7,7 @@
 #include "collision/assert.hpp"
 #include "collision/motion/shape_cast.hpp"
 #include "collision/shapes/box_tree.hpp"
-#include "scene/navigation/shape_separation.hpp"
+#include "scene/navigation/walk/shape_separation.hpp"
 #include "scene/world/data/body.hpp"
 #include "scene/world/world.hpp"
 

@@ -2,10 +2,9 @@
 // paths; each leg of a path is walked by the motion of avatars before it is returned.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <functional>
-#include <list>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -16,11 +15,8 @@
 #include <vector>
 
 #include "scene/navigation/clear_width.hpp"
-#include "scene/navigation/connection_search.hpp"
 #include "scene/navigation/island_list.hpp"
-#include "scene/navigation/links.hpp"
-#include "scene/navigation/mesh/navigation_mesh.hpp"
-#include "scene/navigation/mesh/polygon_sampler.hpp"
+#include "scene/navigation/mesh_states.hpp"
 #include "scene/navigation/path_search.hpp"
 #include "scene/navigation/place_names.hpp"
 #include "scene/navigation/unreachable_reasons.hpp"
@@ -34,8 +30,8 @@ struct NavigationReport {
   std::size_t polygons = 0;         ///< of the mesh for ample clearance
   double area = 0;                  ///< square metres, of all islands
   std::vector<double> islandAreas;  ///< square metres, by number: descending
-  std::size_t bytes = 0;            ///< of memory, with connections, drops, lifts and tried gaps
-  double seconds = 0;               ///< to build or load the meshes
+  std::size_t bytes = 0;  ///< of memory, with connections, drops, lifts, tried gaps, kept meshes
+  double seconds = 0;     ///< to build or load the first meshes
 };
 
 inline constexpr double kMapTolerance = 0.5;  ///< metres: habitat-sim's default
@@ -69,8 +65,8 @@ struct SnapTarget {
 /// of the last update().
 class Navigation {
  public:
-  using Progress = std::function<void(double)>;  ///< share that is done, 0..1
-  static constexpr double kTileShare = 0.8;  ///< of tiles; the rest is of islands and connections
+  using Progress = MeshProgress;
+  static constexpr double kTileShare = scene::kTileShare;
 
   /// Builds the meshes on `threads` threads. `snapshot`: poses of the bodies; null: as authored.
   /// Throws std::runtime_error.
@@ -88,14 +84,17 @@ class Navigation {
   /// The meshes and the gaps that were tried, as bytes.
   std::vector<std::uint8_t> save();
 
-  /// Takes over the poses of bodies, and builds the tiles again in which they changed. Returns the
-  /// number of these tiles. Without any it reports no progress.
+  /// Takes over the poses of bodies. If no meshes for them are kept, builds the tiles again in
+  /// which they changed. Returns the number of these tiles. Without any it reports no progress.
   std::size_t update(const Snapshot& snapshot, int threads = 2, const Progress& progress = {});
+
+  /// Of the meshes for the present poses; differs from that of all others.
+  std::uint64_t stateNumber();
 
   const NavigationAgent& agent() const { return agent_; }
   std::shared_ptr<const AvatarShape> agentShape() {
     const std::lock_guard lock(mutex_);
-    return walker_->shape();
+    return meshes_.walker().shape();
   }
   NavigationReport report();
   std::string findEntityName(EntityId id) const { return world_.data().findEntityName(id); }
@@ -145,10 +144,6 @@ class Navigation {
   std::vector<IslandNeighbour> findIslandNeighbours(std::uint32_t island);
 
  private:
-  void buildTiles(const std::vector<int>& tiles, int threads, const Progress& progress);
-  void assembleMeshes(int threads, const Progress& progress);
-  void joinIslands(int threads, const Progress& progress);
-  NavigationMesh buildUnobstructed(int threads, const Progress& progress) const;
   /// As findPath(); the caller holds the mutex.
   NavigationPath searchPath(const Vec3& from, const Vec3& to, const PathOptions& options,
                             const Progress& progress);
@@ -158,23 +153,14 @@ class Navigation {
   /// As findPlaceIn(), on an island, or anywhere.
   std::optional<Vec3> findPlaceOn(const NamedPlace& named,
                                   const std::optional<std::uint32_t>& island);
+
   const NavigationAgent agent_;
+  const std::chrono::steady_clock::time_point start_;
   World world_;  ///< never ticks
-  TileGrid grid_;
   std::mutex mutex_;
-  std::uint64_t meshState_ = 0;  ///< differs from that of any other meshes, and of earlier ones
-  std::optional<Walker> walker_;
-  std::vector<TileMesh> ampleTiles_, scarceTiles_;
-  std::optional<NavigationMesh> ample_, scarce_;
-  std::optional<UnobstructedMesh> unobstructed_;
-  std::list<Links> links_;                  ///< of the last options, the oldest first
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
-  IslandList islands_;                      ///< of `ample_`
-  TriedGaps triedGaps_;
-  ConnectionList connections_;                                            ///< of `ample_`
-  std::map<std::pair<std::uint32_t, std::uint32_t>, Refusals> refusals_;  ///< by islands
-  PolygonSampler drawn_;  ///< of islands with Island::isDrawn
-  NavigationReport report_;
+  MeshStates meshes_;
+  const double seconds_;  ///< to build or load the first meshes
 };
 
 }  // namespace enfilade::scene

@@ -39,14 +39,14 @@ struct Line {
 
 /// A place on the unobstructed mesh; nullopt: it is not near.
 std::optional<MeshPoint> findUnobstructed(const PathFinder& finder, const Vec3& place) {
-  return finder.unobstructed().mesh.findNearest(
+  return finder.unobstructed().mesh->findNearest(
       place,
       {2 * finder.agent.radius, 0.5 + finder.world.settings.stepHeight, 2 * finder.agent.radius});
 }
 
 std::optional<Line> findUnobstructedLine(const PathFinder& finder, const MeshPoint& from,
                                          const MeshPoint& to, const Vec3& goal) {
-  const NavigationMesh& mesh = finder.unobstructed().mesh;
+  const NavigationMesh& mesh = *finder.unobstructed().mesh;
   const auto corridor = mesh.findCorridor(from, to);
   if (!corridor) return std::nullopt;
   Line line{mesh.straighten(*corridor, from.point, to.point), {from.point}};

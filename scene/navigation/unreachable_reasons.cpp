@@ -192,9 +192,10 @@ double PartGap::cost() const {
   return (to - from).norm() + (hasRoom ? 0 : kWithoutRoom);
 }
 
-UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh, const NavigationMesh& walkable) {
-  std::vector<std::uint32_t> partOf = mesh.findIslands();
-  std::vector<PartGap> gaps = findClosestGaps(mesh, partOf, walkable);
+UnobstructedMesh makeUnobstructedMesh(std::shared_ptr<const NavigationMesh> mesh,
+                                      const NavigationMesh& walkable) {
+  std::vector<std::uint32_t> partOf = mesh->findIslands();
+  std::vector<PartGap> gaps = findClosestGaps(*mesh, partOf, walkable);
   return {std::move(mesh), std::move(partOf), std::move(gaps)};
 }
 

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "scene/navigation/mesh/navigation_mesh.hpp"
@@ -26,16 +27,17 @@ struct PartGap {
 /// The mesh of Clearance::none and its parts. Also the closest places of parts that are near each
 /// other, with room for an agent if there are any.
 struct UnobstructedMesh {
-  NavigationMesh mesh;
-  std::vector<std::uint32_t> partOf;  ///< by polygon
+  std::shared_ptr<const NavigationMesh> mesh;  ///< not null
+  std::vector<std::uint32_t> partOf;           ///< by polygon
   std::vector<PartGap> gaps;  ///< at most one from a part to another; ascending by `fromPart`
 
-  std::size_t memoryBytes() const {
-    return mesh.memoryBytes() + partOf.size() * sizeof(partOf[0]) + gaps.size() * sizeof(PartGap);
+  std::size_t memoryBytes() const {  ///< without the mesh
+    return partOf.size() * sizeof(partOf[0]) + gaps.size() * sizeof(PartGap);
   }
 };
 /// `walkable`: the mesh where agents fit.
-UnobstructedMesh makeUnobstructedMesh(NavigationMesh mesh, const NavigationMesh& walkable);
+UnobstructedMesh makeUnobstructedMesh(std::shared_ptr<const NavigationMesh> mesh,
+                                      const NavigationMesh& walkable);
 
 /// The end of a walk that did not arrive, as the reason of `path`. It has the entity, and its clear
 /// width or height, the step or the drop. The walk led from `from` to a place `beyond` the

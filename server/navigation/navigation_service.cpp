@@ -12,7 +12,7 @@
 
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
-#include "scene/navigation/shape_separation.hpp"
+#include "scene/navigation/walk/shape_separation.hpp"
 #include "server/log/log.hpp"
 #include "server/messages/world_messages.hpp"
 #include "server/navigation/island_answer.hpp"
@@ -27,6 +27,7 @@ namespace {
 using scene::Vec3;
 
 constexpr std::size_t kMaxEntries = 8;         // sizes whose meshes are kept
+constexpr std::size_t kMaxClosedDoors = 64;    // states of bodies whose closed doors are known
 constexpr std::size_t kMaxIslandAreas = 1000;  // in a reply
 // Of a world. Beyond, those of avatars that left are forgotten.
 constexpr std::size_t kMaxKeptPaths = 10'000;
@@ -247,7 +248,8 @@ NavigationService::Entry& NavigationService::prepare(const scene::NavigationAgen
   const auto snapshot = makeMeshSnapshot(doorsOpen, state);
   if (known != entries_.end()) {
     entries_.splice(entries_.begin(), entries_, known);
-    if (known->navigation->update(*snapshot, 2, state.progress) > 0) known->closedDoors.clear();
+    const std::size_t built = known->navigation->update(*snapshot, 2, state.progress);
+    if (built > 0 && known->closedDoors.size() >= kMaxClosedDoors) known->closedDoors.clear();
     known->snapshot = snapshot;
     return *known;
   }
@@ -330,9 +332,10 @@ std::variant<v1::NavigationReply, v1::Error> NavigationService::answer(
   };
   std::function<scene::Navigation&()> withOpenDoors;
   if (scene::hasDoors(*scene_)) withOpenDoors = withDoors(true);
-  const Answer answer{*scene_,   navigation,      reply,         state,
-                      doorsOpen, *entry.snapshot, withOpenDoors, withDoors(false),
-                      index_,    scene_,          places,        entry.closedDoors};
+  const Answer answer{*scene_,       navigation,       reply,
+                      state,         doorsOpen,        *entry.snapshot,
+                      withOpenDoors, withDoors(false), index_,
+                      scene_,        places,           entry.closedDoors[navigation.stateNumber()]};
   std::optional<v1::Error> error;
   switch (query.query_case()) {
     case v1::NavigationQuery::kPath:

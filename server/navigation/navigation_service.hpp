@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <list>
+#include <map>
 #include <memory>
 #include <optional>
 #include <string>
@@ -43,7 +44,8 @@ class NavigationService {
     bool doorsOpen = false;
     std::shared_ptr<const scene::Snapshot> snapshot;  ///< the poses of bodies
     std::unique_ptr<scene::Navigation> navigation;
-    ClosedDoors closedDoors;  ///< of its islands
+    /// Of its islands, by Navigation::stateNumber().
+    std::map<std::uint64_t, ClosedDoors> closedDoors;
   };
   /// The navigation of a size, brought to the state of the query.
   Entry& prepare(const scene::NavigationAgent& agent, bool doorsOpen, const NavigationState& state);

@@ -13,7 +13,7 @@
 
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/mesh_paths.hpp"
-#include "scene/navigation/shape_separation.hpp"
+#include "scene/navigation/walk/shape_separation.hpp"
 #include "scene/navigation/walk/level_detours.hpp"
 #include "tests/scene/body_fixture.hpp"
 

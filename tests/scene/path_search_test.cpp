@@ -117,7 +117,8 @@ class PartlyMeshed {
   TileGrid grid_;
   NavigationMesh ample_ = makeMesh(Clearance::ample), scarce_ = makeMesh(Clearance::scarce);
   UnobstructedMesh unobstructed_ =
-      makeUnobstructedMesh(makeMesh(Clearance::none), makeMesh(Clearance::scarce));
+      makeUnobstructedMesh(std::make_shared<const NavigationMesh>(makeMesh(Clearance::none)),
+                           makeMesh(Clearance::scarce));
   Walker walker_{whole_.data(), agent_};
 };
 

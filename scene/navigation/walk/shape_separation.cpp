@@ -1,4 +1,4 @@
-#include "scene/navigation/shape_separation.hpp"
+#include "scene/navigation/walk/shape_separation.hpp"
 
 #include <limits>
 
