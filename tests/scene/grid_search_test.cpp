@@ -13,8 +13,8 @@
 
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/mesh_paths.hpp"
-#include "scene/navigation/walk/shape_separation.hpp"
 #include "scene/navigation/walk/level_detours.hpp"
+#include "scene/navigation/walk/shape_separation.hpp"
 #include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene::testing {
