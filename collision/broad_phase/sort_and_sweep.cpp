@@ -19,9 +19,9 @@
 // 3. A proxy that leaves its window gets a new one; a grid finds the static boxes near it
 //    (static_grid.cpp). Some windows are rebuilt in advance, in turn, so that rebuilds are spread
 //    over the ticks.
-// 4. Dynamic proxies are tested against each other: with endpoint lists of their windows
-//    (sort_and_sweep_dynamic.cpp) or, where these would exchange too many endpoints, in a batch
-//    (sort_and_sweep_batch.cpp).
+// 4. Dynamic proxies are tested against each other, with endpoint lists of their windows
+//    (sort_and_sweep_dynamic.cpp). Where these would exchange too many endpoints, this is done in a
+//    batch (sort_and_sweep_batch.cpp).
 //
 // Departures from the source: each proxy has its own lists instead of three for the whole scene. A
 // walker thus crosses only endpoints near it, and static objects cost nothing. Between two builds

@@ -3,14 +3,15 @@
 // Steps
 //  1. If the boxes of two branches overlap, the traversal descends into the larger branch. The
 //     pairs where it ends (separated boxes, or two leaves) are the front.
-//  2. The next call starts at the last front (Ehmann and Lin 2001, "Accurate and fast proximity
-//     queries between polyhedra using convex surface decomposition", section 5.2; after Klosowski
-//     1998). If a pair of the front now overlaps, the traversal continues below it. If two siblings
-//     are separated and their parents are, too, the front is raised to the parents.
+//  2. The next call starts at the last front (Ehmann and Lin 2001, section 5.2; after Klosowski
+//     1998). Their paper is "Accurate and fast proximity queries between polyhedra using convex
+//     surface decomposition". If a pair of the front now overlaps, the traversal continues below
+//     it. If two siblings are separated and their parents are, too, the front is raised to the
+//     parents.
 //  3. A pair separated by a gap is not tested again before the motions of both objects, summed,
-//     have used up the gap: no point of a box moves farther than its object's farthest point.
-//  4. World boxes are computed on demand: of a leaf from the boxes of its parts, of another branch
-//     from its box in the frame of the tree, inflated by the margin.
+//     have used up the gap. No point of a box moves farther than its object's farthest point.
+//  4. World boxes are computed on demand. That of a leaf comes from the boxes of its parts. That of
+//     another branch comes from its box in the frame of the tree, inflated by the margin.
 // Departures: the choice of the branch to descend depends on the trees, not on the poses. Each pair
 // of branches thus has one parent, and the front needs no tree. It is an array in traversal order,
 // in which siblings are adjacent.

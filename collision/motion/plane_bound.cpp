@@ -1,18 +1,18 @@
 // Steps
 //  1. A plane with normal n separates A and B by `gap` at parameter 0; the kept distance is
 //     deducted. Let the plane rotate, too, at omega. With w = q - p for a vertex p of A and q of
-//     B, the separation along the rotated normal n(tau) is the minimum n . w, and
+//     B, the separation along the rotated normal n(tau) is the minimum n . w. Its derivative is
 //       (n . w)' = n . (T' - omega x T) + n . ((wB - omega) x rB) - n . ((wA - omega) x rA),
 //     where T is the vector from A's reference point to B's, and r from a body's reference point to
 //     its vertex. The second derivative is at most K (below). Up to tau the separation is at least
 //       f(tau) = gap - tau v - max over A (tau c - g) - max over B (tau c - g) - K tau^2 / 2
 //     with the closing speeds v and c. g >= 0 is the distance of a vertex behind the foremost one.
 //     f is concave and f(0) > 0: if f(tau) is positive, the bodies are separated up to tau.
-//  2. The step is the root of f. Four rotations of the plane are tried, and the longest step wins:
-//     none; with B (a face of B is nearest); with A; and the rotation that keeps both nearest edges
-//     in their planes. The right one accounts for all first-order terms, so the steps converge
-//     quadratically, like Newton's; without it a swinging door needs hundreds of steps. A further
-//     bound treats the bodies as solids of revolution, which only translate.
+//  2. The step is the root of f. Four rotations of the plane are tried, and the longest step wins.
+//     They are none, with B (a face of B is nearest), with A, and the rotation that keeps both
+//     nearest edges in their planes. The right one accounts for all first-order terms, so the steps
+//     converge quadratically, like Newton's. Without it a swinging door needs hundreds of steps. A
+//     further bound treats the bodies as solids of revolution, which only translate.
 //
 // Departure: Mirtich 1996 bounds the speed of all points by one number and never rotates the plane.
 //

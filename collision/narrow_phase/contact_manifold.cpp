@@ -3,9 +3,9 @@
 //     normal and choose the one whose normal is closest to it. Keep the corners of that face within
 //     `limit` of the support plane: a polygon, an edge or a vertex. A body of at most three
 //     vertices uses all of them instead.
-//  2. Project both outlines along the normal and clip one against the other: polygons by Sutherland
-//     and Hodgman, an edge by a polygon (Cyrus and Beck), two edges by their intersection or
-//     overlap. A vertex stays a vertex.
+//  2. Project both outlines along the normal and clip one against the other. Clip polygons by
+//     Sutherland and Hodgman, an edge by a polygon (Cyrus and Beck), two edges by their
+//     intersection or overlap. A vertex stays a vertex.
 //  3. Project each corner of the clipped outline along the normal onto the other outline. That
 //     gives the other point and the separation. Drop points farther than `limit`.
 //  4. If there are too many points, keep the deepest, then repeatedly the one farthest from all

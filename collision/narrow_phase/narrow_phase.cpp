@@ -3,7 +3,7 @@
 //     subtracted before any rounding, so a scene far from the origin loses no precision.
 //  2. GJK (Gilbert, Johnson, Keerthi 1988) with the coherence of Lin and Canny (1991), as in
 //     Cameron, "Enhancing GJK" (1997). The closest features are a simplex of the Minkowski
-//     difference B - A: one point is vertex-vertex, two are vertex-edge (or a diagonal), three are
+//     difference B - A. One point is vertex-vertex, two are vertex-edge (or a diagonal), three are
 //     vertex-face or edge-edge. GJK starts from the previous tick's features. A support along the
 //     nearest point, found by hill climbing from the simplex' vertices, either certifies the
 //     features or gives the next one. In a warm start, climbs stop once they pass the origin

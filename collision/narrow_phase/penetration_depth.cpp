@@ -1,7 +1,7 @@
 // The expanding polytope (van den Bergen 2001), certified.
 // Steps
-//  1. Build a polytope of points of M = B - A around the origin: the cached one if it still
-//     encloses the origin, otherwise one grown from GJK's final simplex, otherwise one found by
+//  1. Build a polytope of points of M = B - A around the origin. This is the cached one if it
+//     still encloses the origin. Otherwise it is grown from GJK's final simplex, or else found by
 //     search (polytope.hpp).
 //  2. Find its facet nearest the origin and the support of M along that facet's normal. The plane
 //     of the support is an upper bound of the depth: moving by its distance separates the bodies.

@@ -2,7 +2,7 @@
 // projection may cover. The test depends only on the depth buffer:
 //
 // - Pixels: the projected corners' bounds, extended by kPixelSlack on each side. A triangle in the
-//   box covers no other pixels: rasterisers move corners by less than 1/100 of a pixel (1/256 for
+//   box covers no other pixels. Rasterisers move corners by less than 1/100 of a pixel (1/256 for
 //   their grid, plus the rounding of clipping).
 // - Depth: the nearest corner's, extended by the rasteriser's error. It interpolates in floats from
 //   the triangle's corners; the error is about 2^-24 of the triangle's maximum depth per pixel of

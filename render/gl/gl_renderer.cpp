@@ -7,7 +7,7 @@
 // 1. Items visible in an earlier frame from a similar camera are drawn into the depth buffer.
 // 2. The depth is read back, and the remaining items are tested against it (occlusion_culler.hpp).
 //    Usually few or none are disoccluded; they are drawn into the depth, too. If there are many (no
-//    similar earlier frame), they are refined front to back: the nearest ones are drawn first and
+//    similar earlier frame), they are refined front to back. The nearest ones are drawn first and
 //    occlude most of the others, then twice as many, and so on.
 // 3. Items visible against the last depth are shaded. If neither colour nor normals are requested,
 //    ids are drawn in the depth prepass, and shading is skipped if no item was disoccluded.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <numeric>
 
@@ -17,7 +18,7 @@ constexpr double kTileMargin = 0.3;  // metres: more than the border of a tile b
 // A door that moves makes a state a tick, of which none is used again. The states of worlds whose
 // bodies rest are used in each step of their environments, and stay.
 constexpr std::size_t kMaxStates = 64;
-constexpr std::size_t kMaxKeptBytes = std::size_t{256} << 20;
+constexpr std::size_t kMaxKeptBytes = std::size_t{128} << 20;
 
 bool isSamePose(const collision::Pose& a, const collision::Pose& b) {
   return a.translation == b.translation && a.rotation.coeffs() == b.rotation.coeffs();
@@ -27,6 +28,12 @@ std::vector<collision::Pose> collectPoses(const WorldData& world) {
   std::vector<collision::Pose> poses;
   for (const Body& body : world.bodies) poses.push_back({body.orientation, body.position});
   return poses;
+}
+
+using Clock = std::chrono::steady_clock;
+
+double measureSecondsSince(Clock::time_point start) {
+  return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 std::uint64_t drawStateNumber() {
@@ -60,17 +67,16 @@ void placeBody(const collision::Pose& pose, Body& body) {
 }
 
 std::size_t MeshState::memoryBytes() const {
-  std::size_t bytes = 2 * (ample->memoryBytes() + scarce->memoryBytes()) +
-                      connections.memoryBytes() + measureBytes(triedGaps) +
-                      islands.numberOf.size() * sizeof(islands.numberOf[0]);
-  if (unobstructed) bytes += unobstructed->memoryBytes();
-  for (const Links& one : links) bytes += one.memoryBytes();
-  return bytes;
+  std::size_t sum = bytes;
+  if (unobstructed) sum += unobstructed->memoryBytes();
+  for (const Links& one : links) sum += one.memoryBytes();
+  return sum;
 }
 
 MeshStates::MeshStates(WorldData& world, const NavigationAgent& agent, int threads,
                        const MeshProgress& progress)
     : world_(world), agent_(agent), grid_(makeTileGrid(world.scene->bounds(), agent)) {
+  const auto start = Clock::now();
   const std::vector<int> tiles = listTiles(grid_);
   MeshState& state = states_.emplace_front();
   state.poses = collectPoses(world);
@@ -78,12 +84,14 @@ MeshStates::MeshStates(WorldData& world, const NavigationAgent& agent, int threa
   state.scarceTiles.resize(tiles.size());
   buildTiles(state, tiles, threads, scaleProgress(progress, 0, kTileShare));
   assemble(state, threads, progress);
+  seconds_ = measureSecondsSince(start);
 }
 
 MeshStates::MeshStates(WorldData& world, const NavigationAgent& agent,
                        std::span<const std::uint8_t> saved, int threads,
                        const MeshProgress& progress)
     : world_(world), agent_(agent), grid_(makeTileGrid(world.scene->bounds(), agent)) {
+  const auto start = Clock::now();
   SavedMeshes meshes = loadMeshes(world, agent, grid_, saved);
   MeshState& state = states_.emplace_front();
   for (std::size_t i = 0; i < meshes.bodies.size(); ++i)
@@ -94,6 +102,7 @@ MeshStates::MeshStates(WorldData& world, const NavigationAgent& agent,
   for (SavedGap& gap : meshes.gaps)
     state.triedGaps[gap.key] = {std::move(gap.there), std::move(gap.back), gap.reach};
   assemble(state, threads, progress);
+  seconds_ = measureSecondsSince(start);
 }
 
 std::vector<std::uint8_t> MeshStates::save() const {
@@ -131,6 +140,9 @@ void MeshStates::assemble(MeshState& state, int threads, const MeshProgress& pro
       state.drawn.add(*state.ample, i);
   }
   for (const Island& island : state.islands.islands) state.area += island.area;
+  state.bytes = 2 * (state.ample->memoryBytes() + state.scarce->memoryBytes()) +
+                state.connections.memoryBytes() + measureBytes(state.triedGaps) +
+                state.islands.numberOf.size() * sizeof(state.islands.numberOf[0]);
   if (progress) progress(1);
 }
 
@@ -165,6 +177,7 @@ std::size_t MeshStates::update(const Snapshot& snapshot, int threads,
   if (known != states_.end()) {
     placeBodies(poses);
     states_.splice(states_.begin(), states_, known);
+    forgetOldStates();
     return 0;
   }
   std::list<MeshState> made(1);

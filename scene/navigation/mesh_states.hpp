@@ -42,6 +42,7 @@ struct MeshState {
   ConnectionList connections;  ///< of `ample`
   PolygonSampler drawn;        ///< of islands with Island::isDrawn
   double area = 0;             ///< square metres, of all islands
+  std::size_t bytes = 0;       ///< of memory, of all above
   // Made by the queries that need them.
   std::optional<UnobstructedMesh> unobstructed;
   std::list<Links> links;                                                ///< the last options last
@@ -73,6 +74,7 @@ class MeshStates {
   MeshState& now() { return states_.front(); }
   Walker& walker() { return *walker_; }
   const TileGrid& grid() const { return grid_; }
+  double buildSeconds() const { return seconds_; }  ///< to build or load the first meshes
   /// The unobstructed mesh of the present state. Builds tiles at the first call of all states.
   const UnobstructedMesh& unobstructed(const MeshProgress& progress);
   /// Of all states.
@@ -85,6 +87,7 @@ class MeshStates {
   std::size_t derive(MeshState& state, std::vector<collision::Pose> poses, int threads,
                      const MeshProgress& progress);
   void placeBodies(const std::vector<collision::Pose>& poses);
+  /// Makes the meshes of the tiles, and all that follows from them.
   void assemble(MeshState& state, int threads, const MeshProgress& progress);
   /// Moves a body, and marks the tiles that its box touches before or afterwards.
   void moveBody(Body& body, const collision::Pose& from, const collision::Pose& to,
@@ -94,6 +97,7 @@ class MeshStates {
   WorldData& world_;
   const NavigationAgent agent_;
   const TileGrid grid_;
+  double seconds_ = 0;
   std::optional<Walker> walker_;
   std::list<MeshState> states_;  ///< the present one first, then by their last use
   std::shared_ptr<const NavigationMesh> unobstructedMesh_;  ///< without bodies: of all states

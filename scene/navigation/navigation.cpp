@@ -1,7 +1,6 @@
 #include "scene/navigation/navigation.hpp"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -33,31 +32,23 @@ World makeWorld(std::shared_ptr<const Scene> scene, const WorldSettings& setting
   return world;
 }
 
-double measureSeconds(const std::chrono::steady_clock::time_point& start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-}
-
 }  // namespace
 
 Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
                        const NavigationAgent& agent, const Snapshot* snapshot, int threads,
                        const Progress& progress)
     : agent_(agent),
-      start_(std::chrono::steady_clock::now()),
       world_(makeWorld(std::move(scene), settings, snapshot)),
       bodies_(snapshot ? std::make_shared<const Snapshot>(*snapshot) : world_.snapshot()),
-      meshes_(world_.data(), agent, threads, progress),
-      seconds_(measureSeconds(start_)) {}
+      meshes_(world_.data(), agent, threads, progress) {}
 
 Navigation::Navigation(std::shared_ptr<const Scene> scene, const WorldSettings& settings,
                        const NavigationAgent& agent, std::span<const std::uint8_t> saved,
                        int threads, const Progress& progress)
     : agent_(agent),
-      start_(std::chrono::steady_clock::now()),
       world_(std::move(scene), settings),
       bodies_(world_.snapshot()),
-      meshes_(world_.data(), agent, saved, threads, progress),
-      seconds_(measureSeconds(start_)) {}
+      meshes_(world_.data(), agent, saved, threads, progress) {}
 
 Navigation::~Navigation() = default;
 
@@ -68,8 +59,9 @@ std::vector<std::uint8_t> Navigation::save() {
 
 std::size_t Navigation::update(const Snapshot& snapshot, int threads, const Progress& progress) {
   const std::lock_guard lock(mutex_);
+  const std::size_t built = meshes_.update(snapshot, threads, progress);
   bodies_ = std::make_shared<const Snapshot>(snapshot);
-  return meshes_.update(snapshot, threads, progress);
+  return built;
 }
 
 std::uint64_t Navigation::stateNumber() {
@@ -80,7 +72,8 @@ std::uint64_t Navigation::stateNumber() {
 NavigationReport Navigation::report() {
   const std::lock_guard lock(mutex_);
   const MeshState& now = meshes_.now();
-  NavigationReport report{now.ample->polygonCount(), now.area, {}, meshes_.memoryBytes(), seconds_};
+  NavigationReport report{
+      now.ample->polygonCount(), now.area, {}, meshes_.memoryBytes(), meshes_.buildSeconds()};
   for (const Island& island : now.islands.islands) report.islandAreas.push_back(island.area);
   return report;
 }

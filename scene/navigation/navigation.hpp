@@ -2,7 +2,6 @@
 // paths; each leg of a path is walked by the motion of avatars before it is returned.
 #pragma once
 
-#include <chrono>
 #include <cstdint>
 #include <functional>
 #include <memory>
@@ -155,12 +154,10 @@ class Navigation {
                                   const std::optional<std::uint32_t>& island);
 
   const NavigationAgent agent_;
-  const std::chrono::steady_clock::time_point start_;
   World world_;  ///< never ticks
   std::mutex mutex_;
   std::shared_ptr<const Snapshot> bodies_;  ///< where they are
   MeshStates meshes_;
-  const double seconds_;  ///< to build or load the first meshes
 };
 
 }  // namespace enfilade::scene

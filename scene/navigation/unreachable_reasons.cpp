@@ -83,8 +83,8 @@ std::optional<double> measureHeadroom(const PathFinder& finder, const WalkOutcom
   return *height + 2 * finder.world.settings.contactOffset;  // below the feet and above the head
 }
 
-/// The clear width straight ahead, in metres; 0: not even a thin agent gets past; nullopt: the
-/// agent does.
+/// The width of the widest agent that gets straight past the obstacle, in metres. 0: not even a
+/// thin one does; nullopt: the agent itself does.
 std::optional<double> measureGapAhead(const PathFinder& finder, const WalkOutcome& stop,
                                       const Vec3& beyond) {
   const auto radius =
@@ -92,7 +92,7 @@ std::optional<double> measureGapAhead(const PathFinder& finder, const WalkOutcom
                      [](NavigationAgent& agent, double size) { agent.radius = size; });
   if (!radius) return 0;
   if (*radius == finder.agent.radius) return std::nullopt;
-  return 2 * (*radius + finder.world.settings.contactOffset);
+  return 2 * *radius;
 }
 
 /// A place for the agent at the end of a gap.
@@ -221,10 +221,8 @@ void explainStop(const PathFinder& finder, const WalkOutcome& stop, const Vec3& 
     path.reason +=
         format(": a step of %.3f m, climbs %.3f", *rise, finder.world.settings.stepHeight);
   } else if (const auto gap = measureGapAhead(finder, stop, beyond)) {
-    path.obstruction->clearWidth = *gap;
-    path.reason += *gap > 0
-                       ? format(": clear width %.3f m, needs %.3f", *gap, 2 * finder.agent.radius)
-                       : format(": no gap, needs %.3f m", 2 * finder.agent.radius);
+    path.reason += *gap > 0 ? format(": %.3f m are free straight ahead", *gap) : ": no gap";
+    path.reason += format(", needs %.3f m", 2 * finder.agent.radius);
   }
 }
 

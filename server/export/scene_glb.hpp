@@ -5,11 +5,11 @@
 //
 // Contents. All coordinates are in the scene's frame: metres, Y up, offset removed.
 //   - scenes[0].extras: `sceneHash` (16 hexadecimal digits), `offset` (file = scene + offset) and
-//     `entities`, one entry per object of the model: `id` and `path`; if known `globalId`, `class`,
-//     `operation`, `storey` (a name), `partOf` (an id) and `body` (a name); `only` is "drawn" or
-//     "solid" for objects that do not collide or are not drawn. Solid ones and trigger volumes have
-//     no geometry here. `storeys` have `name`, `elevation` and `globalId`, `spaces` also `longName`
-//     and a box (`min`, `max`).
+//     `entities`, one entry per object of the model. An entry has `id` and `path`; if known
+//     `globalId`, `class`, `operation`, `storey` (a name), `partOf` (an id) and `body` (a name).
+//     `only` is "drawn" or "solid" for objects that do not collide or are not drawn. Solid ones and
+//     trigger volumes have no geometry here. `storeys` have `name`, `elevation` and `globalId`,
+//     `spaces` also `longName` and a box (`min`, `max`).
 //   - A merged node has one primitive with the attribute _ENTITY_ID, an id per vertex. Its extras:
 //     `entities`, the ids in the order of the indices, and `triangles`, their numbers of triangles.
 //   - An instanced node (EXT_mesh_gpu_instancing) has TRANSLATION, ROTATION, SCALE and _ENTITY_ID

@@ -524,7 +524,7 @@ Faults findLongSentences(const Sources& sources, int maxWords) {
     const bool isPage = endsWith(path, ".md");
     if (!isPage && !isCode(path) && !endsWith(path, ".proto")) continue;
     int words = 0, firstLine = 0;
-    bool inFence = false;
+    bool inFence = false, inItem = false;
     const auto endSentence = [&, &name = path] {
       if (words > maxWords)
         faults.push_back(formatPlace(name, firstLine) + ": a sentence of " + std::to_string(words) +
@@ -550,10 +550,12 @@ Faults findLongSentences(const Sources& sources, int maxWords) {
       const bool followsCode =
           isComment && match[1].str().find_first_not_of(' ') != std::string::npos;
       const std::string written = isComment ? match[3].str() : "";
-      const bool isIndented = written.starts_with(' ');  // formulas and items of a list
-      const bool isFormula = isIndented && written.find('=') != std::string::npos;
-      if (followsCode || written.empty() || isIndented) endSentence();
-      if (!written.empty() && !isFormula) readLine(number, written);
+      const bool isIndented = written.starts_with(' ');
+      inItem = std::regex_search(written, item) || (inItem && isIndented);
+      const bool isFormula = isIndented && written.find(" = ") != std::string::npos;
+      const bool isShown = isFormula || (isIndented && !inItem);  // also a table, an example
+      if (followsCode || written.empty() || isShown) endSentence();
+      if (!written.empty() && !isShown) readLine(number, written);
       if (followsCode) endSentence();
     });
     endSentence();
@@ -586,9 +588,9 @@ Faults findBodyKindsLeftOut(const Sources& sources) {
   static constexpr Place places[] = {
       {"protocol/enfilade.proto", R"(string kind = \d+; +//[^\n]*")", "\""},
       {"scene/import/bodies/SIDECAR.md", R"(\n\| `)", "` \\|"},
-      {"server/page/src/panels/pick.ts", R"(\n  )", ": "},
+      {"server/page/src/panels/pick.ts", R"(const ACTIONS[^;]*\n  )", ": "},
   };
-  static const std::regex row(R"re(\.name = "([a-z]+)")re");
+  static const std::regex row(R"re(\.name = "(\w+)")re");
   const auto table = sources.find("scene/model/body_spec.hpp");
   if (table == sources.end()) return {};
   Faults faults;

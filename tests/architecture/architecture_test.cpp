@@ -194,7 +194,8 @@ TEST(ArchitectureRules, ABodyKindThatAFileLeavesOutIsAFault) {
       {"scene/model/body_spec.hpp", "return {.name = \"gate\"};\nreturn {.name = \"crane\"};\n"},
       {"protocol/enfilade.proto", "  string kind = 3;  // \"gate\" or \"crane\"\n"},
       {"scene/import/bodies/SIDECAR.md", "A `crane`:\n| `gate` | axis |\n"},
-      {"server/page/src/panels/pick.ts", "{\n  crane: [],\n};\n"}};
+      {"server/page/src/panels/pick.ts",
+       "const ACTIONS = {\n  crane: [],\n};\nconst OTHERS = {\n  gate: [],\n};\n"}};
   EXPECT_EQ(findBodyKindsLeftOut(sources),
             (Faults{"server/page/src/panels/pick.ts: no body kind \"gate\"",
                     "scene/import/bodies/SIDECAR.md: no body kind \"crane\""}));

@@ -3,7 +3,8 @@
 
 #include <gtest/gtest.h>
 
-#include "scene/navigation/doors.hpp"
+#include <stdexcept>
+
 #include "scene/navigation/navigation.hpp"
 #include "tests/scene/body_fixture.hpp"
 
@@ -26,10 +27,7 @@ std::shared_ptr<const Scene> makeGatedRooms() {
 
 /// Of a world in which the gate is so much below its closed pose, metres.
 Snapshot makeSnapshotWithGate(const std::shared_ptr<const Scene>& scene, double below) {
-  World world(scene);
-  placeBody({Quat::Identity(), world.data().bodies[0].position - Vec3(0, below, 0)},
-            world.data().bodies[0]);
-  Snapshot snapshot = *world.snapshot();
+  Snapshot snapshot = *World(scene).snapshot();
   auto bodies = std::make_shared<std::vector<BodySnapshot>>(*snapshot.bodies);
   bodies->front().pose.translation.y() -= below;
   snapshot.bodies = bodies;
@@ -64,6 +62,7 @@ TEST(MeshStates, AreThoseOfANavigationThatBeginsThere) {
   const auto scene = makeGatedRooms();
   const Snapshot closed = makeSnapshotWithGate(scene, 0);
   Navigation navigation(scene, {}, {}, &closed);
+  int found = 0, refused = 0;
   for (const double below : {2.2, 0.5, 0.0, 1.0, 2.2}) {
     const Snapshot snapshot = makeSnapshotWithGate(scene, below);
     Navigation fresh(scene, {}, {}, &snapshot);
@@ -75,8 +74,12 @@ TEST(MeshStates, AreThoseOfANavigationThatBeginsThere) {
                            other = fresh.findPath({-2, 0, 0}, goal);
       EXPECT_EQ(path.points, other.points) << below << " to " << goal.transpose();
       EXPECT_EQ(path.reason, other.reason) << below << " to " << goal.transpose();
+      ++(path.found() ? found : refused);
     }
+    EXPECT_EQ(navigation.save(), fresh.save()) << below;
   }
+  EXPECT_EQ(found, 7) << "past the open gate, and in the room";
+  EXPECT_EQ(refused, 8) << "past the closed gate, and onto the platform";
 }
 
 TEST(MeshStates, LeaveThePathsOfOtherWorldsKept) {
@@ -106,9 +109,25 @@ TEST(MeshStates, ThatWereLongNotUsedAreForgotten) {
     EXPECT_GT(navigation.update(makeSnapshotWithGate(scene, 0.01 * i)), 0u);
     EXPECT_EQ(navigation.update(open), 0u) << "it is used";
   }
-  EXPECT_LT(navigation.report().bytes, 80 * bytes);
-  EXPECT_GT(navigation.report().bytes, 40 * bytes);
+  EXPECT_NEAR(static_cast<double>(navigation.report().bytes) / static_cast<double>(bytes), 64, 8);
   EXPECT_GT(navigation.update(closed), 0u) << "it is the oldest";
+}
+
+TEST(MeshStates, AreAsBeforeIfABuildIsAbandoned) {
+  const auto scene = makeGatedRooms();
+  const Snapshot closed = makeSnapshotWithGate(scene, 0), open = makeSnapshotWithGate(scene, 2.2);
+  Navigation navigation(scene, {}, {}, &closed);
+  const std::uint64_t number = navigation.stateNumber();
+  const auto abandon = [](double share) {
+    if (share > 0.9) throw std::runtime_error("abandoned");
+  };
+  EXPECT_THROW(navigation.update(open, 2, abandon), std::runtime_error);
+  EXPECT_EQ(navigation.stateNumber(), number);
+  const NavigationPath none = navigation.findPath({-2, 0, 0}, {2, 0, 0});
+  ASSERT_TRUE(none.obstruction) << "the gate stands where it stood";
+  EXPECT_EQ(navigation.findEntityName(none.obstruction->entity), "gate");
+  EXPECT_GT(navigation.update(open), 0u);
+  EXPECT_TRUE(navigation.findPath({-2, 0, 0}, {2, 0, 0}).found());
 }
 
 TEST(MeshStates, ShareTheUnobstructedMesh) {

@@ -5,7 +5,7 @@
 //   same way. A closed surface in the boundary of H is that boundary, so H is exactly the solid.
 // - `nearlyConvex`: floats cannot hold a rotated box, whose quads are bent by the rounding of their
 //   corners. Each triangle's corners lie within d below the plane of one face of H. Here d = 6
-//   (|n_x| h_x + |n_y| h_y + |n_z| h_z), n is the face's unit normal, and h_i is half a unit of
+//   (|n_x| h_x + |n_y| h_y + |n_z| h_z). The face's unit normal is n, and h_i is half a unit of
 //   rounding of the largest coordinate on axis i. The surface encloses more than half of H's
 //   volume.
 // Then no point of the surface is farther than d from H's boundary (out along n it leaves H). The

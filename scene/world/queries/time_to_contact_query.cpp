@@ -6,7 +6,7 @@
 //    velocity this holds for any two entities. Two convex shapes have a second gap, along their
 //    separating normal; it closes more slowly, but may be smaller. The better of the two is used.
 // 4. Two convex shapes whose present motion is uniform, without such bounds, have a time of impact
-//    (Mirtich 1996): it is the answer, or proves that they pass each other.
+//    (Mirtich 1996). It is the answer, or proves that they pass each other.
 // Ticks: a fall is a parabola sampled at ticks. A tick that begins at speed s covers (s + g dt / 2)
 // dt. A displacement of `d` in the last tick therefore means a speed of d / dt + g dt / 2 now.
 // Dynamic bodies fall in substeps, each with its speed after the substep: they are early by at most

@@ -116,7 +116,7 @@ struct WorldGroup::Memory {
   const std::string socketName;                      ///< of the client
   std::unique_ptr<SharedMemory> current, last = {};  ///< `last`: replaced, but may still be read
   std::uint64_t number = 0;                          ///< of `current`
-  std::uint64_t rounds = 0;
+  std::uint64_t rounds = 0;                          ///< with pictures
 
   /// Space for an attachment, and where it is; nullopt if a new file cannot be passed to the
   /// client. Throws std::system_error.
@@ -129,7 +129,8 @@ struct WorldGroup::Memory {
       ++number;
       last = std::exchange(current, std::move(larger));
     }
-    const std::size_t offset = ++rounds % 2 * (current->bytes().size() / 2);
+    if (bytes > 0) ++rounds;
+    const std::size_t offset = rounds % 2 * (current->bytes().size() / 2);
     place.set_number(number);
     place.set_bytes(current->bytes().size());
     place.set_offset(offset);

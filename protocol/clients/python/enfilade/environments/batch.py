@@ -62,7 +62,8 @@ class Batch:
 def _join(views: List[Optional[np.ndarray]]) -> Optional[np.ndarray]:
     """A read-only array of all, without a copy; None if they are not at equal intervals in one buffer."""
     first = views[0]
-    if first is None or any(one is None or one.strides != first.strides for one in views):
+    if first is None or any(one is None or one.dtype != first.dtype or one.shape != first.shape or
+                            one.strides != first.strides for one in views):
         return None
     buffer = _find_buffer(first)
     if buffer is None or any(_find_buffer(one) is not buffer for one in views[1:]):

@@ -31,7 +31,8 @@ def _is_refusal(error: Exception) -> bool:
 
 class VectorWalkEnv(spaces.VectorEnvBase):
     """Several WalkEnvs that run at the same time, in worlds of one server that share its scene: one
-    message steps all of them. A VectorEnv of Gymnasium if that is installed, with its methods and attributes everywhere.
+    message steps all of them. A VectorEnv of Gymnasium if that is installed, with its methods and
+    attributes everywhere.
 
     scene or address: a model, for which a server process is started, or HOST:PORT of a running
         server that lets this client create worlds (the role admin). Each world is dropped when its
@@ -42,8 +43,8 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         WalkEnv(client=client, **options).
     copy: as in Gymnasium. True: observations belong to their reader; each picture is copied once, from
         the memory that the server shares. False: pictures of a step are that memory, read-only, and
-        valid until the second step after theirs. Those with distances or flow are still copied, since
-        NaN becomes infinity, and so are all of a step in which an environment restarts.
+        valid until the next step(), reset() or render(). Those with distances or flow are still
+        copied, since NaN becomes infinity, and so are all of a step in which an environment restarts.
 
     An environment whose episode ended restarts with the next step(). That step ignores its action,
     and its reward is 0 (Gymnasium's "next step" mode).
@@ -53,7 +54,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
     A wrong number of actions or seeds, or an invalid action, is a ValueError before anything is sent.
     If the server refuses a start or a picture later, or no episode is drawn, that environment alone is
     truncated: its observation is zero, and `info` has "error". There is a warning, too. The next step()
-    restarts it, and the others go on. Other errors are raised with the number of the environment, after
+    restarts it, and the others continue. Other errors are raised with the number of the environment, after
     all replies, and so is the first refusal if none remains: call reset() then. If the server ended,
     create all environments again.
     """
@@ -129,7 +130,7 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         seeds, options = self._seeds(seed), options or {}
         self._over = None
         self._kept = [None] * self.num_envs
-        batch = self._make_batch()
+        batch = self._make_batch(copies=True)
 
         def take(i: int, ids: List[int]) -> Dict[str, Any]:
             seen, info = self.envs[i]._entered(ids, options)
@@ -146,10 +147,10 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         self._last = batch.finish()
         return self._last, self._gathered(infos)
 
-    def _make_batch(self) -> Batch:
+    def _make_batch(self, copies: bool) -> Batch:
         distances = {camera.prefix + name for camera in self.envs[0].cameras
                      for name in DISTANCES.intersection(camera.channels)}
-        return Batch(self.single_observation_space, self.num_envs, self._copies, distances)
+        return Batch(self.single_observation_space, self.num_envs, copies, distances)
 
     def _seeds(self, seed: Any) -> List[Optional[int]]:
         if seed is None:
@@ -191,7 +192,10 @@ class VectorWalkEnv(spaces.VectorEnvBase):
         return post
 
     def _step_each(self, over: np.ndarray, post: Callable[[int], List[int]]) -> Result:
-        batch = self._make_batch()
+        # A restart may take several rounds, in which the server overwrites its memory.
+        if over.any() and not self._copies:
+            self._last = {name: one.copy() for name, one in self._last.items()}
+        batch = self._make_batch(self._copies or bool(over.any()))
 
         def take(i: int, ids: List[int]) -> Tuple[float, bool, bool, Dict[str, Any]]:
             if over[i]:
