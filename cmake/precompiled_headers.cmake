@@ -1,6 +1,7 @@
 # Precompiles the headers of the standard library and of third parties, which take half of a file's
-# compile time. There are four sets: computation; code with messages (protobuf, JSON); and both with
-# GoogleTest. gcc takes the level of optimisation from the precompiled header, so each set has one.
+# compile time. There are five sets: the collision library; computation; code with messages (protobuf,
+# JSON); and the last two with GoogleTest. gcc takes the level of optimisation from the precompiled
+# header, whatever the file's own options are, so each set has one.
 # Each file still includes all its headers: the clang build does not precompile them.
 
 set(ENFILADE_PRECOMPILED_HEADERS
@@ -52,6 +53,8 @@ function(enfilade_precompile_headers root)
   find_package(Protobuf REQUIRED)
   set(messages HEADERS ${ENFILADE_PRECOMPILED_MESSAGES}
                LIBRARIES protobuf::libprotobuf nlohmann_json::nlohmann_json)
+  enfilade_precompiled(enfilade_precompiled_collision)
+  target_compile_options(enfilade_precompiled_collision PRIVATE ${ENFILADE_HURRIED})
   enfilade_precompiled(enfilade_precompiled_code)
   enfilade_precompiled(enfilade_precompiled_messages ${messages})
   target_compile_options(enfilade_precompiled_messages PRIVATE ${ENFILADE_UNHURRIED})
@@ -73,7 +76,9 @@ function(enfilade_precompile_headers root)
       continue()  # nothing to compile, or none of these headers
     endif()
     set(kind code)
-    if(target IN_LIST with_messages)
+    if(target STREQUAL "enfilade_collision")
+      set(kind collision)
+    elseif(target IN_LIST with_messages)
       set(kind messages)
     endif()
     if(target MATCHES "_tests$")

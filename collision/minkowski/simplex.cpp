@@ -94,8 +94,10 @@ void keepTriangle(const Simplex<Real>& s, int i, int j, int k, Face<Real>& best)
 /// With u the unit roundoff of Real, the determinants are off by less than 256 u reach^3. Each of
 /// nine entries, off by at most 8 u reach, has a cofactor of at most 2 reach^2. The determinant's
 /// own five roundings of six products of at most reach^3 add 30 u reach^3.
+/// If the origin is inside, returns true and sets the weights of the corners. They are written in
+/// place: a copy through a face costs as much as the test.
 template <class Real>
-void keepTetrahedron(const Simplex<Real>& s, double reach, bool& inside, Face<Real>& best) {
+bool keepTetrahedron(Simplex<Real>& s, double reach, Face<Real>& best) {
   using Vec = typename Simplex<Real>::Vec;
   const Vec &a = s.points[0], &b = s.points[1], &c = s.points[2], &d = s.points[3];
   const Vec ab = a.cross(b), cd = c.cross(d);
@@ -108,15 +110,15 @@ void keepTetrahedron(const Simplex<Real>& s, double reach, bool& inside, Face<Re
   const bool flat = !(sign * sum > bound);
   const bool sees0 = flat || !(sign * d0 > bound), sees1 = flat || !(sign * d1 > bound);
   const bool sees2 = flat || !(sign * d2 > bound), sees3 = flat || !(sign * d3 > bound);
-  inside = !sees0 && !sees1 && !sees2 && !sees3;
-  if (inside) {
-    best = {{0, 1, 2, 3}, {d0 / sum, d1 / sum, d2 / sum, d3 / sum}, 4, Vec::Zero()};
-    return;
+  if (!sees0 && !sees1 && !sees2 && !sees3) {
+    s.weight[0] = d0 / sum, s.weight[1] = d1 / sum, s.weight[2] = d2 / sum, s.weight[3] = d3 / sum;
+    return true;
   }
   if (sees3) keepTriangle(s, 0, 1, 2, best);
   if (sees2) keepTriangle(s, 0, 1, 3, best);
   if (sees1) keepTriangle(s, 0, 2, 3, best);
   if (sees0) keepTriangle(s, 1, 2, 3, best);
+  return false;
 }
 
 }  // namespace
@@ -124,14 +126,15 @@ void keepTetrahedron(const Simplex<Real>& s, double reach, bool& inside, Face<Re
 template <class Real>
 void Simplex<Real>::keepNearestFace(double reach) {
   containsOrigin = false;
-  Face<Real> face;
-  face.size = 0;
+  Face<Real> face{};
   if (size == 2) {
     keepSegment(*this, 0, 1, face);
   } else if (size == 3) {
     keepTriangle(*this, 0, 1, 2, face);
-  } else {
-    keepTetrahedron(*this, reach, containsOrigin, face);
+  } else if (keepTetrahedron(*this, reach, face)) {
+    containsOrigin = true;
+    nearest.setZero();
+    return;
   }
   ENFILADE_ASSERT(face.size > 0 && face.size <= size);
   for (int i = 0; i < face.size; ++i) {  // corners ascend: reads precede overwrites
