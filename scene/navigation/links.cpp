@@ -88,9 +88,7 @@ std::vector<Vec3> findExits(const Body& lift, const Vec3& inside, Walker& walker
 }
 
 void placeAtStop(Body& lift, double stop) {
-  const collision::Pose pose = computeBodyPose(*lift.spec, computeJointPose(*lift.spec, stop));
-  setBodyPose(lift, pose.translation, pose.rotation);
-  lift.motionBounds = lift.boxes.whole;
+  placeBody(lift, computeBodyPose(*lift.spec, computeJointPose(*lift.spec, stop)));
 }
 
 std::vector<Stop> findStops(WorldData& world, Body& lift, const NavigationAgent& agent) {
@@ -187,11 +185,9 @@ void Links::collectLifts(WorldData& world) {
     const std::vector<double>& positions = lift.spec->stops;
     if (!getTraits(lift.spec->kind).takesStops || positions.size() > kMaxStops) continue;
     const auto body = static_cast<std::uint32_t>(&lift - world.bodies.data());
-    const Vec3 position = lift.position;
-    const collision::Quat orientation = lift.orientation;
+    const collision::Pose before{lift.orientation, lift.position};
     const std::vector<Stop> stops = findStops(world, lift, agent_);
-    setBodyPose(lift, position, orientation);
-    lift.motionBounds = lift.boxes.whole;
+    placeBody(lift, before);
     Walker rider(world, agent_);
     const auto canRide = [&](const Stop& from, const Stop& to) {
       return !from.outside.empty() && !to.outside.empty() &&

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "collision/assert.hpp"
+#include "scene/base/elapsed.hpp"
 #include "scene/base/parallel_for.hpp"
 #include "scene/navigation/mesh/saved_meshes.hpp"
 #include "scene/world/data/body.hpp"
@@ -28,12 +29,6 @@ std::vector<collision::Pose> collectPoses(const WorldData& world) {
   std::vector<collision::Pose> poses;
   for (const Body& body : world.bodies) poses.push_back({body.orientation, body.position});
   return poses;
-}
-
-using Clock = std::chrono::steady_clock;
-
-double measureSecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
 std::uint64_t drawStateNumber() {
@@ -61,11 +56,6 @@ TileMesh buildTile(const WorldData& world, const NavigationAgent& agent, const T
 
 }  // namespace
 
-void placeBody(const collision::Pose& pose, Body& body) {
-  setBodyPose(body, pose.translation, pose.rotation);
-  body.motionBounds = body.boxes.whole;
-}
-
 std::size_t MeshState::memoryBytes() const {
   std::size_t sum = bytes;
   if (unobstructed) sum += unobstructed->memoryBytes();
@@ -76,7 +66,7 @@ std::size_t MeshState::memoryBytes() const {
 MeshStates::MeshStates(WorldData& world, const NavigationAgent& agent, int threads,
                        const MeshProgress& progress)
     : world_(world), agent_(agent), grid_(makeTileGrid(world.scene->bounds(), agent)) {
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   const std::vector<int> tiles = listTiles(grid_);
   MeshState& state = states_.emplace_front();
   state.poses = collectPoses(world);
@@ -91,11 +81,11 @@ MeshStates::MeshStates(WorldData& world, const NavigationAgent& agent,
                        std::span<const std::uint8_t> saved, int threads,
                        const MeshProgress& progress)
     : world_(world), agent_(agent), grid_(makeTileGrid(world.scene->bounds(), agent)) {
-  const auto start = Clock::now();
+  const auto start = std::chrono::steady_clock::now();
   SavedMeshes meshes = loadMeshes(world, agent, grid_, saved);
   MeshState& state = states_.emplace_front();
   for (std::size_t i = 0; i < meshes.bodies.size(); ++i)
-    placeBody(meshes.bodies[i], world.bodies[i]);
+    placeBody(world.bodies[i], meshes.bodies[i]);
   state.poses = std::move(meshes.bodies);
   state.ampleTiles = std::move(meshes.ample);
   state.scarceTiles = std::move(meshes.scarce);
@@ -154,7 +144,7 @@ void MeshStates::moveBody(Body& body, const collision::Pose& from, const collisi
     return static_cast<int>(std::clamp(tile, 0.0, count - 1.0));
   };
   for (const collision::Pose* pose : {&from, &to}) {
-    placeBody(*pose, body);
+    placeBody(body, *pose);
     const Aabb& box = body.boxes.whole;
     forgetGaps(tried, box, agent_);
     const int lastZ = findTile(box.max.z() + margin, grid_.origin.z(), grid_.tilesZ);
@@ -212,7 +202,7 @@ std::size_t MeshStates::derive(MeshState& state, std::vector<collision::Pose> po
 void MeshStates::placeBodies(const std::vector<collision::Pose>& poses) {
   for (std::size_t i = 0; i < poses.size(); ++i)
     if (!isSamePose(poses[i], {world_.bodies[i].orientation, world_.bodies[i].position}))
-      placeBody(poses[i], world_.bodies[i]);
+      placeBody(world_.bodies[i], poses[i]);
   walker_.emplace(world_, agent_);
 }
 
@@ -229,10 +219,9 @@ void MeshStates::forgetOldStates() {
 const UnobstructedMesh& MeshStates::unobstructed(const MeshProgress& progress) {
   constexpr int kThreads = 2;
   if (!unobstructedMesh_) {
-    const std::vector<int> all = listTiles(grid_);
-    std::vector<TileMesh> tiles(all.size());
+    std::vector<TileMesh> tiles(now().ampleTiles.size());
     parallelFor(tiles.size(), kThreads, progress, [&](std::size_t i) {
-      tiles[i] = buildTile(world_, agent_, grid_, all[i], Clearance::none);
+      tiles[i] = buildTile(world_, agent_, grid_, static_cast<int>(i), Clearance::none);
     });
     unobstructedMesh_ = std::make_shared<const NavigationMesh>(grid_, std::move(tiles));
   }

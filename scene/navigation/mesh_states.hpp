@@ -29,9 +29,6 @@ using MeshProgress = std::function<void(double)>;  ///< share that is done, 0..1
 /// The share of the tiles; the rest is of islands and connections.
 inline constexpr double kTileShare = 0.8;
 
-/// Puts a body where it rests.
-void placeBody(const collision::Pose& pose, Body& body);
-
 struct MeshState {
   std::uint64_t number = 0;                       ///< differs from that of any other state
   std::vector<collision::Pose> poses;             ///< of all bodies, by index

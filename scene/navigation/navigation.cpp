@@ -28,7 +28,7 @@ World makeWorld(std::shared_ptr<const Scene> scene, const WorldSettings& setting
   World world(std::move(scene), settings);
   if (!snapshot) return world;
   for (const BodySnapshot& body : *snapshot->bodies)
-    placeBody(body.pose, world.data().bodies[body.index]);
+    placeBody(world.data().bodies[body.index], body.pose);
   return world;
 }
 
@@ -66,23 +66,21 @@ std::size_t Navigation::update(const Snapshot& snapshot, int threads, const Prog
 
 std::uint64_t Navigation::stateNumber() {
   const std::lock_guard lock(mutex_);
-  return meshes_.now().number;
+  return now().number;
 }
 
 NavigationReport Navigation::report() {
   const std::lock_guard lock(mutex_);
-  const MeshState& now = meshes_.now();
   NavigationReport report{
-      now.ample->polygonCount(), now.area, {}, meshes_.memoryBytes(), meshes_.buildSeconds()};
-  for (const Island& island : now.islands.islands) report.islandAreas.push_back(island.area);
+      now().ample->polygonCount(), now().area, {}, meshes_.memoryBytes(), meshes_.buildSeconds()};
+  for (const Island& island : now().islands.islands) report.islandAreas.push_back(island.area);
   return report;
 }
 
 PathFinder Navigation::makeFinder(std::function<const UnobstructedMesh&()> unobstructed) {
-  MeshState& now = meshes_.now();
-  PathFinder finder{world_.data(), agent_,      meshes_.walker(),
-                    *now.ample,    *now.scarce, std::move(unobstructed)};
-  finder.connections = &now.connections;
+  PathFinder finder{world_.data(), agent_,        walker(),
+                    *now().ample,  *now().scarce, std::move(unobstructed)};
+  finder.connections = &now().connections;
   return finder;
 }
 
@@ -95,10 +93,10 @@ NavigationPath Navigation::searchPath(const Vec3& from, const Vec3& to, const Pa
   const auto first = islandAt(from), last = islandAt(to);
   // On furniture one failed search proves nothing about its neighbours.
   const auto isFloor = [&](std::uint32_t island) {
-    return meshes_.now().islands.islands[island].area >= kMinFloorArea;
+    return now().islands.islands[island].area >= kMinFloorArea;
   };
   if (first && last && first != last && isFloor(*first) && isFloor(*last))
-    finder.refusals = &meshes_.now().refusals[{*first, *last}];
+    finder.refusals = &now().refusals[{*first, *last}];
   NavigationPath path = scene::findPath(finder, from, to);
   finder.refusals = nullptr;
   if (path.found()) {
@@ -106,11 +104,10 @@ NavigationPath Navigation::searchPath(const Vec3& from, const Vec3& to, const Pa
     path.legs.push_back({PathLeg::Kind::walk, 0, path.length, path.seconds});
   }
   if (options == PathOptions()) return path;
-  auto links = std::ranges::find(meshes_.now().links, options, &Links::options);
-  if (links == meshes_.now().links.end()) {
-    if (meshes_.now().links.size() == kMaxLinkSets) meshes_.now().links.pop_front();
-    links = meshes_.now().links.emplace(meshes_.now().links.end(), world_.data(), agent_,
-                                        *meshes_.now().ample, options);
+  auto links = std::ranges::find(now().links, options, &Links::options);
+  if (links == now().links.end()) {
+    if (now().links.size() == kMaxLinkSets) now().links.pop_front();
+    links = now().links.emplace(now().links.end(), world_.data(), agent_, *now().ample, options);
   }
   return findLinkedPath(finder, *links, *bodies_, from, to, std::move(path));
 }
@@ -124,33 +121,33 @@ NavigationPath Navigation::findPath(const Vec3& from, const Vec3& to, const Path
 NavigationPath Navigation::findPathAgain(const Vec3& from, const Vec3& to,
                                          std::optional<KeptPath>& kept, const Progress& progress) {
   const std::lock_guard lock(mutex_);
-  const bool mayServe = kept && kept->goal == to && kept->meshState == meshes_.now().number;
+  const bool mayServe = kept && kept->goal == to && kept->meshState == now().number;
   if (mayServe && rejoinPath(makeFinder({}), *kept, from)) return kept->path;
   NavigationPath path = searchPath(from, to, {}, progress);
   kept.reset();
   if (!path.found()) return path;
   kept = keepPath(makeFinder({}), path, to);
-  kept->meshState = meshes_.now().number;
+  kept->meshState = now().number;
   return path;
 }
 
 NavigationPath Navigation::findPathOut(const Vec3& from,
                                        const std::function<bool(const Vec3&)>& isWanted) {
   const std::lock_guard lock(mutex_);
-  return scene::findPathOut(meshes_.walker(), from, isWanted);
+  return scene::findPathOut(walker(), from, isWanted);
 }
 
 std::optional<NarrowPlace> Navigation::findNarrowest(const std::vector<Vec3>& points) {
   const std::lock_guard lock(mutex_);
   const NarrowPlace narrowest =
-      measureNarrowest(world_.data(), agent_, traceFeet(meshes_.walker(), points), Vec3::Zero(),
+      measureNarrowest(world_.data(), agent_, traceFeet(walker(), points), Vec3::Zero(),
                        std::numeric_limits<double>::infinity());
   return narrowest.clearWidth < kMaxSideWidth ? std::optional(narrowest) : std::nullopt;
 }
 
 std::vector<PathStep> Navigation::findSteps(const std::vector<Vec3>& points) {
   const std::lock_guard lock(mutex_);
-  return scene::findSteps(world_.data(), agent_, traceFeet(meshes_.walker(), points));
+  return scene::findSteps(world_.data(), agent_, traceFeet(walker(), points));
 }
 
 Aabb Navigation::computeBox(const NamedPlace& named) const {
@@ -168,11 +165,10 @@ std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
     return collision::contains(inflate(box, kHeightError), {place, place}) &&
            (!named.space || isInSpace(*named.space, {place.x(), middle.y(), place.z()}));
   };
-  if (const auto place =
-          standAt(meshes_.walker(), centre + Vec3(0, kHeightError, 0), 2 * kHeightError)) {
+  if (const auto place = standAt(walker(), centre + Vec3(0, kHeightError, 0), 2 * kHeightError)) {
     const auto number = islandAt(*place);
     const bool isWanted =
-        island ? number == island : number && meshes_.now().islands.islands[*number].isDrawn;
+        island ? number == island : number && now().islands.islands[*number].isDrawn;
     if (isWanted && isInside(*place)) return place;
   }
   struct Candidate {
@@ -184,21 +180,20 @@ std::optional<Vec3> Navigation::findPlaceOn(const NamedPlace& named,
   const std::vector<Vec3> aims = listAims(named, centre);
   // The mesh lies up to kHeightError above or below a floor, which may be the top of the box.
   const Vec3 extents = 0.5 * box.size() + Vec3(0, kHeightError, 0);
-  for (const std::uint32_t polygon : meshes_.now().ample->findPolygons(box.centre(), extents)) {
-    const std::uint32_t number = meshes_.now().islands.numberOf[polygon];
+  for (const std::uint32_t polygon : now().ample->findPolygons(box.centre(), extents)) {
+    const std::uint32_t number = now().islands.numberOf[polygon];
     if (island && number != *island) continue;
-    const bool isAside = number == kNoIsland || !meshes_.now().islands.islands[number].isDrawn;
+    const bool isAside = number == kNoIsland || !now().islands.islands[number].isDrawn;
     const auto add = [&](const Vec3& point) {
       candidates.push_back({isAside, computeGroundDistance(point, centre), point});
     };
-    add(meshes_.now().ample->centre(polygon));
-    for (const Vec3& aim : aims) add(meshes_.now().ample->closestPoint(polygon, aim));
+    add(now().ample->centre(polygon));
+    for (const Vec3& aim : aims) add(now().ample->closestPoint(polygon, aim));
   }
   std::ranges::stable_sort(
       candidates, {}, [](const Candidate& one) { return std::pair(one.isAside, one.distance); });
   for (const Candidate& one : candidates)
-    if (const auto place = standNear(meshes_.walker(), one.point); place && isInside(*place))
-      return place;
+    if (const auto place = standNear(walker(), one.point); place && isInside(*place)) return place;
   return std::nullopt;
 }
 
@@ -215,7 +210,7 @@ std::optional<Vec3> Navigation::findPlaceIn(std::span<const NamedPlace> named,
       if (const auto found = findPlaceOn(*place, island)) return found;
     return std::nullopt;
   };
-  const auto standing = start ? standAt(meshes_.walker(), *start) : std::nullopt;
+  const auto standing = start ? standAt(walker(), *start) : std::nullopt;
   if (const auto island = standing ? islandAt(*standing) : std::nullopt)
     if (const auto found = findOn(island)) return found;
   return findOn(std::nullopt);
@@ -223,11 +218,11 @@ std::optional<Vec3> Navigation::findPlaceIn(std::span<const NamedPlace> named,
 
 std::optional<Vec3> Navigation::snap(const Vec3& point, double maxDistance) {
   const std::lock_guard lock(mutex_);
-  if (const auto place = standAt(meshes_.walker(), point))
+  if (const auto place = standAt(walker(), point))
     if ((*place - point).norm() <= maxDistance) return place;
-  const auto nearest = meshes_.now().ample->findNearest(point, Vec3::Constant(maxDistance));
+  const auto nearest = now().ample->findNearest(point, Vec3::Constant(maxDistance));
   if (!nearest) return std::nullopt;
-  const auto place = standNear(meshes_.walker(), nearest->point);
+  const auto place = standNear(walker(), nearest->point);
   return place && (*place - point).norm() <= maxDistance ? place : std::nullopt;
 }
 
@@ -240,23 +235,22 @@ std::optional<Vec3> Navigation::snapTo(const Vec3& point, const SnapTarget& want
   constexpr std::size_t kMaxCandidates = 16;
   const std::lock_guard lock(mutex_);
   if (!wanted.island)
-    if (const auto place = standAt(meshes_.walker(), point);
-        place && (*place - point).norm() <= kExact)
+    if (const auto place = standAt(walker(), point); place && (*place - point).norm() <= kExact)
       return place;
   const Aabb box{point - wanted.extents, point + wanted.extents};
   std::vector<std::pair<double, Vec3>> candidates;
-  for (const std::uint32_t polygon : meshes_.now().ample->findPolygons(point, wanted.extents)) {
-    const std::uint32_t number = meshes_.now().islands.numberOf[polygon];
+  for (const std::uint32_t polygon : now().ample->findPolygons(point, wanted.extents)) {
+    const std::uint32_t number = now().islands.numberOf[polygon];
     if (number == kNoIsland || (wanted.island && number != *wanted.island) ||
-        (wanted.isDrawn && !meshes_.now().islands.islands[number].isDrawn))
+        (wanted.isDrawn && !now().islands.islands[number].isDrawn))
       continue;
-    const Vec3 closest = meshes_.now().ample->closestPoint(polygon, point);
+    const Vec3 closest = now().ample->closestPoint(polygon, point);
     candidates.emplace_back((closest - point).norm(), closest);
   }
   std::ranges::stable_sort(candidates, {}, &std::pair<double, Vec3>::first);
   candidates.resize(std::min(candidates.size(), kMaxCandidates));
   for (const auto& [distance, closest] : candidates) {
-    const auto place = standNear(meshes_.walker(), closest);
+    const auto place = standNear(walker(), closest);
     if (place && std::abs(place->y() - closest.y()) < kHeightError &&
         collision::contains(box, {*place, *place}))
       return place;
@@ -266,13 +260,13 @@ std::optional<Vec3> Navigation::snapTo(const Vec3& point, const SnapTarget& want
 
 std::optional<Vec3> Navigation::tryStep(const Vec3& from, const Vec3& to, bool slides) {
   const std::lock_guard lock(mutex_);
-  if (!standAt(meshes_.walker(), from)) return std::nullopt;
-  return (slides ? meshes_.walker().slideTo(to) : meshes_.walker().walkTo(to)).footPosition;
+  if (!standAt(walker(), from)) return std::nullopt;
+  return (slides ? walker().slideTo(to) : walker().walkTo(to)).footPosition;
 }
 
 std::optional<ObstacleDistance> Navigation::findObstacle(const Vec3& point, double maxDistance) {
   const std::lock_guard lock(mutex_);
-  const auto place = standAt(meshes_.walker(), point);
+  const auto place = standAt(walker(), point);
   if (!place) return std::nullopt;
   return measureObstacle(world_.data(), agent_, *place, maxDistance);
 }
@@ -300,29 +294,29 @@ NavigationMap Navigation::drawMap(double cell, double height, double tolerance) 
                highest = height + tolerance + meshes_.grid().cellHeight;
   const auto measureFloor = [&](const Vec3& onMesh, double top) {
     const Vec3 above(onMesh.x(), top + kHeightError, onMesh.z());
-    const auto place = standAt(meshes_.walker(), above, above.y() - onMesh.y() + kHeightError);
+    const auto place = standAt(walker(), above, above.y() - onMesh.y() + kHeightError);
     return place ? place->y() : onMesh.y();
   };
-  for (std::uint32_t polygon = 0; polygon < meshes_.now().ample->polygonCount(); ++polygon)
-    if (meshes_.now().islands.numberOf[polygon] != kNoIsland)
-      meshes_.now().ample->rasterize(polygon, grid, lowest, highest, measureFloor, map.cells);
+  for (std::uint32_t polygon = 0; polygon < now().ample->polygonCount(); ++polygon)
+    if (now().islands.numberOf[polygon] != kNoIsland)
+      now().ample->rasterize(polygon, grid, lowest, highest, measureFloor, map.cells);
   return map;
 }
 
 std::vector<Vec3> Navigation::collectTriangles(const std::optional<std::uint32_t>& island) {
   const std::lock_guard lock(mutex_);
   std::vector<Vec3> triangles;
-  for (std::uint32_t polygon = 0; polygon < meshes_.now().ample->polygonCount(); ++polygon) {
-    const std::uint32_t number = meshes_.now().islands.numberOf[polygon];
+  for (std::uint32_t polygon = 0; polygon < now().ample->polygonCount(); ++polygon) {
+    const std::uint32_t number = now().islands.numberOf[polygon];
     if (number == kNoIsland || (island && number != *island)) continue;
-    const std::vector<Vec3> own = meshes_.now().ample->makeTriangles(polygon);
+    const std::vector<Vec3> own = now().ample->makeTriangles(polygon);
     triangles.insert(triangles.end(), own.begin(), own.end());
   }
   return triangles;
 }
 
 std::optional<std::uint32_t> Navigation::islandAt(const Vec3& place) {
-  return findIslandAt(*meshes_.now().ample, meshes_.now().islands, meshes_.walker(), place);
+  return findIslandAt(*now().ample, now().islands, walker(), place);
 }
 
 std::optional<std::uint32_t> Navigation::findIsland(const Vec3& place) {
@@ -332,17 +326,16 @@ std::optional<std::uint32_t> Navigation::findIsland(const Vec3& place) {
 
 std::vector<Island> Navigation::islands() {
   const std::lock_guard lock(mutex_);
-  return meshes_.now().islands.islands;
+  return now().islands.islands;
 }
 
 std::vector<IslandNeighbour> Navigation::findIslandNeighbours(std::uint32_t island) {
   const std::lock_guard lock(mutex_);
   std::vector<IslandNeighbour> neighbours =
-      findNeighbours(*meshes_.now().ample, meshes_.now().islands, island,
-                     kWallAndDoor + 2 * agent_.radius, 0.5 + world_.settings().stepHeight);
+      findNeighbours(*now().ample, now().islands, island, kWallAndDoor + 2 * agent_.radius,
+                     0.5 + world_.settings().stepHeight);
   std::erase_if(neighbours, [&](IslandNeighbour& near) {
-    const auto from = standNear(meshes_.walker(), near.from),
-               to = standNear(meshes_.walker(), near.to);
+    const auto from = standNear(walker(), near.from), to = standNear(walker(), near.to);
     near.from = from.value_or(near.from);
     near.to = to.value_or(near.to);
     return !from || !to;
@@ -358,24 +351,23 @@ std::optional<Vec3> Navigation::findRandomPlace(std::mt19937_64& random,
   if (isPart) {
     std::vector<std::uint32_t> candidates;
     if (wanted.near) {
-      candidates =
-          meshes_.now().ample->findPolygons(*wanted.near, Vec3::Constant(wanted.maxDistance));
+      candidates = now().ample->findPolygons(*wanted.near, Vec3::Constant(wanted.maxDistance));
     } else {
-      candidates.resize(meshes_.now().ample->polygonCount());
+      candidates.resize(now().ample->polygonCount());
       std::iota(candidates.begin(), candidates.end(), 0u);
     }
     for (const std::uint32_t polygon : candidates) {
-      if (meshes_.now().islands.numberOf[polygon] == kNoIsland ||
-          (wanted.island && meshes_.now().islands.numberOf[polygon] != *wanted.island))
+      if (now().islands.numberOf[polygon] == kNoIsland ||
+          (wanted.island && now().islands.numberOf[polygon] != *wanted.island))
         continue;
-      part.add(*meshes_.now().ample, polygon);
+      part.add(*now().ample, polygon);
     }
   }
-  const PolygonSampler& sampler = isPart ? part : meshes_.now().drawn;
+  const PolygonSampler& sampler = isPart ? part : now().drawn;
   if (sampler.empty()) return std::nullopt;
   for (int i = 0; i < kMaxRandomTries; ++i) {
-    const Vec3 point = sampler.draw(*meshes_.now().ample, random) + Vec3(0, kHeightError, 0);
-    const auto place = standAt(meshes_.walker(), point, 2 * kHeightError + kMaxStandDrop);
+    const Vec3 point = sampler.draw(*now().ample, random) + Vec3(0, kHeightError, 0);
+    const auto place = standAt(walker(), point, 2 * kHeightError + kMaxStandDrop);
     if (!place) continue;
     if (wanted.near && (*place - *wanted.near).norm() > wanted.maxDistance) continue;
     if (wanted.awayFrom && (*place - *wanted.awayFrom).norm() < wanted.minDistance) continue;

@@ -93,7 +93,7 @@ class Navigation {
   const NavigationAgent& agent() const { return agent_; }
   std::shared_ptr<const AvatarShape> agentShape() {
     const std::lock_guard lock(mutex_);
-    return meshes_.walker().shape();
+    return walker().shape();
   }
   NavigationReport report();
   std::string findEntityName(EntityId id) const { return world_.data().findEntityName(id); }
@@ -146,6 +146,8 @@ class Navigation {
   /// As findPath(); the caller holds the mutex.
   NavigationPath searchPath(const Vec3& from, const Vec3& to, const PathOptions& options,
                             const Progress& progress);
+  MeshState& now() { return meshes_.now(); }
+  Walker& walker() { return meshes_.walker(); }
   PathFinder makeFinder(std::function<const UnobstructedMesh&()> unobstructed);
   std::optional<std::uint32_t> islandAt(const Vec3& place);
   Aabb computeBox(const NamedPlace& named) const;

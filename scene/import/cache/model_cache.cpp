@@ -18,6 +18,7 @@
 #include <cstdlib>
 #include <cstring>
 
+#include "scene/base/elapsed.hpp"
 #include "scene/import/cache/deduplicate_meshes.hpp"
 #include "scene/import/cache/model_cache_entry.hpp"
 #include "scene/import/file/content_hash.hpp"
@@ -39,10 +40,6 @@ constexpr const char* kTextExtension = ".text";
 constexpr const char* kTemporaryExtension = ".unfinished";
 constexpr auto kTemporaryLifetime =
     std::chrono::hours(1);  // a temporary file this old is abandoned
-
-double measureSecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 // ---- keys --------------------------------------------------------------------------------------
 

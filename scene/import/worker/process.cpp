@@ -20,6 +20,8 @@
 #include <utility>
 #include <vector>
 
+#include "scene/base/elapsed.hpp"
+
 extern char** environ;
 
 namespace enfilade::scene {
@@ -261,10 +263,6 @@ class MessageBuffer {
   std::byte* bytes_ = nullptr;  // those from begin_ to end_ are not handled yet
   std::size_t begin_ = 0, end_ = 0, capacity_ = 0;
 };
-
-double measureSecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// Receives messages until the worker closes the pipe or must be killed.
 ImportExit::Reason receiveMessages(int readEnd, const ImportRequest& request,

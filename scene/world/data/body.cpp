@@ -42,6 +42,11 @@ void setBodyPose(Body& body, const Vec3& position, const collision::Quat& orient
   updateWholeBox(body);
 }
 
+void placeBody(Body& body, const collision::Pose& pose) {
+  setBodyPose(body, pose.translation, pose.rotation);
+  body.motionBounds = body.boxes.whole;
+}
+
 void makePartBoxes(Body& body) {
   BodyBoxes& boxes = body.boxes;
   if (boxes.hasParts) return;

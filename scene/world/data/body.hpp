@@ -106,6 +106,8 @@ inline std::uint32_t getPartCount(const Body& body) {
 
 /// Sets the pose of a body and updates its box. The boxes of several parts become invalid.
 void setBodyPose(Body& body, const Vec3& position, const collision::Quat& orientation);
+/// The same for a body at rest: its motion bounds are its box.
+void placeBody(Body& body, const collision::Pose& pose);
 
 /// Converts a point from scene frame to body frame.
 inline Vec3 toBodyFrame(const Body& body, const Vec3& point) {

@@ -18,7 +18,7 @@ class Batch:
     lie in that memory at equal intervals; it copies `distances` and all small arrays."""
 
     def __init__(self, space: Any, count: int, copies: bool, distances: Collection[str]) -> None:
-        self._count, self._copies, self._distances = count, copies, distances
+        self._count, self._distances = count, distances
         self._spaces = space.spaces
         self._views: Dict[str, List[Optional[np.ndarray]]] = {}
         self.observations: Observation = {}
