@@ -8,7 +8,7 @@
 
 #include "scene/navigation/clear_width.hpp"
 #include "scene/navigation/mesh/shortest_corridor.hpp"
-#include "scene/navigation/walk/level_detours.hpp"
+#include "scene/navigation/walk/shorter_parts.hpp"
 #include "scene/navigation/walk/stand.hpp"
 #include "scene/world/avatars/walk_velocity.hpp"
 
@@ -34,8 +34,9 @@ constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is s
 constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less is not tried
 constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
 constexpr double kMinClimb = 0.01;         // of the length of a path: less is no reason to search
+constexpr double kMeshBendSpacing = 0.05;  // metres
 constexpr double kMaxMeshOffset = 0.1;     // metres, across
-constexpr double kShortPath = 5;  // metres: mesh lines keep some centimetres more than is needed
+constexpr double kShortPath = 8;  // metres: mesh lines keep some centimetres more than is needed
 
 /// The axis of a gap that the walker stopped before, or in.
 std::optional<GapAxis> findNarrowGap(const PathFinder& finder, const Vec3& stop,
@@ -411,6 +412,22 @@ NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> 
   return best;
 }
 
+void tightenBends(Walker& walker, NavigationPath& path, double spacing, Proof& proof) {
+  NavigationPath shorter = path;
+  if (!shortenBends(walker, shorter.points, spacing, proof.improvementWalks)) return;
+  const std::optional<Vec3> bump = proof.bump;
+  const Vec3 failedAt = proof.failedAt;
+  const std::size_t met = proof.met.size();
+  const double before = path.feetLength > 0 ? path.feetLength : path.length;
+  if (walksWithoutBumps(walker, shorter, proof) && shorter.feetLength < before) {
+    path = std::move(shorter);
+    return;
+  }
+  proof.bump = bump;
+  proof.failedAt = failedAt;
+  proof.met.resize(met);
+}
+
 /// On the scarce mesh A* through the middles of portals suffices: its line shows whether a narrow
 /// gap makes a path much shorter.
 MeshLines measureLines(const PathFinder& finder, const Vec3& from, const Vec3& to) {
@@ -439,7 +456,10 @@ NavigationPath findPathByMeshes(const PathFinder& finder, const Vec3& start, con
   proof.isQuick = false;
   if (quick.found() && quick.cost() <= kTight * proof.shortestLine) return quick;
   NavigationPath best = findPathByProposals(finder, start, goal, proof);
-  return quick.found() && (!best.found() || quick.cost() < best.cost()) ? quick : best;
+  if (quick.found() && (!best.found() || quick.cost() < best.cost())) best = std::move(quick);
+  if (best.found() && best.cost() > kTight * proof.shortestLine)
+    tightenBends(finder.walker, best, kMeshBendSpacing, proof);
+  return best;
 }
 
 }  // namespace enfilade::scene

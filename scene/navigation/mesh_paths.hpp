@@ -10,7 +10,7 @@
 
 #include "scene/navigation/path_finder.hpp"
 #include "scene/navigation/walk/grid_search.hpp"
-#include "scene/navigation/walk/level_detours.hpp"
+#include "scene/navigation/walk/shorter_parts.hpp"
 
 namespace enfilade::scene {
 
@@ -55,6 +55,10 @@ enum class Versions : std::uint8_t { all, untilLevel };
 /// version can be walked.
 NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> versions,
                              Versions tried, Proof& proof);
+
+/// Replaces bends of a proved path by shorter ways on grids of `spacing` metres, if the whole can
+/// then be walked.
+void tightenBends(Walker& walker, NavigationPath& path, double spacing, Proof& proof);
 
 /// Metres along a short line on each mesh, with those to and from it.
 MeshLines measureLines(const PathFinder& finder, const Vec3& from, const Vec3& to);

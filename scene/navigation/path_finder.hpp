@@ -67,6 +67,9 @@ struct KeptPath {
   std::array<double, 2> excess{};    ///< metres of the path beyond each, the least so far
   bool isNearLine = false;           ///< the search found a path about as short as a line
   double moved = 0;                  ///< metres since the lines were measured
+  /// Of a path over steps: where the feet stood at its points when the whole was walked; nullopt:
+  /// not known, or in the air. Empty: its legs are even.
+  std::vector<std::optional<Vec3>> stood;
 };
 
 /// The last searches between two islands: they found nothing.

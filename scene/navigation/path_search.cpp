@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "collision/assert.hpp"
 #include "scene/navigation/mesh_paths.hpp"
 #include "scene/navigation/unreachable_reasons.hpp"
 #include "scene/navigation/walk/stand.hpp"
@@ -25,6 +26,7 @@ constexpr double kMaxGridDistance = 3;    // metres between places that are conn
 constexpr double kMaxKeptGrowth = 5e-4;   // of the length: a new search varies by more
 constexpr double kMaxStraightMove = 0.5;  // metres: a longer move may have led around something
 constexpr double kMinSaving = 1e-3;       // metres that a shortcut saves
+constexpr double kSameStand = 1e-9;       // metres: from there on two walks are the same
 constexpr double kMaxKeptMove = 0.01;     // of the length: then another path may be shorter by 2 %
 // From the middle of a perforated floor, which has no mesh, to the next one with a mesh.
 constexpr double kMaxExit = 5;  // metres
@@ -103,11 +105,14 @@ NavigationPath provePath(const PathFinder& finder, const std::vector<Vec3>& plac
   const std::vector<Vec3> shortest = shortenPath(finder.walker, tight, Shortcuts::tight);
   NavigationPath path =
       proveVersions(finder.walker, std::array{shortest, tight, shortened}, Versions::all, proof);
-  if (path.found()) return path;
-  // A fall from a step may lead past places where the feet would have stood.
-  path = proveVersions(finder.walker, std::array{places}, Versions::all, proof);
-  if (!path.found() || path.points.size() > kMaxThinnedPlaces) return path;
-  return leaveOutPlaces(finder.walker, std::move(path), proof);
+  if (!path.found()) {
+    // A fall from a step may lead past places where the feet would have stood.
+    path = proveVersions(finder.walker, std::array{places}, Versions::all, proof);
+    if (path.found() && path.points.size() <= kMaxThinnedPlaces)
+      path = leaveOutPlaces(finder.walker, std::move(path), proof);
+  }
+  if (path.found()) tightenBends(finder.walker, path, kFineSpacing, proof);
+  return path;
 }
 
 NavigationPath findPathByConnections(const PathFinder& finder, const Vec3& start, const Vec3& goal,
@@ -330,6 +335,34 @@ std::vector<Vec3> leadOnto(Walker& walker, const Vec3& start, const std::vector<
   return points;
 }
 
+/// Walks a path tick by tick. nullopt: an obstacle stops the walk.
+std::optional<std::vector<std::optional<Vec3>>> recordStands(Walker& walker,
+                                                             const std::vector<Vec3>& points) {
+  walker.returnTo(points.front());
+  std::vector<std::optional<Vec3>> stood{points.front()};
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    if (walker.walkOn(points[i]).kind != WalkOutcome::Kind::arrived) return std::nullopt;
+    stood.push_back(walker.isStanding() ? std::optional(walker.footPosition()) : std::nullopt);
+  }
+  return stood;
+}
+
+/// Walks a path over steps tick by tick, up to the first point where the feet stand as in the walk
+/// of `stood`. False: an obstacle stops the walk. Unknown places to stand are set.
+bool joinsWalk(Walker& walker, const std::vector<Vec3>& points,
+               std::vector<std::optional<Vec3>>& stood) {
+  ENFILADE_ASSERT(stood.size() == points.size());
+  walker.returnTo(points.front());
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    if (walker.walkOn(points[i]).kind != WalkOutcome::Kind::arrived) return false;
+    const bool isSame =
+        walker.isStanding() && stood[i] && (walker.footPosition() - *stood[i]).norm() <= kSameStand;
+    if (isSame) return true;
+    stood[i] = walker.isStanding() ? std::optional(walker.footPosition()) : std::nullopt;
+  }
+  return true;
+}
+
 }  // namespace
 
 NavigationPath findPath(const PathFinder& finder, const Vec3& from, const Vec3& to) {
@@ -367,6 +400,10 @@ KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goa
   for (std::size_t i = 0; i < kept.lines.size(); ++i)
     kept.excess[i] = path.length - kept.lines[i].value_or(0);
   kept.isNearLine = isNearLine(path.length, kept.lines);
+  if (path.feetLength > 0) {  // over steps
+    const auto stood = recordStands(finder.walker, path.points);
+    kept.stood = stood.value_or(std::vector<std::optional<Vec3>>(path.points.size()));
+  }
   kept.path = std::move(path);
   return kept;
 }
@@ -377,8 +414,18 @@ bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from) {
   const Vec3 start = walker.footPosition();
   if (!kept.isNearLine && (start - kept.searchedFrom).norm() > kMaxKeptMove * kept.path.length)
     return false;
+  walker.takeCrossedSteps();
   std::vector<Vec3> points = leadOnto(walker, start, kept.path.points);
   if (points.empty()) return false;
+  std::vector<std::optional<Vec3>> stood;
+  if (!kept.stood.empty()) {
+    stood = {start};
+    stood.insert(stood.end(), kept.stood.end() - static_cast<std::ptrdiff_t>(points.size() - 1),
+                 kept.stood.end());
+  } else if (walker.takeCrossedSteps()) {
+    stood.resize(points.size());
+  }
+  if (!stood.empty() && !joinsWalk(walker, points, stood)) return false;
   const double length = computeLength(points);
   // A line is at most as much shorter as the agent moved since it was measured.
   const double move = (start - kept.path.points.front()).norm();
@@ -393,6 +440,7 @@ bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from) {
       kept.excess[i] = std::min(kept.excess[i], length - lines[i].value_or(0));
   }
   kept.path.points = std::move(points);
+  kept.stood = std::move(stood);
   kept.path.length = length;
   kept.path.seconds = length / finder.agent.speed;
   kept.path.legs = {{PathLeg::Kind::walk, 0, length, kept.path.seconds}};

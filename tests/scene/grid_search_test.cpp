@@ -13,8 +13,8 @@
 
 #include "scene/navigation/doors.hpp"
 #include "scene/navigation/mesh_paths.hpp"
-#include "scene/navigation/walk/level_detours.hpp"
 #include "scene/navigation/walk/shape_separation.hpp"
+#include "scene/navigation/walk/shorter_parts.hpp"
 #include "tests/scene/body_fixture.hpp"
 
 namespace enfilade::scene::testing {
@@ -152,6 +152,53 @@ TEST(LevelDetours, AnObjectIsWalkedOverIfTheWayAroundItIsLonger) {
     EXPECT_TRUE(goAroundBumps(walker, places, search).empty());
     EXPECT_EQ(search.maxWalks, left) << "a known bump is searched again";
   }
+}
+
+/// On the grid a way that leaves the line 0.7 m before the podium is longer than the one over it.
+TEST(LevelDetours, AWideObjectIsWalkedAroundInAWideCurve) {
+  const World world(std::make_shared<const Scene>(
+      makeBoxModel({{"floor", {-3, -0.2, -5}, {15, 0, 5}},
+                    {"podium", {2, 0, -0.65}, {5, 0.28, 5}},
+                    {"upper step", {3, 0.28, -0.65}, {4, 0.52, 5}}})));
+  Walker walker(world.data(), {});
+  std::vector<Vec3> places{{-2, 0, 0}, {8, 0, 0}};
+  const double over = walkAlong(walker, places).length();
+  ASSERT_NEAR(over, 10 + 2 * 0.52, 0.01);
+  BumpSearch search{40'000};
+  EXPECT_EQ(goAroundBumps(walker, places, search).size(), 1U);
+  EXPECT_LT(walkAlong(walker, places).length(), over - 0.6);
+}
+
+TEST(Bends, AreReplacedByShorterWays) {
+  const World world(std::make_shared<const Scene>(
+      makeBoxModel({{"floor", {-3, -0.2, -5}, {15, 0, 5}}, {"wall", {2, 0, 0}, {2.4, 2, 5}}})));
+  Walker walker(world.data(), {});
+  // The prism needs 0.3 m around the end of the wall. This path keeps 0.4 m more.
+  std::vector<Vec3> places{{0.5, 0, 0.5}, {2.2, 0, -0.7}, {4, 0, 0.5}};
+  const double before = walkAlong(walker, places).length();
+  std::size_t maxWalks = 20'000;
+  EXPECT_TRUE(shortenBends(walker, places, 0.05, maxWalks));
+  EXPECT_LT(maxWalks, 20'000U);
+  EXPECT_EQ(places.front(), Vec3(0.5, 0, 0.5));
+  EXPECT_EQ(places.back(), Vec3(4, 0, 0.5));
+  const double shortest = std::hypot(1.2, 0.8) + 1 + std::hypot(1.3, 0.8);
+  EXPECT_GT(before, 1.05 * shortest);
+  EXPECT_LT(walkAlong(walker, places).length(), 1.01 * shortest);
+}
+
+TEST(Bends, ThatAreNeededStay) {
+  const World world(std::make_shared<const Scene>(
+      makeBoxModel({{"floor", {-3, -0.2, -5}, {15, 0, 5}}, {"wall", {2, 0, 0}, {2.4, 2, 5}}})));
+  Walker walker(world.data(), {});
+  const std::vector<Vec3> around{{0.5, 0, 0.5}, {2, 0, -0.31}, {2.4, 0, -0.31}, {4, 0, 0.5}};
+  std::vector<Vec3> places = around;
+  std::size_t maxWalks = 20'000;
+  EXPECT_FALSE(shortenBends(walker, places, 0.05, maxWalks));
+  EXPECT_EQ(places, around);
+  places = {{0, 0, -2}, {6, 0, -2}};
+  std::size_t noWalks = 20'000;
+  EXPECT_FALSE(shortenBends(walker, places, 0.05, noWalks));
+  EXPECT_EQ(noWalks, 20'000U) << "a straight path is searched";
 }
 
 TEST(LevelDetours, AVersionOfAPathThatLeadsAroundIsPreferred) {

@@ -135,6 +135,33 @@ TEST(KeptPath, LeadsOverSteps) {
   EXPECT_LT(journey.searches, 20);
 }
 
+/// An agent comes to a point of its path as the walk of the whole did. From there on it is the
+/// same.
+TEST(KeptPath, OverStepsIsWalkedUntilItStandsAsBefore) {
+  std::vector<NamedBox> boxes{{"floor", {-6, -0.2, -4}, {6, 0, 4}},
+                              {"step", {1, 0, -4}, {6, 0.2, 4}},
+                              {"wall", {3, 0.2, -4}, {3.2, 2, 2}}};
+  Navigation navigation(makeBoxScene(boxes), {}, {});
+  const Vec3 goal(5, 0.2, 0);
+  std::optional<KeptPath> kept;
+  ASSERT_TRUE(navigation.findPathAgain({-2, 0, 0}, goal, kept).found());
+  ASSERT_EQ(kept->stood.size(), kept->path.points.size());
+  ASSERT_TRUE(kept->stood.back());
+  EXPECT_NEAR(kept->stood.back()->y(), 0.2, 1e-3);
+  const Vec3 searchedFrom = kept->searchedFrom;
+  ASSERT_TRUE(navigation.findPathAgain({-1.9, 0, 0.1}, goal, kept).found());
+  EXPECT_EQ(kept->searchedFrom, searchedFrom);
+  EXPECT_EQ(kept->stood.size(), kept->path.points.size());
+  // The path leads through the wall, and nothing is known of how it was walked.
+  kept->path.points.insert(kept->path.points.end() - 1, Vec3(5, 0.2, -3));
+  kept->path.points.insert(kept->path.points.end() - 2, Vec3(2, 0.2, -3));
+  kept->stood.assign(kept->path.points.size(), std::nullopt);
+  kept->excess = {100, 100};  // its length alone is no reason for a search
+  const NavigationPath path = navigation.findPathAgain({-1.8, 0, 0.2}, goal, kept);
+  EXPECT_TRUE(isPathWalked(navigation, path));
+  EXPECT_NE(kept->searchedFrom, searchedFrom);
+}
+
 /// The foot of the stair is behind the agent. The floor below its upper end is in clear sight.
 TEST(KeptPath, DoesNotLeaveOutAStairToAMezzanine) {
   std::vector<NamedBox> boxes{{"floor", {-8, -0.2, -4}, {8, 0, 4}},

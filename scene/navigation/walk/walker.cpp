@@ -339,8 +339,8 @@ bool Walker::walkEvenly(const Vec3& goal) {
   return walkWithMargin(goal).kind == WalkOutcome::Kind::arrived && !isUneven_;
 }
 
-WalkOutcome Walker::walkOn(const Vec3& goal) {
-  return walkByTicks(goal, kAnyLength, true, world_.settings.stepHeight);
+WalkOutcome Walker::walkOn(const Vec3& goal, double maxLength) {
+  return walkByTicks(goal, maxLength, true, world_.settings.stepHeight);
 }
 
 WalkOutcome Walker::slideTo(const Vec3& goal) {

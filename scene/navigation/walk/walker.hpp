@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <limits>
 #include <map>
 #include <optional>
 #include <string>
@@ -66,7 +67,8 @@ class Walker {
   bool walkEvenly(const Vec3& goal);
   /// Walks tick by tick as an avatar in a world does, equal up to rounding. It may slide along
   /// obstacles, and may end in a fall from a step. Begins standing, or in that fall.
-  WalkOutcome walkOn(const Vec3& goal);
+  /// It also ends on a floor at least `maxLength` metres away, across; a further call continues it.
+  WalkOutcome walkOn(const Vec3& goal, double maxLength = std::numeric_limits<double>::infinity());
   /// Walks tick by tick to `goal`, and may fall by up to `maxDrop` metres on the way.
   WalkOutcome dropTo(const Vec3& goal, double maxDrop);
   /// Walks tick by tick towards `goal`, slides along obstacles, and ends where it gains nothing.
@@ -79,6 +81,7 @@ class Walker {
   const FeetTravel& travel() const { return travel_; }
 
   const Vec3& footPosition() const { return avatar_.footPosition; }
+  bool isStanding() const { return avatar_.grounded; }            ///< not in a fall
   EntityId groundEntity() const { return avatar_.groundEntity; }  ///< after place()
   const NavigationAgent& agent() const { return agent_; }
   std::shared_ptr<const AvatarShape> shape() const { return shape_; }

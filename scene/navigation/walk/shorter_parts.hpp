@@ -1,5 +1,6 @@
-// Detours around low objects, such as the corner of a low bed. The shortest line on a navigation
-// mesh ignores heights, and an agent would step onto the object for a moment.
+// Replaces parts of a path by shorter ways of the feet. The shortest line on a navigation mesh
+// ignores heights, so an agent may step onto the corner of a low bed for a moment. Where a mesh
+// ends early or is missing, a path has bends that it does not need.
 #pragma once
 
 #include <cstddef>
@@ -26,6 +27,11 @@ struct BumpSearch {
 /// path of the feet. Each leg of `places` can be walked. Bumps of `search.known` stay. Returns
 /// those that were replaced.
 BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search);
+
+/// Replaces bends of a path, some metres each, by shorter ways of the feet on grids of `spacing`
+/// metres. Each leg of `places` can be walked. Subtracts the walks from `maxWalks`. False: no way
+/// is shorter.
+bool shortenBends(Walker& walker, std::vector<Vec3>& places, double spacing, std::size_t& maxWalks);
 
 /// The middle of the first part that leads up and down again; nullopt: none does.
 std::optional<Vec3> findBump(Walker& walker, const std::vector<Vec3>& places);

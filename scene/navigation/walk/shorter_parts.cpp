@@ -1,0 +1,240 @@
+#include "scene/navigation/walk/shorter_parts.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <utility>
+
+#include "scene/navigation/walk/grid_search.hpp"
+#include "scene/world/avatars/walk_velocity.hpp"
+
+namespace enfilade::scene {
+namespace {
+
+constexpr double kPiece = 0.1;        // metres between places where heights are compared
+constexpr double kMinChange = 0.01;   // metres of height between two of them
+constexpr double kSameLevel = 0.03;   // metres
+constexpr double kMaxBumpLength = 6;  // metres that the feet move
+constexpr double kMinSaving = 0.01;   // metres
+constexpr double kSameBump = 0.3;     // metres
+constexpr int kMaxBumps = 4;          // of a path
+constexpr double kBendLength = 2.5;   // metres that the feet move
+constexpr double kMinBend = 0.01;     // of that length
+constexpr double kBendMargin = 0.5;   // metres around a bend
+constexpr std::size_t kMaxBendWalks = 12'000;
+constexpr int kMaxPasses = 3;  // over the bends of a path
+
+/// Ways around a bump, tried in turn. A wide object is left out in a wide curve.
+struct Detour {
+  double approach;  ///< metres before and after the bump that are replaced
+  GridSearch grid;
+};
+constexpr std::array kDetours{Detour{0.7, {kCoarseSpacing, 1, 2000, true}},
+                              Detour{2.5, {kCoarseSpacing, 1, 6000, true}},
+                              Detour{0.7, {kFineSpacing, 0.7, 12'000, true}}};
+
+/// A part of a path: its first and its last sample.
+using Part = std::pair<std::size_t, std::size_t>;
+
+/// A place of a walk.
+struct Sample {
+  Vec3 footPosition;
+  FeetTravel travel;          ///< since the start of the walk
+  std::size_t nextPlace = 0;  ///< index of the next place of the path, or of this one
+};
+
+/// Walks a path tick by tick, in short pieces. At the edge of furniture the path of the feet may be
+/// longer than that of a wider walker. nullopt: an obstacle stopped the walk.
+std::optional<std::vector<Sample>> sampleWalk(Walker& walker, const std::vector<Vec3>& places) {
+  walker.returnTo(places.front());
+  std::vector<Sample> samples{{places.front(), {}, 1}};
+  for (std::size_t leg = 1; leg < places.size(); ++leg) {
+    do {
+      if (walker.walkOn(places[leg], kPiece).kind != WalkOutcome::Kind::arrived)
+        return std::nullopt;
+      samples.push_back({walker.footPosition(), walker.travel(), leg});
+    } while (computeGroundDistance(walker.footPosition(), places[leg]) > kArrivalDistance);
+  }
+  return samples;
+}
+
+/// The sample where the walk is back at the height of sample `first`, after which it rises or
+/// sinks. The result is nullopt if it is not back within a short way.
+std::optional<std::size_t> findEndOfBump(const std::vector<Sample>& samples, std::size_t first) {
+  const Sample& start = samples[first];
+  for (std::size_t i = first + 2; i < samples.size(); ++i) {
+    if (samples[i].travel.length() - start.travel.length() > kMaxBumpLength) break;
+    if (std::abs(samples[i].footPosition.y() - start.footPosition.y()) > kSameLevel) continue;
+    if (samples[i].travel.climb - start.travel.climb >= kMinBump) return i;
+  }
+  return std::nullopt;
+}
+
+std::size_t findSampleBefore(const std::vector<Sample>& samples, std::size_t i, double length) {
+  const double start = samples[i].travel.length() - length;
+  while (i > 0 && samples[i].travel.length() > start) --i;
+  return i;
+}
+
+std::size_t findSampleAfter(const std::vector<Sample>& samples, std::size_t i, double length) {
+  const double end = samples[i].travel.length() + length;
+  while (i + 1 < samples.size() && samples[i].travel.length() < end) ++i;
+  return i;
+}
+
+/// The first and the last sample of the next bump at or after sample `first`.
+std::optional<Part> findNextBump(const std::vector<Sample>& samples, std::size_t first) {
+  for (std::size_t i = first; i + 1 < samples.size(); ++i) {
+    if (std::abs(samples[i + 1].footPosition.y() - samples[i].footPosition.y()) < kMinChange)
+      continue;
+    if (const auto end = findEndOfBump(samples, i)) return Part(i, *end);
+  }
+  return std::nullopt;
+}
+
+bool isKnown(const BumpList& known, const Vec3& before, const Vec3& after) {
+  return std::ranges::any_of(known, [&](const auto& bump) {
+    return (bump.first - before).norm() < kSameBump && (bump.second - after).norm() < kSameBump;
+  });
+}
+
+/// The first bend at or after sample `first`: a part along which the feet move farther than
+/// straight from its first to its last sample.
+std::optional<Part> findNextBend(const std::vector<Sample>& samples, std::size_t first) {
+  for (std::size_t i = first; i + 1 < samples.size(); ++i) {
+    const std::size_t last = findSampleAfter(samples, i, kBendLength);
+    const Vec3 move = samples[last].footPosition - samples[i].footPosition;
+    const double length = samples[last].travel.length() - samples[i].travel.length();
+    if (length - projectToGround(move).norm() - std::abs(move.y()) > kMinBend * length)
+      return Part(i, last);
+  }
+  return std::nullopt;
+}
+
+/// Metres that the feet move in a walk tick by tick; infinite if an obstacle stops it.
+double measureWalk(Walker& walker, const std::vector<Vec3>& places) {
+  walker.returnTo(places.front());
+  for (std::size_t i = 1; i < places.size(); ++i)
+    if (walker.walkOn(places[i]).kind != WalkOutcome::Kind::arrived)
+      return std::numeric_limits<double>::infinity();
+  return walker.travel().length();
+}
+
+/// A shorter way between two samples of a path, found on a grid; empty: none is.
+std::vector<Vec3> findShorterWay(Walker& walker, const Sample& first, const Sample& last,
+                                 GridSearch grid, std::size_t& maxWalks) {
+  const double length = last.travel.length() - first.travel.length();
+  const std::size_t walks = grid.maxWalks = std::min(grid.maxWalks, maxWalks);
+  grid.maxLength = kGridExcess * length;
+  const auto way = findGridPath(walker, first.footPosition, last.footPosition, grid);
+  maxWalks -= walks - grid.maxWalks;
+  if (!way) return {};
+  std::vector<Vec3> shorter = shortenPath(walker, *way, Shortcuts::all);
+  pullTight(walker, shorter);
+  if (measureWalk(walker, shorter) >= length - kMinSaving) return {};
+  return shorter;
+}
+
+/// Replaces parts of a path, from its start to its end.
+class PartReplacement {
+ public:
+  PartReplacement(Walker& walker, const std::vector<Vec3>& places,
+                  const std::vector<Sample>& samples)
+      : walker_(walker), places_(places), samples_(samples), path_{places.front()} {}
+
+  /// Replaces the path between two samples, or from the end of the last way if that is later.
+  bool replace(Part part, const GridSearch& grid, std::size_t& maxWalks) {
+    const Sample& first = samples_[std::max(part.first, end_)];
+    const Sample& last = samples_[part.second];
+    const std::vector<Vec3> way = findShorterWay(walker_, first, last, grid, maxWalks);
+    if (way.empty()) return false;
+    for (; next_ < first.nextPlace; ++next_) path_.push_back(places_[next_]);
+    path_.insert(path_.end(), way.begin(), way.end());
+    next_ = last.nextPlace;
+    end_ = part.second;
+    return true;
+  }
+
+  std::vector<Vec3> finish() {
+    path_.insert(path_.end(), places_.begin() + static_cast<std::ptrdiff_t>(next_), places_.end());
+    return shortenPath(walker_, path_, Shortcuts::all);
+  }
+
+ private:
+  Walker& walker_;
+  const std::vector<Vec3>& places_;
+  const std::vector<Sample>& samples_;
+  std::vector<Vec3> path_;
+  std::size_t next_ = 1;  ///< the place that is appended next
+  std::size_t end_ = 0;   ///< the sample where the last way ends
+};
+
+}  // namespace
+
+std::optional<Vec3> findBump(Walker& walker, const std::vector<Vec3>& places) {
+  const auto samples = sampleWalk(walker, places);
+  const auto bump = samples ? findNextBump(*samples, 0) : std::nullopt;
+  if (!bump) return std::nullopt;
+  return (*samples)[(bump->first + bump->second) / 2].footPosition;
+}
+
+BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search) {
+  const auto samples = sampleWalk(walker, places);
+  if (!samples) return {};
+  BumpList replaced;
+  PartReplacement replacement(walker, places, *samples);
+  std::size_t next = 0;
+  for (int i = 0; i < kMaxBumps; ++i) {
+    const auto bump = findNextBump(*samples, next);
+    if (!bump) break;
+    next = bump->second;
+    const std::pair ends((*samples)[bump->first].footPosition,
+                         (*samples)[bump->second].footPosition);
+    if (isKnown(search.known, ends.first, ends.second)) continue;
+    const bool isReplaced = std::ranges::any_of(kDetours, [&](const Detour& detour) {
+      const Part part(findSampleBefore(*samples, bump->first, detour.approach),
+                      findSampleAfter(*samples, bump->second, detour.approach));
+      if (!replacement.replace(part, detour.grid, search.maxWalks)) return false;
+      next = part.second;
+      return true;
+    });
+    (isReplaced ? replaced : search.known).push_back(ends);
+  }
+  if (!replaced.empty()) places = replacement.finish();
+  return replaced;
+}
+
+bool shortenBends(Walker& walker, std::vector<Vec3>& places, double spacing,
+                  std::size_t& maxWalks) {
+  const GridSearch grid{spacing, kBendMargin, kMaxBendWalks, true};
+  bool isAnyShorter = false;
+  BumpList known;  // without a shorter way
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    const auto samples = sampleWalk(walker, places);
+    if (!samples) break;
+    bool isShorter = false;
+    PartReplacement replacement(walker, places, *samples);
+    std::size_t next = 0;
+    while (const auto bend = findNextBend(*samples, next)) {
+      const auto [first, last] = *bend;
+      const std::pair ends((*samples)[first].footPosition, (*samples)[last].footPosition);
+      next = (first + last + 1) / 2;  // of overlapping parts one may be replaced
+      if (isKnown(known, ends.first, ends.second)) continue;
+      if (replacement.replace(*bend, grid, maxWalks)) {
+        isShorter = true;
+        next = last;
+      } else {
+        known.push_back(ends);
+      }
+    }
+    if (!isShorter) break;
+    places = replacement.finish();
+    isAnyShorter = true;
+  }
+  return isAnyShorter;
+}
+
+}  // namespace enfilade::scene
