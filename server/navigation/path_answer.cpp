@@ -1,5 +1,7 @@
 #include "server/navigation/path_answer.hpp"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <iterator>
 #include <string>
@@ -13,6 +15,8 @@ namespace enfilade::server {
 namespace {
 
 using scene::Vec3;
+
+constexpr double kMaxDoorDepth = 1.2;  // metres from where an agent meets the leaf
 
 /// A path and another one from its end.
 scene::NavigationPath join(scene::NavigationPath path, const scene::NavigationPath& next) {
@@ -199,7 +203,15 @@ struct PathWriter {
     const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
     if (first == doors.end()) return std::nullopt;
     const Vec3 &start = through.points[first->point], &end = through.points[first->point + 1];
-    return BlockingDoor{first->body, start + first->onLine * (end - start).normalized()};
+    const double length = (end - start).norm();
+    const auto findPoint = [&](double distance) -> Vec3 {
+      return start + std::clamp(distance / length, 0.0, 1.0) * (end - start);
+    };
+    const auto narrowest =
+        open.findNarrowest({findPoint(first->onLine),
+                            findPoint(first->onLine + kMaxDoorDepth + 2 * open.agent().radius)});
+    return BlockingDoor{first->body, findPoint(first->onLine),
+                        narrowest ? narrowest->clearWidth : 0};
   }
 
   /// Gives a door as the reason, if a path leads through it when it is open. Of two islands it is
@@ -216,13 +228,14 @@ struct PathWriter {
     if (!door) return;
     if (isOfIslands) answer.closedDoors.emplace(islands, *door);
     const scene::BodySpec& spec = answer.scene.model().bodies[door->body];
-    message.set_reason("the door '" + spec.name + "' " +
-                       (isClosed(door->body) ? "is closed: " : "is not open far enough: ") +
-                       answer.doorRemedy);
+    std::string state = isClosed(door->body) ? "is closed" : "is not open far enough";
+    if (door->openWidth > 0)
+      state += fmt::format(" (clear width when open: {:.3f} m)", door->openWidth);
+    message.set_reason("the door '" + spec.name + "' " + state + ": " + answer.doorRemedy);
     message.set_obstacle(spec.objects.front() + 1);
     message.set_obstacle_name(spec.name);
     *message.mutable_obstacle_at() = toProto(door->at);
-    message.clear_clear_width();  // that of what an agent meets on other paths
+    message.set_clear_width(door->openWidth);
   }
 };
 

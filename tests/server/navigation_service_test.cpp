@@ -139,15 +139,19 @@ TEST(NavigationService, ADoorAsItIsIsAReasonOrALeg) {
     return reply.paths(0);
   };
   const v1::NavigationPath closed = askWithDoorAt(0);
-  EXPECT_EQ(closed.reason(), "the door 'door' is closed: open it, or ask with open doors");
+  EXPECT_EQ(closed.reason(),
+            "the door 'door' is closed (clear width when open: 0.964 m): open it, or ask with open "
+            "doors");
   EXPECT_NEAR(closed.obstacle_at().x(), 5.98 - 0.3, 0.03);
-  EXPECT_EQ(closed.clear_width(), 0);
+  EXPECT_NEAR(closed.clear_width(), 0.964, 1e-3);
   const v1::NavigationPath half = askWithDoorAt(-0.5);
   EXPECT_EQ(half.obstacle_name(), "door");
   EXPECT_GT(half.obstacle_at().x(), 4.5);
   EXPECT_LT(half.obstacle_at().x(), 5.98);
-  EXPECT_EQ(half.reason(),
-            "the door 'door' is not open far enough: open it, or ask with open doors");
+  EXPECT_EQ(
+      half.reason(),
+      "the door 'door' is not open far enough (clear width when open: 0.964 m): open it, or ask "
+      "with open doors");
   const v1::NavigationPath open = askWithDoorAt(-1.5);
   ASSERT_EQ(open.legs_size(), 1) << open.reason();
   EXPECT_EQ(open.legs(0).kind(), v1::NavigationLeg::KIND_DOOR);
