@@ -1,5 +1,5 @@
 # Precompiles the headers of the standard library and of third parties, which take half of a file's
-# compile time. There are five sets: the collision library; computation; code with messages (protobuf,
+# compile time. There are five sets: collision and physics; computation; code with messages (protobuf,
 # JSON); and the last two with GoogleTest. gcc takes the level of optimisation from the precompiled
 # header, whatever the file's own options are, so each set has one.
 # Each file still includes all its headers: the clang build does not precompile them.
@@ -76,7 +76,7 @@ function(enfilade_precompile_headers root)
       continue()  # nothing to compile, or none of these headers
     endif()
     set(kind code)
-    if(target STREQUAL "enfilade_collision")
+    if(target MATCHES "^enfilade_(collision|physics)$")
       set(kind collision)
     elseif(target IN_LIST with_messages)
       set(kind messages)
