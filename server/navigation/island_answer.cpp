@@ -18,11 +18,10 @@ struct Separation {
   int worth = -1;
 };
 
-/// A path that was found, or an obstacle with the width there or that is a door, ends a search.
+/// A path that was found, or an obstacle with the clear width there, ends a search.
 int judgeReason(const v1::NavigationPath& path) {
   constexpr int kEnds = 2;
-  if (path.found() || path.clear_width() > 0 || (path.obstacle() != 0 && !path.has_obstacle_at()))
-    return kEnds;
+  if (path.found() || path.clear_width() > 0) return kEnds;
   return path.obstacle() != 0 ? 1 : 0;
 }
 
