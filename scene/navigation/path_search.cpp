@@ -335,18 +335,6 @@ std::vector<Vec3> leadOnto(Walker& walker, const Vec3& start, const std::vector<
   return points;
 }
 
-/// Walks a path tick by tick. nullopt: an obstacle stops the walk.
-std::optional<std::vector<std::optional<Vec3>>> recordStands(Walker& walker,
-                                                             const std::vector<Vec3>& points) {
-  walker.returnTo(points.front());
-  std::vector<std::optional<Vec3>> stood{points.front()};
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    if (walker.walkOn(points[i]).kind != WalkOutcome::Kind::arrived) return std::nullopt;
-    stood.push_back(walker.isStanding() ? std::optional(walker.footPosition()) : std::nullopt);
-  }
-  return stood;
-}
-
 /// Walks a path over steps tick by tick, up to the first point where the feet stand as in the walk
 /// of `stood`. False: an obstacle stops the walk. Unknown places to stand are set.
 bool joinsWalk(Walker& walker, const std::vector<Vec3>& points,
@@ -401,8 +389,9 @@ KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goa
     kept.excess[i] = path.length - kept.lines[i].value_or(0);
   kept.isNearLine = isNearLine(path.length, kept.lines);
   if (path.feetLength > 0) {  // over steps
-    const auto stood = recordStands(finder.walker, path.points);
-    kept.stood = stood.value_or(std::vector<std::optional<Vec3>>(path.points.size()));
+    kept.stood.resize(path.points.size());
+    if (!joinsWalk(finder.walker, path.points, kept.stood))
+      kept.stood.assign(path.points.size(), std::nullopt);
   }
   kept.path = std::move(path);
   return kept;
