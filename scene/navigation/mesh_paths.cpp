@@ -34,9 +34,9 @@ constexpr double kNearlyStraight = 1.005;  // a line that is longer by less is s
 constexpr double kWorthTrying = 1.015;     // a corridor that is shorter by less is not tried
 constexpr double kTight = 1.01;            // of the line of its corridor: a path is short enough
 constexpr double kMinClimb = 0.01;         // of the length of a path: less is no reason to search
-constexpr double kMeshBendSpacing = 0.05;  // metres
+constexpr double kMeshBendSpacing = 0.05;  // metres: 3 cm takes three times as long
 constexpr double kMaxMeshOffset = 0.1;     // metres, across
-constexpr double kShortPath = 8;  // metres: mesh lines keep some centimetres more than is needed
+constexpr double kShortPath = 8;  // metres: of it, some centimetres at each corner are a per cent
 
 /// The axis of a gap that the walker stopped before, or in.
 std::optional<GapAxis> findNarrowGap(const PathFinder& finder, const Vec3& stop,
@@ -335,6 +335,7 @@ Proof::Proof(std::size_t maxRepairWalks)
       fine{kFineSpacing, 0.7, maxRepairWalks},
       quickWalks(std::min(kMaxQuickWalks, maxRepairWalks)),
       improvementWalks(maxRepairWalks),
+      bendWalks(maxRepairWalks),
       bumps{maxRepairWalks} {}
 
 Vec3 computeMeshReach(const PathFinder& finder) {
@@ -377,7 +378,7 @@ bool walksWithoutBumps(Walker& walker, NavigationPath& path, Proof& proof) {
   const auto isSmall = [&] { return climb < std::max(kMinBump, kMinClimb * path.length); };
   if (isSmall()) return true;
   std::vector<Vec3> level = path.points;
-  if (const BumpList replaced = goAroundBumps(walker, level, proof.bumps); !replaced.empty()) {
+  if (const PartEnds replaced = goAroundBumps(walker, level, proof.bumps); !replaced.empty()) {
     const Vec3 failedAt = proof.failedAt;
     const std::vector<Obstruction> met = proof.met;
     if (walksOn(walker, level, proof)) {
@@ -413,12 +414,13 @@ NavigationPath proveVersions(Walker& walker, std::span<const std::vector<Vec3>> 
 }
 
 void tightenBends(Walker& walker, NavigationPath& path, double spacing, Proof& proof) {
-  NavigationPath shorter = path;
-  if (!shortenBends(walker, shorter.points, spacing, proof.improvementWalks)) return;
+  NavigationPath shorter;
+  shorter.points = path.points;
+  if (!shortenBends(walker, shorter.points, spacing, proof.bendWalks)) return;
   const std::optional<Vec3> bump = proof.bump;
   const Vec3 failedAt = proof.failedAt;
   const std::size_t met = proof.met.size();
-  const double before = path.feetLength > 0 ? path.feetLength : path.length;
+  const double before = path.feetLength > 0 ? path.feetLength : measureWalkOn(walker, path.points);
   if (walksWithoutBumps(walker, shorter, proof) && shorter.feetLength < before) {
     path = std::move(shorter);
     return;

@@ -32,6 +32,7 @@ struct Proof {
   Vec3 failedAt = Vec3::Zero();                                   ///< where the last proof failed
   std::vector<Obstruction> met;
   std::size_t improvementWalks;  ///< that are left for repairs on the fine grid after one was found
+  std::size_t bendWalks;         ///< that are left for bends
   BumpSearch bumps;
   std::optional<Vec3> bump;  ///< the first one of the path that was proved last
 };

@@ -335,10 +335,11 @@ std::vector<Vec3> leadOnto(Walker& walker, const Vec3& start, const std::vector<
   return points;
 }
 
-/// Walks a path over steps tick by tick, up to the first point where the feet stand as in the walk
-/// of `stood`. False: an obstacle stops the walk. Unknown places to stand are set.
-bool joinsWalk(Walker& walker, const std::vector<Vec3>& points,
-               std::vector<std::optional<Vec3>>& stood) {
+/// Walks a path tick by tick, up to the first point where the feet stand as in the walk of `stood`.
+/// Before it, `stood` is overwritten. False: an obstacle stops the walk; `stood` is then
+/// unspecified.
+bool walkUntilJoined(Walker& walker, const std::vector<Vec3>& points,
+                     std::vector<std::optional<Vec3>>& stood) {
   ENFILADE_ASSERT(stood.size() == points.size());
   walker.returnTo(points.front());
   for (std::size_t i = 1; i < points.size(); ++i) {
@@ -388,10 +389,13 @@ KeptPath keepPath(const PathFinder& finder, NavigationPath path, const Vec3& goa
   for (std::size_t i = 0; i < kept.lines.size(); ++i)
     kept.excess[i] = path.length - kept.lines[i].value_or(0);
   kept.isNearLine = isNearLine(path.length, kept.lines);
-  if (path.feetLength > 0) {  // over steps
+  if (path.feetLength > 0) {  // it may lead over steps
+    finder.walker.takeCrossedSteps();
     kept.stood.resize(path.points.size());
-    if (!joinsWalk(finder.walker, path.points, kept.stood))
+    if (!walkUntilJoined(finder.walker, path.points, kept.stood))
       kept.stood.assign(path.points.size(), std::nullopt);
+    else if (!finder.walker.takeCrossedSteps())
+      kept.stood.clear();
   }
   kept.path = std::move(path);
   return kept;
@@ -414,7 +418,7 @@ bool rejoinPath(const PathFinder& finder, KeptPath& kept, const Vec3& from) {
   } else if (walker.takeCrossedSteps()) {
     stood.resize(points.size());
   }
-  if (!stood.empty() && !joinsWalk(walker, points, stood)) return false;
+  if (!stood.empty() && !walkUntilJoined(walker, points, stood)) return false;
   const double length = computeLength(points);
   // A line is at most as much shorter as the agent moved since it was measured.
   const double move = (start - kept.path.points.front()).norm();

@@ -152,11 +152,19 @@ TEST(KeptPath, OverStepsIsWalkedUntilItStandsAsBefore) {
   ASSERT_TRUE(navigation.findPathAgain({-1.9, 0, 0.1}, goal, kept).found());
   EXPECT_EQ(kept->searchedFrom, searchedFrom);
   EXPECT_EQ(kept->stood.size(), kept->path.points.size());
+  // Beyond the point where it stands as before, nothing is walked again.
+  std::optional<KeptPath> beyond = kept;
+  ASSERT_GE(beyond->path.points.size(), 4u);
+  beyond->path.points.insert(beyond->path.points.end() - 1, Vec3(2, 0.2, -3));
+  beyond->stood.insert(beyond->stood.end() - 1, std::nullopt);
+  beyond->excess = {100, 100};  // its length alone is no reason for a search
+  navigation.findPathAgain({-1.85, 0, 0.15}, goal, beyond);
+  EXPECT_EQ(beyond->searchedFrom, searchedFrom);
   // The path leads through the wall, and nothing is known of how it was walked.
   kept->path.points.insert(kept->path.points.end() - 1, Vec3(5, 0.2, -3));
   kept->path.points.insert(kept->path.points.end() - 2, Vec3(2, 0.2, -3));
   kept->stood.assign(kept->path.points.size(), std::nullopt);
-  kept->excess = {100, 100};  // its length alone is no reason for a search
+  kept->excess = {100, 100};
   const NavigationPath path = navigation.findPathAgain({-1.8, 0, 0.2}, goal, kept);
   EXPECT_TRUE(isPathWalked(navigation, path));
   EXPECT_NE(kept->searchedFrom, searchedFrom);

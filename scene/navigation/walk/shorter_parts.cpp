@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <utility>
 
@@ -27,7 +26,7 @@ constexpr double kBendMargin = 0.5;   // metres around a bend
 constexpr std::size_t kMaxBendWalks = 12'000;
 constexpr int kMaxPasses = 3;  // over the bends of a path
 
-/// Ways around a bump, tried in turn. A wide object is left out in a wide curve.
+/// Ways around a bump, tried in turn. A wide object needs a longer approach.
 struct Detour {
   double approach;  ///< metres before and after the bump that are replaced
   GridSearch grid;
@@ -44,6 +43,7 @@ struct Sample {
   Vec3 footPosition;
   FeetTravel travel;          ///< since the start of the walk
   std::size_t nextPlace = 0;  ///< index of the next place of the path, or of this one
+  bool isStanding = true;     ///< not in a fall
 };
 
 /// Walks a path tick by tick, in short pieces. At the edge of furniture the path of the feet may be
@@ -52,11 +52,16 @@ std::optional<std::vector<Sample>> sampleWalk(Walker& walker, const std::vector<
   walker.returnTo(places.front());
   std::vector<Sample> samples{{places.front(), {}, 1}};
   for (std::size_t leg = 1; leg < places.size(); ++leg) {
-    do {
+    const auto measureRest = [&] {
+      return computeGroundDistance(walker.footPosition(), places[leg]);
+    };
+    for (double rest = measureRest(), before = rest + kPiece; rest > kArrivalDistance;) {
       if (walker.walkOn(places[leg], kPiece).kind != WalkOutcome::Kind::arrived)
         return std::nullopt;
-      samples.push_back({walker.footPosition(), walker.travel(), leg});
-    } while (computeGroundDistance(walker.footPosition(), places[leg]) > kArrivalDistance);
+      samples.push_back({walker.footPosition(), walker.travel(), leg, walker.isStanding()});
+      before = std::exchange(rest, measureRest());
+      if (rest >= before) return std::nullopt;  // it slides to and fro
+    }
   }
   return samples;
 }
@@ -95,7 +100,7 @@ std::optional<Part> findNextBump(const std::vector<Sample>& samples, std::size_t
   return std::nullopt;
 }
 
-bool isKnown(const BumpList& known, const Vec3& before, const Vec3& after) {
+bool isKnown(const PartEnds& known, const Vec3& before, const Vec3& after) {
   return std::ranges::any_of(known, [&](const auto& bump) {
     return (bump.first - before).norm() < kSameBump && (bump.second - after).norm() < kSameBump;
   });
@@ -114,16 +119,7 @@ std::optional<Part> findNextBend(const std::vector<Sample>& samples, std::size_t
   return std::nullopt;
 }
 
-/// Metres that the feet move in a walk tick by tick; infinite if an obstacle stops it.
-double measureWalk(Walker& walker, const std::vector<Vec3>& places) {
-  walker.returnTo(places.front());
-  for (std::size_t i = 1; i < places.size(); ++i)
-    if (walker.walkOn(places[i]).kind != WalkOutcome::Kind::arrived)
-      return std::numeric_limits<double>::infinity();
-  return walker.travel().length();
-}
-
-/// A shorter way between two samples of a path, found on a grid; empty: none is.
+/// A shorter way between two samples of a path, found on a grid; empty if no way is shorter.
 std::vector<Vec3> findShorterWay(Walker& walker, const Sample& first, const Sample& last,
                                  GridSearch grid, std::size_t& maxWalks) {
   const double length = last.travel.length() - first.travel.length();
@@ -134,7 +130,7 @@ std::vector<Vec3> findShorterWay(Walker& walker, const Sample& first, const Samp
   if (!way) return {};
   std::vector<Vec3> shorter = shortenPath(walker, *way, Shortcuts::all);
   pullTight(walker, shorter);
-  if (measureWalk(walker, shorter) >= length - kMinSaving) return {};
+  if (measureWalkOn(walker, shorter) >= length - kMinSaving) return {};
   return shorter;
 }
 
@@ -145,10 +141,14 @@ class PartReplacement {
                   const std::vector<Sample>& samples)
       : walker_(walker), places_(places), samples_(samples), path_{places.front()} {}
 
-  /// Replaces the path between two samples, or from the end of the last way if that is later.
+  /// Replaces the path between two samples, or from the end of the last way if that is later. A
+  /// sample in a fall is not an end: the part is longer then.
   bool replace(Part part, const GridSearch& grid, std::size_t& maxWalks) {
-    const Sample& first = samples_[std::max(part.first, end_)];
-    const Sample& last = samples_[part.second];
+    part.first = std::max(part.first, end_);
+    while (part.first > end_ && !samples_[part.first].isStanding) --part.first;
+    while (part.second + 1 < samples_.size() && !samples_[part.second].isStanding) ++part.second;
+    if (part.first >= part.second) return false;
+    const Sample &first = samples_[part.first], &last = samples_[part.second];
     const std::vector<Vec3> way = findShorterWay(walker_, first, last, grid, maxWalks);
     if (way.empty()) return false;
     for (; next_ < first.nextPlace; ++next_) path_.push_back(places_[next_]);
@@ -181,10 +181,10 @@ std::optional<Vec3> findBump(Walker& walker, const std::vector<Vec3>& places) {
   return (*samples)[(bump->first + bump->second) / 2].footPosition;
 }
 
-BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search) {
+PartEnds goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search) {
   const auto samples = sampleWalk(walker, places);
   if (!samples) return {};
-  BumpList replaced;
+  PartEnds replaced;
   PartReplacement replacement(walker, places, *samples);
   std::size_t next = 0;
   for (int i = 0; i < kMaxBumps; ++i) {
@@ -211,11 +211,11 @@ bool shortenBends(Walker& walker, std::vector<Vec3>& places, double spacing,
                   std::size_t& maxWalks) {
   const GridSearch grid{spacing, kBendMargin, kMaxBendWalks, true};
   bool isAnyShorter = false;
-  BumpList known;  // without a shorter way
+  PartEnds known;  // without a shorter way
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     const auto samples = sampleWalk(walker, places);
     if (!samples) break;
-    bool isShorter = false;
+    bool isReplaced = false;
     PartReplacement replacement(walker, places, *samples);
     std::size_t next = 0;
     while (const auto bend = findNextBend(*samples, next)) {
@@ -224,14 +224,17 @@ bool shortenBends(Walker& walker, std::vector<Vec3>& places, double spacing,
       next = (first + last + 1) / 2;  // of overlapping parts one may be replaced
       if (isKnown(known, ends.first, ends.second)) continue;
       if (replacement.replace(*bend, grid, maxWalks)) {
-        isShorter = true;
+        isReplaced = true;
         next = last;
       } else {
         known.push_back(ends);
       }
     }
-    if (!isShorter) break;
-    places = replacement.finish();
+    if (!isReplaced) break;
+    // The ways can be walked. The whole may not be, since a fall from a step may end elsewhere.
+    std::vector<Vec3> shorter = replacement.finish();
+    if (measureWalkOn(walker, shorter) >= samples->back().travel.length()) break;
+    places = std::move(shorter);
     isAnyShorter = true;
   }
   return isAnyShorter;

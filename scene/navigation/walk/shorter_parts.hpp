@@ -14,19 +14,19 @@ namespace enfilade::scene {
 
 inline constexpr double kMinBump = 0.1;  ///< metres up and down together: lower ones stay
 
-/// Places before and after bumps.
-using BumpList = std::vector<std::pair<Vec3, Vec3>>;
+/// Places before and after bumps or bends.
+using PartEnds = std::vector<std::pair<Vec3, Vec3>>;
 
 /// Results and budget of the searches of a query.
 struct BumpSearch {
   std::size_t maxWalks = 0;  ///< on grids
-  BumpList known = {};       ///< without a shorter way around: they are not searched again
+  PartEnds known = {};       ///< without a shorter way around: they are not searched again
 };
 
 /// Replaces parts of a path that lead up and down again by ways around them, if this shortens the
 /// path of the feet. Each leg of `places` can be walked. Bumps of `search.known` stay. Returns
 /// those that were replaced.
-BumpList goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search);
+PartEnds goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& search);
 
 /// Replaces bends of a path, some metres each, by shorter ways of the feet on grids of `spacing`
 /// metres. Each leg of `places` can be walked. Subtracts the walks from `maxWalks`. False: no way

@@ -67,7 +67,7 @@ class Walker {
   bool walkEvenly(const Vec3& goal);
   /// Walks tick by tick as an avatar in a world does, equal up to rounding. It may slide along
   /// obstacles, and may end in a fall from a step. Begins standing, or in that fall.
-  /// It also ends on a floor at least `maxLength` metres away, across; a further call continues it.
+  /// Also ends after `maxLength` metres across, once it stands. Another call continues the walk.
   WalkOutcome walkOn(const Vec3& goal, double maxLength = std::numeric_limits<double>::infinity());
   /// Walks tick by tick to `goal`, and may fall by up to `maxDrop` metres on the way.
   WalkOutcome dropTo(const Vec3& goal, double maxDrop);

@@ -35,7 +35,7 @@ class Path:
     obstacle: int = 0  # the entity in the way
     obstacle_name: str = ""
     obstacle_at: Optional[Tuple[float, float, float]] = None
-    clear_width: Optional[float] = None  # metres: at the obstacle, or at the narrowest place of the path
+    clear_width: Optional[float] = None  # metres: at the obstacle (of a door: when open), or of the path
     narrowest_at: Optional[Tuple[float, float, float]] = None
     doors: Tuple["Door", ...] = ()  # with doors="open": the closed ones on the path, in order
     legs: Tuple["Leg", ...] = ()  # in order, of all points
