@@ -154,8 +154,7 @@ TEST(LevelDetours, AnObjectIsWalkedOverIfTheWayAroundItIsLonger) {
   }
 }
 
-/// On the grid a way that leaves the line 0.7 m before the podium is longer than the one over it.
-TEST(LevelDetours, AWideObjectIsWalkedAroundInAWideCurve) {
+TEST(LevelDetours, AnObjectOfTwoStepsIsWalkedAround) {
   const World world(std::make_shared<const Scene>(
       makeBoxModel({{"floor", {-3, -0.2, -5}, {15, 0, 5}},
                     {"podium", {2, 0, -0.65}, {5, 0.28, 5}},

@@ -17,6 +17,7 @@ constexpr double kPiece = 0.1;        // metres between places where heights are
 constexpr double kMinChange = 0.01;   // metres of height between two of them
 constexpr double kSameLevel = 0.03;   // metres
 constexpr double kMaxBumpLength = 6;  // metres that the feet move
+constexpr double kApproach = 0.7;     // metres before and after a bump that a way around replaces
 constexpr double kMinSaving = 0.01;   // metres
 constexpr double kSameBump = 0.3;     // metres
 constexpr int kMaxBumps = 4;          // of a path
@@ -26,14 +27,9 @@ constexpr double kBendMargin = 0.5;   // metres around a bend
 constexpr std::size_t kMaxBendWalks = 12'000;
 constexpr int kMaxPasses = 3;  // over the bends of a path
 
-/// Ways around a bump, tried in turn. A wide object needs a longer approach.
-struct Detour {
-  double approach;  ///< metres before and after the bump that are replaced
-  GridSearch grid;
-};
-constexpr std::array kDetours{Detour{0.7, {kCoarseSpacing, 1, 2000, true}},
-                              Detour{2.5, {kCoarseSpacing, 1, 6000, true}},
-                              Detour{0.7, {kFineSpacing, 0.7, 12'000, true}}};
+/// For ways around a bump, tried in turn.
+constexpr std::array kBumpGrids{GridSearch{kCoarseSpacing, 1, 2000, true},
+                                GridSearch{kFineSpacing, 0.7, 12'000, true}};
 
 /// A part of a path: its first and its last sample.
 using Part = std::pair<std::size_t, std::size_t>;
@@ -194,13 +190,12 @@ PartEnds goAroundBumps(Walker& walker, std::vector<Vec3>& places, BumpSearch& se
     const std::pair ends((*samples)[bump->first].footPosition,
                          (*samples)[bump->second].footPosition);
     if (isKnown(search.known, ends.first, ends.second)) continue;
-    const bool isReplaced = std::ranges::any_of(kDetours, [&](const Detour& detour) {
-      const Part part(findSampleBefore(*samples, bump->first, detour.approach),
-                      findSampleAfter(*samples, bump->second, detour.approach));
-      if (!replacement.replace(part, detour.grid, search.maxWalks)) return false;
-      next = part.second;
-      return true;
+    const Part part(findSampleBefore(*samples, bump->first, kApproach),
+                    findSampleAfter(*samples, bump->second, kApproach));
+    const bool isReplaced = std::ranges::any_of(kBumpGrids, [&](const GridSearch& grid) {
+      return replacement.replace(part, grid, search.maxWalks);
     });
+    if (isReplaced) next = part.second;
     (isReplaced ? replaced : search.known).push_back(ends);
   }
   if (!replaced.empty()) places = replacement.finish();
