@@ -157,6 +157,27 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
   return doors;
 }
 
+std::vector<Vec3> findDoorway(const Scene& scene, std::uint32_t door, double height, double reach) {
+  const BodySpec& spec = scene.model().bodies[door];
+  const BodyShape& shape = *scene.bodyShape(door);
+  const collision::Pose closed = computeBodyPose(spec, computeJointPose(spec, spec.closedPosition));
+  std::vector<Vec3> corners;
+  for (const collision::Hull& part : shape.parts)
+    for (const Vec3& vertex : part.vertices) {
+      corners.push_back(closed.rotation * vertex + closed.translation);
+      corners.back().y() = height;
+    }
+  // The two that are farthest apart are at both ends of the leaf.
+  std::pair<Vec3, Vec3> ends(corners.front(), corners.front());
+  for (const Vec3& corner : corners)
+    if ((corner - ends.first).norm() > (ends.second - ends.first).norm()) ends.second = corner;
+  for (const Vec3& corner : corners)
+    if ((corner - ends.second).norm() > (ends.second - ends.first).norm()) ends.first = corner;
+  const Vec3 middle = 0.5 * (ends.first + ends.second);
+  const Vec3 through = (ends.second - ends.first).cross(Vec3::UnitY()).normalized();
+  return {middle - reach * through, middle + reach * through};
+}
+
 DoorSwing::DoorSwing(EntityIndex& index, const WorldSettings& settings, const Snapshot& snapshot,
                      const NavigationAgent& agent, std::uint32_t body)
     : index_(index),

@@ -41,6 +41,10 @@ std::vector<DoorOnPath> findDoorsOnPath(EntityIndex& index, const WorldSettings&
                                         const std::vector<Vec3>& points,
                                         std::span<const PathLeg> legs = {});
 
+/// Both ends of a straight line through the middle of a closed door, at right angles to its leaf.
+/// They are `reach` metres before and behind it, for feet at `height`.
+std::vector<Vec3> findDoorway(const Scene& scene, std::uint32_t door, double height, double reach);
+
 /// The space that a door sweeps over while it opens from where it is in a snapshot.
 class DoorSwing {
  public:

@@ -418,16 +418,12 @@ void tightenBends(Walker& walker, NavigationPath& path, double spacing, Proof& p
   shorter.points = path.points;
   if (!shortenBends(walker, shorter.points, spacing, proof.bendWalks)) return;
   const std::optional<Vec3> bump = proof.bump;
-  const Vec3 failedAt = proof.failedAt;
-  const std::size_t met = proof.met.size();
-  const double before = path.feetLength > 0 ? path.feetLength : measureWalkOn(walker, path.points);
-  if (walksWithoutBumps(walker, shorter, proof) && shorter.feetLength < before) {
+  const bool isMeasured = path.feetLength > 0;  // else shortenBends() compared both
+  if (walksWithoutBumps(walker, shorter, proof) &&
+      (!isMeasured || shorter.feetLength < path.feetLength))
     path = std::move(shorter);
-    return;
-  }
-  proof.bump = bump;
-  proof.failedAt = failedAt;
-  proof.met.resize(met);
+  else
+    proof.bump = bump;
 }
 
 /// On the scarce mesh A* through the middles of portals suffices: its line shows whether a narrow

@@ -16,28 +16,7 @@ namespace {
 
 using scene::Vec3;
 
-// Metres from where an agent meets a leaf, to the far side of the wall: a half-open leaf is met at
-// its edge.
-constexpr double kMaxDoorDepth = 1.2;
-
-/// The part of a line from `from` metres after its start, `length` metres long or up to its end.
-std::vector<Vec3> cutLine(const std::vector<Vec3>& line, double from, double length) {
-  std::vector<Vec3> part;
-  double before = 0;
-  for (std::size_t i = 1; i < line.size(); ++i) {
-    const Vec3 move = line[i] - line[i - 1];
-    const double size = move.norm(), after = before + size;
-    const auto findPoint = [&](double along) -> Vec3 {
-      return size > 0 ? Vec3(line[i - 1] + (along - before) / size * move) : line[i];
-    };
-    if (part.empty() && after >= from) part.push_back(findPoint(from));
-    if (!part.empty()) part.push_back(findPoint(std::min(after, from + length)));
-    if (after >= from + length) break;
-    before = after;
-  }
-  if (part.empty()) part.push_back(line.back());
-  return part;
-}
+constexpr double kHalfWall = 0.3;  // metres from the middle of a leaf to the faces of a thick wall
 
 /// A path and another one from its end.
 scene::NavigationPath join(scene::NavigationPath path, const scene::NavigationPath& next) {
@@ -223,11 +202,11 @@ struct PathWriter {
     const auto doors = findDoors(open, through);
     const auto first = std::ranges::find_if(doors, &scene::DoorOnPath::isInTheWay);
     if (first == doors.end()) return std::nullopt;
-    const std::vector<Vec3> passage = cutLine(
-        {through.points.begin() + static_cast<std::ptrdiff_t>(first->point), through.points.end()},
-        first->onLine, kMaxDoorDepth + 2 * open.agent().radius);
-    const auto narrowest = open.findNarrowest(passage);
-    return BlockingDoor{first->body, passage.front(), narrowest ? narrowest->clearWidth : 0};
+    const Vec3 &start = through.points[first->point], &end = through.points[first->point + 1];
+    const Vec3 at = start + first->onLine * (end - start).normalized();
+    const auto narrowest =
+        open.findNarrowest(scene::findDoorway(answer.scene, first->body, at.y(), kHalfWall));
+    return BlockingDoor{first->body, at, narrowest ? narrowest->clearWidth : 0};
   }
 
   /// Gives a door as the reason, if a path leads through it when it is open. Of two islands it is

@@ -20,7 +20,7 @@ namespace enfilade::server {
 struct BlockingDoor {
   std::uint32_t body = 0;                ///< index into Model::bodies
   scene::Vec3 at = scene::Vec3::Zero();  ///< where an agent meets it: feet, scene frame, metres
-  double openWidth = 0;  ///< metres clear on the path once it is open; 0: not measured
+  double openWidth = 0;  ///< metres clear at its leaf once it is open; 0: not measured
 };
 
 /// The reasons why no path leads from one island to another one, as the first query found them.

@@ -12,13 +12,13 @@
 #include <string>
 #include <vector>
 
+#include "scene/base/elapsed.hpp"
+
 namespace enfilade::benchmarks {
 
 using Clock = std::chrono::steady_clock;
 
-inline double measureSecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
+using scene::measureSecondsSince;
 
 /// The `q` quantile (0..1) of the values; NaN without values.
 inline double computeQuantile(std::vector<double> values, double q) {

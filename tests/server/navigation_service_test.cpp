@@ -167,6 +167,26 @@ TEST(NavigationService, ADoorAsItIsIsAReasonOrALeg) {
   }
 }
 
+/// Paths that bend at the jamb, and one that begins at the leaf.
+TEST(NavigationService, ADoorHasItsOpenWidthOnEachPath) {
+  const auto scene = std::make_shared<const scene::Scene>(makeRoomsWithDoor(1, true));
+  const scene::World world(scene);
+  for (const auto& [from, to] : {std::pair(scene::Vec3(2, 0, 2.4), scene::Vec3(9, 0, 2.4)),
+                                 std::pair(scene::Vec3(5.4, 0, 2.4), scene::Vec3(6.6, 0, -2.4)),
+                                 std::pair(scene::Vec3(9, 0, -2.4), scene::Vec3(2, 0, 2.4)),
+                                 std::pair(scene::Vec3(5.67, 0, 0), scene::Vec3(9, 0, 0))}) {
+    NavigationService service(scene);
+    v1::NavigationQuery query;
+    *query.mutable_path()->mutable_from()->mutable_point() = toProto(from);
+    *query.mutable_path()->add_to()->mutable_point() = toProto(to);
+    std::vector<std::uint8_t> attachment;
+    const auto reply = std::get<v1::NavigationReply>(
+        service.answer(query, {world.snapshot(), world.settings()}, attachment));
+    EXPECT_EQ(reply.paths(0).obstacle_name(), "door") << from.transpose();
+    EXPECT_NEAR(reply.paths(0).clear_width(), 0.96, 0.03) << from.transpose();
+  }
+}
+
 /// A share that falls begins the next meshes.
 TEST(NavigationService, MeshesOfReasonsAndOfMovedBodiesReportProgress) {
   const auto scene = std::make_shared<const scene::Scene>(

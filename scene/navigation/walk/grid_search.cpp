@@ -163,15 +163,6 @@ double measureLength(Walker& walker, std::span<const Vec3> places) {
   return length;
 }
 
-double measureWalkOn(Walker& walker, std::span<const Vec3> places) {
-  walker.returnTo(places.front());
-  for (std::size_t i = 1; i < places.size(); ++i)
-    if (walker.walkOn(places[i]).kind != WalkOutcome::Kind::arrived)
-      return std::numeric_limits<double>::infinity();
-  const bool isAtEnd = std::abs(walker.footPosition().y() - places.back().y()) <= kSameHeight;
-  return isAtEnd ? walker.travel().length() : std::numeric_limits<double>::infinity();
-}
-
 std::optional<std::vector<Vec3>> findGridPath(Walker& walker, const Vec3& from, const Vec3& to,
                                               GridSearch& search) {
   Aabb window;

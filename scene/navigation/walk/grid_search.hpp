@@ -26,10 +26,6 @@ bool isWalkClear(Walker& walker, const Vec3& from, const Vec3& to);
 /// FeetTravel::length() along places; infinite if a leg cannot be walked.
 double measureLength(Walker& walker, std::span<const Vec3> places);
 
-/// FeetTravel::length() of a walk of the whole, tick by tick. Infinite if an obstacle stops it, or
-/// if it ends at another height.
-double measureWalkOn(Walker& walker, std::span<const Vec3> places);
-
 /// Length of a shortest path on a grid, of the same path pulled tight: at most, on even floor.
 inline constexpr double kGridExcess = 1.08;
 inline constexpr double kCoarseSpacing = 0.12, kFineSpacing = 0.03;  ///< metres, of grids

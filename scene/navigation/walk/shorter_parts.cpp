@@ -43,7 +43,8 @@ struct Sample {
 };
 
 /// Walks a path tick by tick, in short pieces. At the edge of furniture the path of the feet may be
-/// longer than that of a wider walker. nullopt: an obstacle stopped the walk.
+/// longer than that of a wider walker. nullopt: an obstacle stopped the walk, or it ended at
+/// another height.
 std::optional<std::vector<Sample>> sampleWalk(Walker& walker, const std::vector<Vec3>& places) {
   walker.returnTo(places.front());
   std::vector<Sample> samples{{places.front(), {}, 1}};
@@ -59,6 +60,7 @@ std::optional<std::vector<Sample>> sampleWalk(Walker& walker, const std::vector<
       if (rest >= before) return std::nullopt;  // it slides to and fro
     }
   }
+  if (std::abs(walker.footPosition().y() - places.back().y()) > kSameHeight) return std::nullopt;
   return samples;
 }
 
@@ -126,8 +128,9 @@ std::vector<Vec3> findShorterWay(Walker& walker, const Sample& first, const Samp
   if (!way) return {};
   std::vector<Vec3> shorter = shortenPath(walker, *way, Shortcuts::all);
   pullTight(walker, shorter);
-  if (measureWalkOn(walker, shorter) >= length - kMinSaving) return {};
-  return shorter;
+  const auto walked = sampleWalk(walker, shorter);
+  return walked && walked->back().travel.length() < length - kMinSaving ? shorter
+                                                                        : std::vector<Vec3>();
 }
 
 /// Replaces parts of a path, from its start to its end.
@@ -207,9 +210,8 @@ bool shortenBends(Walker& walker, std::vector<Vec3>& places, double spacing,
   const GridSearch grid{spacing, kBendMargin, kMaxBendWalks, true};
   bool isAnyShorter = false;
   PartEnds known;  // without a shorter way
-  for (int pass = 0; pass < kMaxPasses; ++pass) {
-    const auto samples = sampleWalk(walker, places);
-    if (!samples) break;
+  auto samples = sampleWalk(walker, places);
+  for (int pass = 0; samples && pass < kMaxPasses; ++pass) {
     bool isReplaced = false;
     PartReplacement replacement(walker, places, *samples);
     std::size_t next = 0;
@@ -228,8 +230,10 @@ bool shortenBends(Walker& walker, std::vector<Vec3>& places, double spacing,
     if (!isReplaced) break;
     // The ways can be walked. The whole may not be, since a fall from a step may end elsewhere.
     std::vector<Vec3> shorter = replacement.finish();
-    if (measureWalkOn(walker, shorter) >= samples->back().travel.length()) break;
+    auto walked = sampleWalk(walker, shorter);
+    if (!walked || walked->back().travel.length() >= samples->back().travel.length()) break;
     places = std::move(shorter);
+    samples = std::move(walked);
     isAnyShorter = true;
   }
   return isAnyShorter;
